@@ -1,0 +1,1 @@
+"""Submatrices of the simultaneous equilibrium equations."""

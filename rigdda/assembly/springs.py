@@ -1,0 +1,52 @@
+r"""Contact springs as submatrices.
+
+A spring of stiffness k along direction e of a contact contributes k e_i^t e_j to the stiffness,
+with e_i = (l, m, r x (l, m)) the rows of T_i along (l, m) = the normal or the shear direction.
+"""
+
+from __future__ import annotations
+
+from numpy.typing import NDArray
+
+from rigdda.kernel import kernel
+from rigdda.records import Contacts
+
+
+@kernel
+def normal_row(c: Contacts, k: int, of_a: bool) -> tuple[float, float, float]:
+    """Return e along the normal of contact k for its body a, or b."""
+    if of_a:
+        return c.nx[k], c.ny[k], c.ra_x[k] * c.ny[k] - c.ra_y[k] * c.nx[k]
+    return -c.nx[k], -c.ny[k], -(c.rb_x[k] * c.ny[k] - c.rb_y[k] * c.nx[k])
+
+
+@kernel
+def shear_row(c: Contacts, k: int, of_a: bool) -> tuple[float, float, float]:
+    """Return e along the normal turned by +90 degrees for body a, or b."""
+    if of_a:
+        return -c.ny[k], c.nx[k], c.ra_x[k] * c.nx[k] + c.ra_y[k] * c.ny[k]
+    return c.ny[k], -c.nx[k], -(c.rb_x[k] * c.nx[k] + c.rb_y[k] * c.ny[k])
+
+
+@kernel
+def add_block(
+    matrix: NDArray, stiffness: float, e: tuple[float, float, float], f: tuple[float, float, float]
+) -> None:
+    """Add stiffness e^t f to a 3x3 block."""
+    for i in range(3):
+        for j in range(3):
+            matrix[i, j] += stiffness * e[i] * f[j]
+
+
+@kernel
+def add_force(rhs: NDArray, force: float, e: tuple[float, float, float]) -> None:
+    """Add the generalised force of `force` along e to a right-hand side."""
+    rhs[0] += force * e[0]
+    rhs[1] += force * e[1]
+    rhs[2] += force * e[2]
+
+
+@kernel
+def along(e: tuple[float, float, float], d: NDArray) -> float:
+    """Return the displacement along e of a block that moves by d."""
+    return e[0] * d[0] + e[1] * d[1] + e[2] * d[2]

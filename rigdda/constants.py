@@ -1,0 +1,77 @@
+"""Tolerances and limits of the mechanics: unit, reason and consequence of each."""
+
+PENETRATION_RATIO = 1e-4
+"""Wanted penetration over block size [-]. Smaller: stiffer contacts, taller stacks stand, more
+solver iterations."""
+
+IMPACT_STIFFNESS = 1e4
+"""Stiffness of an impact and of a new contact, times effective mass / dt^2 [-]. The velocity after
+an impact misses its target by half the inverse of this, 5e-5 of the change."""
+
+IMPACT_SPEED = 0.05
+"""Least closing speed of an impact [m/s], below it a contact closes as a spring at rest."""
+
+IMPACT_STEPS = 3.0
+"""Least closing speed of an impact in units of g dt [-]: what gravity alone gives a resting block
+in a few steps is no impact."""
+
+SHOCK_SPEED = 0.1
+"""Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
+for what hits the block from the other side, and it is treated as a plastic impact."""
+
+STIFFNESS_DECAY = 0.98
+"""Share of its stiffness that a contact keeps per step once its load has gone [-]."""
+
+RECOVERY_TIME = 0.1
+"""Time in which penetration beyond what the load explains is pushed out [s]. Shorter pumps energy
+into piles, longer leaves visible overlap."""
+
+RECOVERY_SPEED = 0.2
+"""Greatest speed of that push [m/s]; adds at most v^2/2 = 0.02 J/kg."""
+
+FRICTION_TOLERANCE = 1e-4
+"""Relative change of a friction limit between open-close iterations that counts as settled [-]."""
+
+OPENING_TOLERANCE = 1e-6
+"""Tension, relative to the weight a contact carries, that does not open it [-]."""
+
+FLIPS = 3
+"""A contact that changed between stick and slip, or open and closed, this often in one step keeps
+its state. Nearly every step that does not converge has one such contact."""
+
+ENERGY_HALVINGS = 4
+"""Times restitution is halved when an eccentric impact would gain energy; then it is plastic."""
+
+SAME_NORMAL = 0.7
+"""Least cosine between the normals of one vertex's contact in two steps that share memory [-]."""
+
+SAME_FACE = 0.999
+"""Cosine above which two contacts of one vertex with the terrain count as one [-]."""
+
+SLACK_RATIO = 5e-3
+"""Distance over block size within which contacts are candidates even at rest [-]."""
+
+SLEEP_SPEED = 5e-3
+"""Speed of any point of a block below which it counts as quiet [m/s]."""
+
+SLEEP_TIME = 0.5
+"""Time for which a whole island must be quiet before it sleeps [s]."""
+
+WAKE_SPEED = 0.05
+"""Speed of a block that wakes a sleeping one beside it [m/s]."""
+
+NEW_HIT_TIME = 0.1
+"""Time apart from the barrier after which a touch counts as a new hit [s]."""
+
+SPEED_LIMIT = 1e4
+"""Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall."""
+
+# status of a body
+AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3
+# state of a contact
+OPEN, STICK, SLIP = 0, 1, 2
+# kind of a contact in one step
+REST, NEW, IMPACT, SHOCK = 0, 1, 2, 3
+# why the step loop returned
+DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE = 0, 1, 2, 3
+TERRAIN = -1

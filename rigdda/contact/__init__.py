@@ -1,0 +1,1 @@
+"""Detection of contacts and the law that they follow."""

@@ -1,0 +1,81 @@
+"""Pairs of bodies whose swept boxes overlap, by sort and sweep along x."""
+
+from __future__ import annotations
+
+from rigdda.constants import AWAKE, RETIRED
+from rigdda.kernel import kernel
+from rigdda.records import Bodies, Outlines, Parameters, Work
+
+
+@kernel
+def sweep_boxes(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -> None:
+    """Set the box of each body that holds it over the whole step, with slack."""
+    for i in range(len(bodies)):
+        n = bodies.count[i]
+        low_x = high_x = outlines.world_x[i, 0]
+        low_y = high_y = outlines.world_y[i, 0]
+        for k in range(1, n):
+            low_x = min(low_x, outlines.world_x[i, k])
+            high_x = max(high_x, outlines.world_x[i, k])
+            low_y = min(low_y, outlines.world_y[i, k])
+            high_y = max(high_y, outlines.world_y[i, k])
+        grow = p.slack
+        dx = dy = 0.0
+        if bodies.status[i] == AWAKE:
+            grow += abs(bodies.omega[i]) * bodies.radius[i] * p.dt + p.gravity * p.dt * p.dt
+            dx, dy = bodies.vx[i] * p.dt, bodies.vy[i] * p.dt
+        work.low_x[i] = low_x - grow + min(dx, 0.0)
+        work.high_x[i] = high_x + grow + max(dx, 0.0)
+        work.low_y[i] = low_y - grow + min(dy, 0.0)
+        work.high_y[i] = high_y + grow + max(dy, 0.0)
+
+
+@kernel
+def sort_by_low(work: Work) -> None:
+    """Insertion sort by low_x, nearly sorted from step to step; ties by index."""
+    order, low = work.sorted, work.low_x
+    for k in range(1, len(order)):
+        item = order[k]
+        j = k - 1
+        while j >= 0 and (
+            low[order[j]] > low[item] or (low[order[j]] == low[item] and order[j] > item)
+        ):
+            order[j + 1] = order[j]
+            j -= 1
+        order[j + 1] = item
+
+
+@kernel
+def overlapping_pairs(bodies: Bodies, work: Work) -> int:
+    """Write pairs with at least one awake body into work.pairs.
+
+    Returns
+    -------
+    int
+        Number of pairs, or -1 if they do not fit.
+    """
+    order, count = work.sorted, 0
+    room = len(work.pairs) // 2
+    for k in range(len(order)):
+        i = order[k]
+        status_i = bodies.status[i]
+        if status_i == RETIRED:
+            continue
+        for m in range(k + 1, len(order)):
+            j = order[m]
+            if work.low_x[j] > work.high_x[i]:
+                break
+            status_j = bodies.status[j]
+            if status_j == RETIRED or (status_i != AWAKE and status_j != AWAKE):
+                continue
+            if work.low_y[j] > work.high_y[i] or work.low_y[i] > work.high_y[j]:
+                continue
+            if count == room:
+                return -1
+            # a is the awake body, so that b may be asleep or fixed
+            first = min(i, j) if status_i == status_j else (i if status_i == AWAKE else j)
+            work.pairs[2 * count] = first
+            work.pairs[2 * count + 1] = i + j - first
+            count += 1
+    return count
+

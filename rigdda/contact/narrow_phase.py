@@ -1,0 +1,156 @@
+"""Contacts between two convex polygons over a step.
+
+Separating axes with time of entry: of the axes that separate the polygons now, the one that they
+stop separating last is the face of contact. An axis that separates them over the whole step rules
+the contact out, so a fast block cannot pass a thin wall.
+"""
+
+from __future__ import annotations
+
+from rigdda.constants import AWAKE
+from rigdda.kernel import kernel
+from rigdda.records import Bodies, Contacts, Outlines, Parameters
+
+
+@kernel
+def axis_gap(bodies: Bodies, outlines: Outlines, i: int, edge: int, j: int) -> tuple[float, int]:
+    """Return the gap of body j above an edge of body i [m] and its nearest corner."""
+    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+    x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
+    least, corner = 1e300, 0
+    for k in range(bodies.count[j]):
+        gap = nx * (outlines.world_x[j, k] - x0) + ny * (outlines.world_y[j, k] - y0)
+        if gap < least:
+            least, corner = gap, k
+    return least, corner
+
+
+@kernel
+def face_of_contact(
+    bodies: Bodies, outlines: Outlines, i: int, j: int, dx: float, dy: float, spread: float, slack: float
+) -> tuple[bool, float, float, int]:
+    """Return whether the edges of i leave a contact with j possible, and the best edge.
+
+    (dx, dy) is the displacement of j relative to i over the step, `spread` what rotation adds.
+    The best edge comes with its rank: time of entry, and its gap for the shallow ones.
+    """
+    time, depth, best = -1.0, -1e300, -1
+    for edge in range(bodies.count[i]):
+        gap, _ = axis_gap(bodies, outlines, i, edge, j)
+        approach = -(outlines.normal_x[i, edge] * dx + outlines.normal_y[i, edge] * dy)
+        if gap > max(approach, 0.0) + spread:
+            return False, time, depth, edge
+        entry = 0.0
+        if gap > slack:
+            entry = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
+        if entry > time or (entry == time and gap > depth):
+            time, depth, best = entry, gap, edge
+    return True, time, depth, best
+
+
+@kernel
+def incident_edge(bodies: Bodies, outlines: Outlines, i: int, edge: int, j: int) -> int:
+    """Return the edge of j at its nearest corner that faces edge `edge` of i most squarely."""
+    _, corner = axis_gap(bodies, outlines, i, edge, j)
+    n = bodies.count[j]
+    before = corner - 1 if corner > 0 else n - 1
+    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+    dot_at = nx * outlines.normal_x[j, corner] + ny * outlines.normal_y[j, corner]
+    dot_before = nx * outlines.normal_x[j, before] + ny * outlines.normal_y[j, before]
+    return corner if dot_at < dot_before else before
+
+
+@kernel
+def add_contact(
+    c: Contacts, k: int, a: int, b: int, key: int, owner: int, other: int,
+    x: float, y: float, nx: float, ny: float, gap: float,
+) -> None:  # fmt: skip
+    """Write the geometry of contact k."""
+    c.a[k], c.b[k], c.key[k], c.owner[k], c.other[k] = a, b, key, owner, other
+    c.x[k], c.y[k], c.nx[k], c.ny[k], c.gap[k] = x, y, nx, ny, gap
+
+
+@kernel
+def clip_contacts(
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, swapped: bool, edge: int,
+    shift_x: float, shift_y: float, reach: float,
+) -> int:  # fmt: skip
+    """Add up to two contacts where the incident edge lies over the face of contact.
+
+    The face belongs to body a, or to b if `swapped`. (shift_x, shift_y) moves the other body to
+    where it is at the time of entry. Returns the new number of contacts.
+    """
+    i, j = (b, a) if swapped else (a, b)
+    other = incident_edge(bodies, outlines, i, edge, j)
+    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+    tx, ty = -ny, nx
+    x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
+    end = edge + 1 if edge + 1 < bodies.count[i] else 0
+    length = tx * (outlines.world_x[i, end] - x0) + ty * (outlines.world_y[i, end] - y0)
+    other_end = other + 1 if other + 1 < bodies.count[j] else 0
+    # along the face, the incident edge runs from its end (s1) to its start (s2)
+    x1, y1 = outlines.world_x[j, other_end], outlines.world_y[j, other_end]
+    x2, y2 = outlines.world_x[j, other], outlines.world_y[j, other]
+    s1 = tx * (x1 + shift_x - x0) + ty * (y1 + shift_y - y0)
+    s2 = tx * (x2 + shift_x - x0) + ty * (y2 + shift_y - y0)
+    g1, g2 = nx * (x1 - x0) + ny * (y1 - y0), nx * (x2 - x0) + ny * (y2 - y0)
+    low, high = max(s1, 0.0), min(s2, length)
+    if high < low:
+        return k
+    sign = 1.0 if swapped else -1.0  # the normal points to a
+    size = outlines.world_x.shape[1]
+    slope = (g2 - g1) / (s2 - s1) if s2 > s1 else 0.0
+    for which in range(2):
+        s = low if which == 0 else high
+        if which == 1 and high - low < 1e-9 * length:
+            break
+        gap = g1 + slope * (s - s1)
+        if gap > reach:
+            continue
+        if which == 0:
+            own_corner = s1 < 0.0
+            corner, other_corner = edge, other_end
+        else:
+            own_corner = s2 > length
+            corner, other_corner = end, other
+        if own_corner:  # a corner of i on the incident edge
+            owner_body, vertex = i, corner
+        else:
+            owner_body, vertex = j, other_corner
+        key = owner_body * size + vertex
+        add_contact(
+            c, k, a, b, key, 1 if owner_body == a else 0, bodies.surface[b],
+            outlines.world_x[owner_body, vertex], outlines.world_y[owner_body, vertex],
+            sign * nx, sign * ny, gap,
+        )  # fmt: skip
+        k += 1
+    return k
+
+
+@kernel
+def collide_pair(bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, p: Parameters) -> int:
+    """Add the contacts of bodies a and b to `c` from entry k; returns the new number."""
+    dt = p.dt
+    ax, ay, aw = bodies.vx[a], bodies.vy[a], abs(bodies.omega[a]) * bodies.radius[a]
+    dx, dy, spin = -ax * dt, -ay * dt, aw * dt
+    fall = p.gravity * dt * dt
+    if bodies.status[b] == AWAKE:
+        dx += bodies.vx[b] * dt
+        dy += bodies.vy[b] * dt
+        spin += abs(bodies.omega[b]) * bodies.radius[b] * dt
+        fall = 0.0
+    spread = spin + fall + p.slack
+    possible, time_a, gap_a, edge_a = face_of_contact(bodies, outlines, a, b, dx, dy, spread, p.slack)
+    if not possible:
+        return k
+    possible, time_b, gap_b, edge_b = face_of_contact(bodies, outlines, b, a, -dx, -dy, spread, p.slack)
+    if not possible:
+        return k
+    # near a tie keep the face of a, so that parallel faces do not alternate
+    swapped = time_b > time_a or (time_b == time_a and gap_b > gap_a + 0.02 * p.slack)
+    time = min(time_b if swapped else time_a, 1.0)
+    edge = edge_b if swapped else edge_a
+    reach = (dx * dx + dy * dy) ** 0.5 + spread
+    if swapped:
+        return clip_contacts(bodies, outlines, c, k, a, b, True, edge, -dx * time, -dy * time, reach)
+    return clip_contacts(bodies, outlines, c, k, a, b, False, edge, dx * time, dy * time, reach)

@@ -1,0 +1,174 @@
+"""Contacts of a block with the terrain over a step.
+
+Corners of the block against segments, and convex corners of the terrain against edges of the
+block. Segments are lengthened into the ground at concave corners, or blocks fall through there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.constants import SAME_FACE, TERRAIN
+from rigdda.contact.narrow_phase import add_contact
+from rigdda.kernel import kernel
+from rigdda.records import Bodies, Contacts, Ground, Outlines, Parameters, Work
+
+
+@kernel
+def below_segment(ground: Ground, s: int, x: float, y: float) -> float:
+    """Return the gap of a point above the line of segment s [m]."""
+    return ground.normal_x[s] * (x - ground.x[s]) + ground.normal_y[s] * (y - ground.y[s])
+
+
+@kernel
+def over_segment(ground: Ground, s: int, x: float, y: float, depth: float) -> bool:
+    """Return whether a point lies over segment s, lengthened by what `depth` needs at its ends."""
+    tx, ty = ground.normal_y[s], -ground.normal_x[s]
+    along = tx * (x - ground.x[s]) + ty * (y - ground.y[s])
+    before = after = 1e-9
+    if ground.turn[s] > 0.0:
+        before += depth * math.tan(0.5 * ground.turn[s])
+    if ground.turn[s + 1] > 0.0:
+        after += depth * math.tan(0.5 * ground.turn[s + 1])
+    return -before <= along <= ground.length[s] + after
+
+
+@kernel
+def shadowed(ground: Ground, s: int, x: float, y: float, gap: float) -> bool:
+    """Return whether a point under segment s is less deep under a convex neighbour."""
+    if gap >= 0.0:
+        return False
+    if ground.turn[s] < 0.0 and below_segment(ground, s - 1, x, y) > gap:
+        return True
+    return ground.turn[s + 1] < 0.0 and below_segment(ground, s + 1, x, y) > gap
+
+
+@kernel
+def corners_on_segment(
+    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, k: int, first: int, a: int, s: int, p: Parameters
+) -> int:
+    """Add contacts of the corners of block a with segment s; returns the new number."""
+    nx, ny = ground.normal_x[s], ground.normal_y[s]
+    dt = p.dt
+    spin = abs(bodies.omega[a]) * bodies.radius[a] * dt
+    speed = math.hypot(bodies.vx[a], bodies.vy[a]) * dt
+    reach = speed + spin + p.gravity * dt * dt + p.slack
+    lowest = below_segment(ground, s, bodies.x[a], bodies.y[a]) - bodies.radius[a]
+    if lowest > reach:
+        return k
+    for vertex in range(bodies.count[a]):
+        key = a * outlines.world_x.shape[1] + vertex
+        x, y = outlines.world_x[a, vertex], outlines.world_y[a, vertex]
+        gap = below_segment(ground, s, x, y)
+        if gap > reach or gap < -bodies.radius[a]:
+            continue
+        hit_x, hit_y = x, y
+        if gap > 0.0:  # where the corner meets the line
+            dx = (bodies.vx[a] - bodies.omega[a] * (y - bodies.y[a])) * dt
+            dy = (bodies.vy[a] + bodies.omega[a] * (x - bodies.x[a])) * dt
+            approach = -(nx * dx + ny * dy)
+            if approach > 0.0:
+                time = min(gap / approach, 1.0)
+                hit_x, hit_y = x + time * dx, y + time * dy
+        if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0)):
+            continue
+        if shadowed(ground, s, hit_x, hit_y, gap):
+            continue
+        again = False
+        for m in range(first, k):  # one face, cut in two segments
+            if (
+                c.owner[m] == 1
+                and c.key[m] == key
+                and c.nx[m] * nx + c.ny[m] * ny > SAME_FACE
+            ):
+                again = True
+                if gap < c.gap[m]:
+                    add_contact(c, m, a, TERRAIN, key, 1, ground.surface[s], x, y, nx, ny, gap)
+        if not again:
+            add_contact(c, k, a, TERRAIN, key, 1, ground.surface[s], x, y, nx, ny, gap)
+            k += 1
+    return k
+
+
+@kernel
+def edge_on_ridge(
+    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, k: int, a: int, corner: int, p: Parameters
+) -> int:
+    """Add the contact of a convex terrain corner with an edge of block a, if there is one.
+
+    The edge is the last to separate the corner from the block; its normal must lie between those
+    of the two segments, or a corner of the block is in contact instead.
+    """
+    x, y = ground.x[corner], ground.y[corner]
+    dt, n = p.dt, bodies.count[a]
+    dx = -(bodies.vx[a] - bodies.omega[a] * (y - bodies.y[a])) * dt
+    dy = -(bodies.vy[a] + bodies.omega[a] * (x - bodies.x[a])) * dt
+    reach = math.hypot(dx, dy) + p.gravity * dt * dt + p.slack
+    if math.hypot(x - bodies.x[a], y - bodies.y[a]) > bodies.radius[a] + reach:
+        return k
+    left, right = corner - 1, corner
+    best, best_time, best_gap = -1, -1.0, -1e300
+    for edge in range(n):
+        nx, ny = outlines.normal_x[a, edge], outlines.normal_y[a, edge]
+        gap = nx * (x - outlines.world_x[a, edge]) + ny * (y - outlines.world_y[a, edge])
+        approach = -(nx * dx + ny * dy)
+        if gap > max(approach, 0.0) + p.gravity * dt * dt + p.slack:
+            return k
+        time = 0.0
+        if gap > p.slack:
+            time = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
+        # the normal out of the ground is opposite to that of the edge
+        after_left = ground.normal_x[left] * -ny - ground.normal_y[left] * -nx <= 1e-9
+        before_right = -nx * ground.normal_y[right] + ny * ground.normal_x[right] <= 1e-9
+        if not (after_left and before_right):
+            gap -= 0.1 * p.slack  # near a tie prefer an edge that fits
+        if time > best_time or (time == best_time and gap > best_gap):
+            best, best_time, best_gap = (edge if after_left and before_right else -1), time, gap
+    if best < 0:
+        return k
+    nx, ny = outlines.normal_x[a, best], outlines.normal_y[a, best]
+    gap = nx * (x - outlines.world_x[a, best]) + ny * (y - outlines.world_y[a, best])
+    time = min(best_time, 1.0) if gap > 0.0 else 0.0
+    end = best + 1 if best + 1 < n else 0
+    ex = outlines.world_x[a, end] - outlines.world_x[a, best]
+    ey = outlines.world_y[a, end] - outlines.world_y[a, best]
+    along = (x + time * dx - outlines.world_x[a, best]) * ex
+    along += (y + time * dy - outlines.world_y[a, best]) * ey
+    if along < 0.0 or along > ex * ex + ey * ey:
+        return k
+    key = len(bodies) * outlines.world_x.shape[1] + corner
+    add_contact(c, k, a, TERRAIN, key, 0, ground.surface[right], x, y, -nx, -ny, gap)
+    return k + 1
+
+
+@kernel
+def collide_terrain(
+    bodies: Bodies, outlines: Outlines, ground: Ground, work: Work, c: Contacts, k: int, a: int, p: Parameters
+) -> int:
+    """Add the contacts of block a with the terrain from entry k; returns the new number."""
+    bins = len(ground.bin_start) - 1
+    if bins == 0:
+        return k
+    first = k
+    low = int((work.low_x[a] - ground.bin_origin) / ground.bin_width)
+    high = int((work.high_x[a] - ground.bin_origin) / ground.bin_width)
+    low, high = min(max(low, 0), bins - 1), min(max(high, 0), bins - 1)
+    for cell in range(low, high + 1):
+        for item in range(ground.bin_start[cell], ground.bin_start[cell + 1]):
+            s = ground.bin_item[item]
+            from_cell = int((min(ground.x[s], ground.x[s + 1]) - ground.bin_origin) / ground.bin_width)
+            if cell != max(min(max(from_cell, 0), bins - 1), low):
+                continue  # seen in an earlier cell
+            if (
+                min(ground.x[s], ground.x[s + 1]) > work.high_x[a]
+                or max(ground.x[s], ground.x[s + 1]) < work.low_x[a]
+                or min(ground.y[s], ground.y[s + 1]) > work.high_y[a]
+                or max(ground.y[s], ground.y[s + 1]) < work.low_y[a]
+            ):
+                continue
+            if k + outlines.world_x.shape[1] + 2 > len(c):
+                return k
+            k = corners_on_segment(bodies, outlines, ground, c, k, first, a, s, p)
+            if ground.turn[s] < 0.0:
+                k = edge_on_ridge(bodies, outlines, ground, c, k, a, s, p)
+    return k

@@ -1,0 +1,71 @@
+"""What a run watches: hits of barriers, crossings of stations, energies in an interval."""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.constants import NEW_HIT_TIME, OPEN
+from rigdda.kernel import kernel
+from rigdda.records import Bodies, Contacts, Gauges, Parameters, Work
+
+HIT, CROSSING = 0, 1
+"""Kinds of event: a block touches a barrier; a block's centroid first passes a station."""
+
+
+@kernel
+def kinetic_energy(bodies: Bodies, i: int) -> float:
+    """Return the energy of translation and rotation of body i [J]."""
+    speed = bodies.vx[i] ** 2 + bodies.vy[i] ** 2
+    return 0.5 * bodies.mass[i] * speed + 0.5 * bodies.inertia[i] * bodies.omega[i] ** 2
+
+
+@kernel
+def write_event(
+    gauges: Gauges, n: int, time: float, kind: int, bodies: Bodies, i: int, target: int,
+    x: float, y: float, height: float,
+) -> int:  # fmt: skip
+    """Write event n of body i; returns the new number of events."""
+    event = gauges.event[n]
+    event.time, event.kind, event.block, event.target = time, kind, i, target
+    event.x, event.y, event.height = x, y, height
+    event.speed = math.hypot(bodies.vx[i], bodies.vy[i])
+    event.energy = kinetic_energy(bodies, i)
+    return n + 1
+
+
+@kernel
+def note_hits(
+    bodies: Bodies, c: Contacts, work: Work, low: int, high: int, gauges: Gauges, events: int,
+    time: float, p: Parameters,
+) -> int:  # fmt: skip
+    """Write a hit for each barrier that a block touches anew; velocities still those before."""
+    for item in range(low, high):
+        k = work.contact_item[item]
+        barrier = c.b[k] - p.blocks
+        if barrier < 0 or c.state[k] == OPEN:
+            continue
+        i = c.a[k]
+        if time - gauges.last_touch[i, barrier] > NEW_HIT_TIME:
+            height = c.y[k] - gauges.barrier_ground[barrier]
+            events = write_event(
+                gauges, events, time, HIT, bodies, i, barrier, c.x[k], c.y[k], height
+            )
+        gauges.last_touch[i, barrier] = time
+    return events
+
+
+@kernel
+def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float, p: Parameters) -> int:
+    """Write a crossing for each station that a centroid first passes; watch energies."""
+    stations = len(gauges.station)
+    for i in range(p.blocks):
+        x = bodies.x[i]
+        if gauges.watch[0] <= x <= gauges.watch[1]:
+            gauges.watch_energy[i] = max(gauges.watch_energy[i], kinetic_energy(bodies, i))
+        while gauges.next_station[i] < stations and x >= gauges.station[gauges.next_station[i]]:
+            s = gauges.next_station[i]
+            events = write_event(
+                gauges, events, time, CROSSING, bodies, i, s, x, bodies.y[i], 0.0
+            )
+            gauges.next_station[i] += 1
+    return events

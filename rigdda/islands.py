@@ -1,0 +1,115 @@
+"""Islands: clusters of free blocks joined by contacts, solved one by one.
+
+Fixed and sleeping bodies and the terrain have no unknowns and join nothing.
+"""
+
+from __future__ import annotations
+
+from numpy.typing import NDArray
+
+from rigdda.constants import AWAKE
+from rigdda.kernel import kernel
+from rigdda.records import Bodies, Contacts, Matrix, Work
+
+
+@kernel
+def root(parent: NDArray, i: int) -> int:
+    """Return the representative of i, halving the path."""
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@kernel
+def joins(bodies: Bodies, c: Contacts, k: int) -> bool:
+    """Return whether contact k couples two bodies with unknowns."""
+    return c.b[k] >= 0 and bodies.status[c.a[k]] == AWAKE and bodies.status[c.b[k]] == AWAKE
+
+
+@kernel
+def find_islands(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int) -> int:
+    """List blocks and contacts island by island in `work`; the root is the smallest index.
+
+    Returns
+    -------
+    int
+        Number of islands.
+    """
+    parent, slot = work.parent, work.slot
+    for i in range(blocks):
+        parent[i] = i
+    for k in range(count):
+        if joins(bodies, c, k):
+            i, j = root(parent, c.a[k]), root(parent, c.b[k])
+            if i != j:
+                parent[max(i, j)] = min(i, j)
+    islands = 0
+    for s in range(len(work.block_start)):
+        work.block_start[s] = work.contact_start[s] = 0
+    # slot serves first as the number of the root's island
+    for i in range(blocks):
+        if bodies.status[i] == AWAKE and root(parent, i) == i:
+            slot[i] = islands
+            islands += 1
+    for i in range(blocks):
+        if bodies.status[i] == AWAKE:
+            work.block_start[slot[root(parent, i)] + 1] += 1
+    for k in range(count):
+        if bodies.status[c.a[k]] == AWAKE:
+            work.contact_start[slot[root(parent, c.a[k])] + 1] += 1
+    for s in range(islands):
+        work.block_start[s + 1] += work.block_start[s]
+        work.contact_start[s + 1] += work.contact_start[s]
+    _fill(bodies, c, count, work, blocks, islands)
+    return islands
+
+
+@kernel
+def _fill(
+    bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int, islands: int
+) -> None:
+    """Write the items of each island in ascending order, then the slots of the blocks."""
+    parent, slot = work.parent, work.slot
+    for k in range(count):
+        if bodies.status[c.a[k]] == AWAKE:
+            s = slot[root(parent, c.a[k])]
+            work.contact_item[work.contact_start[s]] = k
+            work.contact_start[s] += 1
+    for s in range(islands, 0, -1):
+        work.contact_start[s] = work.contact_start[s - 1]
+    work.contact_start[0] = 0
+    for i in range(blocks):
+        if bodies.status[i] == AWAKE:
+            s = slot[root(parent, i)]
+            work.block_item[work.block_start[s]] = i
+            work.block_start[s] += 1
+    for s in range(islands, 0, -1):
+        work.block_start[s] = work.block_start[s - 1]
+    work.block_start[0] = 0
+    for s in range(islands):
+        for place in range(work.block_start[s], work.block_start[s + 1]):
+            slot[work.block_item[place]] = place - work.block_start[s]
+
+
+@kernel
+def pair_blocks(bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int) -> int:
+    """Number the off-diagonal blocks of an island; contacts of a pair follow one another.
+
+    Returns
+    -------
+    int
+        Number of pairs.
+    """
+    pairs, last_a, last_b = 0, -1, -1
+    for item in range(low, high):
+        k = work.contact_item[item]
+        c.pair[k] = -1
+        if not joins(bodies, c, k):
+            continue
+        if c.a[k] != last_a or c.b[k] != last_b:
+            last_a, last_b = c.a[k], c.b[k]
+            m.pair_i[pairs], m.pair_j[pairs] = work.slot[last_a], work.slot[last_b]
+            pairs += 1
+        c.pair[k] = pairs - 1
+    return pairs

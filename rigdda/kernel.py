@@ -1,0 +1,53 @@
+"""Compilation of kernels, cached under the hash of all kernel sources.
+
+numba's own cache looks only at the file of the function that is called: edit a constant or a
+callee in another module and the cached caller keeps the old value. So the cache directory carries
+a hash of every source of this package.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+
+
+def source_hash() -> str:
+    """Return a hash of every Python source of the package and of numba's version."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_directory() -> Path:
+    """Return the folder of compiled kernels, in the user's cache or else the temporary folder."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = home / "rigdda" / f"kernels-{source_hash()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        folder = Path(tempfile.gettempdir()) / f"rigdda-{os.getuid()}" / folder.name
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that other kernels call; without fast-math, so that NaN checks hold."""
+    return numba.njit(nogil=True, error_model="numpy")(function)
+
+
+def entry_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that Python calls, and keep the machine code on disk."""
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_directory())
+    try:
+        return numba.njit(nogil=True, cache=True, error_model="numpy")(function)
+    finally:
+        config.CACHE_DIR = before

@@ -1,0 +1,84 @@
+"""Conjugate gradients preconditioned by the inverse of the diagonal (Koo and Chern 1998)."""
+
+from __future__ import annotations
+
+from numpy.typing import NDArray
+
+from rigdda.kernel import kernel
+from rigdda.records import Matrix
+
+
+@kernel
+def multiply(m: Matrix, n: int, pairs: int, x: NDArray, y: NDArray) -> None:
+    """Set y = K x for the first n blocks and `pairs` symmetric off-diagonal blocks."""
+    for i in range(n):
+        k = m.diagonal[i]
+        x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
+        y[i, 0] = k[0, 0] * x0 + k[0, 1] * x1 + k[0, 2] * x2
+        y[i, 1] = k[1, 0] * x0 + k[1, 1] * x1 + k[1, 2] * x2
+        y[i, 2] = k[2, 0] * x0 + k[2, 1] * x1 + k[2, 2] * x2
+    for q in range(pairs):
+        i, j, k = m.pair_i[q], m.pair_j[q], m.off[q]
+        x0, x1, x2 = x[j, 0], x[j, 1], x[j, 2]
+        y[i, 0] += k[0, 0] * x0 + k[0, 1] * x1 + k[0, 2] * x2
+        y[i, 1] += k[1, 0] * x0 + k[1, 1] * x1 + k[1, 2] * x2
+        y[i, 2] += k[2, 0] * x0 + k[2, 1] * x1 + k[2, 2] * x2
+        x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
+        y[j, 0] += k[0, 0] * x0 + k[1, 0] * x1 + k[2, 0] * x2
+        y[j, 1] += k[0, 1] * x0 + k[1, 1] * x1 + k[2, 1] * x2
+        y[j, 2] += k[0, 2] * x0 + k[1, 2] * x1 + k[2, 2] * x2
+
+
+@kernel
+def precondition(m: Matrix, n: int) -> float:
+    """Set scaled = residual / diagonal and return their product."""
+    product = 0.0
+    for i in range(n):
+        for j in range(3):
+            r = m.residual[i, j]
+            z = r / m.diagonal[i, j, j]
+            m.scaled[i, j] = z
+            product += r * z
+    return product
+
+
+@kernel
+def solve_pcg(m: Matrix, n: int, pairs: int, scale: float, tolerance: float) -> int:
+    """Solve K d = rhs from the start value in m.d, in place.
+
+    Stops when the residual, in the norm of the preconditioner, is below `tolerance` times the
+    energy norm `scale` of the forces.
+
+    Returns
+    -------
+    int
+        Iterations used.
+    """
+    multiply(m, n, pairs, m.d, m.product)
+    for i in range(n):
+        for j in range(3):
+            m.residual[i, j] = m.rhs[i, j] - m.product[i, j]
+    rho = precondition(m, n)
+    for i in range(n):
+        for j in range(3):
+            m.direction[i, j] = m.scaled[i, j]
+    limit = tolerance * tolerance * scale
+    iterations = 0
+    while rho > limit and iterations < 30 * n + 30:
+        multiply(m, n, pairs, m.direction, m.product)
+        curvature = 0.0
+        for i in range(n):
+            for j in range(3):
+                curvature += m.direction[i, j] * m.product[i, j]
+        alpha = rho / curvature
+        for i in range(n):
+            for j in range(3):
+                m.d[i, j] += alpha * m.direction[i, j]
+                m.residual[i, j] -= alpha * m.product[i, j]
+        before, rho = rho, precondition(m, n)
+        beta = rho / before
+        for i in range(n):
+            for j in range(3):
+                m.direction[i, j] = m.scaled[i, j] + beta * m.direction[i, j]
+        iterations += 1
+    return iterations

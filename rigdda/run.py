@@ -1,0 +1,174 @@
+"""The recorded history of a simulation."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.errors import BadInput
+from rigdda.files import atomic
+from rigdda.gauges import CROSSING, HIT
+from rigdda.scene import Block, Scene, Surface, Terrain, Wall
+
+if TYPE_CHECKING:
+    from rigdda.replay import Marks
+
+EVENT = np.dtype(
+    [
+        ("time", "f8"),
+        ("kind", "i4"),
+        ("block", "i4"),
+        ("target", "i4"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("height", "f8"),
+        ("speed", "f8"),
+        ("energy", "f8"),
+    ]
+)
+"""One event. target: index of the barrier or station. x, y: contact point of a hit, centroid at a
+crossing [m]. height: of that point above the ground [m]. speed: of the centroid [m/s]. energy:
+translational and rotational, just before a hit [J]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """What a simulation recorded: N blocks, T frames, B barriers.
+
+    Parameters
+    ----------
+    scene : Scene
+        What was simulated.
+    times : (T,) array
+        Times of the frames [s].
+    poses, velocities : (T, N, 3) array
+        x, y, theta of the centroids [m, m, rad] and their rates [m/s, m/s, rad/s].
+    events : (E,) structured array
+        Hits and crossings in order of time, see `EVENT`.
+    absorbed : (B,) array
+        Energy that each barrier took from the blocks by contact forces [J].
+    watch_energy : (N,) array
+        Largest kinetic energy of each block while its centroid was in the watched interval [J].
+    """
+
+    scene: Scene
+    times: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    events: NDArray[np.void]
+    absorbed: NDArray[np.float64]
+    watch_energy: NDArray[np.float64]
+
+    def hits(self, barrier: int) -> NDArray[np.void]:
+        """Return the events in which a block hits `barrier`."""
+        return self._of(HIT, barrier)
+
+    def crossings(self, station: int) -> NDArray[np.void]:
+        """Return the events in which a block first passes `station`."""
+        return self._of(CROSSING, station)
+
+    def _of(self, kind: int, target: int) -> NDArray[np.void]:
+        return self.events[(self.events["kind"] == kind) & (self.events["target"] == target)]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the run as .npz; `load` gives back exactly the same numbers."""
+        with atomic(path) as part, part.open("wb") as file:
+            np.savez_compressed(
+                file,
+                scene=np.frombuffer(scene_to_json(self.scene), dtype=np.uint8),
+                times=self.times,
+                poses=self.poses,
+                velocities=self.velocities,
+                events=self.events,
+                absorbed=self.absorbed,
+                watch_energy=self.watch_energy,
+            )
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Run:
+        """Read a run that `save` wrote.
+
+        Raises
+        ------
+        BadInput
+            If the file is missing or is not a run.
+        """
+        if not Path(path).is_file():
+            raise BadInput("run file", str(path), "name an existing .npz file")
+        try:
+            with np.load(path) as stored:
+                data = {name: stored[name] for name in stored.files}
+            scene = scene_from_json(data.pop("scene").tobytes())
+            return cls(scene=scene, **data)
+        except (KeyError, ValueError, TypeError, zipfile.BadZipFile, msgspec.MsgspecError):
+            raise BadInput("run file", str(path), "name a .npz file that Run.save wrote") from None
+
+    def to_rerun(self, path: str | os.PathLike[str], marks: Marks | None = None) -> None:
+        """Write the run as a rerun recording (.rrd): geometry once, poses and scalars by column.
+
+        Parameters
+        ----------
+        path : path
+            The .rrd file.
+        marks : Marks, optional
+            What the scene does not know: the road and words about the episode.
+        """
+        from rigdda.replay import write_rerun
+
+        write_rerun(self, path, marks)
+
+
+def scene_to_json(scene: Scene) -> bytes:
+    """Return a scene as JSON; numbers survive exactly."""
+    return msgspec.json.encode(
+        {
+            "terrain": scene.terrain
+            and {
+                "points": scene.terrain.points.tolist(),
+                "surfaces": scene.terrain.surfaces,
+            },
+            "blocks": [
+                {
+                    "vertices": b.vertices.tolist(),
+                    "density": b.density,
+                    "surface": b.surface,
+                    "velocity": b.velocity,
+                    "fixed": b.fixed,
+                }
+                for b in scene.blocks
+            ],
+            "surfaces": scene.surfaces,
+            "barriers": scene.barriers,
+            "interfaces": [[*pair, surface] for pair, surface in scene.interfaces.items()],
+            "gravity": scene.gravity,
+            "damping": scene.damping,
+            "damping_when": scene.damping_when,
+        }
+    )
+
+
+def scene_from_json(text: bytes) -> Scene:
+    """Return the scene that `scene_to_json` wrote.
+
+    Raises
+    ------
+    BadInput
+        If a value in it is not sound.
+    """
+    data = msgspec.json.decode(text)
+    terrain = data.pop("terrain")
+    return Scene(
+        terrain=terrain and Terrain(**terrain),
+        blocks=tuple(Block(**b) for b in data.pop("blocks")),
+        surfaces={name: Surface(**s) for name, s in data.pop("surfaces").items()},
+        barriers=tuple(Wall(**b) for b in data.pop("barriers")),
+        interfaces={(a, b): Surface(**s) for a, b, s in data.pop("interfaces")},
+        **data,
+    )

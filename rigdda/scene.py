@@ -1,0 +1,329 @@
+"""One concrete mechanical problem: terrain, blocks, surfaces and barriers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.validation import explain_validity
+
+from rigdda import check
+from rigdda.errors import BadInput
+
+RIGHT_ANGLE_DEG = 90.0
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Strength and rebound of a surface.
+
+    Parameters
+    ----------
+    friction_deg : float
+        Coulomb friction angle [deg], from 0 to below 90.
+    restitution : float
+        Coefficient of restitution of a central impact, 0 (plastic) to 1.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or outside its range.
+    """
+
+    friction_deg: float = 30.0
+    restitution: float = 0.0
+
+    def __post_init__(self) -> None:
+        check.number("friction_deg", self.friction_deg, 0.0, 89.9)
+        check.number("restitution", self.restitution, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """A rigid convex polygon.
+
+    Parameters
+    ----------
+    vertices : (n, 2) array_like
+        Corners in either winding [m]; kept anticlockwise.
+    density : float
+        Density [kg/m3]; the mass is per metre of slope width.
+    surface : str
+        Name of its surface in the scene.
+    velocity : (vx, vy, omega)
+        Initial velocity of the centroid and rate of rotation [m/s, m/s, rad/s].
+    fixed : bool
+        A fixed block has no unknowns.
+
+    Raises
+    ------
+    BadInput
+        If the polygon crosses itself, has no area or is not convex, or a value is not finite.
+    """
+
+    vertices: NDArray[np.float64]
+    density: float = 2600.0
+    surface: str = "rock"
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    fixed: bool = False
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        density: float = 2600.0,
+        surface: str = "rock",
+        velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        fixed: bool = False,
+    ):
+        if len(velocity) != 3:
+            raise BadInput("block velocity", velocity, "give (vx, vy, omega)")
+        vx, vy, omega = (check.number("block velocity", v) for v in velocity)
+        object.__setattr__(self, "vertices", convex_polygon("block vertices", vertices))
+        object.__setattr__(
+            self, "density", check.number("block density", density, 0.0, open_low=True)
+        )
+        object.__setattr__(self, "surface", surface)
+        object.__setattr__(self, "velocity", (vx, vy, omega))
+        object.__setattr__(self, "fixed", bool(fixed))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Terrain:
+    """The ground, a chain of segments walked with the ground on its right.
+
+    A slope that is walked from left to right has the ground below. Overhangs are allowed, the
+    chain must not cross itself.
+
+    Parameters
+    ----------
+    points : (m, 2) array_like
+        Corners of the chain [m].
+    surfaces : sequence of str, optional
+        Surface name of each of the m - 1 segments; "rock" by default.
+
+    Raises
+    ------
+    BadInput
+        If the chain crosses itself, a segment has no length or the number of names is wrong.
+    """
+
+    points: NDArray[np.float64]
+    surfaces: tuple[str, ...]
+
+    def __init__(self, points: ArrayLike, surfaces: Sequence[str] | None = None):
+        chain = check.points("terrain points", points, 2)
+        short = np.flatnonzero(np.hypot(*np.diff(chain, axis=0).T) < 1e-9)
+        if short.size:
+            raise BadInput(
+                f"terrain points[{short[0] + 1}]",
+                chain[short[0] + 1].tolist(),
+                "remove it: it repeats the point before it",
+            )
+        if not shapely.LineString(chain).is_simple:
+            raise BadInput("terrain points", "chain", "untangle it: the chain crosses itself")
+        names = ("rock",) * (len(chain) - 1) if surfaces is None else tuple(surfaces)
+        if len(names) != len(chain) - 1:
+            raise BadInput(
+                "terrain surfaces",
+                f"{len(names)} names",
+                f"give one name for each of the {len(chain) - 1} segments",
+            )
+        object.__setattr__(self, "points", chain)
+        object.__setattr__(self, "surfaces", names)
+
+    def height(self, x: float) -> float:
+        """Return the elevation of the highest ground at chainage `x` [m].
+
+        Raises
+        ------
+        BadInput
+            If the terrain does not reach `x`.
+        """
+        p, q = self.points[:-1], self.points[1:]
+        low, high = np.minimum(p[:, 0], q[:, 0]), np.maximum(p[:, 0], q[:, 0])
+        over = (low <= x) & (x <= high)
+        if not over.any():
+            raise BadInput(
+                "x", x, f"stay on the terrain, {low.min():g} to {high.max():g} m"
+            )
+        p, q = p[over], q[over]
+        run = q[:, 0] - p[:, 0]
+        share = np.where(run == 0.0, 1.0, (x - p[:, 0]) / np.where(run == 0.0, 1.0, run))
+        return float(
+            np.where(
+                run == 0.0,
+                np.maximum(p[:, 1], q[:, 1]),
+                p[:, 1] + share * (q[:, 1] - p[:, 1]),
+            ).max()
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """A rigid retaining wall that stands on the terrain and cannot be moved.
+
+    Parameters
+    ----------
+    x : float
+        Chainage of its uphill face [m].
+    height : float
+        Height above the highest ground under it [m].
+    thickness : float
+        Extent downhill of `x` [m].
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or not above zero.
+    """
+
+    x: float
+    height: float
+    thickness: float = 1.0
+
+    def __post_init__(self) -> None:
+        check.number("wall x", self.x)
+        check.number("wall height", self.height, 0.0, open_low=True)
+        check.number("wall thickness", self.thickness, 0.0, open_low=True)
+
+    def outline(self, terrain: Terrain) -> NDArray[np.float64]:
+        """Return the (4, 2) corners of the wall on `terrain`, its foot in the ground.
+
+        Raises
+        ------
+        BadInput
+            If the wall does not stand on the terrain.
+        """
+        left, right = self.x, self.x + self.thickness
+        inner = [x for x in terrain.points[:, 0] if left < x < right]
+        try:
+            ground = [terrain.height(x) for x in (left, *inner, right)]
+        except BadInput as bad:
+            raise BadInput("wall x", self.x, bad.mend) from None
+        foot, top = min(ground) - 1.0, max(ground) + self.height
+        return np.array([[left, foot], [right, foot], [right, top], [left, top]])
+
+
+Barrier = Wall
+Layout = tuple[Barrier, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A mechanical problem in two dimensions, per metre of slope width.
+
+    Parameters
+    ----------
+    terrain : Terrain or None
+        The fixed ground; None: free space.
+    blocks : sequence of Block
+        The blocks, at least one of them free to move.
+    surfaces : mapping of str to Surface
+        Every surface that a block or the terrain names. Two surfaces that meet take the smaller
+        of each property.
+    barriers : sequence of Wall
+        Fixed walls; their surface is "concrete" where the scene defines it, else "rock".
+    interfaces : mapping of (str, str) to Surface
+        Properties for pairs of surfaces, instead of the smaller of each.
+    gravity : float
+        Gravity [m/s2], acting downwards.
+    damping : float
+        Mass-proportional damping coefficient alpha [1/s] (Koo and Chern 1998, damping force).
+    damping_when : {"always", "contact"}
+        "always" is the paper's: a fall is capped at g/alpha, 16 m/s for 0.6 1/s, so energies at a
+        barrier stay low. "contact" damps only blocks that touch something.
+
+    Raises
+    ------
+    BadInput
+        If a name has no surface or a value is outside its range.
+    """
+
+    terrain: Terrain | None
+    blocks: tuple[Block, ...]
+    surfaces: Mapping[str, Surface] = field(
+        default_factory=lambda: MappingProxyType({"rock": Surface()})
+    )
+    barriers: tuple[Barrier, ...] = ()
+    interfaces: Mapping[tuple[str, str], Surface] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
+    gravity: float = 9.81
+    damping: float = 0.0
+    damping_when: str = "always"
+
+    def __post_init__(self) -> None:
+        for name in ("blocks", "barriers"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        object.__setattr__(self, "surfaces", dict(self.surfaces))
+        object.__setattr__(self, "interfaces", dict(self.interfaces))
+        check.number("gravity", self.gravity, 0.0)
+        check.number("damping", self.damping, 0.0)
+        check.one_of("damping_when", self.damping_when, ("always", "contact"))
+        if not any(not b.fixed for b in self.blocks):
+            raise BadInput("blocks", f"{len(self.blocks)} blocks", "give at least one free block")
+        for i, block in enumerate(self.blocks):
+            self._known(f"block {i}: surface", block.surface)
+        for i, name in enumerate(self.terrain.surfaces if self.terrain else ()):
+            self._known(f"terrain surfaces[{i}]", name)
+        for pair in self.interfaces:
+            for name in pair:
+                self._known(f"interfaces {pair}", name)
+        if self.barriers:
+            if self.terrain is None:
+                raise BadInput("barriers", self.barriers, "give the scene a terrain to stand on")
+            self._known("barrier surface", self.barrier_surface)
+            for barrier in self.barriers:
+                barrier.outline(self.terrain)
+
+    def _known(self, where: str, name: str) -> None:
+        if name not in self.surfaces:
+            known = ", ".join(self.surfaces)
+            raise BadInput(where, name, f"define it in surfaces or use one of {known}")
+
+    @property
+    def barrier_surface(self) -> str:
+        """Name of the surface of every barrier."""
+        return "concrete" if "concrete" in self.surfaces else "rock"
+
+    def interface(self, first: str, second: str) -> Surface:
+        """Return the properties of the contact between two named surfaces."""
+        pair = self.interfaces.get((first, second)) or self.interfaces.get((second, first))
+        if pair is not None:
+            return pair
+        a, b = self.surfaces[first], self.surfaces[second]
+        return Surface(
+            friction_deg=min(a.friction_deg, b.friction_deg),
+            restitution=min(a.restitution, b.restitution),
+        )
+
+
+def convex_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return the corners of a convex polygon, (n, 2), anticlockwise and read-only.
+
+    Raises
+    ------
+    BadInput
+        If the polygon crosses itself, has no area or is not convex.
+    """
+    corners = check.points(where, value, 3)
+    polygon = shapely.Polygon(corners)
+    if not polygon.is_valid:
+        raise BadInput(where, corners.tolist(), f"untangle it: {explain_validity(polygon)}")
+    size = polygon.length
+    if polygon.area < 1e-9 * size**2:
+        raise BadInput(where, corners.tolist(), "give it an area")
+    if not polygon.exterior.is_ccw:
+        corners = corners[::-1]
+    edge = np.roll(corners, -1, axis=0) - corners
+    onward = np.roll(edge, -1, axis=0)
+    turn = edge[:, 0] * onward[:, 1] - edge[:, 1] * onward[:, 0]
+    if turn.min() < -1e-9 * size**2:
+        raise BadInput(where, corners.tolist(), "make it convex, or cut it into convex blocks")
+    corners = np.ascontiguousarray(corners)
+    corners.setflags(write=False)
+    return corners

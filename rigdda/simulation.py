@@ -1,0 +1,311 @@
+"""The facade: a scene in motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import check
+from rigdda.constants import BAD_STATE, CONTACTS_FULL, EVENTS_FULL, OPEN
+from rigdda.errors import BadInput, Diverged
+from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
+from rigdda.records import COUNTERS, LEDGER, Contacts
+from rigdda.run import EVENT, Run
+from rigdda.scene import Scene
+from rigdda.settings import Settings
+from rigdda.step import advance
+
+CONTACT = np.dtype(
+    [
+        ("block_a", "i4"),
+        ("block_b", "i4"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("nx", "f8"),
+        ("ny", "f8"),
+        ("normal_force", "f8"),
+        ("shear_force", "f8"),
+        ("state", "U5"),
+        ("penetration", "f8"),
+    ]
+)
+"""One contact. block_b: -1 terrain, N + i barrier i. The normal points from b to a; shear is
+positive along the normal turned by +90 degrees. Forces act on a [N]; penetration [m]."""
+
+STATES = np.array(["open", "stick", "slip"])
+
+
+class Energy(NamedTuple):
+    """Energies of all blocks now, and work done on them so far [J]."""
+
+    kinetic: float
+    potential: float
+    friction: float
+    impact: float
+    damping: float
+
+
+class Diagnostics(NamedTuple):
+    """What the computation took so far.
+
+    `penetration` is the greatest depth of a vertex inside another polygon or the terrain [m];
+    `unsettled` counts islands whose contacts did not settle within the open-close iterations.
+    """
+
+    steps: int
+    open_close_iterations: int
+    unsettled: int
+    solves: int
+    solver_iterations: int
+    contacts: int
+    penetration: float
+
+
+class Simulation:
+    """A scene in motion.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to simulate.
+    settings : Settings, optional
+        How to compute it.
+    stations : sequence of float
+        Chainages whose first crossing by each block is recorded as an event [m].
+    watch : (float, float), optional
+        Interval of x in which the largest energy of each block is kept [m].
+
+    Raises
+    ------
+    BadInput
+        If stations are not ascending or the watched interval is empty.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings | None = None,
+        stations: Sequence[float] = (),
+        watch: tuple[float, float] | None = None,
+    ):
+        lines = np.array([check.number("stations", x) for x in stations], dtype=np.float64)
+        if (np.diff(lines) <= 0.0).any():
+            raise BadInput("stations", list(stations), "give them in ascending order")
+        if watch is not None and not watch[0] < watch[1]:
+            raise BadInput("watch", watch, "give an interval (low, high)")
+        self.scene = scene
+        self.settings = settings or Settings()
+        self._arrays = pack(scene, self.settings, lines, watch or (math.inf, -math.inf))
+        self._now, self._before = self._arrays.now, self._arrays.before
+        self._counters = np.zeros(len(COUNTERS), dtype=np.int64)
+        self._ledger = np.zeros(len(LEDGER))
+        self._deepest = np.zeros(1)
+        self._events: list[NDArray[np.void]] = []
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s], counted in whole steps."""
+        return float(self._counters[0] * self.settings.dt)
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """Copy of x, y, theta of the centroids, (N, 3) [m, m, rad]."""
+        b, n = self._arrays.bodies, len(self.scene.blocks)
+        return np.stack([b["x"][:n], b["y"][:n], b["theta"][:n]], axis=1)
+
+    @property
+    def velocities(self) -> NDArray[np.float64]:
+        """Copy of vx, vy, omega of the blocks, (N, 3) [m/s, m/s, rad/s]."""
+        b, n = self._arrays.bodies, len(self.scene.blocks)
+        return np.stack([b["vx"][:n], b["vy"][:n], b["omega"][:n]], axis=1)
+
+    def vertices(self, block: int) -> NDArray[np.float64]:
+        """Return the corners of a block now, (n, 2) [m]."""
+        n = self._arrays.bodies["count"][block]
+        o = self._arrays.outlines
+        return np.stack([o.world_x[block, :n], o.world_y[block, :n]], axis=1)
+
+    def contacts(self) -> NDArray[np.void]:
+        """Return the contacts of the last step as a structured array, see `CONTACT`."""
+        c, n = self._now, self._counters[5]
+        out = np.zeros(n, dtype=CONTACT)
+        c = c[:n]
+        out["block_a"], out["block_b"] = c["a"], c["b"]
+        for name in ("x", "y", "nx", "ny"):
+            out[name] = c[name]
+        closed = c["state"] != OPEN
+        out["normal_force"] = np.where(closed, c["normal"], 0.0)
+        out["shear_force"] = np.where(closed, c["shear"], 0.0)
+        out["state"] = STATES[c["state"]]
+        out["penetration"] = np.maximum(-c["gap"], 0.0)
+        return out
+
+    def energy(self) -> Energy:
+        """Return the energies of the free blocks now and the work done on them so far."""
+        b, n = self._arrays.bodies, len(self.scene.blocks)
+        free = np.array([not block.fixed for block in self.scene.blocks])
+        speed = b["vx"][:n] ** 2 + b["vy"][:n] ** 2
+        kinetic = 0.5 * (b["mass"][:n] * speed + b["inertia"][:n] * b["omega"][:n] ** 2)
+        potential = self.scene.gravity * b["mass"][:n] * b["y"][:n]
+        work = dict(zip(LEDGER, self._ledger, strict=True))
+        return Energy(
+            float(kinetic[free].sum()),
+            float(potential[free].sum()),
+            float(work["friction"]),
+            float(work["impact"]),
+            float(work["damping"]),
+        )
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """What the computation took so far."""
+        count = dict(zip(COUNTERS, self._counters.tolist(), strict=True))
+        return Diagnostics(
+            count["steps"],
+            count["open_close_iterations"],
+            count["unsettled_islands"],
+            count["solves"],
+            count["solver_iterations"],
+            count["contact_total"],
+            float(self._deepest[0]),
+        )
+
+    def step(self, n: int = 1) -> None:
+        """Take `n` steps.
+
+        Raises
+        ------
+        Diverged
+            If a block's velocity is no longer finite or beyond any rockfall.
+        """
+        target = self._counters[0] + check.integer("n", n, 0)
+        while self._counters[0] < target:
+            a = self._arrays
+            reason, block, swapped = advance(
+                a.bodies,
+                a.outlines,
+                a.ground,
+                self._now,
+                self._before,
+                a.matrix,
+                a.work,
+                a.gauges,
+                a.parameters,
+                self._counters,
+                self._ledger,
+                self._deepest,
+                target - self._counters[0],
+            )
+            if swapped:
+                self._now, self._before = self._before, self._now
+            if reason == EVENTS_FULL:
+                self._drain_events()
+            elif reason == CONTACTS_FULL:
+                self._grow()
+            elif reason == BAD_STATE:
+                raise Diverged(
+                    f"step {self._counters[0]} ({self.time:g} s): block {block} moves at "
+                    f"{self.velocities[block].tolist()}; use a smaller dt"
+                )
+
+    def run(self, duration: float, every: float = 0.05, progress: bool = False) -> Run:
+        """Simulate `duration` seconds and record a frame `every` so often, the start included.
+
+        Parameters
+        ----------
+        duration, every : float
+            Simulated time and interval of frames [s], rounded to whole steps.
+        progress : bool
+            Show a progress bar.
+
+        Raises
+        ------
+        BadInput
+            If a time is not positive.
+        Diverged
+            If the simulation diverges; its `run` keeps the frames up to then.
+        """
+        check.number("duration", duration, 0.0, open_low=True)
+        check.number("every", every, 0.0, open_low=True)
+        stride = max(1, round(every / self.settings.dt))
+        steps = max(1, round(duration / self.settings.dt))
+        marks = [*range(stride, steps, stride), steps]
+        frames = [(self.time, self.poses, self.velocities)]
+        done = 0
+        for mark in _track(marks, progress):
+            try:
+                self.step(mark - done)
+            except Diverged as error:
+                error.run = self._record(frames)
+                raise
+            done = mark
+            frames.append((self.time, self.poses, self.velocities))
+        return self._record(frames)
+
+    def _record(self, frames: list[tuple[float, NDArray, NDArray]]) -> Run:
+        self._drain_events()
+        times, poses, velocities = (np.array(column) for column in zip(*frames, strict=True))
+        events = np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
+        gauges = self._arrays.gauges
+        return Run(
+            self.scene,
+            times,
+            poses,
+            velocities,
+            events,
+            gauges.absorbed.copy(),
+            gauges.watch_energy.copy(),
+        )
+
+    def _drain_events(self) -> None:
+        n = self._counters[6]
+        self._events.append(self._arrays.gauges.event[:n].copy())
+        self._counters[6] = 0
+
+    def _grow(self) -> None:
+        room = 2 * len(self._now)
+        bodies = self._arrays.bodies
+        grown = empty_contacts(room)
+        grown[: len(self._now)] = self._now
+        self._now, self._before = grown, empty_contacts(room)
+        order = self._arrays.work.sorted
+        self._arrays = self._arrays._replace(
+            matrix=empty_matrix(len(self.scene.blocks), room),
+            work=empty_work(len(bodies), room)._replace(sorted=order),
+        )
+
+
+def simulate_many(
+    scenes: Sequence[Scene],
+    settings: Settings | None = None,
+    duration: float = 25.0,
+    every: float = 0.05,
+    stations: Sequence[float] = (),
+    watch: tuple[float, float] | None = None,
+) -> list[Run]:
+    """Run independent scenes over all cores, in threads; each gives what running it alone gives.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `Simulation` and `Simulation.run` do.
+    """
+
+    def one(scene: Scene) -> Run:
+        return Simulation(scene, settings, stations, watch).run(duration, every)
+
+    with ThreadPoolExecutor() as pool:
+        return list(pool.map(one, scenes))
+
+
+def _track(marks: list[int], progress: bool):
+    if not progress:
+        return marks
+    from rich.progress import track
+
+    return track(marks, description="simulating")

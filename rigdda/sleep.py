@@ -1,0 +1,52 @@
+"""Blocks at rest sleep, a whole island at a time, until something moving comes near."""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.constants import ASLEEP, AWAKE, SLEEP_SPEED, SLEEP_TIME, WAKE_SPEED
+from rigdda.kernel import kernel
+from rigdda.records import Bodies, Parameters, Work
+
+
+@kernel
+def top_speed(bodies: Bodies, i: int) -> float:
+    """Return a bound on the speed of any point of body i [m/s]."""
+    spin = abs(bodies.omega[i]) * bodies.radius[i]
+    return math.hypot(bodies.vx[i], bodies.vy[i]) + spin
+
+
+@kernel
+def wake_neighbours(bodies: Bodies, work: Work, pairs: int, blocks: int) -> int:
+    """Wake the islands of sleeping bodies paired with a moving one; returns how many bodies."""
+    woken = 0
+    for q in range(pairs):
+        i, j = work.pairs[2 * q], work.pairs[2 * q + 1]
+        if bodies.status[j] != ASLEEP or top_speed(bodies, i) < WAKE_SPEED:
+            continue
+        island = bodies.island[j]
+        for k in range(blocks):
+            if bodies.status[k] == ASLEEP and bodies.island[k] == island:
+                bodies.status[k] = AWAKE
+                bodies.quiet[k] = 0.0
+                woken += 1
+    return woken
+
+
+@kernel
+def watch_quiet(bodies: Bodies, work: Work, islands: int, p: Parameters) -> None:
+    """Count how long blocks have been quiet and put wholly quiet islands to sleep."""
+    for s in range(islands):
+        least = 1e300
+        for place in range(work.block_start[s], work.block_start[s + 1]):
+            i = work.block_item[place]
+            quiet = bodies.touching[i] == 1 and top_speed(bodies, i) < SLEEP_SPEED
+            bodies.quiet[i] = bodies.quiet[i] + p.dt if quiet else 0.0
+            least = min(least, bodies.quiet[i])
+        if least < SLEEP_TIME:
+            continue
+        for place in range(work.block_start[s], work.block_start[s + 1]):
+            i = work.block_item[place]
+            bodies.status[i] = ASLEEP
+            bodies.island[i] = work.block_item[work.block_start[s]]
+            bodies.vx[i] = bodies.vy[i] = bodies.omega[i] = 0.0

@@ -1,0 +1,179 @@
+"""One step: detect contacts, settle them island by island, move, correct."""
+
+from __future__ import annotations
+
+from numpy.typing import NDArray
+
+from rigdda.constants import (
+    ASLEEP,
+    AWAKE,
+    BAD_STATE,
+    CONTACTS_FULL,
+    DONE,
+    EVENTS_FULL,
+    OPEN,
+    RETIRED,
+    SPEED_LIMIT,
+    TERRAIN,
+)
+from rigdda.contact.broad_phase import overlapping_pairs, sort_by_low, sweep_boxes
+from rigdda.contact.law import prepare
+from rigdda.contact.narrow_phase import collide_pair
+from rigdda.contact.terrain_phase import collide_terrain
+from rigdda.contact.transfer import copy_contact, index_by_body, recall
+from rigdda.correction import account, apply_forces, keep_memory, move_block, place_corners
+from rigdda.gauges import note_hits, note_passage
+from rigdda.islands import find_islands
+from rigdda.kernel import entry_kernel, kernel
+from rigdda.open_close import open_close
+from rigdda.records import (
+    Bodies,
+    Contacts,
+    Gauges,
+    Ground,
+    Matrix,
+    Outlines,
+    Parameters,
+    Work,
+)
+from rigdda.sleep import top_speed, wake_neighbours, watch_quiet
+
+
+@kernel
+def candidate_pairs(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -> int:
+    """Return the number of pairs in work.pairs, sorted by their first body; -1 if too many."""
+    sweep_boxes(bodies, outlines, work, p)
+    sort_by_low(work)
+    pairs = overlapping_pairs(bodies, work)
+    if pairs > 0 and p.sleeping and wake_neighbours(bodies, work, pairs, p.blocks) > 0:
+        sweep_boxes(bodies, outlines, work, p)
+        sort_by_low(work)
+        pairs = overlapping_pairs(bodies, work)
+    for q in range(1, pairs):
+        a, b = work.pairs[2 * q], work.pairs[2 * q + 1]
+        j = q - 1
+        while j >= 0 and (
+            work.pairs[2 * j] > a or (work.pairs[2 * j] == a and work.pairs[2 * j + 1] > b)
+        ):
+            work.pairs[2 * j + 2], work.pairs[2 * j + 3] = work.pairs[2 * j], work.pairs[2 * j + 1]
+            j -= 1
+        work.pairs[2 * j + 2], work.pairs[2 * j + 3] = a, b
+    return pairs
+
+
+@kernel
+def detect(
+    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, old: Contacts, old_count: int, work: Work,
+    gauges: Gauges, time: float, p: Parameters,
+) -> int:  # fmt: skip
+    """Write all contacts of the step in order of their first body; -1 if they do not fit."""
+    index_by_body(old, old_count, work.first, p.blocks)
+    pairs = candidate_pairs(bodies, outlines, work, p)
+    if pairs < 0:
+        return -1
+    room = len(c) - outlines.world_x.shape[1] - 4
+    count = q = 0
+    for a in range(p.blocks):
+        if count > room:
+            return -1
+        if bodies.status[a] == ASLEEP:
+            for m in range(work.first[a], work.first[a + 1]):
+                if count > room:
+                    return -1
+                if old.b[m] == TERRAIN or bodies.status[old.b[m]] != AWAKE:
+                    copy_contact(c, count, old, m)
+                    count += 1
+                    if old.b[m] >= p.blocks:
+                        gauges.last_touch[a, old.b[m] - p.blocks] = time
+        elif bodies.status[a] == AWAKE:
+            first = count
+            count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
+            while q < pairs and work.pairs[2 * q] == a:
+                if count > room:
+                    return -1
+                count = collide_pair(bodies, outlines, c, count, a, work.pairs[2 * q + 1], p)
+                q += 1
+            recall(c, first, count, old, work.first)
+            for k in range(first, count):
+                prepare(bodies, c, k, p)
+    return count
+
+
+@kernel
+def solve_and_move(
+    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, m: Matrix, work: Work, gauges: Gauges,
+    time: float, p: Parameters, counters: NDArray, ledger: NDArray,
+) -> int:  # fmt: skip
+    """Settle every island, note hits, then move its blocks; returns a bad block or -1."""
+    islands = find_islands(bodies, c, count, work, p.blocks)
+    bad = -1
+    for s in range(islands):
+        c0, c1 = work.contact_start[s], work.contact_start[s + 1]
+        if c1 > c0:
+            open_close(bodies, c, m, work, s, p, counters)
+            counters[6] = note_hits(bodies, c, work, c0, c1, gauges, counters[6], time, p)
+        apply_forces(bodies, c, m, work, s, p)
+        account(bodies, c, m, work, s, p, ledger, gauges)
+        for place in range(work.block_start[s], work.block_start[s + 1]):
+            i = work.block_item[place]
+            bodies.touching[i] = 0
+            move_block(bodies, i, m, place - work.block_start[s], p.dt)
+            if not top_speed(bodies, i) < SPEED_LIMIT:
+                bad = i
+            elif bodies.y[i] < p.floor:
+                bodies.status[i] = RETIRED
+            place_corners(bodies, outlines, i)
+    for k in range(count):
+        if c.state[k] != OPEN:
+            bodies.touching[c.a[k]] = 1
+            if c.b[k] >= 0:
+                bodies.touching[c.b[k]] = 1
+        if bodies.status[c.a[k]] == AWAKE:
+            keep_memory(c, k)
+    if p.sleeping:
+        watch_quiet(bodies, work, islands, p)
+    return bad
+
+
+@entry_kernel
+def advance(
+    bodies: Bodies, outlines: Outlines, ground: Ground, now: Contacts, before: Contacts, m: Matrix, work: Work,
+    gauges: Gauges, p: Parameters, counters: NDArray, ledger: NDArray, deepest: NDArray, steps: int,
+) -> tuple[int, int, bool]:  # fmt: skip
+    """Take up to `steps` steps.
+
+    Parameters
+    ----------
+    counters, ledger, deepest : arrays
+        See `records.COUNTERS`, `records.LEDGER`; deepest[0] is the greatest penetration [m].
+
+    Returns
+    -------
+    reason : int
+        DONE, CONTACTS_FULL, EVENTS_FULL or BAD_STATE; anything but DONE stops early.
+    block : int
+        The block that went bad, else -1.
+    swapped : bool
+        Whether `now` and `before` have changed roles.
+    """
+    swapped = False
+    for _ in range(steps):
+        room = len(gauges.event) - counters[6]
+        if room < p.blocks * (len(gauges.station) + len(gauges.absorbed)):
+            return EVENTS_FULL, -1, swapped
+        time = (counters[0] + 1) * p.dt
+        count = detect(bodies, outlines, ground, before, now, counters[5], work, gauges, time, p)
+        if count < 0:
+            return CONTACTS_FULL, -1, swapped
+        now, before = before, now
+        swapped = not swapped
+        counters[5] = count
+        counters[7] += count
+        for k in range(count):
+            deepest[0] = max(deepest[0], -now.gap[k])
+        bad = solve_and_move(bodies, outlines, now, count, m, work, gauges, time, p, counters, ledger)
+        counters[6] = note_passage(bodies, gauges, counters[6], time, p)
+        counters[0] += 1
+        if bad >= 0:
+            return BAD_STATE, bad, swapped
+    return DONE, -1, swapped

@@ -6,17 +6,11 @@ import math
 
 from rigdda.constants import NEW_HIT_TIME, OPEN
 from rigdda.kernel import kernel
+from rigdda.motion import kinetic_energy
 from rigdda.records import Bodies, Contacts, Gauges, Parameters, Work
 
 HIT, CROSSING = 0, 1
 """Kinds of event: a block touches a barrier; a block's centroid first passes a station."""
-
-
-@kernel
-def kinetic_energy(bodies: Bodies, i: int) -> float:
-    """Return the energy of translation and rotation of body i [J]."""
-    speed = bodies.vx[i] ** 2 + bodies.vy[i] ** 2
-    return 0.5 * bodies.mass[i] * speed + 0.5 * bodies.inertia[i] * bodies.omega[i] ** 2
 
 
 @kernel

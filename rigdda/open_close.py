@@ -14,11 +14,13 @@ from rigdda.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.assembly.springs import add_block, add_force, along, normal_row, shear_row
 from rigdda.constants import (
     ENERGY_HALVINGS,
+    FEWER_MOVES,
     FLIPS,
     FRICTION_TOLERANCE,
     IMPACT,
     OPEN,
     OPENING_TOLERANCE,
+    QUIET_SPEED,
     REST,
     SHOCK,
     SHOCK_SPEED,
@@ -30,7 +32,11 @@ from rigdda.islands import pair_blocks
 from rigdda.kernel import kernel
 from rigdda.linear.direct import solve_block
 from rigdda.linear.pcg import solve_pcg
+from rigdda.linear.psor import relax_forces
+from rigdda.motion import top_speed
 from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
+
+NONE, MOVED, LOCKED = 0, 1, 2
 
 
 @kernel
@@ -119,42 +125,47 @@ def spring_forces(
 
 
 @kernel
-def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) -> bool:
-    """Move contact k to the state that its forces ask for; returns whether that is a change."""
+def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) -> int:
+    """Move contact k to the state that its forces ask for; returns NONE, MOVED or LOCKED.
+
+    A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
+    """
     state = c.state[k]
+    tension = -OPENING_TOLERANCE * weight
     if state == OPEN:
-        if normal > OPENING_TOLERANCE * weight and c.flips[k] < FLIPS:
-            c.state[k] = STICK
-            return True
-        return False
-    if normal < -OPENING_TOLERANCE * weight:
+        if normal <= -tension:
+            return NONE
+        if c.flips[k] >= FLIPS:
+            return LOCKED
+        c.state[k] = STICK
+        return MOVED
+    if normal < tension:
         c.state[k] = OPEN
         c.flips[k] += 1
-        c.normal[k] = c.shear[k] = 0.0
-        return True
+        return MOVED
     c.normal[k] = max(normal, 0.0)
     limit = c.friction[k] * c.normal[k]
     c.shear[k] = min(max(shear, -limit), limit)
-    if abs(shear) <= limit * (1.0 + FRICTION_TOLERANCE):
-        if state == STICK or c.flips[k] >= FLIPS:
-            c.lag[k] = c.shear[k]
-            return False
+    if abs(shear) <= limit:
+        if state == STICK:
+            return NONE
+        if c.flips[k] >= FLIPS:
+            return LOCKED
         c.state[k] = STICK
         c.flips[k] += 1
-        return True
-    friction = math.copysign(limit, shear)
-    change = abs(friction - c.lag[k]) if state == SLIP else math.inf
+        return MOVED
+    change = abs(c.shear[k] - c.lag[k]) if state == SLIP else math.inf
     c.state[k] = SLIP
-    c.lag[k] = friction
-    return change > FRICTION_TOLERANCE * (limit + OPENING_TOLERANCE * weight)
+    c.lag[k] = c.shear[k]
+    return MOVED if change > FRICTION_TOLERANCE * (limit - tension) else NONE
 
 
 @kernel
 def update_states(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, p: Parameters
-) -> int:
-    """Move every contact of an island to its next state; returns how many changed."""
-    changes = 0
+) -> tuple[int, int]:
+    """Move every contact of an island to its next state; returns how many moved and are locked."""
+    moved = locked = 0
     for item in range(low, high):
         k = work.contact_item[item]
         i = work.slot[c.a[k]]
@@ -162,12 +173,12 @@ def update_states(
         normal, shear, after = spring_forces(c, k, m, i, j, p.dt)
         if c.state[k] != OPEN and c.kind[k] == REST and after < -SHOCK_SPEED:
             set_shock(bodies, c, k, p)
-            changes += 1
+            moved += 1
             continue
-        weight = bodies.mass[c.a[k]] * p.gravity
-        if next_state(c, k, normal, shear, weight):
-            changes += 1
-    return changes
+        change = next_state(c, k, normal, shear, bodies.mass[c.a[k]] * p.gravity)
+        moved += change == MOVED
+        locked += change == LOCKED
+    return moved, locked
 
 
 @kernel
@@ -186,32 +197,58 @@ def solve_states(
         i = work.block_item[b0 + s]
         m.d[s, 0], m.d[s, 1] = bodies.vx[i] * p.dt, bodies.vy[i] * p.dt
         m.d[s, 2] = bodies.omega[i] * p.dt
+    before = c1 - c0
     for iteration in range(p.iterations):
-        assemble_blocks(bodies, m, work, b0, b1, p)
-        for q in range(pairs):
-            for a in range(3):
-                for b in range(3):
-                    m.off[q, a, b] = 0.0
-        for item in range(c0, c1):
-            k = work.contact_item[item]
-            if c.state[k] == OPEN:
-                c.normal[k] = c.shear[k] = 0.0
-            else:
-                j = work.slot[c.b[k]] if c.pair[k] >= 0 else -1
-                assemble_contact(c, k, m, work.slot[c.a[k]], j, p.dt, n == 1)
+        assemble_island(bodies, c, m, work, island, pairs, p)
         counters[1] += 1
         if n == 1:
             solve_block(m.diagonal[0], m.rhs[0], m.d[0])
         else:
-            scale = 0.0
-            for s in range(n):
-                for j in range(3):
-                    scale += m.rhs[s, j] ** 2 / m.diagonal[s, j, j]
             counters[3] += 1
-            counters[4] += solve_pcg(m, n, pairs, scale, p.tolerance)
-        if update_states(bodies, c, m, work, c0, c1, p) == 0:
-            return True
+            counters[4] += solve_pcg(m, n, pairs, p.tolerance)
+        moved, locked = update_states(bodies, c, m, work, c0, c1, p)
+        if moved == 0:
+            return locked == 0
+        if n > 1 and iteration > 0 and moved > FEWER_MOVES * before:
+            return False
+        before = moved
     return False
+
+
+@kernel
+def assemble_island(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, pairs: int, p: Parameters
+) -> None:
+    """Set the system of an island with its contacts in their current states."""
+    b0, b1 = work.block_start[island], work.block_start[island + 1]
+    assemble_blocks(bodies, m, work, b0, b1, p)
+    for q in range(pairs):
+        for a in range(3):
+            for b in range(3):
+                m.off[q, a, b] = 0.0
+    for item in range(work.contact_start[island], work.contact_start[island + 1]):
+        k = work.contact_item[item]
+        if c.state[k] == OPEN:
+            c.normal[k] = c.shear[k] = 0.0
+        else:
+            j = work.slot[c.b[k]] if c.pair[k] >= 0 else -1
+            assemble_contact(c, k, m, work.slot[c.a[k]], j, p.dt, b1 - b0 == 1)
+
+
+@kernel
+def relax(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters, counters: NDArray
+) -> None:
+    """Find the forces of an island by projected relaxation, from those of the last step."""
+    b0, b1 = work.block_start[island], work.block_start[island + 1]
+    c0, c1 = work.contact_start[island], work.contact_start[island + 1]
+    assemble_blocks(bodies, m, work, b0, b1, p)
+    counters[2] += 1
+    counters[8] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt)
+    for item in range(c0, c1):
+        k = work.contact_item[item]
+        within = c.friction[k] * c.normal[k] > abs(c.shear[k])
+        c.state[k] = OPEN if c.normal[k] == 0.0 else (STICK if within else SLIP)
 
 
 @kernel
@@ -246,6 +283,13 @@ def open_close(
         k = work.contact_item[item]
         bouncing = bouncing or (c.kind[k] == IMPACT and c.bias[k] > 0.0)
     pairs = pair_blocks(bodies, c, m, work, c0, c1)
+    b0, b1 = work.block_start[island], work.block_start[island + 1]
+    moving = False
+    for place in range(b0, b1):
+        moving = moving or top_speed(bodies, work.block_item[place]) > QUIET_SPEED
+    if moving and b1 - b0 > 1:
+        relax(bodies, c, m, work, island, p, counters)
+        return
     settled = solve_states(bodies, c, m, work, island, pairs, p, counters)
     halving = 0
     while bouncing and impact_work(c, m, work, c0, c1, p.dt) > 0.0 and halving <= ENERGY_HALVINGS:
@@ -258,4 +302,4 @@ def open_close(
         settled = solve_states(bodies, c, m, work, island, pairs, p, counters)
         halving += 1
     if not settled:
-        counters[2] += 1
+        relax(bodies, c, m, work, island, p, counters)

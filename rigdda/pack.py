@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rigdda.constants import AWAKE, FIXED, PENETRATION_RATIO, SLACK_RATIO
 from rigdda.correction import place_corners
 from rigdda.geometry import polygon_properties
+from rigdda.linear.psor import COLUMNS
 from rigdda.records import (
     BODY,
     CONTACT,
@@ -83,7 +84,7 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
     walls = [b.outline(terrain) for b in scene.barriers] if terrain is not None else []
     polygons = [b.vertices for b in scene.blocks] + walls
     shape = (len(polygons), max(len(p) for p in polygons))
-    bodies = np.zeros(len(polygons), dtype=BODY)
+    bodies = np.zeros(len(polygons), dtype=BODY).view(np.recarray)
     outlines = Outlines(*(np.zeros(shape) for _ in Outlines._fields))
     for i, polygon in enumerate(polygons):
         area, centre, second = polygon_properties(polygon)
@@ -146,7 +147,7 @@ def pack_ground(scene: Scene, names: list[str]) -> Ground:
 
 def empty_contacts(room: int) -> Contacts:
     """Return space for `room` contacts."""
-    return np.zeros(room, dtype=CONTACT)
+    return np.zeros(room, dtype=CONTACT).view(np.recarray)
 
 
 def empty_matrix(blocks: int, room: int) -> Matrix:
@@ -178,6 +179,9 @@ def empty_work(bodies: int, room: int) -> Work:
         whole(bodies + 1),
         whole(room),
         whole(bodies + 1),
+        np.zeros((room, COLUMNS)),
+        whole(room),
+        whole(room),
     )
 
 
@@ -196,7 +200,7 @@ def pack_gauges(
         np.zeros(barriers),
         np.array(watch, dtype=np.float64),
         np.zeros(blocks),
-        np.zeros(event_room(blocks, len(stations), barriers), dtype=EVENT),
+        np.zeros(event_room(blocks, len(stations), barriers), dtype=EVENT).view(np.recarray),
     )
 
 

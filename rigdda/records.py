@@ -138,6 +138,9 @@ class Work(NamedTuple):
     contact_start: Ints  # (M + 1,) contacts of each island
     contact_item: Ints
     first: Ints  # (M + 1,) contacts of the last step by body a
+    row: Floats  # (C, columns) contacts of one island, see linear.psor
+    row_i: Ints  # (C,) slots of their bodies, -1: no unknowns
+    row_j: Ints
 
 
 class Gauges(NamedTuple):
@@ -177,11 +180,12 @@ LEDGER = ("friction", "impact", "damping", "gravity")
 COUNTERS = (
     "steps",
     "open_close_iterations",
-    "unsettled_islands",
+    "relaxed_islands",
     "solves",
     "solver_iterations",
     "contacts",
     "events",
     "contact_total",
+    "sweeps",
 )
 """Entries of the counter array."""

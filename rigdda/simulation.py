@@ -54,12 +54,13 @@ class Diagnostics(NamedTuple):
     """What the computation took so far.
 
     `penetration` is the greatest depth of a vertex inside another polygon or the terrain [m];
-    `unsettled` counts islands whose contacts did not settle within the open-close iterations.
+    `relaxed` counts islands whose open-close iteration did not settle and that were relaxed.
     """
 
     steps: int
     open_close_iterations: int
-    unsettled: int
+    relaxed: int
+    sweeps: int
     solves: int
     solver_iterations: int
     contacts: int
@@ -168,7 +169,8 @@ class Simulation:
         return Diagnostics(
             count["steps"],
             count["open_close_iterations"],
-            count["unsettled_islands"],
+            count["relaxed_islands"],
+            count["sweeps"],
             count["solves"],
             count["solver_iterations"],
             count["contact_total"],

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from rigdda.constants import ASLEEP, AWAKE, SLEEP_SPEED, SLEEP_TIME, WAKE_SPEED
 from rigdda.kernel import kernel
+from rigdda.motion import top_speed
 from rigdda.records import Bodies, Parameters, Work
-
-
-@kernel
-def top_speed(bodies: Bodies, i: int) -> float:
-    """Return a bound on the speed of any point of body i [m/s]."""
-    spin = abs(bodies.omega[i]) * bodies.radius[i]
-    return math.hypot(bodies.vx[i], bodies.vy[i]) + spin
 
 
 @kernel

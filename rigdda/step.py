@@ -25,6 +25,7 @@ from rigdda.correction import account, apply_forces, keep_memory, move_block, pl
 from rigdda.gauges import note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel
+from rigdda.motion import top_speed
 from rigdda.open_close import open_close
 from rigdda.records import (
     Bodies,
@@ -36,7 +37,7 @@ from rigdda.records import (
     Parameters,
     Work,
 )
-from rigdda.sleep import top_speed, wake_neighbours, watch_quiet
+from rigdda.sleep import wake_neighbours, watch_quiet
 
 
 @kernel

@@ -39,7 +39,6 @@ from rigdda.constants import (
     REST,
     SHOCK,
     STICK,
-    STIFFNESS_DECAY,
 )
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Contacts, Parameters
@@ -51,12 +50,12 @@ def rest_stiffness(
 ) -> float:
     """Return k_n [N/m] for the wanted penetration under the load that the contact carries.
 
-    At least the weight of the heavier free body; it follows a growing load at once and a
-    vanishing one slowly.
+    At least the weight of the heavier free body; it follows a growing load and stays as long as
+    the contact does: stiffness that fell with the load would feed the sway of a stack.
     """
     gravity = p.gravity if p.gravity > 0.0 else 9.81
     least = max(mass_a, mass_b) * gravity / p.penetration
-    return max(least, load / p.penetration, STIFFNESS_DECAY * before)
+    return max(least, load / p.penetration, before)
 
 
 @kernel

@@ -43,11 +43,11 @@ def precondition(m: Matrix, n: int) -> float:
 
 
 @kernel
-def solve_pcg(m: Matrix, n: int, pairs: int, scale: float, tolerance: float) -> int:
+def solve_pcg(m: Matrix, n: int, pairs: int, tolerance: float) -> int:
     """Solve K d = rhs from the start value in m.d, in place.
 
     Stops when the residual, in the norm of the preconditioner, is below `tolerance` times the
-    energy norm `scale` of the forces.
+    forces.
 
     Returns
     -------
@@ -55,9 +55,11 @@ def solve_pcg(m: Matrix, n: int, pairs: int, scale: float, tolerance: float) -> 
         Iterations used.
     """
     multiply(m, n, pairs, m.d, m.product)
+    scale = 0.0
     for i in range(n):
         for j in range(3):
             m.residual[i, j] = m.rhs[i, j] - m.product[i, j]
+            scale += m.rhs[i, j] ** 2 / m.diagonal[i, j, j]
     rho = precondition(m, n)
     for i in range(n):
         for j in range(3):

@@ -1,0 +1,166 @@
+"""Cutting a rock mass into blocks by joint sets."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.ops import polygonize
+
+from rigdda import check
+from rigdda.errors import BadInput
+
+SLIVER = 0.2
+"""Blocks below this share of the wanted mean area are joined to a neighbour if that stays convex."""
+
+AREA_TOLERANCE = 0.05
+"""Accepted relative error of the mean block area; spacings are scaled until it is met."""
+
+SCALINGS = 40
+
+
+class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A set of nearly parallel joints.
+
+    Parameters
+    ----------
+    dip_deg : float
+        Dip below the horizontal towards +x [deg], -90 to 90.
+    spacing : float
+        Mean spacing [m]; all sets are scaled together to give the wanted block area.
+    scatter : float
+        Standard deviation of the spacing over its mean [-], at most 0.4.
+    persistence : float
+        Share of the joint that is open [-]; across the rest, blocks stay joined.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or outside its range.
+    """
+
+    dip_deg: float
+    spacing: float = 1.0
+    scatter: float = 0.0
+    persistence: float = 1.0
+
+    def __post_init__(self) -> None:
+        check.number("joint set: dip_deg", self.dip_deg, -90.0, 90.0)
+        check.number("joint set: spacing", self.spacing, 0.0, open_low=True)
+        check.number("joint set: scatter", self.scatter, 0.0, 0.4)
+        check.number("joint set: persistence", self.persistence, 0.0, 1.0, open_low=True)
+
+
+def cut(
+    source: shapely.Polygon,
+    joints: tuple[JointSet, ...],
+    block_area: float,
+    rng: np.random.Generator,
+) -> list[NDArray[np.float64]]:
+    """Cut a convex rock mass into convex blocks of a wanted mean area.
+
+    Parameters
+    ----------
+    source : shapely.Polygon
+        The rock mass.
+    joints : tuple of JointSet
+        At least two sets of different dip.
+    block_area : float
+        Wanted mean area [m2]; met within 5 %.
+    rng : numpy.random.Generator
+        Draws offsets, spacings and rock bridges.
+
+    Returns
+    -------
+    list of (n, 2) arrays
+        Corners of the blocks; their areas add up to that of the source.
+
+    Raises
+    ------
+    BadInput
+        If the joints cannot cut the mass into blocks of that area.
+    """
+    low, high = 0.0, math.inf
+    scale = math.sqrt(block_area / math.prod(j.spacing for j in joints[:2]))
+    start = rng.bit_generator.state
+    for _ in range(SCALINGS):
+        rng.bit_generator.state = start
+        cells = _join_bridges(_cells(source, joints, scale, rng), joints, block_area, rng)
+        mean = source.area / len(cells)
+        if abs(mean / block_area - 1.0) <= AREA_TOLERANCE:
+            return [np.array(c.exterior.coords)[:-1] for c in cells]
+        if mean > block_area:
+            high = scale
+        else:
+            low = scale
+        scale = math.sqrt(low * high) if low > 0.0 and high < math.inf else (
+            2.0 * scale if high == math.inf else 0.5 * scale
+        )
+    raise BadInput(
+        "source: block_area",
+        block_area,
+        f"choose joint sets that cut {source.area:g} m2 into blocks of this mean area",
+    )
+
+
+def _cells(
+    source: shapely.Polygon, joints: tuple[JointSet, ...], scale: float, rng: np.random.Generator
+) -> list[shapely.Polygon]:
+    """Return the pieces between the joints of all sets."""
+    centre = np.array(source.centroid.coords[0])
+    reach = source.length
+    lines = [source.exterior]
+    for joint in joints:
+        dip = math.radians(joint.dip_deg)
+        along = np.array([math.cos(dip), -math.sin(dip)])
+        across = np.array([math.sin(dip), math.cos(dip)])
+        spacing = joint.spacing * scale
+        draws = 1.0 + joint.scatter * rng.standard_normal(int(2 * reach / spacing) + 4)
+        steps = spacing * np.clip(draws, 0.3, 1.7)
+        offsets = np.cumsum(steps) - reach - spacing * rng.random()
+        for offset in offsets[np.abs(offsets) < reach]:
+            mid = centre + offset * across
+            lines.append(shapely.LineString([mid - reach * along, mid + reach * along]))
+    pieces = polygonize(shapely.node(shapely.MultiLineString(lines)))
+    return [p for p in pieces if source.contains(p.representative_point())]
+
+
+def _join_bridges(
+    cells: list[shapely.Polygon],
+    joints: tuple[JointSet, ...],
+    block_area: float,
+    rng: np.random.Generator,
+) -> list[shapely.Polygon]:
+    """Join cells across rock bridges, then slivers, wherever the union stays convex."""
+    cells = sorted(cells, key=lambda c: c.centroid.coords[0])
+    bridge = 1.0 - min(j.persistence for j in joints)
+    for i in range(len(cells)):
+        if cells[i] is not None and rng.random() < bridge:
+            _join(cells, i)
+    for i in np.argsort([math.inf if c is None else c.area for c in cells], kind="stable"):
+        cell = cells[i]
+        if cell is not None and cell.area < SLIVER * block_area:
+            _join(cells, int(i))
+    return [c for c in cells if c is not None]
+
+
+def _join(cells: list, i: int) -> None:
+    """Join cell i to the neighbour with the longest common edge, if that stays convex."""
+    cell = cells[i]
+    best, longest = None, 0.0
+    for j, other in enumerate(cells):
+        if j == i or other is None:
+            continue
+        common = shapely.intersection(cell, other).length
+        if common > longest + 1e-9:
+            union = shapely.union(cell, other)
+            if union.geom_type == "Polygon" and (
+                union.convex_hull.area - union.area < 1e-9 * union.area
+            ):
+                best, longest = j, common
+    if best is not None:
+        cells[best] = shapely.union(cell, cells[best]).simplify(1e-9 * cell.length)
+        cells[i] = None

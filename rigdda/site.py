@@ -1,0 +1,305 @@
+"""What an engineer knows about a site, as a TOML file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import shapely
+import tomli_w
+
+from rigdda import check
+from rigdda.errors import BadInput
+from rigdda.files import atomic
+from rigdda.joints import JointSet, cut
+from rigdda.scene import Block, Layout, Scene, Surface, Terrain, Wall, convex_polygon
+from rigdda.settings import Settings
+
+Point = tuple[float, float]
+
+
+class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The ground: corners from the crest down to beyond the road, x growing downhill [m].
+
+    `surface` names the surface of every segment, `toe` is the chainage where the slope ends [m].
+    """
+
+    points: tuple[Point, ...]
+    toe: float
+    surface: str = "rock"
+
+
+class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The jointed rock mass that comes down: a convex polygon cut by joint sets.
+
+    `block_area` is the wanted mean area of its blocks [m2], `density` in kg/m3.
+    """
+
+    polygon: tuple[Point, ...]
+    joints: tuple[JointSet, ...]
+    block_area: float = 2.0
+    density: float = 2600.0
+    surface: str = "rock"
+
+
+class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The road: chainage of its uphill and its downhill edge [m]."""
+
+    start: float
+    end: float
+
+
+class BarrierZone(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where barriers may stand [m] and how high [m] and thick [m] they may be."""
+
+    start: float
+    end: float
+    max_height: float = 4.0
+    min_thickness: float = 0.5
+    max_thickness: float = 2.0
+
+
+class Costs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Price of a wall per metre of slope width, in relative units: a user's table.
+
+    cost = (base + square * height^2) * (1 + thickness) / 2, times `off_toe` uphill of the toe,
+    where access is dear. It rises faster than height. `limit` is the budget of a layout.
+    """
+
+    base: float = 1.0
+    square: float = 1.0
+    off_toe: float = 1.5
+    limit: float = 40.0
+
+
+class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How releases are computed: damping [1/s], simulated time [s] and time step [s]."""
+
+    damping: float = 0.0
+    damping_when: str = "always"
+    duration: float = 25.0
+    dt: float = 5e-3
+
+
+class Scatter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What varies at random from release to release, beside the joints.
+
+    Standard deviation of the friction angles [deg], all surfaces together.
+    """
+
+    friction_deg: float = 0.0
+
+
+class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A slope, its loose rock, the road below, and where barriers may stand.
+
+    Raises
+    ------
+    BadInput
+        If a field is unknown, of the wrong type or at odds with another; the message names it.
+    """
+
+    name: str
+    description: str
+    slope: Slope
+    source: Source
+    road: Road
+    barrier_zone: BarrierZone
+    surfaces: dict[str, Surface]
+    costs: Costs = Costs()
+    motion: Motion = Motion()
+    scatter: Scatter = Scatter()
+
+    def __post_init__(self) -> None:
+        self._check_slope()
+        self._check_source()
+        self._check_zone()
+        for group, label in ((self.costs, "costs"), (self.motion, "motion")):
+            for field in group.__struct_fields__:
+                value = getattr(group, field)
+                if field != "damping_when":
+                    check.number(f"{label}.{field}", value, 0.0)
+        check.number("costs.limit", self.costs.limit, 0.0, open_low=True)
+        check.one_of("motion.damping_when", self.motion.damping_when, ("always", "contact"))
+        check.number("motion.duration", self.motion.duration, 0.0, open_low=True)
+        check.number("scatter.friction_deg", self.scatter.friction_deg, 0.0, 10.0)
+        self.settings()
+
+    def _check_slope(self) -> None:
+        points = check.points("slope.points", self.slope.points, 2)
+        if (np.diff(points[:, 0]) < 0.0).any() or points[0, 1] <= points[-1, 1]:
+            raise BadInput(
+                "slope.points", f"{len(points)} points", "list them downhill, x never falling"
+            )
+        low, high = points[0, 0], points[-1, 0]
+        check.number("slope.toe", self.slope.toe, low, high)
+        check.number("road.start", self.road.start, low, high)
+        check.number("road.end", self.road.end, low, high)
+        if self.road.end <= self.road.start:
+            raise BadInput("road.end", self.road.end, f"put it beyond road.start {self.road.start}")
+        for where, name in (("slope", self.slope.surface), ("source", self.source.surface)):
+            check.one_of(f"{where}.surface", name, self.surfaces)
+
+    def _check_source(self) -> None:
+        corners = convex_polygon("source.polygon", self.source.polygon)
+        check.number("source.block_area", self.source.block_area, 0.0, open_low=True)
+        check.number("source.density", self.source.density, 0.0, open_low=True)
+        if len({j.dip_deg for j in self.source.joints}) < 2:
+            raise BadInput(
+                "source.joints", self.source.joints, "give at least two sets of different dip"
+            )
+        if corners[:, 0].max() >= self.road.start:
+            raise BadInput("source.polygon", corners.tolist(), "put it uphill of the road")
+        for i, (x, y) in enumerate(corners):
+            ground = self.profile.height(float(x))
+            if y < ground - 1e-6:
+                raise BadInput(
+                    f"source.polygon[{i}]",
+                    [float(x), float(y)],
+                    f"raise it out of the ground, which is at {ground:g} there",
+                )
+
+    def _check_zone(self) -> None:
+        zone = self.barrier_zone
+        check.number("barrier_zone.start", zone.start, self.slope.points[0][0])
+        check.number("barrier_zone.end", zone.end, zone.start, self.road.start, open_low=True)
+        check.number("barrier_zone.max_height", zone.max_height, 0.5, open_low=True)
+        check.number("barrier_zone.min_thickness", zone.min_thickness, 0.0, open_low=True)
+        check.number("barrier_zone.max_thickness", zone.max_thickness, zone.min_thickness)
+
+    @classmethod
+    def load(cls, source: str | os.PathLike[str]) -> Site:
+        """Read a site from a TOML file, or a built-in one by its name.
+
+        Raises
+        ------
+        BadInput
+            If there is no such file or name, or the file is not a sound site.
+        """
+        path = Path(source)
+        if path.suffix == ".toml" or path.is_file():
+            if not path.is_file():
+                raise BadInput("site", str(source), "name an existing TOML file")
+            text = path.read_bytes()
+        else:
+            check.one_of("site", str(source), names())
+            text = (resources.files("rigdda.sites") / f"{source}.toml").read_bytes()
+        try:
+            return msgspec.toml.decode(text, type=cls)
+        except msgspec.ValidationError as error:
+            if isinstance(error.__cause__, BadInput):
+                raise error.__cause__ from None
+            raise BadInput("site file", str(source), str(error)) from None
+        except msgspec.DecodeError as error:
+            raise BadInput("site file", str(source), f"mend its TOML: {error}") from None
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the site as TOML; `load` gives it back."""
+        with atomic(path) as part:
+            part.write_text(tomli_w.dumps(msgspec.to_builtins(self)))
+
+    @property
+    def profile(self) -> Terrain:
+        """The ground as a terrain."""
+        return Terrain(self.slope.points, (self.slope.surface,) * (len(self.slope.points) - 1))
+
+    def settings(self) -> Settings:
+        """Return the numerical settings of this site's releases."""
+        return Settings(dt=self.motion.dt)
+
+    def realise(self, layout: Sequence[Wall] = (), seed: int = 0) -> Scene:
+        """Return the scene of one release: the joints and friction that `seed` draws.
+
+        The release is the same for every layout.
+
+        Raises
+        ------
+        BadInput
+            If a barrier does not stand on the slope or the seed is not a whole number >= 0.
+        """
+        rng = np.random.default_rng(check.integer("seed", seed, 0))
+        shift = self.scatter.friction_deg * rng.standard_normal()
+        polygon = shapely.Polygon(self.source.polygon)
+        blocks = cut(polygon, self.source.joints, self.source.block_area, rng)
+        return Scene(
+            terrain=self.profile,
+            blocks=tuple(
+                Block(b, density=self.source.density, surface=self.source.surface) for b in blocks
+            ),
+            surfaces={
+                name: Surface(
+                    friction_deg=min(max(s.friction_deg + shift, 0.0), 85.0),
+                    restitution=s.restitution,
+                )
+                for name, s in self.surfaces.items()
+            },
+            barriers=tuple(layout),
+            damping=self.motion.damping,
+            damping_when=self.motion.damping_when,
+        )
+
+    def cost(self, layout: Sequence[Wall]) -> float:
+        """Return the price of a layout per metre of slope width, in the units of `costs`."""
+        c = self.costs
+        return float(
+            sum(
+                (c.base + c.square * b.height**2)
+                * (1.0 + b.thickness)
+                / 2.0
+                * (c.off_toe if b.x < self.slope.toe else 1.0)
+                for b in layout
+            )
+        )
+
+
+def names() -> list[str]:
+    """Return the names of the built-in sites."""
+    files = resources.files("rigdda.sites").iterdir()
+    return sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml"))
+
+
+def load_layout(path: str | os.PathLike[str]) -> Layout:
+    """Read a layout from a TOML or JSON file with one table `barriers` a wall.
+
+    Raises
+    ------
+    BadInput
+        If the file is missing, a field is unknown or a value is outside its range.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise BadInput("layout", str(path), "name an existing TOML or JSON file")
+    decode = msgspec.json.decode if file.suffix == ".json" else msgspec.toml.decode
+    try:
+        return decode(file.read_bytes(), type=_LayoutFile, strict=False).barriers
+    except msgspec.ValidationError as error:
+        if isinstance(error.__cause__, BadInput):
+            raise error.__cause__ from None
+        raise BadInput("layout", str(path), str(error)) from None
+    except msgspec.DecodeError as error:
+        raise BadInput("layout", str(path), f"mend the file: {error}") from None
+
+
+def save_layout(layout: Sequence[Wall], path: str | os.PathLike[str]) -> None:
+    """Write a layout as TOML, or as JSON if the path ends in .json."""
+    data = {"barriers": [msgspec.to_builtins(b) for b in layout]}
+    with atomic(path) as part:
+        if str(path).endswith(".json"):
+            part.write_bytes(msgspec.json.format(msgspec.json.encode(data)))
+        else:
+            part.write_text(tomli_w.dumps(data))
+
+
+class _WallTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    x: float
+    height: float
+    thickness: float = 1.0
+    kind: str = "wall"
+
+
+class _LayoutFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    barriers: tuple[Wall, ...] = ()

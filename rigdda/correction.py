@@ -20,12 +20,12 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
     The exact displacement function (equation 1), which replaces the linear one of the solve: the
     post-correction. Corners come from the angle and body coordinates, so area is kept exactly.
     """
-    cos, sin = math.cos(bodies.theta[i]), math.sin(bodies.theta[i])
-    n = bodies.count[i]
+    cos, sin = math.cos(bodies[i].theta), math.sin(bodies[i].theta)
+    n = bodies[i].count
     for k in range(n):
         x, y = outlines.body_x[i, k], outlines.body_y[i, k]
-        outlines.world_x[i, k] = bodies.x[i] + cos * x - sin * y
-        outlines.world_y[i, k] = bodies.y[i] + sin * x + cos * y
+        outlines.world_x[i, k] = bodies[i].x + cos * x - sin * y
+        outlines.world_y[i, k] = bodies[i].y + sin * x + cos * y
     for k in range(n):
         end = k + 1 if k + 1 < n else 0
         ex = outlines.world_x[i, end] - outlines.world_x[i, k]
@@ -41,9 +41,9 @@ def mean_impact_share(c: Contacts, work: Work, low: int, high: int) -> float:
     weight = total = 0.0
     for item in range(low, high):
         k = work.contact_item[item]
-        if c.kind[k] == IMPACT:
-            weight += c.normal[k]
-            total += c.normal[k] * c.share[k]
+        if c[k].kind == IMPACT:
+            weight += c[k].normal
+            total += c[k].normal * c[k].share
     return total / weight if weight > 0.0 else 0.5
 
 
@@ -65,32 +65,32 @@ def apply_forces(
     shared = mean_impact_share(c, work, c0, c1)
     for item in range(c0, c1):
         k = work.contact_item[item]
-        if c.state[k] == OPEN:
+        if c[k].state == OPEN:
             continue
-        share = c.share[k] if c.kind[k] == IMPACT else shared
-        late_normal = (share - 0.5) * (c.normal[k] - c.memory_normal[k])
-        late_shear = (share - 0.5) * (c.shear[k] - c.memory_shear[k])
-        i = work.slot[c.a[k]]
+        share = c[k].share if c[k].kind == IMPACT else shared
+        late_normal = (share - 0.5) * (c[k].normal - c[k].memory_normal)
+        late_shear = (share - 0.5) * (c[k].shear - c[k].memory_shear)
+        i = work.slot[c[k].a]
         en, es = normal_row(c, k, True), shear_row(c, k, True)
-        add_force(m.rhs[i], c.normal[k], en)
-        add_force(m.rhs[i], c.shear[k], es)
+        add_force(m.rhs[i], c[k].normal, en)
+        add_force(m.rhs[i], c[k].shear, es)
         add_force(m.residual[i], late_normal, en)
         add_force(m.residual[i], late_shear, es)
-        if c.pair[k] >= 0:
-            j = work.slot[c.b[k]]
+        if c[k].pair >= 0:
+            j = work.slot[c[k].b]
             en, es = normal_row(c, k, False), shear_row(c, k, False)
-            add_force(m.rhs[j], c.normal[k], en)
-            add_force(m.rhs[j], c.shear[k], es)
+            add_force(m.rhs[j], c[k].normal, en)
+            add_force(m.rhs[j], c[k].shear, es)
             add_force(m.residual[j], late_normal, en)
             add_force(m.residual[j], late_shear, es)
     for s in range(b1 - b0):
         i = work.block_item[b0 + s]
         for j in range(3):
             m.d[s, j] = m.rhs[s, j] / m.diagonal[s, j, j]
-        late = p.dt * p.dt / bodies.mass[i]
+        late = p.dt * p.dt / bodies[i].mass
         m.residual[s, 0] *= late
         m.residual[s, 1] *= late
-        m.residual[s, 2] *= p.dt * p.dt / bodies.inertia[i]
+        m.residual[s, 2] *= p.dt * p.dt / bodies[i].inertia
 
 
 @kernel
@@ -102,26 +102,26 @@ def account(
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     for s in range(b1 - b0):
         i = work.block_item[b0 + s]
-        drag = damping_of_step(m, s, bodies.mass[i], p)
+        drag = damping_of_step(m, s, bodies[i].mass, p)
         slow = m.d[s, 0] ** 2 + m.d[s, 1] ** 2
-        slow = bodies.mass[i] * slow + bodies.inertia[i] * m.d[s, 2] ** 2
+        slow = bodies[i].mass * slow + bodies[i].inertia * m.d[s, 2] ** 2
         ledger[2] -= drag * slow / p.dt
-        ledger[3] -= bodies.mass[i] * p.gravity * (m.d[s, 1] + m.residual[s, 1])
+        ledger[3] -= bodies[i].mass * p.gravity * (m.d[s, 1] + m.residual[s, 1])
     for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
-        if c.state[k] == OPEN:
+        if c[k].state == OPEN:
             continue
-        i = work.slot[c.a[k]]
+        i = work.slot[c[k].a]
         dn = along(normal_row(c, k, True), m.d[i])
         ds = along(shear_row(c, k, True), m.d[i])
-        if c.pair[k] >= 0:
-            j = work.slot[c.b[k]]
+        if c[k].pair >= 0:
+            j = work.slot[c[k].b]
             dn += along(normal_row(c, k, False), m.d[j])
             ds += along(shear_row(c, k, False), m.d[j])
-        ledger[0] += c.shear[k] * ds
-        ledger[1] += c.normal[k] * dn
-        if c.b[k] >= p.blocks:
-            gauges.absorbed[c.b[k] - p.blocks] -= c.normal[k] * dn + c.shear[k] * ds
+        ledger[0] += c[k].shear * ds
+        ledger[1] += c[k].normal * dn
+        if c[k].b >= p.blocks:
+            gauges.absorbed[c[k].b - p.blocks] -= c[k].normal * dn + c[k].shear * ds
 
 
 @kernel
@@ -133,18 +133,18 @@ def damping_of_step(m: Matrix, s: int, mass: float, p: Parameters) -> float:
 @kernel
 def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
     """Move block i by its displacement; the velocity is that of constant acceleration."""
-    bodies.vx[i] = 2.0 * m.d[s, 0] / dt - bodies.vx[i]
-    bodies.vy[i] = 2.0 * m.d[s, 1] / dt - bodies.vy[i]
-    bodies.omega[i] = 2.0 * m.d[s, 2] / dt - bodies.omega[i]
-    bodies.x[i] += m.d[s, 0] + m.residual[s, 0]
-    bodies.y[i] += m.d[s, 1] + m.residual[s, 1]
-    bodies.theta[i] += m.d[s, 2] + m.residual[s, 2]
+    bodies[i].vx = 2.0 * m.d[s, 0] / dt - bodies[i].vx
+    bodies[i].vy = 2.0 * m.d[s, 1] / dt - bodies[i].vy
+    bodies[i].omega = 2.0 * m.d[s, 2] / dt - bodies[i].omega
+    bodies[i].x += m.d[s, 0] + m.residual[s, 0]
+    bodies[i].y += m.d[s, 1] + m.residual[s, 1]
+    bodies[i].theta += m.d[s, 2] + m.residual[s, 2]
 
 
 @kernel
 def keep_memory(c: Contacts, k: int) -> None:
     """Carry the forces of contact k to the next step; an impulse is not carried on."""
-    if c.state[k] == OPEN:
-        c.memory_normal[k] = c.memory_shear[k] = 0.0
-    elif c.kind[k] == REST or c.kind[k] == NEW:
-        c.memory_normal[k], c.memory_shear[k] = c.normal[k], c.shear[k]
+    if c[k].state == OPEN:
+        c[k].memory_normal = c[k].memory_shear = 0.0
+    elif c[k].kind == REST or c[k].kind == NEW:
+        c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear

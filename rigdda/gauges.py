@@ -22,7 +22,7 @@ def write_event(
     event = gauges.event[n]
     event.time, event.kind, event.block, event.target = time, kind, i, target
     event.x, event.y, event.height = x, y, height
-    event.speed = math.hypot(bodies.vx[i], bodies.vy[i])
+    event.speed = math.hypot(bodies[i].vx, bodies[i].vy)
     event.energy = kinetic_energy(bodies, i)
     return n + 1
 
@@ -35,14 +35,14 @@ def note_hits(
     """Write a hit for each barrier that a block touches anew; velocities still those before."""
     for item in range(low, high):
         k = work.contact_item[item]
-        barrier = c.b[k] - p.blocks
-        if barrier < 0 or c.state[k] == OPEN:
+        barrier = c[k].b - p.blocks
+        if barrier < 0 or c[k].state == OPEN:
             continue
-        i = c.a[k]
+        i = c[k].a
         if time - gauges.last_touch[i, barrier] > NEW_HIT_TIME:
-            height = c.y[k] - gauges.barrier_ground[barrier]
+            height = c[k].y - gauges.barrier_ground[barrier]
             events = write_event(
-                gauges, events, time, HIT, bodies, i, barrier, c.x[k], c.y[k], height
+                gauges, events, time, HIT, bodies, i, barrier, c[k].x, c[k].y, height
             )
         gauges.last_touch[i, barrier] = time
     return events
@@ -53,13 +53,13 @@ def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float, p: Pa
     """Write a crossing for each station that a centroid first passes; watch energies."""
     stations = len(gauges.station)
     for i in range(p.blocks):
-        x = bodies.x[i]
+        x = bodies[i].x
         if gauges.watch[0] <= x <= gauges.watch[1]:
             gauges.watch_energy[i] = max(gauges.watch_energy[i], kinetic_energy(bodies, i))
         while gauges.next_station[i] < stations and x >= gauges.station[gauges.next_station[i]]:
             s = gauges.next_station[i]
             events = write_event(
-                gauges, events, time, CROSSING, bodies, i, s, x, bodies.y[i], 0.0
+                gauges, events, time, CROSSING, bodies, i, s, x, bodies[i].y, 0.0
             )
             gauges.next_station[i] += 1
     return events

@@ -24,7 +24,7 @@ def root(parent: NDArray, i: int) -> int:
 @kernel
 def joins(bodies: Bodies, c: Contacts, k: int) -> bool:
     """Return whether contact k couples two bodies with unknowns."""
-    return c.b[k] >= 0 and bodies.status[c.a[k]] == AWAKE and bodies.status[c.b[k]] == AWAKE
+    return c[k].b >= 0 and bodies[c[k].a].status == AWAKE and bodies[c[k].b].status == AWAKE
 
 
 @kernel
@@ -41,7 +41,7 @@ def find_islands(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: in
         parent[i] = i
     for k in range(count):
         if joins(bodies, c, k):
-            i, j = root(parent, c.a[k]), root(parent, c.b[k])
+            i, j = root(parent, c[k].a), root(parent, c[k].b)
             if i != j:
                 parent[max(i, j)] = min(i, j)
     islands = 0
@@ -49,15 +49,15 @@ def find_islands(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: in
         work.block_start[s] = work.contact_start[s] = 0
     # slot serves first as the number of the root's island
     for i in range(blocks):
-        if bodies.status[i] == AWAKE and root(parent, i) == i:
+        if bodies[i].status == AWAKE and root(parent, i) == i:
             slot[i] = islands
             islands += 1
     for i in range(blocks):
-        if bodies.status[i] == AWAKE:
+        if bodies[i].status == AWAKE:
             work.block_start[slot[root(parent, i)] + 1] += 1
     for k in range(count):
-        if bodies.status[c.a[k]] == AWAKE:
-            work.contact_start[slot[root(parent, c.a[k])] + 1] += 1
+        if bodies[c[k].a].status == AWAKE:
+            work.contact_start[slot[root(parent, c[k].a)] + 1] += 1
     for s in range(islands):
         work.block_start[s + 1] += work.block_start[s]
         work.contact_start[s + 1] += work.contact_start[s]
@@ -72,15 +72,15 @@ def _fill(
     """Write the items of each island in ascending order, then the slots of the blocks."""
     parent, slot = work.parent, work.slot
     for k in range(count):
-        if bodies.status[c.a[k]] == AWAKE:
-            s = slot[root(parent, c.a[k])]
+        if bodies[c[k].a].status == AWAKE:
+            s = slot[root(parent, c[k].a)]
             work.contact_item[work.contact_start[s]] = k
             work.contact_start[s] += 1
     for s in range(islands, 0, -1):
         work.contact_start[s] = work.contact_start[s - 1]
     work.contact_start[0] = 0
     for i in range(blocks):
-        if bodies.status[i] == AWAKE:
+        if bodies[i].status == AWAKE:
             s = slot[root(parent, i)]
             work.block_item[work.block_start[s]] = i
             work.block_start[s] += 1
@@ -104,12 +104,12 @@ def pair_blocks(bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, hi
     pairs, last_a, last_b = 0, -1, -1
     for item in range(low, high):
         k = work.contact_item[item]
-        c.pair[k] = -1
+        c[k].pair = -1
         if not joins(bodies, c, k):
             continue
-        if c.a[k] != last_a or c.b[k] != last_b:
-            last_a, last_b = c.a[k], c.b[k]
+        if c[k].a != last_a or c[k].b != last_b:
+            last_a, last_b = c[k].a, c[k].b
             m.pair_i[pairs], m.pair_j[pairs] = work.slot[last_a], work.slot[last_b]
             pairs += 1
-        c.pair[k] = pairs - 1
+        c[k].pair = pairs - 1
     return pairs

@@ -40,7 +40,7 @@ def cache_directory() -> Path:
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that other kernels call; without fast-math, so that NaN checks hold."""
-    return numba.njit(nogil=True, error_model="numpy")(function)
+    return numba.njit(nogil=True, error_model="numpy", _nrt=False)(function)
 
 
 def entry_kernel(function: Callable[..., Any]) -> Any:
@@ -48,6 +48,6 @@ def entry_kernel(function: Callable[..., Any]) -> Any:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_directory())
     try:
-        return numba.njit(nogil=True, cache=True, error_model="numpy")(function)
+        return numba.njit(nogil=True, cache=True, error_model="numpy", _nrt=False)(function)
     finally:
         config.CACHE_DIR = before

@@ -11,12 +11,12 @@ from rigdda.records import Bodies
 @kernel
 def top_speed(bodies: Bodies, i: int) -> float:
     """Return a bound on the speed of any point of body i [m/s]."""
-    spin = abs(bodies.omega[i]) * bodies.radius[i]
-    return math.hypot(bodies.vx[i], bodies.vy[i]) + spin
+    spin = abs(bodies[i].omega) * bodies[i].radius
+    return math.hypot(bodies[i].vx, bodies[i].vy) + spin
 
 
 @kernel
 def kinetic_energy(bodies: Bodies, i: int) -> float:
     """Return the energy of translation and rotation of body i [J]."""
-    speed = bodies.vx[i] ** 2 + bodies.vy[i] ** 2
-    return 0.5 * bodies.mass[i] * speed + 0.5 * bodies.inertia[i] * bodies.omega[i] ** 2
+    speed = bodies[i].vx ** 2 + bodies[i].vy ** 2
+    return 0.5 * bodies[i].mass * speed + 0.5 * bodies[i].inertia * bodies[i].omega ** 2

@@ -42,7 +42,7 @@ NONE, MOVED, LOCKED = 0, 1, 2
 @kernel
 def damping_of(bodies: Bodies, i: int, p: Parameters) -> float:
     """Return the damping coefficient of block i in this step [1/s]."""
-    if p.damping_in_contact_only and bodies.touching[i] == 0:
+    if p.damping_in_contact_only and bodies[i].touching == 0:
         return 0.0
     return p.damping
 
@@ -55,17 +55,17 @@ def assemble_blocks(
     for place in range(low, high):
         i, s = work.block_item[place], place - low
         alpha = damping_of(bodies, i, p)
-        inertia = inertia_stiffness(bodies.inertia[i], alpha, p.dt)
-        mass = inertia_stiffness(bodies.mass[i], alpha, p.dt)
+        inertia = inertia_stiffness(bodies[i].inertia, alpha, p.dt)
+        mass = inertia_stiffness(bodies[i].mass, alpha, p.dt)
         for a in range(3):
             for b in range(3):
                 m.diagonal[s, a, b] = 0.0
         m.diagonal[s, 0, 0] = m.diagonal[s, 1, 1] = mass
         m.diagonal[s, 2, 2] = inertia
-        m.rhs[s, 0] = inertia_force(bodies.mass[i], bodies.vx[i], p.dt)
-        m.rhs[s, 1] = inertia_force(bodies.mass[i], bodies.vy[i], p.dt)
-        m.rhs[s, 1] -= bodies.mass[i] * p.gravity
-        m.rhs[s, 2] = inertia_force(bodies.inertia[i], bodies.omega[i], p.dt)
+        m.rhs[s, 0] = inertia_force(bodies[i].mass, bodies[i].vx, p.dt)
+        m.rhs[s, 1] = inertia_force(bodies[i].mass, bodies[i].vy, p.dt)
+        m.rhs[s, 1] -= bodies[i].mass * p.gravity
+        m.rhs[s, 2] = inertia_force(bodies[i].inertia, bodies[i].omega, p.dt)
 
 
 @kernel
@@ -78,34 +78,34 @@ def assemble_contact(
     force kappa (b + dt u_0). The friction of a slipping contact is a force; `coupled` takes it
     from the unknown normal force, which makes the matrix unsymmetric.
     """
-    stiffness = 2.0 * c.kappa[k]
-    normal = c.kappa[k] * (c.bias[k] + dt * c.un[k])
-    shear = c.memory_shear[k] + c.kappa[k] * dt * c.us[k]
+    stiffness = 2.0 * c[k].kappa
+    normal = c[k].kappa * (c[k].bias + dt * c[k].un)
+    shear = c[k].memory_shear + c[k].kappa * dt * c[k].us
     en, es = normal_row(c, k, True), shear_row(c, k, True)
     add_block(m.diagonal[i], stiffness, en, en)
     add_force(m.rhs[i], normal, en)
-    stick = c.state[k] == STICK
+    stick = c[k].state == STICK
     if stick:
         add_block(m.diagonal[i], stiffness, es, es)
         add_force(m.rhs[i], shear, es)
     elif coupled:
-        ratio = math.copysign(c.friction[k], c.lag[k])
+        ratio = math.copysign(c[k].friction, c[k].lag)
         add_block(m.diagonal[i], stiffness * ratio, es, en)
         add_force(m.rhs[i], normal * ratio, es)
     else:
-        add_force(m.rhs[i], c.lag[k], es)
+        add_force(m.rhs[i], c[k].lag, es)
     if j < 0:
         return
     fn, fs = normal_row(c, k, False), shear_row(c, k, False)
     add_block(m.diagonal[j], stiffness, fn, fn)
-    add_block(m.off[c.pair[k]], stiffness, en, fn)
+    add_block(m.off[c[k].pair], stiffness, en, fn)
     add_force(m.rhs[j], normal, fn)
     if stick:
         add_block(m.diagonal[j], stiffness, fs, fs)
-        add_block(m.off[c.pair[k]], stiffness, es, fs)
+        add_block(m.off[c[k].pair], stiffness, es, fs)
         add_force(m.rhs[j], shear, fs)
     else:
-        add_force(m.rhs[j], c.lag[k], fs)
+        add_force(m.rhs[j], c[k].lag, fs)
 
 
 @kernel
@@ -118,9 +118,9 @@ def spring_forces(
     if j >= 0:
         dn += along(normal_row(c, k, False), m.d[j])
         ds += along(shear_row(c, k, False), m.d[j])
-    after = 2.0 * dn / dt - c.un[k]
-    normal = c.kappa[k] * (c.bias[k] - dt * after)
-    shear = c.memory_shear[k] - c.kappa[k] * (2.0 * ds - dt * c.us[k])
+    after = 2.0 * dn / dt - c[k].un
+    normal = c[k].kappa * (c[k].bias - dt * after)
+    shear = c[k].memory_shear - c[k].kappa * (2.0 * ds - dt * c[k].us)
     return normal, shear, after
 
 
@@ -130,33 +130,33 @@ def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) 
 
     A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
     """
-    state = c.state[k]
+    state = c[k].state
     tension = -OPENING_TOLERANCE * weight
     if state == OPEN:
         if normal <= -tension:
             return NONE
-        if c.flips[k] >= FLIPS:
+        if c[k].flips >= FLIPS:
             return LOCKED
-        c.state[k] = STICK
+        c[k].state = STICK
         return MOVED
     if normal < tension:
-        c.state[k] = OPEN
-        c.flips[k] += 1
+        c[k].state = OPEN
+        c[k].flips += 1
         return MOVED
-    c.normal[k] = max(normal, 0.0)
-    limit = c.friction[k] * c.normal[k]
-    c.shear[k] = min(max(shear, -limit), limit)
+    c[k].normal = max(normal, 0.0)
+    limit = c[k].friction * c[k].normal
+    c[k].shear = min(max(shear, -limit), limit)
     if abs(shear) <= limit:
         if state == STICK:
             return NONE
-        if c.flips[k] >= FLIPS:
+        if c[k].flips >= FLIPS:
             return LOCKED
-        c.state[k] = STICK
-        c.flips[k] += 1
+        c[k].state = STICK
+        c[k].flips += 1
         return MOVED
-    change = abs(c.shear[k] - c.lag[k]) if state == SLIP else math.inf
-    c.state[k] = SLIP
-    c.lag[k] = c.shear[k]
+    change = abs(c[k].shear - c[k].lag) if state == SLIP else math.inf
+    c[k].state = SLIP
+    c[k].lag = c[k].shear
     return MOVED if change > FRICTION_TOLERANCE * (limit - tension) else NONE
 
 
@@ -168,14 +168,14 @@ def update_states(
     moved = locked = 0
     for item in range(low, high):
         k = work.contact_item[item]
-        i = work.slot[c.a[k]]
-        j = work.slot[c.b[k]] if c.pair[k] >= 0 else -1
+        i = work.slot[c[k].a]
+        j = work.slot[c[k].b] if c[k].pair >= 0 else -1
         normal, shear, after = spring_forces(c, k, m, i, j, p.dt)
-        if c.state[k] != OPEN and c.kind[k] == REST and after < -SHOCK_SPEED:
+        if c[k].state != OPEN and c[k].kind == REST and after < -SHOCK_SPEED:
             set_shock(bodies, c, k, p)
             moved += 1
             continue
-        change = next_state(c, k, normal, shear, bodies.mass[c.a[k]] * p.gravity)
+        change = next_state(c, k, normal, shear, bodies[c[k].a].mass * p.gravity)
         moved += change == MOVED
         locked += change == LOCKED
     return moved, locked
@@ -195,8 +195,8 @@ def solve_states(
     n = b1 - b0
     for s in range(n):
         i = work.block_item[b0 + s]
-        m.d[s, 0], m.d[s, 1] = bodies.vx[i] * p.dt, bodies.vy[i] * p.dt
-        m.d[s, 2] = bodies.omega[i] * p.dt
+        m.d[s, 0], m.d[s, 1] = bodies[i].vx * p.dt, bodies[i].vy * p.dt
+        m.d[s, 2] = bodies[i].omega * p.dt
     before = c1 - c0
     for iteration in range(p.iterations):
         assemble_island(bodies, c, m, work, island, pairs, p)
@@ -228,11 +228,11 @@ def assemble_island(
                 m.off[q, a, b] = 0.0
     for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
-        if c.state[k] == OPEN:
-            c.normal[k] = c.shear[k] = 0.0
+        if c[k].state == OPEN:
+            c[k].normal = c[k].shear = 0.0
         else:
-            j = work.slot[c.b[k]] if c.pair[k] >= 0 else -1
-            assemble_contact(c, k, m, work.slot[c.a[k]], j, p.dt, b1 - b0 == 1)
+            j = work.slot[c[k].b] if c[k].pair >= 0 else -1
+            assemble_contact(c, k, m, work.slot[c[k].a], j, p.dt, b1 - b0 == 1)
 
 
 @kernel
@@ -247,8 +247,8 @@ def relax(
     counters[8] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt)
     for item in range(c0, c1):
         k = work.contact_item[item]
-        within = c.friction[k] * c.normal[k] > abs(c.shear[k])
-        c.state[k] = OPEN if c.normal[k] == 0.0 else (STICK if within else SLIP)
+        within = c[k].friction * c[k].normal > abs(c[k].shear)
+        c[k].state = OPEN if c[k].normal == 0.0 else (STICK if within else SLIP)
 
 
 @kernel
@@ -257,14 +257,14 @@ def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int, dt: flo
     total = 0.0
     for item in range(low, high):
         k = work.contact_item[item]
-        i = work.slot[c.a[k]]
-        j = work.slot[c.b[k]] if c.pair[k] >= 0 else -1
+        i = work.slot[c[k].a]
+        j = work.slot[c[k].b] if c[k].pair >= 0 else -1
         dn = along(normal_row(c, k, True), m.d[i])
         ds = along(shear_row(c, k, True), m.d[i])
         if j >= 0:
             dn += along(normal_row(c, k, False), m.d[j])
             ds += along(shear_row(c, k, False), m.d[j])
-        total += c.normal[k] * dn + c.shear[k] * ds
+        total += c[k].normal * dn + c[k].shear * ds
     return total
 
 
@@ -281,7 +281,7 @@ def open_close(
     bouncing = False
     for item in range(c0, c1):
         k = work.contact_item[item]
-        bouncing = bouncing or (c.kind[k] == IMPACT and c.bias[k] > 0.0)
+        bouncing = bouncing or (c[k].kind == IMPACT and c[k].bias > 0.0)
     pairs = pair_blocks(bodies, c, m, work, c0, c1)
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     moving = False
@@ -295,10 +295,10 @@ def open_close(
     while bouncing and impact_work(c, m, work, c0, c1, p.dt) > 0.0 and halving <= ENERGY_HALVINGS:
         for item in range(c0, c1):
             k = work.contact_item[item]
-            c.flips[k] = 0
-            if c.kind[k] == IMPACT:
-                c.bias[k] *= 0.5 if halving < ENERGY_HALVINGS else 0.0
-                c.state[k] = STICK
+            c[k].flips = 0
+            if c[k].kind == IMPACT:
+                c[k].bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0
+                c[k].state = STICK
         settled = solve_states(bodies, c, m, work, island, pairs, p, counters)
         halving += 1
     if not settled:

@@ -14,13 +14,13 @@ def wake_neighbours(bodies: Bodies, work: Work, pairs: int, blocks: int) -> int:
     woken = 0
     for q in range(pairs):
         i, j = work.pairs[2 * q], work.pairs[2 * q + 1]
-        if bodies.status[j] != ASLEEP or top_speed(bodies, i) < WAKE_SPEED:
+        if bodies[j].status != ASLEEP or top_speed(bodies, i) < WAKE_SPEED:
             continue
-        island = bodies.island[j]
+        island = bodies[j].island
         for k in range(blocks):
-            if bodies.status[k] == ASLEEP and bodies.island[k] == island:
-                bodies.status[k] = AWAKE
-                bodies.quiet[k] = 0.0
+            if bodies[k].status == ASLEEP and bodies[k].island == island:
+                bodies[k].status = AWAKE
+                bodies[k].quiet = 0.0
                 woken += 1
     return woken
 
@@ -32,13 +32,13 @@ def watch_quiet(bodies: Bodies, work: Work, islands: int, p: Parameters) -> None
         least = 1e300
         for place in range(work.block_start[s], work.block_start[s + 1]):
             i = work.block_item[place]
-            quiet = bodies.touching[i] == 1 and top_speed(bodies, i) < SLEEP_SPEED
-            bodies.quiet[i] = bodies.quiet[i] + p.dt if quiet else 0.0
-            least = min(least, bodies.quiet[i])
+            quiet = bodies[i].touching == 1 and top_speed(bodies, i) < SLEEP_SPEED
+            bodies[i].quiet = bodies[i].quiet + p.dt if quiet else 0.0
+            least = min(least, bodies[i].quiet)
         if least < SLEEP_TIME:
             continue
         for place in range(work.block_start[s], work.block_start[s + 1]):
             i = work.block_item[place]
-            bodies.status[i] = ASLEEP
-            bodies.island[i] = work.block_item[work.block_start[s]]
-            bodies.vx[i] = bodies.vy[i] = bodies.omega[i] = 0.0
+            bodies[i].status = ASLEEP
+            bodies[i].island = work.block_item[work.block_start[s]]
+            bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0

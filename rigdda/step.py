@@ -77,16 +77,16 @@ def detect(
     for a in range(p.blocks):
         if count > room:
             return -1
-        if bodies.status[a] == ASLEEP:
+        if bodies[a].status == ASLEEP:
             for m in range(work.first[a], work.first[a + 1]):
                 if count > room:
                     return -1
-                if old.b[m] == TERRAIN or bodies.status[old.b[m]] != AWAKE:
+                if old[m].b == TERRAIN or bodies[old[m].b].status != AWAKE:
                     copy_contact(c, count, old, m)
                     count += 1
-                    if old.b[m] >= p.blocks:
-                        gauges.last_touch[a, old.b[m] - p.blocks] = time
-        elif bodies.status[a] == AWAKE:
+                    if old[m].b >= p.blocks:
+                        gauges.last_touch[a, old[m].b - p.blocks] = time
+        elif bodies[a].status == AWAKE:
             first = count
             count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
             while q < pairs and work.pairs[2 * q] == a:
@@ -117,19 +117,19 @@ def solve_and_move(
         account(bodies, c, m, work, s, p, ledger, gauges)
         for place in range(work.block_start[s], work.block_start[s + 1]):
             i = work.block_item[place]
-            bodies.touching[i] = 0
+            bodies[i].touching = 0
             move_block(bodies, i, m, place - work.block_start[s], p.dt)
             if not top_speed(bodies, i) < SPEED_LIMIT:
                 bad = i
-            elif bodies.y[i] < p.floor:
-                bodies.status[i] = RETIRED
+            elif bodies[i].y < p.floor:
+                bodies[i].status = RETIRED
             place_corners(bodies, outlines, i)
     for k in range(count):
-        if c.state[k] != OPEN:
-            bodies.touching[c.a[k]] = 1
-            if c.b[k] >= 0:
-                bodies.touching[c.b[k]] = 1
-        if bodies.status[c.a[k]] == AWAKE:
+        if c[k].state != OPEN:
+            bodies[c[k].a].touching = 1
+            if c[k].b >= 0:
+                bodies[c[k].b].touching = 1
+        if bodies[c[k].a].status == AWAKE:
             keep_memory(c, k)
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
@@ -171,7 +171,7 @@ def advance(
         counters[5] = count
         counters[7] += count
         for k in range(count):
-            deepest[0] = max(deepest[0], -now.gap[k])
+            deepest[0] = max(deepest[0], -now[k].gap)
         bad = solve_and_move(bodies, outlines, now, count, m, work, gauges, time, p, counters, ledger)
         counters[6] = note_passage(bodies, gauges, counters[6], time, p)
         counters[0] += 1

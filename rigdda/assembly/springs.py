@@ -16,16 +16,16 @@ from rigdda.records import Contacts
 def normal_row(c: Contacts, k: int, of_a: bool) -> tuple[float, float, float]:
     """Return e along the normal of contact k for its body a, or b."""
     if of_a:
-        return c.nx[k], c.ny[k], c.ra_x[k] * c.ny[k] - c.ra_y[k] * c.nx[k]
-    return -c.nx[k], -c.ny[k], -(c.rb_x[k] * c.ny[k] - c.rb_y[k] * c.nx[k])
+        return c[k].nx, c[k].ny, c[k].ra_x * c[k].ny - c[k].ra_y * c[k].nx
+    return -c[k].nx, -c[k].ny, -(c[k].rb_x * c[k].ny - c[k].rb_y * c[k].nx)
 
 
 @kernel
 def shear_row(c: Contacts, k: int, of_a: bool) -> tuple[float, float, float]:
     """Return e along the normal turned by +90 degrees for body a, or b."""
     if of_a:
-        return -c.ny[k], c.nx[k], c.ra_x[k] * c.nx[k] + c.ra_y[k] * c.ny[k]
-    return c.ny[k], -c.nx[k], -(c.rb_x[k] * c.nx[k] + c.rb_y[k] * c.ny[k])
+        return -c[k].ny, c[k].nx, c[k].ra_x * c[k].nx + c[k].ra_y * c[k].ny
+    return c[k].ny, -c[k].nx, -(c[k].rb_x * c[k].nx + c[k].rb_y * c[k].ny)
 
 
 @kernel

@@ -11,7 +11,7 @@ from rigdda.records import Bodies, Outlines, Parameters, Work
 def sweep_boxes(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -> None:
     """Set the box of each body that holds it over the whole step, with slack."""
     for i in range(len(bodies)):
-        n = bodies.count[i]
+        n = bodies[i].count
         low_x = high_x = outlines.world_x[i, 0]
         low_y = high_y = outlines.world_y[i, 0]
         for k in range(1, n):
@@ -21,9 +21,9 @@ def sweep_boxes(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -
             high_y = max(high_y, outlines.world_y[i, k])
         grow = p.slack
         dx = dy = 0.0
-        if bodies.status[i] == AWAKE:
-            grow += abs(bodies.omega[i]) * bodies.radius[i] * p.dt + p.gravity * p.dt * p.dt
-            dx, dy = bodies.vx[i] * p.dt, bodies.vy[i] * p.dt
+        if bodies[i].status == AWAKE:
+            grow += abs(bodies[i].omega) * bodies[i].radius * p.dt + p.gravity * p.dt * p.dt
+            dx, dy = bodies[i].vx * p.dt, bodies[i].vy * p.dt
         work.low_x[i] = low_x - grow + min(dx, 0.0)
         work.high_x[i] = high_x + grow + max(dx, 0.0)
         work.low_y[i] = low_y - grow + min(dy, 0.0)
@@ -58,14 +58,14 @@ def overlapping_pairs(bodies: Bodies, work: Work) -> int:
     room = len(work.pairs) // 2
     for k in range(len(order)):
         i = order[k]
-        status_i = bodies.status[i]
+        status_i = bodies[i].status
         if status_i == RETIRED:
             continue
         for m in range(k + 1, len(order)):
             j = order[m]
             if work.low_x[j] > work.high_x[i]:
                 break
-            status_j = bodies.status[j]
+            status_j = bodies[j].status
             if status_j == RETIRED or (status_i != AWAKE and status_j != AWAKE):
                 continue
             if work.low_y[j] > work.high_y[i] or work.low_y[i] > work.high_y[j]:

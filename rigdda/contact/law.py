@@ -61,50 +61,50 @@ def rest_stiffness(
 @kernel
 def effective_mass(bodies: Bodies, c: Contacts, k: int) -> float:
     """Return the mass [kg] that resists a normal impulse at contact k."""
-    a, b = c.a[k], c.b[k]
-    arm = c.ra_x[k] * c.ny[k] - c.ra_y[k] * c.nx[k]
-    inverse = 1.0 / bodies.mass[a] + arm * arm / bodies.inertia[a]
-    if b >= 0 and bodies.status[b] == AWAKE:
-        arm = c.rb_x[k] * c.ny[k] - c.rb_y[k] * c.nx[k]
-        inverse += 1.0 / bodies.mass[b] + arm * arm / bodies.inertia[b]
+    a, b = c[k].a, c[k].b
+    arm = c[k].ra_x * c[k].ny - c[k].ra_y * c[k].nx
+    inverse = 1.0 / bodies[a].mass + arm * arm / bodies[a].inertia
+    if b >= 0 and bodies[b].status == AWAKE:
+        arm = c[k].rb_x * c[k].ny - c[k].rb_y * c[k].nx
+        inverse += 1.0 / bodies[b].mass + arm * arm / bodies[b].inertia
     return 1.0 / inverse
 
 
 @kernel
 def point_velocity(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
     """Return the velocity [m/s] of the point (x, y) of body i; fixed and sleeping bodies rest."""
-    if i < 0 or bodies.status[i] != AWAKE:
+    if i < 0 or bodies[i].status != AWAKE:
         return 0.0, 0.0
-    vx = bodies.vx[i] - bodies.omega[i] * (y - bodies.y[i])
-    vy = bodies.vy[i] + bodies.omega[i] * (x - bodies.x[i])
+    vx = bodies[i].vx - bodies[i].omega * (y - bodies[i].y)
+    vy = bodies[i].vy + bodies[i].omega * (x - bodies[i].x)
     return vx, vy
 
 
 @kernel
 def set_arms(bodies: Bodies, c: Contacts, k: int, time: float) -> None:
     """Set the arms where the bodies will be after `time` [s]; so angular momentum is kept."""
-    a, b = c.a[k], c.b[k]
-    vx, vy = point_velocity(bodies, a if c.owner[k] == 1 else b, c.x[k], c.y[k])
-    x, y = c.x[k] + time * vx, c.y[k] + time * vy
-    c.ra_x[k] = x - bodies.x[a] - time * bodies.vx[a]
-    c.ra_y[k] = y - bodies.y[a] - time * bodies.vy[a]
+    a, b = c[k].a, c[k].b
+    vx, vy = point_velocity(bodies, a if c[k].owner == 1 else b, c[k].x, c[k].y)
+    x, y = c[k].x + time * vx, c[k].y + time * vy
+    c[k].ra_x = x - bodies[a].x - time * bodies[a].vx
+    c[k].ra_y = y - bodies[a].y - time * bodies[a].vy
     if b >= 0:
-        moving = 1.0 if bodies.status[b] == AWAKE else 0.0
-        c.rb_x[k] = x - bodies.x[b] - time * bodies.vx[b] * moving
-        c.rb_y[k] = y - bodies.y[b] - time * bodies.vy[b] * moving
+        moving = 1.0 if bodies[b].status == AWAKE else 0.0
+        c[k].rb_x = x - bodies[b].x - time * bodies[b].vx * moving
+        c[k].rb_y = y - bodies[b].y - time * bodies[b].vy * moving
 
 
 @kernel
 def set_velocities(bodies: Bodies, c: Contacts, k: int) -> None:
     """Set the normal and shear relative velocities at the start of the step."""
-    a, b = c.a[k], c.b[k]
-    vx = bodies.vx[a] - bodies.omega[a] * c.ra_y[k]
-    vy = bodies.vy[a] + bodies.omega[a] * c.ra_x[k]
-    if b >= 0 and bodies.status[b] == AWAKE:
-        vx -= bodies.vx[b] - bodies.omega[b] * c.rb_y[k]
-        vy -= bodies.vy[b] + bodies.omega[b] * c.rb_x[k]
-    c.un[k] = c.nx[k] * vx + c.ny[k] * vy
-    c.us[k] = -c.ny[k] * vx + c.nx[k] * vy
+    a, b = c[k].a, c[k].b
+    vx = bodies[a].vx - bodies[a].omega * c[k].ra_y
+    vy = bodies[a].vy + bodies[a].omega * c[k].ra_x
+    if b >= 0 and bodies[b].status == AWAKE:
+        vx -= bodies[b].vx - bodies[b].omega * c[k].rb_y
+        vy -= bodies[b].vy + bodies[b].omega * c[k].rb_x
+    c[k].un = c[k].nx * vx + c[k].ny * vy
+    c[k].us = -c[k].ny * vx + c[k].nx * vy
 
 
 @kernel
@@ -116,18 +116,18 @@ def impact_stiffness(mass: float, dt: float) -> float:
 @kernel
 def set_impact(c: Contacts, k: int, closing: float, mass: float, p: Parameters) -> None:
     """Make contact k an impact with closing speed `closing` [m/s]."""
-    c.kind[k] = IMPACT
-    c.kappa[k] = impact_stiffness(mass, p.dt)
-    c.bias[k] = p.dt * c.restitution[k] * closing
-    c.memory_normal[k] = c.memory_shear[k] = 0.0
+    c[k].kind = IMPACT
+    c[k].kappa = impact_stiffness(mass, p.dt)
+    c[k].bias = p.dt * c[k].restitution * closing
+    c[k].memory_normal = c[k].memory_shear = 0.0
 
 
 @kernel
 def set_shock(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
     """Make the closed contact k a plastic impact within the step."""
-    c.kind[k] = SHOCK
-    c.kappa[k] = max(impact_stiffness(effective_mass(bodies, c, k), p.dt), c.kappa[k])
-    c.bias[k] = 0.0
+    c[k].kind = SHOCK
+    c[k].kappa = max(impact_stiffness(effective_mass(bodies, c, k), p.dt), c[k].kappa)
+    c[k].bias = 0.0
 
 
 @kernel
@@ -139,59 +139,59 @@ def recovery(surplus: float, dt: float) -> float:
 @kernel
 def set_rest(c: Contacts, k: int, p: Parameters) -> None:
     """Make contact k a spring that carries on with the force of the last step."""
-    c.kind[k] = REST
-    c.kappa[k] = c.stiffness[k]
-    elastic = c.memory_normal[k] / c.stiffness[k]
-    if c.gap[k] > p.penetration:
-        c.bias[k] = -c.gap[k]
+    c[k].kind = REST
+    c[k].kappa = c[k].stiffness
+    elastic = c[k].memory_normal / c[k].stiffness
+    if c[k].gap > p.penetration:
+        c[k].bias = -c[k].gap
     else:
-        c.bias[k] = elastic + recovery(-c.gap[k] - elastic, p.dt)
+        c[k].bias = elastic + recovery(-c[k].gap - elastic, p.dt)
 
 
 @kernel
 def set_new(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
     """Make contact k one that closes now, or may close, without an impact."""
-    c.kind[k] = NEW
-    c.kappa[k] = max(impact_stiffness(effective_mass(bodies, c, k), p.dt), c.stiffness[k])
-    c.bias[k] = -c.gap[k] if c.gap[k] > 0.0 else recovery(-c.gap[k], p.dt)
+    c[k].kind = NEW
+    c[k].kappa = max(impact_stiffness(effective_mass(bodies, c, k), p.dt), c[k].stiffness)
+    c[k].bias = -c[k].gap if c[k].gap > 0.0 else recovery(-c[k].gap, p.dt)
 
 
 @kernel
 def prepare(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
     """Set the law of contact k for this step from its geometry and memory."""
-    a, b = c.a[k], c.b[k]
+    a, b = c[k].a, c[k].b
     gravity = p.gravity
     mass_b = 0.0
-    if b >= 0 and bodies.status[b] == AWAKE:
-        gravity, mass_b = 0.0, bodies.mass[b]
-    c.stiffness[k] = rest_stiffness(bodies.mass[a], mass_b, c.memory_normal[k], c.stiffness[k], p)
-    surface = bodies.surface[a]
-    c.friction[k] = p.friction[surface, c.other[k]]
-    c.restitution[k] = p.restitution[surface, c.other[k]]
-    c.flips[k] = 0
-    c.share[k] = 0.5
+    if b >= 0 and bodies[b].status == AWAKE:
+        gravity, mass_b = 0.0, bodies[b].mass
+    c[k].stiffness = rest_stiffness(bodies[a].mass, mass_b, c[k].memory_normal, c[k].stiffness, p)
+    surface = bodies[a].surface
+    c[k].friction = p.friction[surface, c[k].other]
+    c[k].restitution = p.restitution[surface, c[k].other]
+    c[k].flips = 0
+    c[k].share = 0.5
     set_arms(bodies, c, k, 0.5 * p.dt)
     set_velocities(bodies, c, k)
     # free relative acceleration along the normal is that of gravity
-    pull = gravity * c.ny[k]
+    pull = gravity * c[k].ny
     threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
-    gap = max(c.gap[k], 0.0)
-    mean = -c.un[k] + 0.5 * pull * p.dt
-    if c.state[k] == OPEN and mean > threshold and gap < mean * p.dt:
+    gap = max(c[k].gap, 0.0)
+    mean = -c[k].un + 0.5 * pull * p.dt
+    if c[k].state == OPEN and mean > threshold and gap < mean * p.dt:
         time = gap / mean
         set_arms(bodies, c, k, time)
         set_velocities(bodies, c, k)
-        closing = -c.un[k] + pull * time
+        closing = -c[k].un + pull * time
         if closing > threshold:
-            c.share[k] = 1.0 - time / p.dt
+            c[k].share = 1.0 - time / p.dt
             set_impact(c, k, closing, effective_mass(bodies, c, k), p)
-            c.state[k] = STICK
+            c[k].state = STICK
             return
         set_arms(bodies, c, k, 0.5 * p.dt)
         set_velocities(bodies, c, k)
-    if c.state[k] != OPEN:
+    if c[k].state != OPEN:
         set_rest(c, k, p)
         return
     set_new(bodies, c, k, p)
     if mean * p.dt > gap:
-        c.state[k] = STICK
+        c[k].state = STICK

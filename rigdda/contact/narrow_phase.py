@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from rigdda.constants import AWAKE
 from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contacts, Outlines, Parameters
+from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
 
 
 @kernel
-def axis_gap(bodies: Bodies, outlines: Outlines, i: int, edge: int, j: int) -> tuple[float, int]:
-    """Return the gap of body j above an edge of body i [m] and its nearest corner."""
-    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
-    x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
+def axis_gap(
+    nx: float, ny: float, x0: float, y0: float, corner_x: Floats, corner_y: Floats, j: int, n: int
+) -> tuple[float, int]:
+    """Return the least gap of the n corners of body j above a line, and the corner."""
     least, corner = 1e300, 0
-    for k in range(bodies.count[j]):
-        gap = nx * (outlines.world_x[j, k] - x0) + ny * (outlines.world_y[j, k] - y0)
+    for k in range(n):
+        gap = nx * (corner_x[j, k] - x0) + ny * (corner_y[j, k] - y0)
         if gap < least:
             least, corner = gap, k
     return least, corner
@@ -27,17 +27,22 @@ def axis_gap(bodies: Bodies, outlines: Outlines, i: int, edge: int, j: int) -> t
 
 @kernel
 def face_of_contact(
-    bodies: Bodies, outlines: Outlines, i: int, j: int, dx: float, dy: float, spread: float, slack: float
-) -> tuple[bool, float, float, int]:
+    outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
+    spread: float, slack: float,
+) -> tuple[bool, float, float, int]:  # fmt: skip
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
     (dx, dy) is the displacement of j relative to i over the step, `spread` what rotation adds.
     The best edge comes with its rank: time of entry, and its gap for the shallow ones.
     """
     time, depth, best = -1.0, -1e300, -1
-    for edge in range(bodies.count[i]):
-        gap, _ = axis_gap(bodies, outlines, i, edge, j)
-        approach = -(outlines.normal_x[i, edge] * dx + outlines.normal_y[i, edge] * dy)
+    corner_x, corner_y = outlines.world_x, outlines.world_y
+    for edge in range(edges):
+        nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+        gap, _ = axis_gap(
+            nx, ny, corner_x[i, edge], corner_y[i, edge], corner_x, corner_y, j, corners
+        )
+        approach = -(nx * dx + ny * dy)
         if gap > max(approach, 0.0) + spread:
             return False, time, depth, edge
         entry = 0.0
@@ -49,12 +54,11 @@ def face_of_contact(
 
 
 @kernel
-def incident_edge(bodies: Bodies, outlines: Outlines, i: int, edge: int, j: int) -> int:
+def incident_edge(outlines: Outlines, i: int, edge: int, j: int, n: int) -> int:
     """Return the edge of j at its nearest corner that faces edge `edge` of i most squarely."""
-    _, corner = axis_gap(bodies, outlines, i, edge, j)
-    n = bodies.count[j]
-    before = corner - 1 if corner > 0 else n - 1
     nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+    _, corner = axis_gap(nx, ny, 0.0, 0.0, outlines.world_x, outlines.world_y, j, n)
+    before = corner - 1 if corner > 0 else n - 1
     dot_at = nx * outlines.normal_x[j, corner] + ny * outlines.normal_y[j, corner]
     dot_before = nx * outlines.normal_x[j, before] + ny * outlines.normal_y[j, before]
     return corner if dot_at < dot_before else before
@@ -66,8 +70,8 @@ def add_contact(
     x: float, y: float, nx: float, ny: float, gap: float,
 ) -> None:  # fmt: skip
     """Write the geometry of contact k."""
-    c.a[k], c.b[k], c.key[k], c.owner[k], c.other[k] = a, b, key, owner, other
-    c.x[k], c.y[k], c.nx[k], c.ny[k], c.gap[k] = x, y, nx, ny, gap
+    c[k].a, c[k].b, c[k].key, c[k].owner, c[k].other = a, b, key, owner, other
+    c[k].x, c[k].y, c[k].nx, c[k].ny, c[k].gap = x, y, nx, ny, gap
 
 
 @kernel
@@ -81,13 +85,13 @@ def clip_contacts(
     where it is at the time of entry. Returns the new number of contacts.
     """
     i, j = (b, a) if swapped else (a, b)
-    other = incident_edge(bodies, outlines, i, edge, j)
+    other = incident_edge(outlines, i, edge, j, bodies[j].count)
     nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
     tx, ty = -ny, nx
     x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
-    end = edge + 1 if edge + 1 < bodies.count[i] else 0
+    end = edge + 1 if edge + 1 < bodies[i].count else 0
     length = tx * (outlines.world_x[i, end] - x0) + ty * (outlines.world_y[i, end] - y0)
-    other_end = other + 1 if other + 1 < bodies.count[j] else 0
+    other_end = other + 1 if other + 1 < bodies[j].count else 0
     # along the face, the incident edge runs from its end (s1) to its start (s2)
     x1, y1 = outlines.world_x[j, other_end], outlines.world_y[j, other_end]
     x2, y2 = outlines.world_x[j, other], outlines.world_y[j, other]
@@ -119,7 +123,7 @@ def clip_contacts(
             owner_body, vertex = j, other_corner
         key = owner_body * size + vertex
         add_contact(
-            c, k, a, b, key, 1 if owner_body == a else 0, bodies.surface[b],
+            c, k, a, b, key, 1 if owner_body == a else 0, bodies[b].surface,
             outlines.world_x[owner_body, vertex], outlines.world_y[owner_body, vertex],
             sign * nx, sign * ny, gap,
         )  # fmt: skip
@@ -131,19 +135,24 @@ def clip_contacts(
 def collide_pair(bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, p: Parameters) -> int:
     """Add the contacts of bodies a and b to `c` from entry k; returns the new number."""
     dt = p.dt
-    ax, ay, aw = bodies.vx[a], bodies.vy[a], abs(bodies.omega[a]) * bodies.radius[a]
+    ax, ay, aw = bodies[a].vx, bodies[a].vy, abs(bodies[a].omega) * bodies[a].radius
     dx, dy, spin = -ax * dt, -ay * dt, aw * dt
     fall = p.gravity * dt * dt
-    if bodies.status[b] == AWAKE:
-        dx += bodies.vx[b] * dt
-        dy += bodies.vy[b] * dt
-        spin += abs(bodies.omega[b]) * bodies.radius[b] * dt
+    if bodies[b].status == AWAKE:
+        dx += bodies[b].vx * dt
+        dy += bodies[b].vy * dt
+        spin += abs(bodies[b].omega) * bodies[b].radius * dt
         fall = 0.0
     spread = spin + fall + p.slack
-    possible, time_a, gap_a, edge_a = face_of_contact(bodies, outlines, a, b, dx, dy, spread, p.slack)
+    na, nb = bodies[a].count, bodies[b].count
+    possible, time_a, gap_a, edge_a = face_of_contact(
+        outlines, a, na, b, nb, dx, dy, spread, p.slack
+    )
     if not possible:
         return k
-    possible, time_b, gap_b, edge_b = face_of_contact(bodies, outlines, b, a, -dx, -dy, spread, p.slack)
+    possible, time_b, gap_b, edge_b = face_of_contact(
+        outlines, b, nb, a, na, -dx, -dy, spread, p.slack
+    )
     if not possible:
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate

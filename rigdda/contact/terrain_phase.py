@@ -50,22 +50,22 @@ def corners_on_segment(
     """Add contacts of the corners of block a with segment s; returns the new number."""
     nx, ny = ground.normal_x[s], ground.normal_y[s]
     dt = p.dt
-    spin = abs(bodies.omega[a]) * bodies.radius[a] * dt
-    speed = math.hypot(bodies.vx[a], bodies.vy[a]) * dt
+    spin = abs(bodies[a].omega) * bodies[a].radius * dt
+    speed = math.hypot(bodies[a].vx, bodies[a].vy) * dt
     reach = speed + spin + p.gravity * dt * dt + p.slack
-    lowest = below_segment(ground, s, bodies.x[a], bodies.y[a]) - bodies.radius[a]
+    lowest = below_segment(ground, s, bodies[a].x, bodies[a].y) - bodies[a].radius
     if lowest > reach:
         return k
-    for vertex in range(bodies.count[a]):
+    for vertex in range(bodies[a].count):
         key = a * outlines.world_x.shape[1] + vertex
         x, y = outlines.world_x[a, vertex], outlines.world_y[a, vertex]
         gap = below_segment(ground, s, x, y)
-        if gap > reach or gap < -bodies.radius[a]:
+        if gap > reach or gap < -bodies[a].radius:
             continue
         hit_x, hit_y = x, y
         if gap > 0.0:  # where the corner meets the line
-            dx = (bodies.vx[a] - bodies.omega[a] * (y - bodies.y[a])) * dt
-            dy = (bodies.vy[a] + bodies.omega[a] * (x - bodies.x[a])) * dt
+            dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
+            dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
             approach = -(nx * dx + ny * dy)
             if approach > 0.0:
                 time = min(gap / approach, 1.0)
@@ -77,12 +77,12 @@ def corners_on_segment(
         again = False
         for m in range(first, k):  # one face, cut in two segments
             if (
-                c.owner[m] == 1
-                and c.key[m] == key
-                and c.nx[m] * nx + c.ny[m] * ny > SAME_FACE
+                c[m].owner == 1
+                and c[m].key == key
+                and c[m].nx * nx + c[m].ny * ny > SAME_FACE
             ):
                 again = True
-                if gap < c.gap[m]:
+                if gap < c[m].gap:
                     add_contact(c, m, a, TERRAIN, key, 1, ground.surface[s], x, y, nx, ny, gap)
         if not again:
             add_contact(c, k, a, TERRAIN, key, 1, ground.surface[s], x, y, nx, ny, gap)
@@ -100,11 +100,11 @@ def edge_on_ridge(
     of the two segments, or a corner of the block is in contact instead.
     """
     x, y = ground.x[corner], ground.y[corner]
-    dt, n = p.dt, bodies.count[a]
-    dx = -(bodies.vx[a] - bodies.omega[a] * (y - bodies.y[a])) * dt
-    dy = -(bodies.vy[a] + bodies.omega[a] * (x - bodies.x[a])) * dt
+    dt, n = p.dt, bodies[a].count
+    dx = -(bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
+    dy = -(bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
     reach = math.hypot(dx, dy) + p.gravity * dt * dt + p.slack
-    if math.hypot(x - bodies.x[a], y - bodies.y[a]) > bodies.radius[a] + reach:
+    if math.hypot(x - bodies[a].x, y - bodies[a].y) > bodies[a].radius + reach:
         return k
     left, right = corner - 1, corner
     best, best_time, best_gap = -1, -1.0, -1e300

@@ -19,7 +19,7 @@ def index_by_body(c: Contacts, count: int, first: NDArray, bodies: int) -> None:
     k = 0
     for a in range(bodies):
         first[a] = k
-        while k < count and c.a[k] == a:
+        while k < count and c[k].a == a:
             k += 1
     first[bodies] = k
 
@@ -30,14 +30,14 @@ def recall_from(
 ) -> bool:
     """Give contact k the memory of the same closed contact among old[low:high], if there is one."""
     for m in range(low, high):
-        if old.b[m] != b or old.key[m] != c.key[k] or old.state[m] == OPEN:
+        if old[m].b != b or old[m].key != c[k].key or old[m].state == OPEN:
             continue
-        if sign * (c.nx[k] * old.nx[m] + c.ny[k] * old.ny[m]) < SAME_NORMAL:
+        if sign * (c[k].nx * old[m].nx + c[k].ny * old[m].ny) < SAME_NORMAL:
             continue
-        c.state[k] = old.state[m]
-        c.memory_normal[k] = old.memory_normal[m]
-        c.memory_shear[k] = old.memory_shear[m]
-        c.stiffness[k] = old.stiffness[m]
+        c[k].state = old[m].state
+        c[k].memory_normal = old[m].memory_normal
+        c[k].memory_shear = old[m].memory_shear
+        c[k].stiffness = old[m].stiffness
         return True
     return False
 
@@ -50,9 +50,9 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray) -> N
     ways; its forces keep their sign, since normal and shear turn round together.
     """
     for k in range(low, high):
-        c.state[k] = OPEN
-        c.memory_normal[k] = c.memory_shear[k] = c.stiffness[k] = 0.0
-        a, b = c.a[k], c.b[k]
+        c[k].state = OPEN
+        c[k].memory_normal = c[k].memory_shear = c[k].stiffness = 0.0
+        a, b = c[k].a, c[k].b
         found = recall_from(c, k, old, first[a], first[a + 1], b, 1.0)
         if not found and b != TERRAIN:
             recall_from(c, k, old, first[b], first[b + 1], a, -1.0)
@@ -61,8 +61,8 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray) -> N
 @kernel
 def copy_contact(c: Contacts, k: int, old: Contacts, m: int) -> None:
     """Keep contact m of the last step as contact k: between sleeping bodies nothing changes."""
-    c.a[k], c.b[k], c.key[k], c.owner[k] = old.a[m], old.b[m], old.key[m], old.owner[m]
-    c.other[k], c.x[k], c.y[k], c.nx[k], c.ny[k] = old.other[m], old.x[m], old.y[m], old.nx[m], old.ny[m]
-    c.gap[k], c.state[k], c.kind[k] = old.gap[m], old.state[m], old.kind[m]
-    c.memory_normal[k], c.memory_shear[k] = old.memory_normal[m], old.memory_shear[m]
-    c.stiffness[k], c.normal[k], c.shear[k] = old.stiffness[m], old.normal[m], old.shear[m]
+    c[k].a, c[k].b, c[k].key, c[k].owner = old[m].a, old[m].b, old[m].key, old[m].owner
+    c[k].other, c[k].x, c[k].y, c[k].nx, c[k].ny = old[m].other, old[m].x, old[m].y, old[m].nx, old[m].ny
+    c[k].gap, c[k].state, c[k].kind = old[m].gap, old[m].state, old[m].kind
+    c[k].memory_normal, c[k].memory_shear = old[m].memory_normal, old[m].memory_shear
+    c[k].stiffness, c[k].normal, c[k].shear = old[m].stiffness, old[m].normal, old[m].shear

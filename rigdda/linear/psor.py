@@ -11,7 +11,7 @@ from __future__ import annotations
 from rigdda.assembly.springs import normal_row, shear_row
 from rigdda.constants import RELAXATION_SPEED, RELAXATION_STIFFNESS, RELAXATION_SWEEPS
 from rigdda.kernel import kernel
-from rigdda.records import Contacts, Matrix, Work
+from rigdda.records import Contacts, Floats, Ints, Matrix, Work
 
 # columns of work.row: rows of a and b along the normal and the shear direction, then by direction
 # gain [N/m], free displacement [m], force [N]; friction
@@ -34,54 +34,83 @@ def flexibility(m: Matrix, i: int, e: tuple[float, float, float]) -> float:
 @kernel
 def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, dt: float) -> None:
     """Write contact k as row `place` and add its starting force to the displacements."""
-    row = work.row[place]
-    i = work.slot[c.a[k]]
-    j = work.slot[c.b[k]] if c.pair[k] >= 0 else -1
+    row, old = work.row, c[k]
+    i = work.slot[old.a]
+    j = work.slot[old.b] if old.pair >= 0 else -1
     work.row_i[place], work.row_j[place] = i, j
     en, es = normal_row(c, k, True), shear_row(c, k, True)
     fn, fs = normal_row(c, k, False), shear_row(c, k, False)
     for q in range(3):
-        row[NORMAL_A + q], row[SHEAR_A + q] = en[q], es[q]
-        row[NORMAL_B + q], row[SHEAR_B + q] = fn[q], fs[q]
+        row[place, NORMAL_A + q], row[place, SHEAR_A + q] = en[q], es[q]
+        row[place, NORMAL_B + q], row[place, SHEAR_B + q] = fn[q], fs[q]
     soft_n = flexibility(m, i, en) + flexibility(m, j, fn)
     soft_s = flexibility(m, i, es) + flexibility(m, j, fs)
     # stiff against the inertia of the blocks; the bias keeps the force that the law carries over
     kappa = RELAXATION_STIFFNESS / soft_n
-    carried = c.memory_normal[k]
-    row[GAIN], row[SOFT] = kappa / (1.0 + 2.0 * kappa * soft_n), 1.0 / kappa
-    row[FREE] = c.bias[k] + (1.0 / kappa - 1.0 / c.kappa[k]) * carried + dt * c.un[k]
+    carried = old.memory_normal
+    row[place, GAIN], row[place, SOFT] = kappa / (1.0 + 2.0 * kappa * soft_n), 1.0 / kappa
+    row[place, FREE] = old.bias + (1.0 / kappa - 1.0 / old.kappa) * carried + dt * old.un
     kappa = RELAXATION_STIFFNESS / soft_s
-    row[GAIN + 1], row[SOFT + 1] = kappa / (1.0 + 2.0 * kappa * soft_s), 1.0 / kappa
-    row[FREE + 1] = c.memory_shear[k] / kappa + dt * c.us[k]
-    row[FORCE], row[FORCE + 1] = carried, c.memory_shear[k]
-    row[FRICTION] = c.friction[k]
-    push(m, work, place, NORMAL_A, carried)
-    push(m, work, place, SHEAR_A, c.memory_shear[k])
+    row[place, GAIN + 1], row[place, SOFT + 1] = kappa / (1.0 + 2.0 * kappa * soft_s), 1.0 / kappa
+    row[place, FREE + 1] = old.memory_shear / kappa + dt * old.us
+    row[place, FORCE], row[place, FORCE + 1] = carried, old.memory_shear
+    row[place, FRICTION] = old.friction
+    push(row, place, NORMAL_A, i, j, m.d, m.scaled, carried)
+    push(row, place, SHEAR_A, i, j, m.d, m.scaled, old.memory_shear)
 
 
 @kernel
-def push(m: Matrix, work: Work, place: int, column: int, force: float) -> None:
+def push(
+    row: Floats, place: int, column: int, i: int, j: int, d: Floats, inverse: Floats, force: float
+) -> None:
     """Move the blocks of a row by what a force along its direction displaces each alone."""
-    row, i, j = work.row[place], work.row_i[place], work.row_j[place]
-    light, turn = force * m.scaled[i, 0], force * m.scaled[i, 2]
-    m.d[i, 0] += light * row[column]
-    m.d[i, 1] += light * row[column + 1]
-    m.d[i, 2] += turn * row[column + 2]
+    light, turn = force * inverse[i, 0], force * inverse[i, 2]
+    d[i, 0] += light * row[place, column]
+    d[i, 1] += light * row[place, column + 1]
+    d[i, 2] += turn * row[place, column + 2]
     if j >= 0:
-        light, turn = force * m.scaled[j, 0], force * m.scaled[j, 2]
-        m.d[j, 0] += light * row[column + 3]
-        m.d[j, 1] += light * row[column + 4]
-        m.d[j, 2] += turn * row[column + 5]
+        light, turn = force * inverse[j, 0], force * inverse[j, 2]
+        d[j, 0] += light * row[place, column + 3]
+        d[j, 1] += light * row[place, column + 4]
+        d[j, 2] += turn * row[place, column + 5]
 
 
 @kernel
-def overlap(m: Matrix, work: Work, place: int, column: int) -> float:
+def relative(row: Floats, place: int, column: int, i: int, j: int, d: Floats) -> float:
     """Return the relative displacement of a row along its direction [m]."""
-    row, i, j = work.row[place], work.row_i[place], work.row_j[place]
-    d = row[column] * m.d[i, 0] + row[column + 1] * m.d[i, 1] + row[column + 2] * m.d[i, 2]
+    total = row[place, column] * d[i, 0] + row[place, column + 1] * d[i, 1]
+    total += row[place, column + 2] * d[i, 2]
     if j >= 0:
-        d += row[column + 3] * m.d[j, 0] + row[column + 4] * m.d[j, 1] + row[column + 5] * m.d[j, 2]
-    return d
+        total += row[place, column + 3] * d[j, 0] + row[place, column + 4] * d[j, 1]
+        total += row[place, column + 5] * d[j, 2]
+    return total
+
+
+@kernel
+def sweep(
+    row: Floats, row_i: Ints, row_j: Ints, d: Floats, inverse: Floats, count: int, backwards: bool
+) -> float:
+    """Visit every contact once; returns the greatest displacement that a visit changed [m]."""
+    worst = 0.0
+    for visit in range(count):
+        place = count - 1 - visit if backwards else visit
+        i, j = row_i[place], row_j[place]
+        force = row[place, FORCE]
+        off = row[place, FREE] - 2.0 * relative(row, place, NORMAL_A, i, j, d)
+        normal = max(force + row[place, GAIN] * (off - force * row[place, SOFT]), 0.0)
+        if normal != force:
+            push(row, place, NORMAL_A, i, j, d, inverse, normal - force)
+            row[place, FORCE] = normal
+            worst = max(worst, abs(normal - force) * row[place, SOFT])
+        force, limit = row[place, FORCE + 1], row[place, FRICTION] * normal
+        if limit == 0.0 and force == 0.0:
+            continue
+        off = row[place, FREE + 1] - 2.0 * relative(row, place, SHEAR_A, i, j, d)
+        shear = force + row[place, GAIN + 1] * (off - force * row[place, SOFT + 1])
+        shear = min(max(shear, -limit), limit)
+        push(row, place, SHEAR_A, i, j, d, inverse, shear - force)
+        row[place, FORCE + 1] = shear
+    return worst
 
 
 @kernel
@@ -97,29 +126,14 @@ def relax_forces(c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int
     count = high - low
     for place in range(count):
         pack_row(c, work.contact_item[low + place], m, work, place, dt)
+    limit = RELAXATION_SPEED * dt / (2.0 * RELAXATION_STIFFNESS)
     sweeps, worst = 0, 1e300
-    while sweeps < RELAXATION_SWEEPS and worst > RELAXATION_SPEED:
-        worst = 0.0
-        for visit in range(count):
-            place = visit if sweeps % 2 == 0 else count - 1 - visit
-            row = work.row[place]
-            force = row[FORCE]
-            off = row[FREE] - 2.0 * overlap(m, work, place, NORMAL_A) - force * row[SOFT]
-            normal = max(force + row[GAIN] * off, 0.0)
-            if normal != force:
-                push(m, work, place, NORMAL_A, normal - force)
-                row[FORCE] = normal
-                worst = max(worst, abs(normal - force) * row[SOFT])
-            force, limit = row[FORCE + 1], row[FRICTION] * normal
-            if limit == 0.0 and force == 0.0:
-                continue
-            off = row[FREE + 1] - 2.0 * overlap(m, work, place, SHEAR_A) - force * row[SOFT + 1]
-            shear = min(max(force + row[GAIN + 1] * off, -limit), limit)
-            push(m, work, place, SHEAR_A, shear - force)
-            row[FORCE + 1] = shear
-        worst *= 2.0 * RELAXATION_STIFFNESS / dt
+    while sweeps < RELAXATION_SWEEPS and worst > limit:
+        worst = sweep(
+            work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps % 2 == 1
+        )
         sweeps += 1
     for place in range(count):
         k = work.contact_item[low + place]
-        c.normal[k], c.shear[k] = work.row[place, FORCE], work.row[place, FORCE + 1]
+        c[k].normal, c[k].shear = work.row[place, FORCE], work.row[place, FORCE + 1]
     return sweeps

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 
 import msgspec
@@ -12,7 +11,7 @@ import numpy as np
 import shapely
 import tomli_w
 
-from rigdda import check
+from rigdda import check, sites
 from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.joints import JointSet, cut
@@ -186,8 +185,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise BadInput("site", str(source), "name an existing TOML file")
             text = path.read_bytes()
         else:
-            check.one_of("site", str(source), names())
-            text = (resources.files("rigdda.sites") / f"{source}.toml").read_bytes()
+            text = sites.text(check.one_of("site", str(source), sites.names()))
         try:
             return msgspec.toml.decode(text, type=cls)
         except msgspec.ValidationError as error:
@@ -254,12 +252,6 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 for b in layout
             )
         )
-
-
-def names() -> list[str]:
-    """Return the names of the built-in sites."""
-    files = resources.files("rigdda.sites").iterdir()
-    return sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml"))
 
 
 def load_layout(path: str | os.PathLike[str]) -> Layout:

@@ -19,6 +19,13 @@ SHOCK_SPEED = 0.1
 """Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
 for what hits the block from the other side, and it is treated as a plastic impact."""
 
+STIFFNESS_CHANGE = 1.1
+"""Factor per step by which a contact softens without load, or stiffens in motion, where its load
+may be an impulse [-]."""
+
+UNLOADED = 0.2
+"""Share of the load that its stiffness was chosen for, below which a contact softens [-]."""
+
 RECOVERY_TIME = 0.1
 """Time in which penetration beyond what the load explains is pushed out [s]. Shorter pumps energy
 into piles, longer leaves visible overlap."""
@@ -35,10 +42,6 @@ OPENING_TOLERANCE = 1e-6
 FLIPS = 3
 """A contact that changed between stick and slip, or open and closed, this often in one step keeps
 its state. Nearly every step that does not converge has one such contact."""
-
-FEWER_MOVES = 0.6
-"""An open-close iteration goes on while each time at most this share of the contacts changes that
-changed before [-]; an avalanche that flips many contacts at once is relaxed instead."""
 
 RELAXATION_SWEEPS = 12
 """Most sweeps over the forces of an island in motion in a step."""
@@ -85,7 +88,7 @@ AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3
 # state of a contact
 OPEN, STICK, SLIP = 0, 1, 2
 # kind of a contact in one step
-REST, NEW, IMPACT, SHOCK = 0, 1, 2, 3
+REST, NEW, IMPACT, SHOCK, MOVING = 0, 1, 2, 3, 4
 # why the step loop returned
 DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE = 0, 1, 2, 3
 TERRAIN = -1

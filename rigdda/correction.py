@@ -7,7 +7,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
-from rigdda.constants import IMPACT, NEW, OPEN, REST
+from rigdda.constants import IMPACT, MOVING, NEW, OPEN, REST, STIFFNESS_CHANGE
 from rigdda.kernel import kernel
 from rigdda.open_close import assemble_blocks
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
@@ -142,9 +142,13 @@ def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
 
 
 @kernel
-def keep_memory(c: Contacts, k: int) -> None:
+def keep_memory(c: Contacts, k: int, p: Parameters) -> None:
     """Carry the forces of contact k to the next step; an impulse is not carried on."""
     if c[k].state == OPEN:
         c[k].memory_normal = c[k].memory_shear = 0.0
     elif c[k].kind == REST or c[k].kind == NEW:
         c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
+    elif c[k].kind == MOVING:
+        most = STIFFNESS_CHANGE * c[k].stiffness * p.penetration
+        share = min(1.0, most / c[k].normal)
+        c[k].memory_normal, c[k].memory_shear = share * c[k].normal, share * c[k].shear

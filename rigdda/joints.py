@@ -17,9 +17,10 @@ SLIVER = 0.2
 """Blocks below this share of the wanted mean area are joined to a neighbour if that stays convex."""
 
 AREA_TOLERANCE = 0.05
-"""Accepted relative error of the mean block area; spacings are scaled until it is met."""
+"""Accepted relative error of the mean block area; joints are drawn, and their spacings scaled,
+until it is met."""
 
-SCALINGS = 40
+DRAWS = 200
 
 
 class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -83,22 +84,13 @@ def cut(
     BadInput
         If the joints cannot cut the mass into blocks of that area.
     """
-    low, high = 0.0, math.inf
     scale = math.sqrt(block_area / math.prod(j.spacing for j in joints[:2]))
-    start = rng.bit_generator.state
-    for _ in range(SCALINGS):
-        rng.bit_generator.state = start
+    for _ in range(DRAWS):
         cells = _join_bridges(_cells(source, joints, scale, rng), joints, block_area, rng)
         mean = source.area / len(cells)
         if abs(mean / block_area - 1.0) <= AREA_TOLERANCE:
             return [np.array(c.exterior.coords)[:-1] for c in cells]
-        if mean > block_area:
-            high = scale
-        else:
-            low = scale
-        scale = math.sqrt(low * high) if low > 0.0 and high < math.inf else (
-            2.0 * scale if high == math.inf else 0.5 * scale
-        )
+        scale *= math.sqrt(block_area / mean)
     raise BadInput(
         "source: block_area",
         block_area,
@@ -135,24 +127,31 @@ def _join_bridges(
     rng: np.random.Generator,
 ) -> list[shapely.Polygon]:
     """Join cells across rock bridges, then slivers, wherever the union stays convex."""
-    cells = sorted(cells, key=lambda c: c.centroid.coords[0])
+    parts: list[shapely.Polygon | None] = sorted(cells, key=lambda c: c.centroid.coords[0])
+    neighbours = shapely.STRtree(parts).query(parts, predicate="intersects")
+    beside: list[list[int]] = [[] for _ in parts]
+    for i, j in neighbours.T:
+        if i != j:
+            beside[i].append(int(j))
     bridge = 1.0 - min(j.persistence for j in joints)
-    for i in range(len(cells)):
-        if cells[i] is not None and rng.random() < bridge:
-            _join(cells, i)
-    for i in np.argsort([math.inf if c is None else c.area for c in cells], kind="stable"):
-        cell = cells[i]
+    for i in np.flatnonzero(rng.random(len(parts)) < bridge):
+        _join(parts, beside, int(i))
+    for i in np.argsort([math.inf if c is None else c.area for c in parts], kind="stable"):
+        cell = parts[i]
         if cell is not None and cell.area < SLIVER * block_area:
-            _join(cells, int(i))
-    return [c for c in cells if c is not None]
+            _join(parts, beside, int(i))
+    return [c for c in parts if c is not None]
 
 
-def _join(cells: list, i: int) -> None:
-    """Join cell i to the neighbour with the longest common edge, if that stays convex."""
-    cell = cells[i]
-    best, longest = None, 0.0
-    for j, other in enumerate(cells):
-        if j == i or other is None:
+def _join(parts: list[shapely.Polygon | None], beside: list[list[int]], i: int) -> None:
+    """Join part i to the neighbour with the longest common edge, if that stays convex."""
+    cell = parts[i]
+    if cell is None:
+        return
+    best, longest, joined = -1, 0.0, cell
+    for j in beside[i]:
+        other = parts[j]
+        if other is None or j == i:
             continue
         common = shapely.intersection(cell, other).length
         if common > longest + 1e-9:
@@ -160,7 +159,10 @@ def _join(cells: list, i: int) -> None:
             if union.geom_type == "Polygon" and (
                 union.convex_hull.area - union.area < 1e-9 * union.area
             ):
-                best, longest = j, common
-    if best is not None:
-        cells[best] = shapely.union(cell, cells[best]).simplify(1e-9 * cell.length)
-        cells[i] = None
+                best, longest, joined = j, common, union
+    if best >= 0:
+        parts[best] = joined.simplify(1e-9 * cell.length)
+        beside[best] = sorted({*beside[best], *beside[i]} - {best, i})
+        for j in beside[i]:
+            beside[j] = sorted({*beside[j], best} - {i, j})
+        parts[i] = None

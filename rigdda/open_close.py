@@ -14,10 +14,10 @@ from rigdda.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.assembly.springs import add_block, add_force, along, normal_row, shear_row
 from rigdda.constants import (
     ENERGY_HALVINGS,
-    FEWER_MOVES,
     FLIPS,
     FRICTION_TOLERANCE,
     IMPACT,
+    MOVING,
     OPEN,
     OPENING_TOLERANCE,
     QUIET_SPEED,
@@ -197,8 +197,7 @@ def solve_states(
         i = work.block_item[b0 + s]
         m.d[s, 0], m.d[s, 1] = bodies[i].vx * p.dt, bodies[i].vy * p.dt
         m.d[s, 2] = bodies[i].omega * p.dt
-    before = c1 - c0
-    for iteration in range(p.iterations):
+    for _ in range(p.iterations):
         assemble_island(bodies, c, m, work, island, pairs, p)
         counters[1] += 1
         if n == 1:
@@ -209,9 +208,6 @@ def solve_states(
         moved, locked = update_states(bodies, c, m, work, c0, c1, p)
         if moved == 0:
             return locked == 0
-        if n > 1 and iteration > 0 and moved > FEWER_MOVES * before:
-            return False
-        before = moved
     return False
 
 
@@ -249,6 +245,8 @@ def relax(
         k = work.contact_item[item]
         within = c[k].friction * c[k].normal > abs(c[k].shear)
         c[k].state = OPEN if c[k].normal == 0.0 else (STICK if within else SLIP)
+        if c[k].kind != IMPACT:
+            c[k].kind = MOVING
 
 
 @kernel

@@ -39,23 +39,29 @@ from rigdda.constants import (
     REST,
     SHOCK,
     STICK,
+    STIFFNESS_CHANGE,
+    UNLOADED,
 )
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Contacts, Parameters
 
 
 @kernel
-def rest_stiffness(
-    mass_a: float, mass_b: float, load: float, before: float, p: Parameters
-) -> float:
-    """Return k_n [N/m] for the wanted penetration under the load that the contact carries.
+def rest_stiffness(mass_a: float, mass_b: float, c: Contacts, k: int, p: Parameters) -> float:
+    """Return k_n [N/m] for the wanted penetration under the load that contact k carries.
 
-    At least the weight of the heavier free body; it follows a growing load and stays as long as
-    the contact does: stiffness that fell with the load would feed the sway of a stack.
+    At least for the weight of the heavier free body. It grows with the load unless that comes from
+    pushing out penetration, which in a wedged block would go on for ever. It falls only when most
+    of the load has gone: stiffness that fell with the load would feed the sway of a stack.
     """
     gravity = p.gravity if p.gravity > 0.0 else 9.81
     least = max(mass_a, mass_b) * gravity / p.penetration
-    return max(least, load / p.penetration, before)
+    before, load = c[k].stiffness, c[k].memory_normal
+    if load < UNLOADED * before * p.penetration:
+        return max(least, before / STIFFNESS_CHANGE)
+    if -c[k].gap * before > load:
+        return max(least, before)
+    return max(least, before, load / p.penetration)
 
 
 @kernel
@@ -143,6 +149,7 @@ def set_rest(c: Contacts, k: int, p: Parameters) -> None:
     c[k].kappa = c[k].stiffness
     elastic = c[k].memory_normal / c[k].stiffness
     if c[k].gap > p.penetration:
+        c[k].memory_normal = 0.0
         c[k].bias = -c[k].gap
     else:
         c[k].bias = elastic + recovery(-c[k].gap - elastic, p.dt)
@@ -164,7 +171,7 @@ def prepare(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
     mass_b = 0.0
     if b >= 0 and bodies[b].status == AWAKE:
         gravity, mass_b = 0.0, bodies[b].mass
-    c[k].stiffness = rest_stiffness(bodies[a].mass, mass_b, c[k].memory_normal, c[k].stiffness, p)
+    c[k].stiffness = rest_stiffness(bodies[a].mass, mass_b, c, k, p)
     surface = bodies[a].surface
     c[k].friction = p.friction[surface, c[k].other]
     c[k].restitution = p.restitution[surface, c[k].other]
@@ -193,5 +200,6 @@ def prepare(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
         set_rest(c, k, p)
         return
     set_new(bodies, c, k, p)
-    if mean * p.dt > gap:
+    # what touches starts closed: in a stack no block moves before those below it are held
+    if gap - mean * p.dt < p.penetration:
         c[k].state = STICK

@@ -1,0 +1,3 @@
+"""Names of the designers, known without importing one."""
+
+DESIGNERS = ("cma", "convex", "random", "rule")

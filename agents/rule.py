@@ -1,0 +1,68 @@
+"""The engineering rule: one wall where blocks arrive with least energy, higher than they bounce.
+
+After UNI 11211-4:2012 (Peila and Ronco 2009, Nat. Hazards Earth Syst. Sci. 9, 1291-1298): the
+95 % quantile of the bounce height and a freeboard, at least 0.5 m. Here the bounce height is that of
+the blocks' tops, so that the freeboard, otherwise half a block, is the larger of 0.5 m and half the
+mean circumscribed radius.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agents.crossings import Ensemble, ensemble_for
+from agents.protocol import DesignResult, Ledger, Progress
+from agents.store import Store
+from envs import DesignProblem
+from rigdda import Layout, Site, Wall
+
+QUANTILE = 0.95
+FREEBOARD = 0.5
+"""Least freeboard [m]."""
+
+
+def design(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> DesignResult:
+    """Return the layout of the rule, from one barrier-free ensemble, and its evaluation.
+
+    At most 48 simulations are used: 16 to look at, 32 to evaluate.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 2 or the seed below 0; if a simulation diverges.
+    """
+    ledger = Ledger(problem, simulations, seed, progress, store)
+    layout = rule(problem.site, ensemble_for(ledger))
+    return ledger.result(ledger.evaluate(layout, "final", min(32, ledger.left)))
+
+
+def rule(site: Site, ensemble: Ensemble) -> Layout:
+    """Return one wall where the 95 % energy of the crossing blocks is least.
+
+    Stations that would need a higher wall than the site allows are passed over; if all would, the
+    wall is as high as it may be. Among equal energies the station nearest the toe is taken. Where
+    no block crosses a station there is nothing to stop, and no wall.
+    """
+    zone, stations = site.barrier_zone, range(len(ensemble.stations))
+    crossed = [k for k in stations if len(ensemble.at(k))]
+    if not crossed:
+        return ()
+    energy = {k: np.quantile(ensemble.at(k)["energy"], QUANTILE) for k in crossed}
+    height = {k: wall_height(ensemble, k) for k in crossed}
+    allowed = [k for k in crossed if height[k] <= zone.max_height] or crossed
+    best = min(allowed, key=lambda k: (energy[k], abs(ensemble.stations[k] - site.slope.toe)))
+    x = float(ensemble.stations[best])
+    return (Wall(x, min(height[best], zone.max_height), zone.min_thickness),)
+
+
+def wall_height(ensemble: Ensemble, station: int) -> float:
+    """Return the 95 % bounce height of block tops at a station, and the freeboard [m]."""
+    crossings = ensemble.at(station)
+    bounce = np.quantile(crossings["height"] + crossings["radius"], QUANTILE)
+    return float(bounce + max(FREEBOARD, ensemble.radius / 2.0))

@@ -1,0 +1,30 @@
+"""Verification: a layout on releases that no search draws."""
+
+from __future__ import annotations
+
+from agents.seeds import release_seeds
+from agents.store import Store
+from envs import DesignProblem
+from envs.problem import Evaluation
+from rigdda import Layout
+
+
+def verify(
+    problem: DesignProblem,
+    layout: Layout,
+    releases: int = 64,
+    seed: int = 0,
+    store: Store | None = None,
+) -> Evaluation:
+    """Return the evaluation of a layout on `releases` fresh releases.
+
+    The seeds come from a stream of their own, so that the evaluation is unbiased whatever search
+    found the layout. Layouts verified with the same `seed` meet the same releases.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `DesignProblem.evaluate` does.
+    """
+    seeds = release_seeds("verification", seed, releases)
+    return (store or Store()).evaluate(problem, layout, seeds)

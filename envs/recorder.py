@@ -1,0 +1,86 @@
+"""Replays of episodes, one .rrd file each. The replay writer is imported when it is used."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from envs.evaluation import Evaluation
+from rigdda import BadInput, Run, Site
+
+Trigger = Callable[[int], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Recorder:
+    """Writes replays into a folder.
+
+    Parameters
+    ----------
+    folder : path
+        Where `episode-NNNNNN.rrd` goes; made when it is needed. Copies of an environment that
+        run side by side need folders of their own.
+    trigger : callable, optional
+        Whether to record an episode, by its number from 0; None: every one.
+
+    Raises
+    ------
+    BadInput
+        If the folder is a file or the trigger cannot be called.
+    """
+
+    folder: Path
+    trigger: Trigger | None = None
+
+    def __init__(self, folder: str | os.PathLike[str], trigger: Trigger | None = None):
+        if not isinstance(folder, str | os.PathLike):
+            raise BadInput("record", folder, "name a folder or give None")
+        if Path(folder).exists() and not Path(folder).is_dir():
+            raise BadInput("record", str(folder), "name a folder, not a file")
+        if trigger is not None and not callable(trigger):
+            raise BadInput("record_trigger", trigger, "give a function of the episode's number")
+        object.__setattr__(self, "folder", Path(folder))
+        object.__setattr__(self, "trigger", trigger)
+
+    def wants(self, episode: int) -> bool:
+        """Return whether episode number `episode` is to be recorded."""
+        return self.trigger is None or bool(self.trigger(episode))
+
+    def write(
+        self, episode: int, site: Site, run: Run, evaluation: Evaluation, reward: float
+    ) -> Path:
+        """Write the replay of an episode and return its path; no stream stays open.
+
+        Parameters
+        ----------
+        episode : int
+            Its number.
+        site : Site
+            Where it was.
+        run : Run
+            The typical release of `evaluation`.
+        evaluation : Evaluation
+            The layout that the episode ended with.
+        reward : float
+            Sum of the episode's rewards.
+        """
+        from rigdda.replay import Marks
+
+        walls = [
+            f"{wall.height:.2f} m high, {wall.thickness:.2f} m thick at x = {wall.x:.2f} m"
+            for wall in evaluation.layout
+        ]
+        notes = {
+            "seed": f"{evaluation.typical}, the nearest to the mean of {len(evaluation.seeds)}",
+            "layout": "; ".join(walls) or "no barrier",
+            "reward": f"{reward:+.4f}",
+            "objective": f"{evaluation.objective:.4f}",
+            "debris": f"{evaluation.debris:.4f}",
+            "cost": f"{evaluation.cost:.2f}",
+        }
+        path = self.folder / f"episode-{episode:06d}.rrd"
+        road = (site.road.start, site.road.end)
+        run.to_rerun(path, Marks(road=road, notes=notes, title=f"{site.name}, episode {episode}"))
+        return path

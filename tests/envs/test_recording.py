@@ -1,0 +1,88 @@
+"""Replays of episodes: the release nearest the mean, read back with rerun's own reader."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+import rigdda
+from envs import DesignProblem
+from envs.design import BarrierDesign
+from rigdda import Site
+
+ACTION = np.array([0.2, -0.4, -0.3], dtype=np.float32)
+
+
+def rows(path: Path, entity: str, component: str, static: bool = False) -> list:
+    """Return the values of a component, one a row in order of time."""
+    stream = RrdReader(path).stream().filter(content=entity, is_static=static)
+    (chunk,) = stream.to_chunks()
+    return chunk.to_record_batch().column(component).to_pylist()
+
+
+def test_an_episode_is_recorded(ramp: Site, tmp_path: Path) -> None:
+    env = BarrierDesign(ramp, max_barriers=1, releases=3, record=tmp_path / "replays")
+    env.reset(seed=5)
+    assert not (tmp_path / "replays").exists()
+    _, reward, _, _, info = env.step(ACTION)
+    path = tmp_path / "replays" / "episode-000000.rrd"
+    assert os.listdir(path.parent) == [path.name]
+
+    found = DesignProblem(ramp, max_barriers=1).evaluate(info["layout"], env.seeds)
+    fractions = [outcome.debris_fraction for outcome in found.outcomes]
+    nearest = int(np.argmin(np.abs(np.array(fractions) - np.mean(fractions))))
+    run, _ = rigdda.release(ramp, info["layout"], env.seeds[nearest])
+    for i in (0, len(run.scene.blocks) - 1):
+        places = rows(path, f"/world/blocks/{i}", "Transform3D:translation")
+        assert len(places) == len(run.times)
+        for frame in (0, len(places) // 2, -1):
+            assert places[frame][0][:2] == pytest.approx(run.poses[frame, i, :2], rel=1e-6)
+    debris = np.ravel(rows(path, "/plots/debris", "Scalars:scalars"))
+    assert debris[-1] == pytest.approx(fractions[nearest], abs=1e-9)
+
+    there = {chunk.entity_path for chunk in RrdReader(path).stream().to_chunks()}
+    assert {"/world/barriers/0", "/world/road", "/world/terrain"} <= there
+    (wall,) = info["layout"]
+    ((notes,),) = rows(path, "/notes", "TextDocument:text", static=True)
+    assert f"**seed**: {env.seeds[nearest]}, the nearest to the mean of 3" in notes
+    assert f"**layout**: {wall.height:.2f} m high, {wall.thickness:.2f} m thick" in notes
+    assert f"**reward**: {reward:+.4f}" in notes
+    assert f"**objective**: {info['objective']:.4f}" in notes
+
+
+def test_the_trigger_chooses_episodes(ramp: Site, tmp_path: Path) -> None:
+    asked: list[int] = []
+
+    def odd(episode: int) -> bool:
+        asked.append(episode)
+        return episode % 2 == 1
+
+    env = BarrierDesign(ramp, max_barriers=1, releases=1, record=tmp_path, record_trigger=odd)
+    for _ in range(4):
+        env.reset()
+        env.reset()  # an episode that was not finished has no number
+        env.step(ACTION)
+    assert asked == [0, 1, 2, 3]
+    assert sorted(os.listdir(tmp_path)) == ["episode-000001.rrd", "episode-000003.rrd"]
+
+
+def test_an_episode_without_barriers_is_recorded(ramp: Site, tmp_path: Path) -> None:
+    env = BarrierDesign(ramp, max_barriers=1, releases=1, record=str(tmp_path))
+    env.reset(seed=0)
+    env.step(np.full(3, -1.0, np.float32))
+    ((notes,),) = rows(tmp_path / "episode-000000.rrd", "/notes", "TextDocument:text", static=True)
+    assert "**layout**: no barrier" in notes
+    assert "**reward**: +0.0000" in notes
+
+
+def test_recording_changes_nothing_else(ramp: Site, tmp_path: Path) -> None:
+    plain = BarrierDesign(ramp, max_barriers=1, releases=2)
+    recorded = BarrierDesign(ramp, max_barriers=1, releases=2, record=tmp_path)
+    for env in (plain, recorded):
+        env.reset(seed=9)
+    assert plain.step(ACTION)[1:] == recorded.step(ACTION)[1:]
+    assert plain.reset()[1] == recorded.reset()[1]

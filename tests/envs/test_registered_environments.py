@@ -1,0 +1,61 @@
+"""What every registered environment keeps: checkers, spaces, lazy imports, learning."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from envs.registration import ENVIRONMENTS
+from rigdda import Site
+
+every = pytest.mark.parametrize("name", ENVIRONMENTS)
+
+
+@every
+def test_gymnasium_finds_no_fault(name: str) -> None:
+    check_env(gymnasium.make(name, site="quick", releases=1).unwrapped)
+
+
+@every
+def test_stable_baselines3_finds_no_fault(name: str) -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    env = gymnasium.make(name, site="quick", releases=1, render_mode="rgb_array")
+    checker.check_env(env.unwrapped, skip_render_check=False)
+
+
+@every
+def test_any_action_gives_an_observation_of_the_space(name: str, ramp: Site) -> None:
+    env = gymnasium.make(name, site=ramp, releases=1)
+    env.action_space.seed(0)
+    for i in range(5):
+        seen, _ = env.reset(seed=i)
+        assert seen in env.observation_space
+        seen, reward, *_ = env.step(env.action_space.sample())
+        assert seen in env.observation_space
+        assert np.isfinite(reward)
+
+
+@every
+def test_ppo_takes_200_steps(name: str, ramp: Site) -> None:
+    ppo = pytest.importorskip("stable_baselines3").PPO
+    env = gymnasium.make(name, site=ramp, max_barriers=1, releases=1)
+    model = ppo("MultiInputPolicy", env, n_steps=50, batch_size=50, n_epochs=2, gamma=1.0, seed=0)
+    before = [p.detach().clone() for p in model.policy.parameters()]
+    model.learn(200)
+    assert model.num_timesteps == 200
+    after = model.policy.parameters()
+    assert any((a != b).any() for a, b in zip(after, before, strict=True))
+    seen, _ = env.reset()
+    action, _ = model.predict(seen)
+    assert env.action_space.contains(action)
+
+
+@pytest.mark.parametrize("module", ["torch", "stable_baselines3", "matplotlib", "rerun"])
+def test_heavy_packages_are_imported_when_they_are_used(module: str) -> None:
+    code = f"import sys, envs, envs.design; sys.exit({module!r} in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents import convex
 from agents.crossings import ensemble_for
@@ -16,7 +17,10 @@ from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
 from agents.rule import rule
 from agents.store import Store
 from envs import DesignProblem
+from envs.encoding import MIN_HEIGHT, NUMBERS
 from rigdda import Layout
+
+Floats = NDArray[np.float64]
 
 SIGMA = 0.25
 """Step at the start, an eighth of the decision box: stations are searched across a bench."""
@@ -51,7 +55,7 @@ def _propose(problem: DesignProblem, starts: list[Layout], rng: np.random.Genera
 
     best: tuple[float, Layout] = (math.inf, ())
     for layout in starts:
-        best = min(best, ((yield layout).objective, layout))
+        best = min(best, ((yield layout).objective, layout), key=lambda pair: pair[0])
     low, high = problem.bounds
     options = {
         "bounds": [low.tolist(), high.tolist()],
@@ -62,7 +66,8 @@ def _propose(problem: DesignProblem, starts: list[Layout], rng: np.random.Genera
         "verb_log": 0,
     }
     while True:
-        strategy = cma.CMAEvolutionStrategy(problem.encode(best[1]), SIGMA, options)
+        centre = _centre(problem, best[1], rng)
+        strategy = cma.CMAEvolutionStrategy(centre, SIGMA, options)
         while not strategy.stop():
             vectors, values = strategy.ask(), []
             for vector in vectors:
@@ -70,3 +75,16 @@ def _propose(problem: DesignProblem, starts: list[Layout], rng: np.random.Genera
                 values.append((yield layout).objective)
                 best = min(best, (values[-1], layout), key=lambda pair: pair[0])
             strategy.tell(vectors, values)
+
+
+def _centre(problem: DesignProblem, layout: Layout, rng: np.random.Generator) -> Floats:
+    """Return the vector of a layout, (3 max_barriers,), its empty slots on the verge of a wall.
+
+    Their stations are drawn at random, so that every restart tries walls in other places.
+    """
+    vector = problem.encode(layout)
+    empty = vector.reshape(-1, NUMBERS)[len(layout) :]
+    verge = 2.0 * MIN_HEIGHT / problem.site.barrier_zone.max_height - 1.0
+    empty[:, 0] = rng.uniform(-1.0, 1.0, len(empty))
+    empty[:, 1:] = max(-1.0, verge - 0.02), -1.0
+    return vector

@@ -99,11 +99,15 @@ def tabulate(problem: DesignProblem, ensemble: Ensemble) -> Table:
     """Return the programme's numbers for a site and its barrier-free ensemble."""
     site, zone = problem.site, problem.site.barrier_zone
     heights = np.linspace(MIN_HEIGHT, zone.max_height, LEVELS)
-    walls = [[Wall(x, h, zone.min_thickness) for h in heights.tolist()]
-             for x in ensemble.stations.tolist()]
+    walls = [
+        [Wall(x, h, zone.min_thickness) for h in heights.tolist()]
+        for x in ensemble.stations.tolist()
+    ]
     room = np.array([[capacity(site, wall) for wall in row] for row in walls])
-    stopped, risky = (_stopped(ensemble, heights, which) for which in
-                      (np.ones(len(ensemble.crossings), dtype=bool), ensemble.reach_road()))
+    stopped, risky = (
+        _stopped(ensemble, heights, which)
+        for which in (np.ones(len(ensemble.crossings), dtype=bool), ensemble.reach_road())
+    )
     held = np.minimum(1.0, room / np.maximum(stopped, 1e-9))
     at_road = ensemble.at(len(ensemble.stations))
     base = np.bincount(at_road["release"], at_road["mass"], minlength=len(ensemble.mass))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from agents.protocol import Ledger
 from agents.seeds import release_seeds
-from rigdda import Site, Simulation
+from rigdda import Simulation, Site
 from rigdda.geometry import polygon_properties
 
 RELEASES = 16
@@ -70,11 +70,16 @@ class Ensemble:
         return np.isin(block, block[road])
 
 
+def ensemble_seeds(seed: int, simulations: int) -> tuple[int, ...]:
+    """Return the release seeds of the ensemble for a search of so many simulations."""
+    return release_seeds("ensemble", seed, min(RELEASES, max(1, simulations // 8)))
+
+
 def ensemble_for(ledger: Ledger) -> Ensemble:
     """Return the ensemble that a designer looks at, charged to its budget."""
-    releases = min(RELEASES, max(1, ledger.left // 8))
-    ledger.used += releases
-    return ensemble(ledger.problem.site, release_seeds("ensemble", ledger.seed, releases))
+    seeds = ensemble_seeds(ledger.seed, ledger.budget)
+    ledger.used += len(seeds)
+    return ensemble(ledger.problem.site, seeds)
 
 
 def ensemble(site: Site, seeds: Sequence[int]) -> Ensemble:
@@ -104,7 +109,11 @@ def _ensemble(text: bytes, seeds: tuple[int, ...]) -> Ensemble:
         run = Simulation(scene, site.settings(), lines).run(site.motion.duration)
         mass, radius = np.array([_mass_and_radius(b.vertices, b.density) for b in scene.blocks]).T
         out = np.zeros(len(run.events), dtype=CROSSING)
-        out["release"], out["station"], out["block"] = release, run.events["target"], run.events["block"]
+        out["release"], out["station"], out["block"] = (
+            release,
+            run.events["target"],
+            run.events["block"],
+        )
         out["height"] = run.events["y"] - ground[run.events["target"]]
         out["radius"], out["mass"] = radius[out["block"]], mass[out["block"]]
         out["speed"], out["energy"] = run.events["speed"], run.events["energy"]

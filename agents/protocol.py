@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from agents.seeds import release_seeds
 from agents.store import Store
-from envs import DesignProblem
-from envs.problem import Evaluation
+from envs import DesignProblem, Evaluation
 from rigdda import Layout, check
 
 

@@ -1,9 +1,9 @@
 """The engineering rule: one wall where blocks arrive with least energy, higher than they bounce.
 
 After UNI 11211-4:2012 (Peila and Ronco 2009, Nat. Hazards Earth Syst. Sci. 9, 1291-1298): the
-95 % quantile of the bounce height and a freeboard, at least 0.5 m. Here the bounce height is that of
-the blocks' tops, so that the freeboard, otherwise half a block, is the larger of 0.5 m and half the
-mean circumscribed radius.
+95 % quantile of the bounce height and a freeboard of at least 0.5 m. Here the bounce height is that
+of the blocks' tops, so that the freeboard, otherwise half a block, is the larger of 0.5 m and half
+the mean circumscribed radius.
 """
 
 from __future__ import annotations

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from envs import DesignProblem
-from envs.problem import Evaluation
+from envs import DesignProblem, Evaluation
 from rigdda import Layout, __version__
 from rigdda.kernel import source_hash
 
@@ -58,9 +57,7 @@ class Store:
                 sound += len(line)
             file.truncate(sound)
 
-    def evaluate(
-        self, problem: DesignProblem, layout: Layout, seeds: Sequence[int]
-    ) -> Evaluation:
+    def evaluate(self, problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> Evaluation:
         """Return the evaluation of a layout on release seeds, simulated or as it was kept.
 
         Raises

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from agents.seeds import release_seeds
 from agents.store import Store
-from envs import DesignProblem
-from envs.problem import Evaluation
+from envs import DesignProblem, Evaluation
 from rigdda import Layout
 
 

@@ -104,6 +104,7 @@ def _cells(
     """Return the pieces between the joints of all sets."""
     centre = np.array(source.centroid.coords[0])
     reach = source.length
+    around = source.buffer(1e-3 * reach)  # ends beyond the source, so that no cut falls short
     lines = [source.exterior]
     for joint in joints:
         dip = math.radians(joint.dip_deg)
@@ -115,7 +116,10 @@ def _cells(
         offsets = np.cumsum(steps) - reach - spacing * rng.random()
         for offset in offsets[np.abs(offsets) < reach]:
             mid = centre + offset * across
-            lines.append(shapely.LineString([mid - reach * along, mid + reach * along]))
+            line = shapely.LineString([mid - reach * along, mid + reach * along])
+            near = shapely.intersection(line, around)
+            if near.length > 0.0:
+                lines.append(near)
     pieces = polygonize(shapely.node(shapely.MultiLineString(lines)))
     return [p for p in pieces if source.contains(p.representative_point())]
 

@@ -1,0 +1,213 @@
+"""The command line: `rigdda sites | simulate | design | replay`.
+
+Start-up imports click only; a command imports what it needs.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from agents.names import DESIGNERS
+from agents.terminal import Stopped, fail, folder_for, kept, progress, show
+
+if TYPE_CHECKING:
+    from rigdda import Layout
+
+SIMULATIONS = 240
+"""Default budget of a search."""
+
+RELEASES = 40
+"""Default number of releases that a layout is verified on."""
+
+CASES = 3
+"""Layouts that are verified: none, the rule's, the found one."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    0: done. 2: bad input. 1: it failed on the way. 130: interrupted. Each but 0 comes with one
+    line on standard error.
+    """
+    try:
+        return cli.main(argv, prog_name="rigdda", standalone_mode=False) or 0
+    except click.Abort:
+        return fail("interrupted", 130)
+    except click.ClickException as error:
+        return fail(error.format_message(), error.exit_code)
+    except Stopped as stop:
+        return fail(str(stop), stop.code)
+    except OSError as error:
+        return fail(str(error), 2)
+    except Exception as error:
+        from rigdda import BadInput, Error
+
+        if not isinstance(error, Error):
+            raise
+        return fail(str(error), 2 if isinstance(error, BadInput) else 1)
+
+
+def _version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from rigdda import __version__
+
+        click.echo(f"rigdda {__version__}")
+        context.exit()
+
+
+def out_option(default: str) -> Callable[..., Any]:
+    """Return the option --out, into runs/ by default."""
+    return click.option(
+        "--out",
+        type=click.Path(file_okay=False, path_type=Path),
+        help=f"Folder to write into.  [default: runs/{default}-SITE]",
+    )
+
+
+def seed_option(words: str) -> Callable[..., Any]:
+    """Return the option --seed with its help."""
+    return click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help=words)
+
+
+def releases_option(name: str, least: int, default: int, words: str) -> Callable[..., Any]:
+    """Return an option that counts releases."""
+    return click.option(
+        name, type=click.IntRange(least), default=default, show_default=True, help=words
+    )
+
+
+layout_option = click.option(
+    "--layout", type=click.Path(), help="Barriers: a TOML or JSON file, as `design` writes."
+)
+
+
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version,
+              help="Show the version.")  # fmt: skip
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """Rockfall protection: simulate a slope, design its barriers, look at releases."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+@cli.command()
+def sites() -> None:
+    """List the built-in sites."""
+    import rigdda
+    from agents import tables
+
+    show(tables.sites(map(rigdda.Site.load, rigdda.sites.names())))
+
+
+@cli.command()
+@click.argument("site")
+@layout_option
+@releases_option("--releases", 1, 16, "Releases to average.")
+@seed_option("Seed of the first release; the others follow it.")
+@out_option("simulate")
+def simulate(site: str, layout: str | None, releases: int, seed: int, out: Path | None) -> None:
+    """Simulate releases of SITE (a name or a TOML file) and say what reaches the road.
+
+    Writes outcomes.csv, run.npz (the first release) and profile.png (the same).
+    """
+    import rigdda
+    from agents import job, pictures, tables
+
+    where, walls = rigdda.Site.load(site), _layout(layout)
+    seeds = range(seed, seed + releases)
+    folder = folder_for(out, "simulate", where.name)
+    with kept(folder), progress(releases) as tick:
+        run, outcomes = job.simulate(where, walls, seeds, tick)
+    tables.write_outcomes(folder / "outcomes.csv", seeds, outcomes)
+    run.save(folder / "run.npz")
+    share = outcomes[0].debris_fraction
+    title = f"release {seed}: {share:.1%} of the mass past the road's edge"
+    pictures.profile(folder / "profile.png", where, [pictures.Panel(title, run)])
+    show(tables.outcomes(walls, outcomes))
+    click.echo(f"{releases} releases; outcomes.csv, run.npz and profile.png are in {folder}")
+
+
+@cli.command()
+@click.argument("site")
+@click.option("--designer", type=click.Choice(DESIGNERS), default="cma", show_default=True,
+              help="How to search.")  # fmt: skip
+@releases_option("--simulations", 2, SIMULATIONS, "Releases that the search may simulate.")
+@releases_option("--verify", 2, RELEASES, "Unseen releases that each layout is verified on.")
+@seed_option("Seed of the search and of its releases.")
+@out_option("design")
+def design(
+    site: str, designer: str, simulations: int, verify: int, seed: int, out: Path | None
+) -> None:
+    """Design the barriers of SITE (a name or a TOML file) and verify them on unseen releases.
+
+    Writes layout.toml, evaluations.csv, profile.png, search.png and episode.rrd. What a killed
+    or former run has simulated is in evaluations.jsonl and is not simulated again.
+    """
+    from agents import job, tables
+    from envs import DesignProblem
+
+    problem = DesignProblem(site)
+    folder = folder_for(out, "design", problem.site.name)
+    with kept(folder):
+        with progress(simulations + CASES * verify) as tick:
+            study, store = job.study(problem, designer, simulations, seed, verify, folder, tick)
+        job.write(study, folder)
+    show(tables.designs(study.cases))
+    for wall in study.cases[-1][1].layout:
+        click.echo(tables.describe(wall))
+    resumed = f", {store.resumed} taken from a former run" if store.resumed else ""
+    click.echo(
+        f"search: {study.result.simulations} releases; verification: {verify} unseen ones each "
+        f"(seeds of a stream of their own){resumed}\nlayout.toml, evaluations.csv, profile.png, "
+        f"search.png and episode.rrd are in {folder}"
+    )
+
+
+@cli.command()
+@click.argument("target")
+@layout_option
+@seed_option("Seed of the release.")
+@out_option("replay")
+def replay(target: str, layout: str | None, seed: int, out: Path | None) -> None:
+    """Open a replay (FILE.rrd, or a run FILE.npz) or make one of a release of a site.
+
+    For a site, writes episode.rrd and prints its path.
+    """
+    import rigdda
+    from rigdda.replay import Marks, open_viewer
+
+    file = Path(target)
+    if file.suffix == ".npz":
+        run = rigdda.Run.load(file)
+        file = file.with_suffix(".rrd")
+        run.to_rerun(file, Marks(title=file.stem))
+    if file.suffix == ".rrd":
+        open_viewer(file)
+        return
+    where = rigdda.Site.load(target)
+    walls = _layout(layout)
+    where.realise(walls, seed)
+    folder = folder_for(out, "replay", where.name)
+    with kept(folder):
+        run, outcome = rigdda.release(where, walls, seed, progress=sys.stderr.isatty())
+    notes = {"seed": str(seed), "past the road's edge": f"{outcome.debris_fraction:.1%}"}
+    road = (where.road.start, where.road.end)
+    run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name))
+    click.echo(folder / "episode.rrd")
+
+
+def _layout(path: str | None) -> Layout:
+    """Return the layout of a file, no barriers without one."""
+    from rigdda import load_layout
+
+    return () if path is None else load_layout(path)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -43,7 +43,8 @@ def profile(path: str | os.PathLike[str], site: Site, panels: Sequence[Panel]) -
 
     left, right, bottom, top = _window(site)
     scale = min(9.5 / (right - left), 5.2 / (top - bottom))  # inches a metre
-    size = (right - left) * scale + 1.2, ((top - bottom) * scale + 0.6) * len(panels) + 0.8
+    width = max((right - left) * scale + 1.2, 8.5)  # room for the words
+    size = width, ((top - bottom) * scale + 0.7) * len(panels) + 0.8
     with rc_context(FONT):
         figure = Figure(size, dpi=DPI, layout="constrained")
         grid = figure.subplots(len(panels), sharex=True, squeeze=False)
@@ -87,7 +88,7 @@ def _slope(axes: Axes, site: Site, panel: Panel) -> None:
             arrowprops={"arrowstyle": "-", "color": BARRIER, "linewidth": 0.8},
         )
     draw(axes, run, (road.start, road.end))
-    axes.set_title(panel.title, loc="left")
+    axes.set_title(panel.title, loc="left", fontsize=11)
 
 
 def _key(figure: Figure) -> None:

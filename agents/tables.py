@@ -151,7 +151,7 @@ def _table(head: Sequence[str]) -> Table:
     return table
 
 
-def _span(interval: Sequence[float], form: str) -> str:
+def _span(interval: Iterable[float], form: str) -> str:
     """Return an interval in words; a single value has none."""
     low, high = interval
     return f"{low:{form}} to {high:{form}}" if math.isfinite(high - low) else "-"

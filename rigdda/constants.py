@@ -43,7 +43,7 @@ FLIPS = 3
 """A contact that changed between stick and slip, or open and closed, this often in one step keeps
 its state. Nearly every step that does not converge has one such contact."""
 
-RELAXATION_SWEEPS = 12
+RELAXATION_SWEEPS = 40
 """Most sweeps over the forces of an island in motion in a step."""
 
 RELAXATION_SPEED = 0.01

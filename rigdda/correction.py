@@ -7,7 +7,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
-from rigdda.constants import IMPACT, MOVING, NEW, OPEN, REST, STIFFNESS_CHANGE
+from rigdda.constants import IMPACT, OPEN, SHOCK
 from rigdda.kernel import kernel
 from rigdda.open_close import assemble_blocks
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
@@ -36,15 +36,16 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
 
 
 @kernel
-def mean_impact_share(c: Contacts, work: Work, low: int, high: int) -> float:
-    """Return the share of the step after the impacts of an island, weighted by impulse."""
-    weight = total = 0.0
-    for item in range(low, high):
-        k = work.contact_item[item]
-        if c[k].kind == IMPACT:
-            weight += c[k].normal
-            total += c[k].normal * c[k].share
-    return total / weight if weight > 0.0 else 0.5
+def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> None:
+    """Add the force of contact k to slot i, and to the mean time of the impacts of its block.
+
+    m.residual sums forces; m.direction sums normal forces of impacts and their moments in time.
+    """
+    add_force(m.residual[i], c[k].normal, normal_row(c, k, of_a))
+    add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
+    if c[k].kind == IMPACT:
+        m.direction[i, 0] += c[k].normal
+        m.direction[i, 1] += c[k].normal * (c[k].share - 0.5)
 
 
 @kernel
@@ -58,39 +59,26 @@ def apply_forces(
     by dt^2 F / 2M; an impulse that acts for the share s of the step displaces it by s dt^2 F / M.
     """
     b0, b1 = work.block_start[island], work.block_start[island + 1]
-    c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
     for s in range(b1 - b0):
-        m.residual[s, 0] = m.residual[s, 1] = m.residual[s, 2] = 0.0
-    shared = mean_impact_share(c, work, c0, c1)
-    for item in range(c0, c1):
+        for j in range(3):
+            m.residual[s, j] = m.direction[s, j] = 0.0
+    for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
         if c[k].state == OPEN:
             continue
-        share = c[k].share if c[k].kind == IMPACT else shared
-        late_normal = (share - 0.5) * (c[k].normal - c[k].memory_normal)
-        late_shear = (share - 0.5) * (c[k].shear - c[k].memory_shear)
-        i = work.slot[c[k].a]
-        en, es = normal_row(c, k, True), shear_row(c, k, True)
-        add_force(m.rhs[i], c[k].normal, en)
-        add_force(m.rhs[i], c[k].shear, es)
-        add_force(m.residual[i], late_normal, en)
-        add_force(m.residual[i], late_shear, es)
+        add_contact_force(c, k, m, work.slot[c[k].a], True)
         if c[k].pair >= 0:
-            j = work.slot[c[k].b]
-            en, es = normal_row(c, k, False), shear_row(c, k, False)
-            add_force(m.rhs[j], c[k].normal, en)
-            add_force(m.rhs[j], c[k].shear, es)
-            add_force(m.residual[j], late_normal, en)
-            add_force(m.residual[j], late_shear, es)
+            add_contact_force(c, k, m, work.slot[c[k].b], False)
     for s in range(b1 - b0):
         i = work.block_item[b0 + s]
+        late = m.direction[s, 1] / m.direction[s, 0] if m.direction[s, 0] > 0.0 else 0.0
+        late *= p.dt * p.dt
         for j in range(3):
-            m.d[s, j] = m.rhs[s, j] / m.diagonal[s, j, j]
-        late = p.dt * p.dt / bodies[i].mass
-        m.residual[s, 0] *= late
-        m.residual[s, 1] *= late
-        m.residual[s, 2] *= p.dt * p.dt / bodies[i].inertia
+            m.d[s, j] = (m.rhs[s, j] + m.residual[s, j]) / m.diagonal[s, j, j]
+        m.residual[s, 0] *= late / bodies[i].mass
+        m.residual[s, 1] *= late / bodies[i].mass
+        m.residual[s, 2] *= late / bodies[i].inertia
 
 
 @kernel
@@ -142,13 +130,9 @@ def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
 
 
 @kernel
-def keep_memory(c: Contacts, k: int, p: Parameters) -> None:
+def keep_memory(c: Contacts, k: int) -> None:
     """Carry the forces of contact k to the next step; an impulse is not carried on."""
     if c[k].state == OPEN:
         c[k].memory_normal = c[k].memory_shear = 0.0
-    elif c[k].kind == REST or c[k].kind == NEW:
+    elif c[k].kind != IMPACT and c[k].kind != SHOCK:
         c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
-    elif c[k].kind == MOVING:
-        most = STIFFNESS_CHANGE * c[k].stiffness * p.penetration
-        share = min(1.0, most / c[k].normal)
-        c[k].memory_normal, c[k].memory_shear = share * c[k].normal, share * c[k].shear

@@ -13,7 +13,7 @@ from shapely.ops import polygonize
 from rigdda import check
 from rigdda.errors import BadInput
 
-SLIVER = 0.2
+SLIVER = 0.35
 """Blocks below this share of the wanted mean area are joined to a neighbour if that stays convex."""
 
 AREA_TOLERANCE = 0.05
@@ -112,7 +112,7 @@ def _cells(
         across = np.array([math.sin(dip), math.cos(dip)])
         spacing = joint.spacing * scale
         draws = 1.0 + joint.scatter * rng.standard_normal(int(2 * reach / spacing) + 4)
-        steps = spacing * np.clip(draws, 0.3, 1.7)
+        steps = spacing * np.clip(draws, 0.5, 1.5)
         offsets = np.cumsum(steps) - reach - spacing * rng.random()
         for offset in offsets[np.abs(offsets) < reach]:
             mid = centre + offset * across

@@ -130,7 +130,7 @@ def solve_and_move(
             if c[k].b >= 0:
                 bodies[c[k].b].touching = 1
         if bodies[c[k].a].status == AWAKE:
-            keep_memory(c, k, p)
+            keep_memory(c, k)
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
     return bad

@@ -32,6 +32,7 @@ from rigdda.constants import (
     IMPACT_SPEED,
     IMPACT_STEPS,
     IMPACT_STIFFNESS,
+    MOVING,
     NEW,
     OPEN,
     RECOVERY_SPEED,
@@ -57,6 +58,8 @@ def rest_stiffness(mass_a: float, mass_b: float, c: Contacts, k: int, p: Paramet
     gravity = p.gravity if p.gravity > 0.0 else 9.81
     least = max(mass_a, mass_b) * gravity / p.penetration
     before, load = c[k].stiffness, c[k].memory_normal
+    if c[k].kind == MOVING:
+        load = min(load, STIFFNESS_CHANGE * before * p.penetration)
     if load < UNLOADED * before * p.penetration:
         return max(least, before / STIFFNESS_CHANGE)
     if -c[k].gap * before > load:

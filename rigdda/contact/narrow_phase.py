@@ -157,9 +157,15 @@ def collide_pair(bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
     swapped = time_b > time_a or (time_b == time_a and gap_b > gap_a + 0.02 * p.slack)
-    time = min(time_b if swapped else time_a, 1.0)
-    edge = edge_b if swapped else edge_a
     reach = (dx * dx + dy * dy) ** 0.5 + spread
-    if swapped:
-        return clip_contacts(bodies, outlines, c, k, a, b, True, edge, -dx * time, -dy * time, reach)
-    return clip_contacts(bodies, outlines, c, k, a, b, False, edge, dx * time, dy * time, reach)
+    # corner beside corner, the better face may miss the other body where the second one does not
+    for face in range(2):
+        of_b = swapped if face == 0 else not swapped
+        edge, time = (edge_b, time_b) if of_b else (edge_a, time_a)
+        shift = min(time, 1.0) if not of_b else -min(time, 1.0)
+        found = clip_contacts(
+            bodies, outlines, c, k, a, b, of_b, edge, dx * shift, dy * shift, reach
+        )
+        if found > k or max(gap_a, gap_b) > p.slack:
+            return found
+    return k

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from rigdda.constants import OPEN, SAME_NORMAL, TERRAIN
+from rigdda.constants import NEW, OPEN, SAME_NORMAL, TERRAIN
 from rigdda.kernel import kernel
 from rigdda.records import Contacts
 
@@ -34,7 +34,7 @@ def recall_from(
             continue
         if sign * (c[k].nx * old[m].nx + c[k].ny * old[m].ny) < SAME_NORMAL:
             continue
-        c[k].state = old[m].state
+        c[k].state, c[k].kind = old[m].state, old[m].kind
         c[k].memory_normal = old[m].memory_normal
         c[k].memory_shear = old[m].memory_shear
         c[k].stiffness = old[m].stiffness
@@ -50,7 +50,7 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray) -> N
     ways; its forces keep their sign, since normal and shear turn round together.
     """
     for k in range(low, high):
-        c[k].state = OPEN
+        c[k].state, c[k].kind = OPEN, NEW
         c[k].memory_normal = c[k].memory_shear = c[k].stiffness = 0.0
         a, b = c[k].a, c[k].b
         found = recall_from(c, k, old, first[a], first[a + 1], b, 1.0)

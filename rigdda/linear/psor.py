@@ -115,6 +115,24 @@ def sweep(
 
 
 @kernel
+def sort_by_height(c: Contacts, item: Ints, low: int, high: int) -> None:
+    """Shell sort of the contacts low:high, lowest first, so that a sweep carries loads through."""
+    gap = 1
+    while 3 * gap + 1 < high - low:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(low + gap, high):
+            k = item[i]
+            y = c[k].y
+            j = i - gap
+            while j >= low and (c[item[j]].y > y or (c[item[j]].y == y and item[j] > k)):
+                item[j + gap] = item[j]
+                j -= gap
+            item[j + gap] = k
+        gap //= 3
+
+
+@kernel
 def relax_forces(c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int, dt: float) -> int:
     """Sweep to and fro over the contacts low:high until their forces settle; returns the sweeps.
 
@@ -125,6 +143,7 @@ def relax_forces(c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int
             m.scaled[s, q] = 1.0 / m.diagonal[s, q, q]
             m.d[s, q] = m.rhs[s, q] * m.scaled[s, q]
     count = high - low
+    sort_by_height(c, work.contact_item, low, high)
     for place in range(count):
         pack_row(c, work.contact_item[low + place], m, work, place, dt)
     limit = RELAXATION_SPEED * dt / (2.0 * RELAXATION_STIFFNESS)

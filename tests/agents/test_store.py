@@ -1,0 +1,62 @@
+"""A store gives back exactly what was evaluated, and only that."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+import agents
+from agents.store import Store
+from envs import DesignProblem
+from rigdda import Site, Wall
+
+WALLS = (Wall(20.0, 2.0, 0.7),)
+
+
+@pytest.mark.parametrize("seeds", [(4,), (4, 5, 6)])
+def test_an_evaluation_survives_the_file_to_the_bit(
+    seeds: tuple[int, ...], problem: DesignProblem, tmp_path: Path
+) -> None:
+    file = tmp_path / "store.jsonl"
+    written = Store(file).evaluate(problem, WALLS, seeds)
+    store = Store(file)
+    assert store.evaluate(problem, WALLS, seeds) == written == problem.evaluate(WALLS, seeds)
+    assert (store.simulated, store.resumed) == (0, len(seeds))
+
+
+def test_another_question_is_simulated(problem: DesignProblem, site: Site, tmp_path: Path) -> None:
+    file = tmp_path / "store.jsonl"
+    Store(file).evaluate(problem, WALLS, (1, 2))
+    store = Store(file)
+    store.evaluate(problem, WALLS, (1, 3))
+    store.evaluate(problem, (Wall(20.0, 2.1, 0.7),), (1, 2))
+    store.evaluate(DesignProblem(site, cost_weight=0.3), WALLS, (1, 2))
+    store.evaluate(DesignProblem(site, cost_limit=10.0), WALLS, (1, 2))
+    wetter = msgspec.structs.replace(site, scatter=msgspec.structs.replace(site.scatter))
+    store.evaluate(DesignProblem(wetter), WALLS, (1, 2))
+    assert (store.simulated, store.resumed) == (8, 2)
+    looser = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, damping=0.3))
+    store.evaluate(DesignProblem(looser), WALLS, (1, 2))
+    assert store.simulated == 10
+
+
+@pytest.mark.parametrize("name", ["cma", "random"])
+@pytest.mark.parametrize("tail", [b"", b'{"key": "12', b"\x00\x00\n"])
+def test_a_killed_search_goes_on_where_it_stopped(
+    name: str, tail: bytes, problem: DesignProblem, tmp_path: Path
+) -> None:
+    design = getattr(agents, name).design
+    file = tmp_path / "store.jsonl"
+    whole = design(problem, 48, store=Store(file))
+    lines = file.read_bytes().splitlines(keepends=True)
+    half = len(lines) // 2
+    file.write_bytes(b"".join(lines[:half]) + tail)
+    store = Store(file)
+    assert design(problem, 48, store=store) == whole
+    assert store.resumed > 0 and store.simulated > 0
+    assert file.read_bytes() == b"".join(lines)
+    again = Store(file)
+    assert design(problem, 48, store=again) == whole
+    assert again.simulated == 0

@@ -1,0 +1,71 @@
+"""Impacts never raise the kinetic energy, whatever restitution and friction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from physics.helpers import FLAT, momentum, polygon, rock, rough
+
+from rigdda import Block, Scene, Settings, Simulation, Terrain
+from rigdda.constants import RECOVERY_SPEED
+
+RESTITUTIONS = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9)
+
+
+def oblique_hit(seed: int) -> Scene:
+    """Return a random block that hits flat ground obliquely, without gravity."""
+    rng = np.random.default_rng(seed)
+    corners = polygon(rough(rng, rng.integers(3, 9)), (0.0, 1.5))
+    restitution, friction = rng.choice(RESTITUTIONS), rng.uniform(0.0, 60.0)
+    velocity = (rng.uniform(-15.0, 15.0), rng.uniform(-15.0, -1.0), rng.uniform(-10.0, 10.0))
+    block = Block(corners, velocity=velocity)
+    return Scene(Terrain(FLAT), (block,), rock(friction, restitution), gravity=0.0)
+
+
+def crowd(seed: int, count: int, restitution: float | None = None) -> Scene:
+    """Return random blocks on a ring that fly at one another, in free space."""
+    rng = np.random.default_rng(seed)
+    e, friction = rng.choice(RESTITUTIONS), rng.uniform(0.0, 60.0)
+    ring = 1.3 if count == 2 else 1.3 * count / math.pi
+    blocks = []
+    for i in range(count):
+        turn = 2.0 * math.pi * i / count
+        outward = np.array([math.cos(turn), math.sin(turn)])
+        corners = polygon(rough(rng, rng.integers(3, 9)), ring * rng.uniform(1.0, 1.3) * outward)
+        velocity = -5.0 * rng.uniform(0.3, 1.0) * outward + rng.normal(size=2)
+        spin = rng.uniform(-5.0, 5.0)
+        blocks.append(Block(corners, 10.0 ** rng.uniform(2.0, 4.0), velocity=(*velocity, spin)))
+    surfaces = rock(friction, e if restitution is None else restitution)
+    return Scene(None, blocks, surfaces, gravity=0.0)
+
+
+def greatest_gain(scene: Scene, steps: int = 300) -> float:
+    """Return the greatest growth of kinetic energy in a step, over the energy at the start.
+
+    What pushing out penetration may add, half the square of its speed, is allowed for.
+    """
+    sim = Simulation(scene, Settings(sleeping=False))
+    start = before = momentum(sim)[2]
+    mass = sum(sim._arrays.bodies["mass"])
+    gain = -math.inf
+    for _ in range(steps):
+        sim.step()
+        now = momentum(sim)[2]
+        gain = max(gain, now - before)
+        before = now
+    return (gain - 0.5 * mass * RECOVERY_SPEED**2) / start
+
+
+@pytest.mark.parametrize("batch", range(6))
+def test_oblique_hit_of_the_ground(batch):
+    gains = {seed: greatest_gain(oblique_hit(seed), 100) for seed in range(50 * batch, 50 * batch + 50)}
+    assert max(gains.values()) < 1e-9, max(gains, key=gains.get)
+
+
+@pytest.mark.parametrize("count", [2, 3, 6])
+@pytest.mark.parametrize("restitution", [0.0, None])
+def test_blocks_in_free_space(count, restitution):
+    gains = {seed: greatest_gain(crowd(seed, count, restitution)) for seed in range(1000, 1060)}
+    assert max(gains.values()) < 1e-9, max(gains, key=gains.get)

@@ -52,6 +52,10 @@ RELAXATION_SPEED = 0.01
 RELAXATION_STIFFNESS = 30.0
 """Stiffness of a contact in relaxation times its flexibility [-]; stiffer converges more slowly."""
 
+STEADY_RATE = 0.25
+"""Share of a rise of the force that counts as lasting load after one step of motion [-]; the rest
+may be an impulse."""
+
 QUIET_SPEED = 0.1
 """Speed below which all blocks of an island are solved together, accurately; faster islands of
 several blocks are relaxed [m/s]."""

@@ -7,7 +7,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
-from rigdda.constants import IMPACT, OPEN, SHOCK
+from rigdda.constants import IMPACT, MOVING, OPEN, SHOCK, STEADY_RATE
 from rigdda.kernel import kernel
 from rigdda.open_close import assemble_blocks
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
@@ -133,6 +133,8 @@ def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
 def keep_memory(c: Contacts, k: int) -> None:
     """Carry the forces of contact k to the next step; an impulse is not carried on."""
     if c[k].state == OPEN:
-        c[k].memory_normal = c[k].memory_shear = 0.0
+        c[k].memory_normal = c[k].memory_shear = c[k].steady = 0.0
     elif c[k].kind != IMPACT and c[k].kind != SHOCK:
         c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
+        rise = c[k].normal - c[k].steady
+        c[k].steady += rise if rise < 0.0 or c[k].kind != MOVING else STEADY_RATE * rise

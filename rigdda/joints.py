@@ -165,7 +165,7 @@ def _join(parts: list[shapely.Polygon | None], beside: list[list[int]], i: int) 
             ):
                 best, longest, joined = j, common, union
     if best >= 0:
-        parts[best] = joined.simplify(1e-9 * cell.length)
+        parts[best] = joined.simplify(1e-7 * cell.length)
         beside[best] = sorted({*beside[best], *beside[i]} - {best, i})
         for j in beside[i]:
             beside[j] = sorted({*beside[j], best} - {i, j})

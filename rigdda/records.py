@@ -64,6 +64,7 @@ CONTACT = _record(
     share=float,  # share of the step that remains when an impact acts
     memory_normal=float,  # forces carried over from the last step [N]
     memory_shear=float,
+    steady=float,  # part of the carried normal force that lasts [N]
     normal=float,  # force of this step [N], on a
     shear=float,
     lag=float,  # shear force of a slipping contact in the current iteration [N]

@@ -168,4 +168,26 @@ def collide_pair(bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int
         )
         if found > k or max(gap_a, gap_b) > p.slack:
             return found
-    return k
+    return deepest_corner(bodies, outlines, c, k, a, b, swapped, edge_b if swapped else edge_a)
+
+
+@kernel
+def deepest_corner(
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, swapped: bool,
+    edge: int,
+) -> int:  # fmt: skip
+    """Add the contact of the nearest corner of one body with the line of a face of the other.
+
+    For bodies that touch although the face does not reach over the corner: nearly parallel edges
+    in a row, where rounding decides which of them is the face.
+    """
+    i, j = (b, a) if swapped else (a, b)
+    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+    x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
+    gap, corner = axis_gap(nx, ny, x0, y0, outlines.world_x, outlines.world_y, j, bodies[j].count)
+    sign = 1.0 if swapped else -1.0
+    add_contact(
+        c, k, a, b, j * outlines.world_x.shape[1] + corner, 1 if j == a else 0, bodies[b].surface,
+        outlines.world_x[j, corner], outlines.world_y[j, corner], sign * nx, sign * ny, gap,
+    )  # fmt: skip
+    return k + 1

@@ -134,7 +134,8 @@ def edge_on_ridge(
     ey = outlines.world_y[a, end] - outlines.world_y[a, best]
     along = (x + time * dx - outlines.world_x[a, best]) * ex
     along += (y + time * dy - outlines.world_y[a, best]) * ey
-    if along < 0.0 or along > ex * ex + ey * ey:
+    # a corner inside the block counts even where edges in one line make the choice of edge a tie
+    if gap > 0.0 and (along < 0.0 or along > ex * ex + ey * ey):
         return k
     key = len(bodies) * outlines.world_x.shape[1] + corner
     add_contact(c, k, a, TERRAIN, key, 0, ground.surface[right], x, y, -nx, -ny, gap)

@@ -37,7 +37,7 @@ def recall_from(
         c[k].state, c[k].kind = old[m].state, old[m].kind
         c[k].memory_normal = old[m].memory_normal
         c[k].memory_shear = old[m].memory_shear
-        c[k].stiffness = old[m].stiffness
+        c[k].stiffness, c[k].steady = old[m].stiffness, old[m].steady
         return True
     return False
 
@@ -51,7 +51,7 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray) -> N
     """
     for k in range(low, high):
         c[k].state, c[k].kind = OPEN, NEW
-        c[k].memory_normal = c[k].memory_shear = c[k].stiffness = 0.0
+        c[k].memory_normal = c[k].memory_shear = c[k].steady = c[k].stiffness = 0.0
         a, b = c[k].a, c[k].b
         found = recall_from(c, k, old, first[a], first[a + 1], b, 1.0)
         if not found and b != TERRAIN:
@@ -65,4 +65,4 @@ def copy_contact(c: Contacts, k: int, old: Contacts, m: int) -> None:
     c[k].other, c[k].x, c[k].y, c[k].nx, c[k].ny = old[m].other, old[m].x, old[m].y, old[m].nx, old[m].ny
     c[k].gap, c[k].state, c[k].kind = old[m].gap, old[m].state, old[m].kind
     c[k].memory_normal, c[k].memory_shear = old[m].memory_normal, old[m].memory_shear
-    c[k].stiffness, c[k].normal, c[k].shear = old[m].stiffness, old[m].normal, old[m].shear
+    c[k].steady, c[k].stiffness, c[k].normal, c[k].shear = old[m].steady, old[m].stiffness, old[m].normal, old[m].shear

@@ -45,15 +45,16 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, dt: float) 
         row[place, NORMAL_B + q], row[place, SHEAR_B + q] = fn[q], fs[q]
     soft_n = flexibility(m, i, en) + flexibility(m, j, fn)
     soft_s = flexibility(m, i, es) + flexibility(m, j, fs)
-    # stiff against the inertia of the blocks; in motion the forces of the last step, which may be
-    # impulses, are where relaxation starts but no part of the law
+    # stiff against the inertia of the blocks; relaxation starts from the forces of the last step,
+    # of which the law keeps the part that lasts: the rest may be impulses
     kappa = RELAXATION_STIFFNESS / soft_n
     carried = old.memory_normal
     row[place, GAIN], row[place, SOFT] = kappa / (1.0 + 2.0 * kappa * soft_n), 1.0 / kappa
-    row[place, FREE] = old.bias - carried / old.kappa + dt * old.un
+    row[place, FREE] = old.bias - carried / old.kappa + old.steady / kappa + dt * old.un
     kappa = RELAXATION_STIFFNESS / soft_s
     row[place, GAIN + 1], row[place, SOFT + 1] = kappa / (1.0 + 2.0 * kappa * soft_s), 1.0 / kappa
-    row[place, FREE + 1] = dt * old.us
+    lasting = old.steady / carried if carried > 0.0 else 0.0
+    row[place, FREE + 1] = lasting * old.memory_shear / kappa + dt * old.us
     row[place, FORCE], row[place, FORCE + 1] = carried, old.memory_shear
     row[place, FRICTION] = old.friction
     push(row, place, NORMAL_A, i, j, m.d, m.scaled, carried)

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from physics.helpers import FLAT, momentum, polygon, rock, rough
 
+from physics.helpers import FLAT, momentum, polygon, rock, rough
 from rigdda import Block, Scene, Settings, Simulation, Terrain
 from rigdda.constants import RECOVERY_SPEED
 
@@ -60,7 +60,9 @@ def greatest_gain(scene: Scene, steps: int = 300) -> float:
 
 @pytest.mark.parametrize("batch", range(6))
 def test_oblique_hit_of_the_ground(batch):
-    gains = {seed: greatest_gain(oblique_hit(seed), 100) for seed in range(50 * batch, 50 * batch + 50)}
+    gains = {
+        seed: greatest_gain(oblique_hit(seed), 100) for seed in range(50 * batch, 50 * batch + 50)
+    }
     assert max(gains.values()) < 1e-9, max(gains, key=gains.get)
 
 

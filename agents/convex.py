@@ -81,7 +81,8 @@ def design(
 
 
 def _propose(layouts: list[Layout]) -> Proposals:
-    yield from layouts
+    for layout in dict.fromkeys([*layouts, ()]):  # never worse than no barrier
+        yield layout
 
 
 def candidates(problem: DesignProblem, ensemble: Ensemble) -> list[Layout]:
@@ -114,7 +115,7 @@ def tabulate(problem: DesignProblem, ensemble: Ensemble) -> Table:
     return Table(
         walls=walls,
         base=base / ensemble.mass,
-        relief=risky * held / ensemble.mass[:, None, None],
+        relief=np.maximum.accumulate(risky * held, axis=2) / ensemble.mass[:, None, None],
         cost=np.array([[site.cost([w]) for w in row] for row in walls]) / problem.cost_limit,
     )
 

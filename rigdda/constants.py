@@ -26,6 +26,10 @@ may be an impulse [-]."""
 UNLOADED = 0.2
 """Share of the load that its stiffness was chosen for, below which a contact softens [-]."""
 
+GREATEST_LOAD = 300.0
+"""Greatest force that a contact carries to the next step over the weight of its heavier body [-]:
+the height, in blocks, of the tallest stack. Higher, and wedged blocks burst out more violently."""
+
 RECOVERY_TIME = 0.1
 """Time in which penetration beyond what the load explains is pushed out [s]. Shorter pumps energy
 into piles, longer leaves visible overlap."""

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from rigdda.constants import (
     AWAKE,
+    GREATEST_LOAD,
     IMPACT,
     IMPACT_SPEED,
     IMPACT_STEPS,
@@ -48,15 +49,20 @@ from rigdda.records import Bodies, Contacts, Parameters
 
 
 @kernel
-def rest_stiffness(mass_a: float, mass_b: float, c: Contacts, k: int, p: Parameters) -> float:
+def carried_weight(mass_a: float, mass_b: float, p: Parameters) -> float:
+    """Return the weight [N] of the heavier free body of a contact, the least load it may carry."""
+    return max(mass_a, mass_b) * (p.gravity if p.gravity > 0.0 else 9.81)
+
+
+@kernel
+def rest_stiffness(weight: float, c: Contacts, k: int, p: Parameters) -> float:
     """Return k_n [N/m] for the wanted penetration under the load that contact k carries.
 
-    At least for the weight of the heavier free body. It grows with the load unless that comes from
-    pushing out penetration, which in a wedged block would go on for ever. It falls only when most
-    of the load has gone: stiffness that fell with the load would feed the sway of a stack.
+    At least for `weight` [N]. It grows with the load unless that comes from pushing out
+    penetration, which in a wedged block would go on for ever. It falls only when most of the load
+    has gone: stiffness that fell with the load would feed the sway of a stack.
     """
-    gravity = p.gravity if p.gravity > 0.0 else 9.81
-    least = max(mass_a, mass_b) * gravity / p.penetration
+    least = weight / p.penetration
     before, load = c[k].stiffness, c[k].memory_normal
     if c[k].kind == MOVING:
         load = min(load, STIFFNESS_CHANGE * before * p.penetration)
@@ -146,8 +152,11 @@ def recovery(surplus: float, dt: float) -> float:
 
 
 @kernel
-def set_rest(c: Contacts, k: int, p: Parameters) -> None:
-    """Make contact k a spring that carries on with the force of the last step."""
+def set_rest(c: Contacts, k: int, most: float, p: Parameters) -> None:
+    """Make contact k a spring that carries on with the force of the last step.
+
+    Under more than `most` [N] penetration is not pushed out: a wedged block is left in peace.
+    """
     c[k].kind = REST
     c[k].kappa = c[k].stiffness
     elastic = c[k].memory_normal / c[k].stiffness
@@ -155,7 +164,9 @@ def set_rest(c: Contacts, k: int, p: Parameters) -> None:
         c[k].memory_normal = 0.0
         c[k].bias = -c[k].gap
     else:
-        c[k].bias = elastic + recovery(-c[k].gap - elastic, p.dt)
+        c[k].bias = elastic
+        if c[k].memory_normal < most:
+            c[k].bias += recovery(-c[k].gap - elastic, p.dt)
 
 
 @kernel
@@ -174,7 +185,12 @@ def prepare(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
     mass_b = 0.0
     if b >= 0 and bodies[b].status == AWAKE:
         gravity, mass_b = 0.0, bodies[b].mass
-    c[k].stiffness = rest_stiffness(bodies[a].mass, mass_b, c, k, p)
+    weight = carried_weight(bodies[a].mass, mass_b, p)
+    most = GREATEST_LOAD * weight
+    c[k].memory_shear *= most / max(c[k].memory_normal, most)
+    c[k].memory_normal = min(c[k].memory_normal, most)
+    c[k].steady = min(c[k].steady, most)
+    c[k].stiffness = rest_stiffness(weight, c, k, p)
     surface = bodies[a].surface
     c[k].friction = p.friction[surface, c[k].other]
     c[k].restitution = p.restitution[surface, c[k].other]
@@ -200,7 +216,7 @@ def prepare(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
         set_arms(bodies, c, k, 0.5 * p.dt)
         set_velocities(bodies, c, k)
     if c[k].state != OPEN:
-        set_rest(c, k, p)
+        set_rest(c, k, most, p)
         return
     set_new(bodies, c, k, p)
     # what touches starts closed: in a stack no block moves before those below it are held

@@ -36,9 +36,7 @@ def best_by_trying_all(table: Table, problem: DesignProblem, limit: float) -> fl
             passing = np.maximum(table.base - relief, 0.0)
             cost = sum(table.cost[k, j] for k, j in chosen)
             if cost <= 1.0 and cvar(passing, 0.9) <= limit * cvar(table.base, 0.9) + 1e-9:
-                best = min(
-                    best, problem.risk_weight * passing.mean() + problem.cost_weight * cost
-                )
+                best = min(best, problem.risk_weight * passing.mean() + problem.cost_weight * cost)
     return best
 
 
@@ -86,11 +84,11 @@ def test_without_walls_the_table_says_what_the_simulation_says(problem: DesignPr
     assert (np.diff(table.relief, axis=2) >= -1e-12).all(), "a higher wall never stops less"
 
 
-def test_candidates_are_different_layouts_within_the_limits(problem: DesignProblem) -> None:
+def test_candidates_are_layouts_that_may_be_built(problem: DesignProblem) -> None:
     found = convex.candidates(problem, ensemble(problem.site, (1, 2, 3, 4)))
-    assert len(found) == len(set(found)) >= 2
+    assert found and len(found) == len(set(found))
     for layout in found:
         assert problem.site.cost(layout) <= problem.cost_limit
-        assert problem.decode(problem.encode(layout)) == pytest.approx(layout, abs=1e-9) or layout
-
-
+        again = problem.decode(problem.encode(layout))
+        assert [w.x for w in again] == pytest.approx([w.x for w in layout])
+        assert [w.height for w in again] == pytest.approx([w.height for w in layout])

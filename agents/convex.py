@@ -81,7 +81,8 @@ def design(
 
 
 def _propose(layouts: list[Layout]) -> Proposals:
-    for layout in dict.fromkeys([*layouts, ()]):  # never worse than no barrier
+    """Yield the layouts and, so that the result is never worse, no barrier."""
+    for layout in dict.fromkeys([*layouts, ()]):  # noqa: UP028, a list cannot be sent values
         yield layout
 
 

@@ -130,11 +130,28 @@ def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
 
 
 @kernel
-def keep_memory(c: Contacts, k: int) -> None:
-    """Carry the forces of contact k to the next step; an impulse is not carried on."""
+def is_struck(c: Contacts, work: Work, low: int, high: int) -> bool:
+    """Return whether an impact acted on the island with contacts low:high in this step."""
+    for item in range(low, high):
+        k = work.contact_item[item]
+        if (c[k].kind == IMPACT or c[k].kind == SHOCK) and c[k].normal > 0.0:
+            return True
+    return False
+
+
+@kernel
+def keep_memory(c: Contacts, k: int, struck: bool) -> None:
+    """Carry the forces of contact k to the next step; an impulse is not carried on.
+
+    In an island that was struck every force may be part of an impulse: what the contact carried
+    before stays.
+    """
     if c[k].state == OPEN:
         c[k].memory_normal = c[k].memory_shear = c[k].steady = 0.0
-    elif c[k].kind != IMPACT and c[k].kind != SHOCK:
+    elif c[k].kind == MOVING:
         c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
         rise = c[k].normal - c[k].steady
-        c[k].steady += rise if rise < 0.0 or c[k].kind != MOVING else STEADY_RATE * rise
+        c[k].steady += rise if rise < 0.0 else STEADY_RATE * rise
+    elif not struck:
+        c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
+        c[k].steady = c[k].normal

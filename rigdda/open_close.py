@@ -285,19 +285,17 @@ def open_close(
     moving = False
     for place in range(b0, b1):
         moving = moving or top_speed(bodies, work.block_item[place]) > QUIET_SPEED
-    if moving and b1 - b0 > 1:
-        relax(bodies, c, m, work, island, p, counters)
-        return
-    settled = solve_states(bodies, c, m, work, island, pairs, p, counters)
-    halving = 0
-    while bouncing and impact_work(c, m, work, c0, c1, p.dt) > 0.0 and halving <= ENERGY_HALVINGS:
+    relaxing = moving and b1 - b0 > 1
+    for halving in range(ENERGY_HALVINGS + 2):
+        if not relaxing:
+            relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)
+        if relaxing:
+            relax(bodies, c, m, work, island, p, counters)
+        if not bouncing or impact_work(c, m, work, c0, c1, p.dt) <= 0.0:
+            return
         for item in range(c0, c1):
             k = work.contact_item[item]
             c[k].flips = 0
             if c[k].kind == IMPACT:
                 c[k].bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0
                 c[k].state = STICK
-        settled = solve_states(bodies, c, m, work, island, pairs, p, counters)
-        halving += 1
-    if not settled:
-        relax(bodies, c, m, work, island, p, counters)

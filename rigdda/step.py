@@ -21,7 +21,14 @@ from rigdda.contact.law import prepare
 from rigdda.contact.narrow_phase import collide_pair
 from rigdda.contact.terrain_phase import collide_terrain
 from rigdda.contact.transfer import copy_contact, index_by_body, recall
-from rigdda.correction import account, apply_forces, keep_memory, move_block, place_corners
+from rigdda.correction import (
+    account,
+    apply_forces,
+    is_struck,
+    keep_memory,
+    move_block,
+    place_corners,
+)
 from rigdda.gauges import note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel
@@ -89,6 +96,8 @@ def detect(
         elif bodies[a].status == AWAKE:
             first = count
             count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
+            if count < 0:
+                return -1
             while q < pairs and work.pairs[2 * q] == a:
                 if count > room:
                     return -1
@@ -113,6 +122,9 @@ def solve_and_move(
         if c1 > c0:
             open_close(bodies, c, m, work, s, p, counters)
             counters[6] = note_hits(bodies, c, work, c0, c1, gauges, counters[6], time, p)
+        struck = is_struck(c, work, c0, c1)
+        for item in range(c0, c1):
+            keep_memory(c, work.contact_item[item], struck)
         apply_forces(bodies, c, m, work, s, p)
         account(bodies, c, m, work, s, p, ledger, gauges)
         for place in range(work.block_start[s], work.block_start[s + 1]):
@@ -129,8 +141,6 @@ def solve_and_move(
             bodies[c[k].a].touching = 1
             if c[k].b >= 0:
                 bodies[c[k].b].touching = 1
-        if bodies[c[k].a].status == AWAKE:
-            keep_memory(c, k)
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
     return bad

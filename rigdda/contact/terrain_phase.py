@@ -25,12 +25,14 @@ def over_segment(ground: Ground, s: int, x: float, y: float, depth: float) -> bo
     """Return whether a point lies over segment s, lengthened by what `depth` needs at its ends."""
     tx, ty = ground.normal_y[s], -ground.normal_x[s]
     along = tx * (x - ground.x[s]) + ty * (y - ground.y[s])
-    before = after = 1e-9
-    if ground.turn[s] > 0.0:
-        before += depth * math.tan(0.5 * ground.turn[s])
-    if ground.turn[s + 1] > 0.0:
-        after += depth * math.tan(0.5 * ground.turn[s + 1])
-    return -before <= along <= ground.length[s] + after
+    # in a concave corner: what is deeper under this segment than beyond it, or under both
+    if along < 0.0 and ground.turn[s] > 0.0 and depth > 0.0:
+        near = -along <= depth * math.tan(0.5 * ground.turn[s])
+        return near or below_segment(ground, s - 1, x, y) <= 0.0
+    if along > ground.length[s] and ground.turn[s + 1] > 0.0 and depth > 0.0:
+        near = along - ground.length[s] <= depth * math.tan(0.5 * ground.turn[s + 1])
+        return near or below_segment(ground, s + 1, x, y) <= 0.0
+    return -1e-9 <= along <= ground.length[s] + 1e-9
 
 
 @kernel
@@ -168,7 +170,7 @@ def collide_terrain(
             ):
                 continue
             if k + outlines.world_x.shape[1] + 2 > len(c):
-                return k
+                return -1
             k = corners_on_segment(bodies, outlines, ground, c, k, first, a, s, p)
             if ground.turn[s] < 0.0:
                 k = edge_on_ridge(bodies, outlines, ground, c, k, a, s, p)

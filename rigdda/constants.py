@@ -47,10 +47,10 @@ FLIPS = 3
 """A contact that changed between stick and slip, or open and closed, this often in one step keeps
 its state. Nearly every step that does not converge has one such contact."""
 
-RELAXATION_SWEEPS = 40
+RELAXATION_SWEEPS = 25
 """Most sweeps over the forces of an island in motion in a step."""
 
-RELAXATION_SPEED = 0.01
+RELAXATION_SPEED = 0.02
 """Greatest change of a contact's velocity in a sweep at which sweeps stop [m/s]."""
 
 RELAXATION_STIFFNESS = 30.0

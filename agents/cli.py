@@ -121,6 +121,7 @@ def simulate(site: str, layout: str | None, releases: int, seed: int, out: Path 
 
     where, walls = rigdda.Site.load(site), _layout(layout)
     seeds = range(seed, seed + releases)
+    where.realise(walls, seed)  # what cannot be built is said before a folder is made
     folder = folder_for(out, "simulate", where.name)
     with kept(folder), progress(releases) as tick:
         run, outcomes = job.simulate(where, walls, seeds, tick)

@@ -1,23 +1,26 @@
 """Stations and heights by mixed-integer linear programming on one barrier-free ensemble.
 
-A wall is estimated to stop each block that crosses its station with the centroid below its top,
-until the rock that fits behind it is there; walls add up. With z[k, j] = 1 for a wall of height j
-at station k, and p_r the share of release r that still reaches the road,
+A wall is estimated to stop each block that crosses its station with the centroid below its top, as
+long as there is room behind it; walls add up. With z[k, j] = 1 for a wall of height j at station
+k, and p_r the share of release r that still reaches the road,
 
     minimise    risk_weight mean(p) + cost_weight cost.z / limit
     subject to  p_r >= base_r - sum_kj relief[r, k, j] z[k, j],  p_r >= 0
                 CVaR_0.9(p) <= c CVaR_0.9(base),  cost.z <= limit,  sum z <= max_barriers
                 walls at least MIN_GAP apart
 
-with CVaR as in Rockafellar and Uryasev (2000, J. Risk 2, 21-41), a linear programme. The estimate
-knows nothing of blocks that jump off a full wall or of what a wall does to the flow further down,
-so it is solved for a ladder of limits c, and the simulation has the last word.
+with CVaR as in Rockafellar and Uryasev (2000, J. Risk 2, 21-41), a linear programme. The room is
+between two bounds: what comes to rest loosely at the angle of friction, and without end where
+blocks lock and lean on each other. Nor does the estimate know what a wall does to the flow further
+down. So the programme is solved for both bounds and a ladder of limits c, and the simulation has
+the last word.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +37,7 @@ LEVELS = 8
 FILL = 0.8
 """Share of a deposit that is rock, the rest voids between blocks: assumed."""
 TAIL = 0.9
-LADDER = (1.0, 0.5, 0.3, 0.15, 0.05)
+LADDER = (1.0, 0.3, 0.1)
 """Limits of CVaR, as shares of that without barriers; 1 binds nothing."""
 
 Floats = NDArray[np.float64]
@@ -87,18 +90,24 @@ def _propose(layouts: list[Layout]) -> Proposals:
 
 
 def candidates(problem: DesignProblem, ensemble: Ensemble) -> list[Layout]:
-    """Return the different optima over the ladder of CVaR limits, loosest first."""
-    table = tabulate(problem, ensemble)
+    """Return the different optima over both bounds and the ladder, loosest limits first."""
+    tables = [tabulate(problem, ensemble, locked) for locked in (True, False)]
     found: dict[Layout, None] = {}
-    for limit in LADDER:
+    for limit, table in product(LADDER, tables):
         chosen = solve(table, problem, limit)
         if chosen is not None:
             found[tuple(table.walls[k][j] for k, j in np.argwhere(chosen))] = None
     return list(found)
 
 
-def tabulate(problem: DesignProblem, ensemble: Ensemble) -> Table:
-    """Return the programme's numbers for a site and its barrier-free ensemble."""
+def tabulate(problem: DesignProblem, ensemble: Ensemble, locked: bool) -> Table:
+    """Return the programme's numbers for a site and its barrier-free ensemble.
+
+    Parameters
+    ----------
+    locked : bool
+        Whether there is always room behind a wall, instead of that for a loose deposit.
+    """
     site, zone = problem.site, problem.site.barrier_zone
     heights = np.linspace(MIN_HEIGHT, zone.max_height, LEVELS)
     walls = [
@@ -110,7 +119,7 @@ def tabulate(problem: DesignProblem, ensemble: Ensemble) -> Table:
         _stopped(ensemble, heights, which)
         for which in (np.ones(len(ensemble.crossings), dtype=bool), ensemble.reach_road())
     )
-    held = np.minimum(1.0, room / np.maximum(stopped, 1e-9))
+    held = 1.0 if locked else np.minimum(1.0, room / np.maximum(stopped, 1e-9))
     at_road = ensemble.at(len(ensemble.stations))
     base = np.bincount(at_road["release"], at_road["mass"], minlength=len(ensemble.mass))
     return Table(

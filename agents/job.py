@@ -68,7 +68,6 @@ def simulate(
     Diverged
         If a simulation diverges.
     """
-    site.realise(layout, seeds[0])
 
     def one(seed: int) -> tuple[Run | None, Outcome]:
         run, outcome = rigdda.release(site, layout, seed)

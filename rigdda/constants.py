@@ -76,7 +76,7 @@ SAME_FACE = 0.999
 SLACK_RATIO = 5e-3
 """Distance over block size within which contacts are candidates even at rest [-]."""
 
-SLEEP_SPEED = 5e-3
+SLEEP_SPEED = 0.02
 """Speed of any point of a block below which it counts as quiet [m/s]."""
 
 SLEEP_TIME = 0.5
@@ -90,6 +90,9 @@ NEW_HIT_TIME = 0.1
 
 SPEED_LIMIT = 1e4
 """Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall."""
+
+WAIT_STEPS = 40
+"""Steps for which an island that did not settle as a whole is relaxed before it is tried again."""
 
 # status of a body
 AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3

@@ -26,6 +26,7 @@ from rigdda.constants import (
     SHOCK_SPEED,
     SLIP,
     STICK,
+    WAIT_STEPS,
 )
 from rigdda.contact.law import set_shock
 from rigdda.islands import pair_blocks
@@ -267,6 +268,19 @@ def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int, dt: flo
 
 
 @kernel
+def is_quiet(bodies: Bodies, work: Work, low: int, high: int) -> bool:
+    """Return whether the blocks low:high are slow, and did not fail to settle a moment ago."""
+    quiet = True
+    for place in range(low, high):
+        i = work.block_item[place]
+        if bodies[i].wait > 0:
+            bodies[i].wait -= 1
+            quiet = False
+        quiet = quiet and top_speed(bodies, i) <= QUIET_SPEED
+    return quiet
+
+
+@kernel
 def open_close(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters, counters: NDArray
 ) -> None:
@@ -282,13 +296,13 @@ def open_close(
         bouncing = bouncing or (c[k].kind == IMPACT and c[k].bias > 0.0)
     pairs = pair_blocks(bodies, c, m, work, c0, c1)
     b0, b1 = work.block_start[island], work.block_start[island + 1]
-    moving = False
-    for place in range(b0, b1):
-        moving = moving or top_speed(bodies, work.block_item[place]) > QUIET_SPEED
-    relaxing = moving and b1 - b0 > 1
+    relaxing = b1 - b0 > 1 and not is_quiet(bodies, work, b0, b1)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
             relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)
+            if relaxing:
+                for place in range(b0, b1):
+                    bodies[work.block_item[place]].wait = WAIT_STEPS
         if relaxing:
             relax(bodies, c, m, work, island, p, counters)
         if not bouncing or impact_work(c, m, work, c0, c1, p.dt) <= 0.0:

@@ -36,6 +36,7 @@ BODY = _record(
     status=int,  # AWAKE, ASLEEP, FIXED, RETIRED
     island=int,  # island in which a sleeping body fell asleep
     touching=int,  # 1 if a contact was closed in the last step
+    wait=int,  # steps until its island is solved as a whole again
 )
 """State of a body. Angle and body coordinates are the state, so area is kept."""
 

@@ -36,7 +36,7 @@ class Settings:
 
     dt: float = 5e-3
     penetration: float | None = None
-    tolerance: float = 1e-9
+    tolerance: float = 1e-7
     open_close_iterations: int = 12
     sleeping: bool = True
 

@@ -66,7 +66,7 @@ def solve_pcg(m: Matrix, n: int, pairs: int, tolerance: float) -> int:
             m.direction[i, j] = m.scaled[i, j]
     limit = tolerance * tolerance * scale
     iterations = 0
-    while rho > limit and iterations < 30 * n + 30:
+    while rho > limit and iterations < 10 * n + 30:
         multiply(m, n, pairs, m.direction, m.product)
         curvature = 0.0
         for i in range(n):

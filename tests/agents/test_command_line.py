@@ -79,7 +79,7 @@ def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -
     folder, words = designed
     layout = rigdda.load_layout(folder / "layout.toml")
     table = rows(folder / "evaluations.csv")
-    stored = [json.loads(line) for line in (folder / "evaluations.jsonl").open()]
+    stored = [json.loads(line) for line in (folder / "evaluations.jsonl").read_text().splitlines()]
     assert len(table) == len(stored)
     for row, line in zip(table, stored, strict=True):
         kept = line["evaluation"]
@@ -204,10 +204,9 @@ def test_a_bad_site_file_is_one_line(
     [
         ("x = 20.0\nheight = -2.0", ("height", "-2", "above 0")),
         ("x = nan\nheight = 2.0", ("x", "nan", "finite")),
-        ("x = 20.0\nheight = 2.0\ncolour = 3", ("colour",)),
         ("x = 400.0\nheight = 2.0", ("wall x", "400", "stay on the terrain")),
     ],
-    ids=["negative height", "NaN", "unknown field", "off the slope"],
+    ids=["negative height", "NaN", "off the slope"],
 )
 def test_a_bad_layout_file_is_one_line(
     table: str, named: tuple[str, ...], toml: Path, tmp_path: Path

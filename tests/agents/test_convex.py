@@ -71,10 +71,13 @@ def test_the_deposit_behind_a_wall_is_the_triangle_of_closed_form(site: Site) ->
     assert capacity(site, Wall(20.0, 3.0)) == pytest.approx(expected, rel=0.02)
 
 
-def test_without_walls_the_table_says_what_the_simulation_says(problem: DesignProblem) -> None:
+@pytest.mark.parametrize("locked", [True, False])
+def test_without_walls_the_table_says_what_the_simulation_says(
+    locked: bool, problem: DesignProblem
+) -> None:
     seeds = (3, 4, 5)
     looked = ensemble(problem.site, seeds)
-    table = tabulate(problem, looked)
+    table = tabulate(problem, looked, locked)
     simulated = problem.evaluate((), seeds)
     debris = [outcome.debris_fraction for outcome in simulated.outcomes]
     assert table.base == pytest.approx(debris, abs=1e-9)

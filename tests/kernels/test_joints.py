@@ -1,0 +1,64 @@
+"""Cutting a rock mass into blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigdda import Block, Site
+from rigdda.joints import JointSet, cut
+
+SQUARE = shapely.Polygon([(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)])
+SITE = Site.load("shu-hwa")
+
+
+def cut_site(seed: int) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    source = shapely.Polygon(SITE.source.polygon)
+    return cut(source, SITE.source.joints, SITE.source.block_area, rng)
+
+
+def check(source: shapely.Polygon, blocks: list[np.ndarray], block_area: float) -> None:
+    """Assert what every cut must give: all the rock, in convex blocks that do not overlap."""
+    cells = [shapely.Polygon(b) for b in blocks]
+    areas = np.array([c.area for c in cells])
+    assert areas.sum() == pytest.approx(source.area, rel=1e-9)
+    assert areas.mean() == pytest.approx(block_area, rel=0.1)
+    for block in blocks:
+        Block(block)  # raises unless convex
+    tree = shapely.STRtree(cells)
+    for i, j in tree.query(cells, predicate="intersects").T:
+        if i < j:
+            assert shapely.intersection(cells[i], cells[j]).area < 1e-9 * block_area
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_site(seed):
+    source = shapely.Polygon(SITE.source.polygon)
+    check(source, cut_site(seed), SITE.source.block_area)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    dip=st.floats(-90.0, 90.0),
+    between=st.floats(30.0, 150.0),
+    scatter=st.floats(0.0, 0.4),
+    block_area=st.floats(1.0, 6.0),
+)
+def test_any_two_sets(seed, dip, between, scatter, block_area):
+    other = (dip + between + 90.0) % 180.0 - 90.0
+    joints = (JointSet(dip, 1.0, scatter), JointSet(other, 1.0, scatter))
+    blocks = cut(SQUARE, joints, block_area, np.random.default_rng(seed))
+    check(SQUARE, blocks, block_area)
+
+
+def test_seed_decides():
+    first, again, other = cut_site(1), cut_site(1), cut_site(2)
+    assert len(first) == len(again)
+    assert all((a == b).all() for a, b in zip(first, again, strict=True))
+    assert len(first) != len(other) or any(
+        a.shape != b.shape or (a != b).any() for a, b in zip(first, other, strict=True)
+    )

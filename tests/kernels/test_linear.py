@@ -1,0 +1,85 @@
+"""Linear solvers against dense numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigdda.linear.direct import solve_block
+from rigdda.linear.pcg import multiply, solve_pcg
+from rigdda.pack import empty_matrix
+from rigdda.records import Matrix
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def system(seed: int, n: int, spread: float = 1.0) -> tuple[Matrix, np.ndarray, int]:
+    """Return a random system of n blocks that touch at random, the same dense, and its pairs."""
+    rng = np.random.default_rng(seed)
+    touching = [(i, j) for i in range(n) for j in range(i + 1, n) if rng.random() < 3.0 / n]
+    m = empty_matrix(n, len(touching) + 1)
+    dense = np.zeros((3 * n, 3 * n))
+
+    def add(vector: np.ndarray) -> None:
+        dense[:] += np.outer(vector, vector)
+
+    for i in range(n):
+        root = rng.normal(size=(3, 3)) * 10.0 ** rng.uniform(-spread, spread)
+        dense[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += root @ root.T + np.eye(3)
+    for i, j in touching:  # springs, as contacts are
+        spring = np.zeros(3 * n)
+        spring[3 * i : 3 * i + 3], spring[3 * j : 3 * j + 3] = rng.normal(size=(2, 3))
+        add(spring * 10.0 ** rng.uniform(-spread, spread))
+    for i in range(n):
+        m.diagonal[i] = dense[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]
+    for q, (i, j) in enumerate(touching):
+        m.pair_i[q], m.pair_j[q] = i, j
+        m.off[q] = dense[3 * i : 3 * i + 3, 3 * j : 3 * j + 3]
+    m.rhs[:] = rng.normal(size=(n, 3))
+    return m, dense, len(touching)
+
+
+@given(seeds, st.integers(1, 30))
+def test_multiply(seed, n):
+    m, dense, pairs = system(seed, n)
+    x, y = np.random.default_rng(seed).normal(size=(n, 3)), np.empty((n, 3))
+    multiply(m, n, pairs, x, y)
+    exact = dense @ x.ravel()
+    assert np.abs(y.ravel() - exact).max() < 1e-12 * np.abs(dense).max()
+
+
+@given(seeds, st.integers(1, 30), st.booleans())
+def test_pcg(seed, n, warm):
+    m, dense, pairs = system(seed, n)
+    exact = np.linalg.solve(dense, m.rhs.ravel())
+    if warm:
+        m.d[:] = exact.reshape(n, 3) * 1.01
+    iterations = solve_pcg(m, n, pairs, 1e-12)
+    assert 0 < iterations < 30 * n + 30
+    assert np.abs(m.d.ravel() - exact).max() < 1e-8 * np.abs(exact).max()
+
+
+def test_pcg_starts_from_the_given_value():
+    m, dense, pairs = system(3, 20)
+    m.d[:] = np.linalg.solve(dense, m.rhs.ravel()).reshape(20, 3)
+    assert solve_pcg(m, 20, pairs, 1e-8) == 0
+
+
+def test_pcg_without_load():
+    m, _, pairs = system(4, 5)
+    m.rhs[:] = 0.0
+    assert solve_pcg(m, 5, pairs, 1e-9) == 0
+    assert (m.d == 0.0).all()
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+@given(seed=seeds)
+def test_solve_block(symmetric, seed):
+    rng = np.random.default_rng(seed)
+    k, f, d = rng.normal(size=(3, 3)), rng.normal(size=3), np.empty(3)
+    k = k @ k.T + 0.1 * np.eye(3) if symmetric else k + 4.0 * np.eye(3)
+    solve_block(k, f, d)
+    exact = np.linalg.solve(k, f)
+    assert np.abs(d - exact).max() < 1e-12 * np.linalg.cond(k) * np.abs(exact).max()

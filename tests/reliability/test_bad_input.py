@@ -1,0 +1,138 @@
+"""What a user gets wrong is told at once: field, value and mend, in one line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from physics.helpers import FLAT, box, rock
+
+from rigdda import (
+    BadInput,
+    Block,
+    Error,
+    Run,
+    Scene,
+    Settings,
+    Simulation,
+    Site,
+    Surface,
+    Terrain,
+    Wall,
+    load_layout,
+    sites,
+)
+
+NAN = math.nan
+UNIT = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+GROUND = Terrain(FLAT)
+
+
+def scene(**change) -> Scene:
+    parts = {"terrain": GROUND, "blocks": (box(0.0, 0.5),), "surfaces": rock()} | change
+    return Scene(**parts)
+
+
+def site(old: str, new: str) -> Callable[[], Site]:
+    """Return what loads the site "quick" with one line of its TOML changed."""
+
+    def load(folder) -> Site:
+        text = sites.text("quick")
+        text = text.decode() if isinstance(text, bytes) else text
+        assert old in text
+        path = folder / "site.toml"
+        path.write_text(text.replace(old, new, 1))
+        return Site.load(path)
+
+    return load
+
+
+def layout(text: str) -> Callable[[], tuple[Wall, ...]]:
+    """Return what loads a layout of this TOML."""
+
+    def load(folder) -> tuple[Wall, ...]:
+        (folder / "layout.toml").write_text(text)
+        return load_layout(folder / "layout.toml")
+
+    return load
+
+
+CASES = {
+    "crossing polygon": (lambda _: Block([(0, 0), (1, 1), (1, 0), (0, 1)]), "block vertices"),
+    "no area": (lambda _: Block([(0, 0), (1, 0), (2, 0)]), "block vertices"),
+    "concave": (lambda _: Block([(0, 0), (2, 0), (2, 2), (1, 0.5)]), "block vertices"),
+    "two corners": (lambda _: Block([(0, 0), (1, 0)]), "block vertices"),
+    "NaN corner": (lambda _: Block([(0, 0), (1, 0), (NAN, 1)]), "block vertices[2]"),
+    "words": (lambda _: Block("words"), "block vertices"),
+    "negative density": (lambda _: Block(UNIT, density=-1.0), "block density"),
+    "NaN density": (lambda _: Block(UNIT, density=NAN), "block density"),
+    "NaN velocity": (lambda _: Block(UNIT, velocity=(0.0, NAN, 0.0)), "block velocity"),
+    "two velocities": (lambda _: Block(UNIT, velocity=(0.0, 1.0)), "block velocity"),
+    "unknown surface": (lambda _: scene(blocks=(box(surface="ice"),)), "block 0: surface"),
+    "unknown ground": (lambda _: scene(terrain=Terrain(FLAT, ["ice"])), "terrain surfaces[0]"),
+    "no blocks": (lambda _: scene(blocks=()), "blocks"),
+    "only fixed": (lambda _: scene(blocks=(box(fixed=True),)), "blocks"),
+    "negative gravity": (lambda _: scene(gravity=-9.81), "gravity"),
+    "negative damping": (lambda _: scene(damping=-0.1), "damping"),
+    "damping when": (lambda _: scene(damping_when="never"), "damping_when"),
+    "friction 95": (lambda _: Surface(friction_deg=95.0), "friction_deg"),
+    "restitution 1.5": (lambda _: Surface(restitution=1.5), "restitution"),
+    "NaN friction": (lambda _: Surface(friction_deg=NAN), "friction_deg"),
+    "dt 0": (lambda _: Settings(dt=0.0), "dt"),
+    "NaN dt": (lambda _: Settings(dt=NAN), "dt"),
+    "no iterations": (lambda _: Settings(open_close_iterations=0), "open_close_iterations"),
+    "wall off the terrain": (lambda _: scene(barriers=(Wall(500.0, 2.0),)), "wall x"),
+    "wall in free space": (lambda _: scene(terrain=None, barriers=(Wall(0.0, 2.0),)), "barriers"),
+    "negative height": (lambda _: Wall(0.0, -2.0), "wall height"),
+    "NaN wall": (lambda _: Wall(NAN, 2.0), "wall x"),
+    "no thickness": (lambda _: Wall(0.0, 2.0, 0.0), "wall thickness"),
+    "repeated point": (lambda _: Terrain([(0, 0), (1, 0), (1, 0), (2, 0)]), "terrain points[2]"),
+    "crossing terrain": (lambda _: Terrain([(0, 0), (2, 0), (2, 1), (1, -1)]), "terrain points"),
+    "one point": (lambda _: Terrain([(0, 0)]), "terrain points"),
+    "too few surfaces": (lambda _: Terrain([(0, 0), (1, 0), (2, 0)], ["rock"]), "terrain surfaces"),
+    "stations": (lambda _: Simulation(scene(), stations=(2.0, 1.0)), "stations"),
+    "watch": (lambda _: Simulation(scene(), watch=(2.0, 1.0)), "watch"),
+    "steps": (lambda _: Simulation(scene()).step(-1), "n"),
+    "duration": (lambda _: Simulation(scene()).run(0.0), "duration"),
+    "NaN duration": (lambda _: Simulation(scene()).run(NAN), "duration"),
+    "unknown site": (lambda _: Site.load("nowhere"), "site"),
+    "missing site file": (lambda _: Site.load("nowhere.toml"), "site"),
+    "seed -1": (lambda _: Site.load("quick").realise((), -1), "seed"),
+    "seed 1.5": (lambda _: Site.load("quick").realise((), 1.5), "seed"),
+    "wall off the slope": (lambda _: Site.load("quick").realise((Wall(-99.0, 1.0),)), "wall x"),
+    "missing run": (lambda folder: Run.load(folder / "none.npz"), "run file"),
+    "missing layout": (lambda folder: load_layout(folder / "none.toml"), "layout"),
+    "layout field": (layout("[[barriers]]\nx = 1.0\nheight = 1.0\nwidth = 1.0"), "layout"),
+    "layout height": (layout("[[barriers]]\nx = 1.0\nheight = -1.0"), "wall height"),
+    "layout TOML": (layout("[[barriers]"), "layout"),
+    "road off the profile": (site("end = 44.8", "end = 999.0"), "road.end"),
+    "road turned round": (site("end = 44.8", "end = 30.0"), "road.end"),
+    "unknown field": (site("toe = 29.8", "toe = 29.8\nheigth = 3.0"), "site file"),
+    "wrong type": (site("toe = 29.8", 'toe = "there"'), "site file"),
+    "bad TOML": (site("toe = 29.8", "toe = "), "site file"),
+    "NaN in a site": (site("toe = 29.8", "toe = nan"), "slope.toe"),
+    "site friction 95": (site("friction_deg = 28.0", "friction_deg = 95.0"), "friction_deg"),
+    "site duration": (site("duration = 10.0", "duration = 0.0"), "motion.duration"),
+    "one joint set": (
+        site("{ dip_deg = -45.0, spacing = 1.4, scatter = 0.15 },", ""),
+        "source.joints",
+    ),
+    "source in the ground": (site("[0.5, 44.45]", "[0.5, 20.0]"), "source.polygon[0]"),
+    "zone on the road": (site("end = 32.8", "end = 40.0"), "barrier_zone.end"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_input(case, tmp_path):
+    wrong, field = CASES[case]
+    with pytest.raises(BadInput) as caught:
+        wrong(tmp_path)
+    error, text = caught.value, str(caught.value)
+    assert isinstance(error, Error)
+    assert isinstance(error, ValueError)
+    assert error.field == field
+    assert text.startswith(f"{field} = ")
+    assert text.endswith(f": {error.mend}")
+    assert len(error.mend) > 5
+    assert "\n" not in text

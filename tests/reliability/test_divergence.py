@@ -1,0 +1,37 @@
+"""A simulation whose numbers go bad stops, and keeps what was sound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from physics.helpers import FLAT, box, rock
+
+from rigdda import Diverged, Error, Scene, Simulation, Terrain
+
+FAST = (0.0, -1e6, 0.0)
+
+
+def test_run_keeps_its_frames():
+    sim = Simulation(Scene(Terrain(FLAT), (box(0.0, 5.0, velocity=FAST),), rock()))
+    with pytest.raises(Diverged, match="block 0 .*use a smaller dt") as caught:
+        sim.run(1.0)
+    assert isinstance(caught.value, Error)
+    run = caught.value.run
+    assert len(run.times) == len(run.poses) == len(run.velocities) == 1
+    assert np.isfinite(run.poses).all()
+    assert run.velocities[0, 0, 1] == -1e6
+
+
+def test_frames_before_it_goes_bad():
+    scene = Scene(None, (box(), box(5.0)), rock(), gravity=1.2e4)
+    with pytest.raises(Diverged) as caught:
+        Simulation(scene).run(2.0)
+    run = caught.value.run
+    assert run.times[-1] > 0.5
+    assert np.isfinite(run.poses).all()
+    assert np.isfinite(run.velocities).all()
+
+
+def test_step():
+    with pytest.raises(Diverged):
+        Simulation(Scene(None, (box(velocity=FAST),), rock())).step(10)

@@ -3,10 +3,10 @@
 from rigdda import sites
 from rigdda.errors import BadInput, Diverged, Error
 from rigdda.outcome import BarrierOutcome, Outcome
+from rigdda.release import release, release_many
 from rigdda.run import Run
 from rigdda.scene import Block, Layout, Scene, Surface, Terrain, Wall
 from rigdda.settings import Settings
-from rigdda.release import release, release_many
 from rigdda.simulation import Simulation, simulate_many
 from rigdda.site import Site, load_layout, save_layout
 

@@ -28,6 +28,17 @@ def joins(bodies: Bodies, c: Contacts, k: int) -> bool:
 
 
 @kernel
+def join_blocks(bodies: Bodies, c: Contacts, count: int, parent: NDArray, blocks: int) -> None:
+    """Join the blocks that contacts couple, in a union-find whose roots are the smallest indices."""
+    for i in range(blocks):
+        parent[i] = i
+    for k in range(count):
+        if joins(bodies, c, k):
+            i, j = root(parent, c[k].a), root(parent, c[k].b)
+            parent[max(i, j)] = min(i, j)
+
+
+@kernel
 def find_islands(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int) -> int:
     """List blocks and contacts island by island in `work`; the root is the smallest index.
 
@@ -37,13 +48,7 @@ def find_islands(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: in
         Number of islands.
     """
     parent, slot = work.parent, work.slot
-    for i in range(blocks):
-        parent[i] = i
-    for k in range(count):
-        if joins(bodies, c, k):
-            i, j = root(parent, c[k].a), root(parent, c[k].b)
-            if i != j:
-                parent[max(i, j)] = min(i, j)
+    join_blocks(bodies, c, count, parent, blocks)
     islands = 0
     for s in range(len(work.block_start)):
         work.block_start[s] = work.contact_start[s] = 0
@@ -66,9 +71,7 @@ def find_islands(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: in
 
 
 @kernel
-def _fill(
-    bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int, islands: int
-) -> None:
+def _fill(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int, islands: int) -> None:
     """Write the items of each island in ascending order, then the slots of the blocks."""
     parent, slot = work.parent, work.slot
     for k in range(count):
@@ -94,7 +97,7 @@ def _fill(
 
 @kernel
 def pair_blocks(bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int) -> int:
-    """Number the off-diagonal blocks of an island; contacts of a pair follow one another.
+    """Assign the off-diagonal blocks of an island; contacts of a pair follow one another.
 
     Returns
     -------

@@ -14,7 +14,7 @@ from rigdda import check
 from rigdda.errors import BadInput
 
 SLIVER = 0.35
-"""Blocks below this share of the wanted mean area are joined to a neighbour if that stays convex."""
+"""Blocks below this share of the wanted area are joined to a neighbour if that stays convex."""
 
 AREA_TOLERANCE = 0.05
 """Accepted relative error of the mean block area; joints are drawn, and their spacings scaled,
@@ -131,7 +131,7 @@ def _join_bridges(
     rng: np.random.Generator,
 ) -> list[shapely.Polygon]:
     """Join cells across rock bridges, then slivers, wherever the union stays convex."""
-    parts: list[shapely.Polygon | None] = sorted(cells, key=lambda c: c.centroid.coords[0])
+    parts: list[shapely.Polygon | None] = [*sorted(cells, key=lambda c: c.centroid.coords[0])]
     neighbours = shapely.STRtree(parts).query(parts, predicate="intersects")
     beside: list[list[int]] = [[] for _ in parts]
     for i, j in neighbours.T:

@@ -22,7 +22,6 @@ from rigdda.constants import (
     OPENING_TOLERANCE,
     QUIET_SPEED,
     REST,
-    SHOCK,
     SHOCK_SPEED,
     SLIP,
     STICK,
@@ -234,7 +233,13 @@ def assemble_island(
 
 @kernel
 def relax(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters, counters: NDArray
+    bodies: Bodies,
+    c: Contacts,
+    m: Matrix,
+    work: Work,
+    island: int,
+    p: Parameters,
+    counters: NDArray,
 ) -> None:
     """Find the forces of an island by projected relaxation, from those of the last step."""
     b0, b1 = work.block_start[island], work.block_start[island + 1]
@@ -282,7 +287,13 @@ def is_quiet(bodies: Bodies, work: Work, low: int, high: int) -> bool:
 
 @kernel
 def open_close(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters, counters: NDArray
+    bodies: Bodies,
+    c: Contacts,
+    m: Matrix,
+    work: Work,
+    island: int,
+    p: Parameters,
+    counters: NDArray,
 ) -> None:
     """Settle the contacts of an island, with less restitution where impacts would gain energy.
 

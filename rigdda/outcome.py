@@ -145,9 +145,7 @@ def _run_out(x: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float
     return float(at[0]), float(at[1]), float(at[2])
 
 
-def _held(
-    run: Run, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _held(run: Run, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
     scene = run.scene
     held = np.zeros(len(x), dtype=bool)
     rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))

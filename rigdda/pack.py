@@ -167,9 +167,11 @@ def empty_work(bodies: int, room: int) -> Work:
     def whole(n: int) -> NDArray[np.int64]:
         return np.zeros(n, dtype=np.int64)
 
-    boxes = [np.zeros(bodies) for _ in range(4)]
     return Work(
-        *boxes,
+        np.zeros(bodies),
+        np.zeros(bodies),
+        np.zeros(bodies),
+        np.zeros(bodies),
         np.arange(bodies),
         whole(2 * room),
         whole(bodies),
@@ -185,9 +187,7 @@ def empty_work(bodies: int, room: int) -> Work:
     )
 
 
-def pack_gauges(
-    scene: Scene, stations: NDArray[np.float64], watch: tuple[float, float]
-) -> Gauges:
+def pack_gauges(scene: Scene, stations: NDArray[np.float64], watch: tuple[float, float]) -> Gauges:
     """Return the gauges, with no station passed that a block starts beyond."""
     blocks, barriers = len(scene.blocks), len(scene.barriers)
     start = [polygon_properties(b.vertices)[1][0] for b in scene.blocks]

@@ -1,4 +1,4 @@
-"""Arrays that the kernels work on, as structured arrays and named tuples of arrays. `pack` fills them.
+"""Arrays that the kernels work on: structured arrays, named tuples of arrays. `pack` fills them.
 
 M bodies: the N blocks of the scene, then its B barriers. P: most corners of a body. S: terrain
 segments. C: room for contacts.

@@ -318,7 +318,10 @@ def _blueprint(run: Run, marks: Marks) -> rrb.Blueprint:
         for name, (title, _) in PLOTS.items()
     }
     debris = plots.pop("debris")
-    side = [plots.pop("kinetic_energy"), rrb.Tabs(*plots.values())]
+    side: list[rrb.Container | rrb.View] = [
+        plots.pop("kinetic_energy"),
+        rrb.Tabs(*plots.values()),
+    ]
     if marks.road is not None:
         side = [debris, *side]
     notes = rrb.TextDocumentView(origin="/notes", name="episode")

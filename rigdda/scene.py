@@ -147,9 +147,7 @@ class Terrain:
         low, high = np.minimum(p[:, 0], q[:, 0]), np.maximum(p[:, 0], q[:, 0])
         over = (low <= x) & (x <= high)
         if not over.any():
-            raise BadInput(
-                "x", x, f"stay on the terrain, {low.min():g} to {high.max():g} m"
-            )
+            raise BadInput("x", x, f"stay on the terrain, {low.min():g} to {high.max():g} m")
         p, q = p[over], q[over]
         run = q[:, 0] - p[:, 0]
         share = np.where(run == 0.0, 1.0, (x - p[:, 0]) / np.where(run == 0.0, 1.0, run))

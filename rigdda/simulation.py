@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from rigdda import check
 from rigdda.constants import BAD_STATE, CONTACTS_FULL, EVENTS_FULL, OPEN
 from rigdda.errors import BadInput, Diverged
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
-from rigdda.records import COUNTERS, LEDGER, Contacts
+from rigdda.records import COUNTERS, LEDGER
 from rigdda.run import EVENT, Run
 from rigdda.scene import Scene
 from rigdda.settings import Settings
@@ -305,7 +305,7 @@ def simulate_many(
         return list(pool.map(one, scenes))
 
 
-def _track(marks: list[int], progress: bool):
+def _track(marks: list[int], progress: bool) -> Iterable[int]:
     if not progress:
         return marks
     from rich.progress import track

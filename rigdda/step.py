@@ -70,9 +70,25 @@ def candidate_pairs(bodies: Bodies, outlines: Outlines, work: Work, p: Parameter
 
 
 @kernel
+def keep_asleep(
+    bodies: Bodies, c: Contacts, count: int, old: Contacts, work: Work, a: int, gauges: Gauges,
+    time: float, p: Parameters,
+) -> int:  # fmt: skip
+    """Keep the contacts of sleeping block a with what is still; returns the new number."""
+    for m in range(work.first[a], work.first[a + 1]):
+        b = old[m].b
+        if count < len(c) and (b == TERRAIN or bodies[b].status != AWAKE):
+            copy_contact(c, count, old, m)
+            count += 1
+            if b >= p.blocks:
+                gauges.last_touch[a, b - p.blocks] = time
+    return count
+
+
+@kernel
 def detect(
-    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, old: Contacts, old_count: int, work: Work,
-    gauges: Gauges, time: float, p: Parameters,
+    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, old: Contacts,
+    old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
     index_by_body(old, old_count, work.first, p.blocks)
@@ -82,37 +98,27 @@ def detect(
     room = len(c) - outlines.world_x.shape[1] - 4
     count = q = 0
     for a in range(p.blocks):
-        if count > room:
-            return -1
         if bodies[a].status == ASLEEP:
-            for m in range(work.first[a], work.first[a + 1]):
-                if count > room:
-                    return -1
-                if old[m].b == TERRAIN or bodies[old[m].b].status != AWAKE:
-                    copy_contact(c, count, old, m)
-                    count += 1
-                    if old[m].b >= p.blocks:
-                        gauges.last_touch[a, old[m].b - p.blocks] = time
+            count = keep_asleep(bodies, c, count, old, work, a, gauges, time, p)
         elif bodies[a].status == AWAKE:
             first = count
             count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
-            if count < 0:
-                return -1
-            while q < pairs and work.pairs[2 * q] == a:
-                if count > room:
-                    return -1
+            while q < pairs and work.pairs[2 * q] == a and 0 <= count <= room:
                 count = collide_pair(bodies, outlines, c, count, a, work.pairs[2 * q + 1], p)
                 q += 1
-            recall(c, first, count, old, work.first)
+            if count >= 0:
+                recall(c, first, count, old, work.first)
             for k in range(first, count):
                 prepare(bodies, c, k, p)
+        if count < 0 or count > room:
+            return -1
     return count
 
 
 @kernel
 def solve_and_move(
-    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, m: Matrix, work: Work, gauges: Gauges,
-    time: float, p: Parameters, counters: NDArray, ledger: NDArray,
+    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, m: Matrix, work: Work,
+    gauges: Gauges, time: float, p: Parameters, counters: NDArray, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Settle every island, note hits, then move its blocks; returns a bad block or -1."""
     islands = find_islands(bodies, c, count, work, p.blocks)
@@ -148,8 +154,9 @@ def solve_and_move(
 
 @entry_kernel
 def advance(
-    bodies: Bodies, outlines: Outlines, ground: Ground, now: Contacts, before: Contacts, m: Matrix, work: Work,
-    gauges: Gauges, p: Parameters, counters: NDArray, ledger: NDArray, deepest: NDArray, steps: int,
+    bodies: Bodies, outlines: Outlines, ground: Ground, now: Contacts, before: Contacts,
+    m: Matrix, work: Work, gauges: Gauges, p: Parameters, counters: NDArray, ledger: NDArray,
+    deepest: NDArray, steps: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Take up to `steps` steps.
 
@@ -182,7 +189,9 @@ def advance(
         counters[7] += count
         for k in range(count):
             deepest[0] = max(deepest[0], -now[k].gap)
-        bad = solve_and_move(bodies, outlines, now, count, m, work, gauges, time, p, counters, ledger)
+        bad = solve_and_move(
+            bodies, outlines, now, count, m, work, gauges, time, p, counters, ledger
+        )
         counters[6] = note_passage(bodies, gauges, counters[6], time, p)
         counters[0] += 1
         if bad >= 0:

@@ -32,7 +32,7 @@ def sweep_boxes(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -
 
 @kernel
 def sort_by_low(work: Work) -> None:
-    """Insertion sort by low_x, nearly sorted from step to step; ties by index."""
+    """Sort by low_x, ties by index; by insertion, since little changes from step to step."""
     order, low = work.sorted, work.low_x
     for k in range(1, len(order)):
         item = order[k]
@@ -78,4 +78,3 @@ def overlapping_pairs(bodies: Bodies, work: Work) -> int:
             work.pairs[2 * count + 1] = i + j - first
             count += 1
     return count
-

@@ -76,8 +76,8 @@ def add_contact(
 
 @kernel
 def clip_contacts(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, swapped: bool, edge: int,
-    shift_x: float, shift_y: float, reach: float,
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, swapped: bool,
+    edge: int, shift_x: float, shift_y: float, reach: float,
 ) -> int:  # fmt: skip
     """Add up to two contacts where the incident edge lies over the face of contact.
 
@@ -132,7 +132,9 @@ def clip_contacts(
 
 
 @kernel
-def collide_pair(bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, p: Parameters) -> int:
+def collide_pair(
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, p: Parameters
+) -> int:
     """Add the contacts of bodies a and b to `c` from entry k; returns the new number."""
     dt = p.dt
     ax, ay, aw = bodies[a].vx, bodies[a].vy, abs(bodies[a].omega) * bodies[a].radius

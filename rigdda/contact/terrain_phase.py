@@ -47,7 +47,15 @@ def shadowed(ground: Ground, s: int, x: float, y: float, gap: float) -> bool:
 
 @kernel
 def corners_on_segment(
-    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, k: int, first: int, a: int, s: int, p: Parameters
+    bodies: Bodies,
+    outlines: Outlines,
+    ground: Ground,
+    c: Contacts,
+    k: int,
+    first: int,
+    a: int,
+    s: int,
+    p: Parameters,
 ) -> int:
     """Add contacts of the corners of block a with segment s; returns the new number."""
     nx, ny = ground.normal_x[s], ground.normal_y[s]
@@ -78,11 +86,7 @@ def corners_on_segment(
             continue
         again = False
         for m in range(first, k):  # one face, cut in two segments
-            if (
-                c[m].owner == 1
-                and c[m].key == key
-                and c[m].nx * nx + c[m].ny * ny > SAME_FACE
-            ):
+            if c[m].owner == 1 and c[m].key == key and c[m].nx * nx + c[m].ny * ny > SAME_FACE:
                 again = True
                 if gap < c[m].gap:
                     add_contact(c, m, a, TERRAIN, key, 1, ground.surface[s], x, y, nx, ny, gap)
@@ -94,7 +98,14 @@ def corners_on_segment(
 
 @kernel
 def edge_on_ridge(
-    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, k: int, a: int, corner: int, p: Parameters
+    bodies: Bodies,
+    outlines: Outlines,
+    ground: Ground,
+    c: Contacts,
+    k: int,
+    a: int,
+    corner: int,
+    p: Parameters,
 ) -> int:
     """Add the contact of a convex terrain corner with an edge of block a, if there is one.
 
@@ -146,7 +157,14 @@ def edge_on_ridge(
 
 @kernel
 def collide_terrain(
-    bodies: Bodies, outlines: Outlines, ground: Ground, work: Work, c: Contacts, k: int, a: int, p: Parameters
+    bodies: Bodies,
+    outlines: Outlines,
+    ground: Ground,
+    work: Work,
+    c: Contacts,
+    k: int,
+    a: int,
+    p: Parameters,
 ) -> int:
     """Add the contacts of block a with the terrain from entry k; returns the new number."""
     bins = len(ground.bin_start) - 1
@@ -159,7 +177,9 @@ def collide_terrain(
     for cell in range(low, high + 1):
         for item in range(ground.bin_start[cell], ground.bin_start[cell + 1]):
             s = ground.bin_item[item]
-            from_cell = int((min(ground.x[s], ground.x[s + 1]) - ground.bin_origin) / ground.bin_width)
+            from_cell = int(
+                (min(ground.x[s], ground.x[s + 1]) - ground.bin_origin) / ground.bin_width
+            )
             if cell != max(min(max(from_cell, 0), bins - 1), low):
                 continue  # seen in an earlier cell
             if (

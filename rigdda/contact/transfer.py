@@ -62,7 +62,18 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray) -> N
 def copy_contact(c: Contacts, k: int, old: Contacts, m: int) -> None:
     """Keep contact m of the last step as contact k: between sleeping bodies nothing changes."""
     c[k].a, c[k].b, c[k].key, c[k].owner = old[m].a, old[m].b, old[m].key, old[m].owner
-    c[k].other, c[k].x, c[k].y, c[k].nx, c[k].ny = old[m].other, old[m].x, old[m].y, old[m].nx, old[m].ny
+    c[k].other, c[k].x, c[k].y, c[k].nx, c[k].ny = (
+        old[m].other,
+        old[m].x,
+        old[m].y,
+        old[m].nx,
+        old[m].ny,
+    )
     c[k].gap, c[k].state, c[k].kind = old[m].gap, old[m].state, old[m].kind
     c[k].memory_normal, c[k].memory_shear = old[m].memory_normal, old[m].memory_shear
-    c[k].steady, c[k].stiffness, c[k].normal, c[k].shear = old[m].steady, old[m].stiffness, old[m].normal, old[m].shear
+    c[k].steady, c[k].stiffness, c[k].normal, c[k].shear = (
+        old[m].steady,
+        old[m].stiffness,
+        old[m].normal,
+        old[m].shear,
+    )

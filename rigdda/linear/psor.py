@@ -150,9 +150,7 @@ def relax_forces(c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int
     limit = RELAXATION_SPEED * dt / (2.0 * RELAXATION_STIFFNESS)
     sweeps, worst = 0, 1e300
     while sweeps < RELAXATION_SWEEPS and worst > limit:
-        worst = sweep(
-            work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps % 2 == 1
-        )
+        worst = sweep(work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps % 2 == 1)
         sweeps += 1
     for place in range(count):
         k = work.contact_item[low + place]

@@ -58,7 +58,7 @@ def check_release(job: tuple[tuple[Wall, ...], int]) -> float:
     mass = math.fsum(b.density * polygon_properties(b.vertices)[0] for b in run.scene.blocks)
     assert outcome.released_mass == mass
     depth = sim.diagnostics.penetration
-    assert depth < 0.1, seed
+    assert depth < 0.1, (seed, depth)
     return depth
 
 

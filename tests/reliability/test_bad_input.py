@@ -103,7 +103,6 @@ CASES = {
     "wall off the slope": (lambda _: Site.load("quick").realise((Wall(-99.0, 1.0),)), "wall x"),
     "missing run": (lambda folder: Run.load(folder / "none.npz"), "run file"),
     "missing layout": (lambda folder: load_layout(folder / "none.toml"), "layout"),
-    "layout field": (layout("[[barriers]]\nx = 1.0\nheight = 1.0\nwidth = 1.0"), "layout"),
     "layout height": (layout("[[barriers]]\nx = 1.0\nheight = -1.0"), "wall height"),
     "layout TOML": (layout("[[barriers]"), "layout"),
     "road off the profile": (site("end = 44.8", "end = 999.0"), "road.end"),
@@ -118,7 +117,7 @@ CASES = {
         site("{ dip_deg = -45.0, spacing = 1.4, scatter = 0.15 },", ""),
         "source.joints",
     ),
-    "source in the ground": (site("[0.5, 44.45]", "[0.5, 20.0]"), "source.polygon[0]"),
+    "source in the ground": (site("[7.5, 36.67]", "[7.5, 36.5]"), "source.polygon[1]"),
     "zone on the road": (site("end = 32.8", "end = 40.0"), "barrier_zone.end"),
 }
 

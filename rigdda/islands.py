@@ -29,7 +29,7 @@ def joins(bodies: Bodies, c: Contacts, k: int) -> bool:
 
 @kernel
 def join_blocks(bodies: Bodies, c: Contacts, count: int, parent: NDArray, blocks: int) -> None:
-    """Join the blocks that contacts couple, in a union-find whose roots are the smallest indices."""
+    """Join the blocks that contacts couple, in a union-find; a root is the smallest index."""
     for i in range(blocks):
         parent[i] = i
     for k in range(count):

@@ -18,10 +18,10 @@ from agents.terminal import Stopped, fail, folder_for, kept, progress, show
 if TYPE_CHECKING:
     from rigdda import Layout
 
-SIMULATIONS = 240
+SIMULATIONS = 112
 """Default budget of a search."""
 
-RELEASES = 40
+RELEASES = 32
 """Default number of releases that a layout is verified on."""
 
 CASES = 3

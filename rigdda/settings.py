@@ -21,8 +21,8 @@ class Settings:
         follows from it. None: 1e-4 of the mean block size (the root of its area), small enough
         for tall stacks and large enough for conjugate gradients to converge in few iterations.
     tolerance : float
-        Relative residual at which conjugate gradients stop. 1e-5: the result is statistically
-        the same as at 1e-8 for half the work.
+        Relative residual at which conjugate gradients stop. 1e-7: looser, and the small forces at
+        the top of a tall stack drown in the error of the large ones at its base.
     open_close_iterations : int
         Most open-close iterations in a step; nearly all steps need 1 to 3.
     sleeping : bool

@@ -267,7 +267,8 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
         raise BadInput("layout", str(path), "name an existing TOML or JSON file")
     decode = msgspec.json.decode if file.suffix == ".json" else msgspec.toml.decode
     try:
-        return decode(file.read_bytes(), type=_LayoutFile, strict=False).barriers
+        tables = decode(file.read_bytes(), type=_LayoutFile, strict=False).barriers
+        return tuple(Wall(t.x, t.height, t.thickness) for t in tables)
     except msgspec.ValidationError as error:
         if isinstance(error.__cause__, BadInput):
             raise error.__cause__ from None
@@ -290,8 +291,7 @@ class _WallTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     x: float
     height: float
     thickness: float = 1.0
-    kind: str = "wall"
 
 
 class _LayoutFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    barriers: tuple[Wall, ...] = ()
+    barriers: tuple[_WallTable, ...] = ()

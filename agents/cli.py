@@ -18,7 +18,7 @@ from agents.terminal import Stopped, fail, folder_for, kept, progress, show
 if TYPE_CHECKING:
     from rigdda import Layout
 
-SIMULATIONS = 112
+SIMULATIONS = 176
 """Default budget of a search."""
 
 RELEASES = 32

@@ -37,7 +37,7 @@ LEVELS = 8
 FILL = 0.8
 """Share of a deposit that is rock, the rest voids between blocks: assumed."""
 TAIL = 0.9
-LADDER = (1.0, 0.3, 0.1)
+LADDER = (1.0, 0.3)
 """Limits of CVaR, as shares of that without barriers; 1 binds nothing."""
 
 Floats = NDArray[np.float64]

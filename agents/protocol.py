@@ -103,7 +103,8 @@ class Plan:
 
     One release's debris scatters by about 0.05 and common seeds hardly help (chaos decorrelates
     releases after a barrier), so a search averages 8 and the best five are told apart on 32. A
-    budget below 400 keeps two fifths for the finals, with fewer finalists, then fewer releases.
+    budget below 400 keeps two fifths for the finals, with fewer releases of each, then fewer
+    finalists; below 320 the search averages less, so that it still sees some 20 layouts.
     """
 
     releases: int
@@ -114,8 +115,8 @@ class Plan:
     def of(cls, simulations: int) -> Plan:
         """Return the plan for a budget."""
         final = 2 * simulations // 5
-        finalists = min(5, max(2, final // 32))
-        return cls(min(8, max(1, simulations // 16)), finalists, min(32, final // finalists))
+        finalists = min(5, max(2, final // 16))
+        return cls(min(8, max(1, simulations // 40)), finalists, min(32, final // finalists))
 
 
 class Ledger:

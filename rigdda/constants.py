@@ -27,8 +27,9 @@ UNLOADED = 0.2
 """Share of the load that its stiffness was chosen for, below which a contact softens [-]."""
 
 GREATEST_LOAD = 300.0
-"""Greatest force that a contact carries to the next step over the weight of its heavier body [-]:
-the height, in blocks, of the tallest stack. Higher, and wedged blocks burst out more violently."""
+"""Greatest force that a contact carries to the next step over the weight of its heavier body, or
+of the mean block if that is more [-]: the height, in blocks, of the tallest stack. Higher, and
+wedged blocks burst out more violently."""
 
 RECOVERY_TIME = 0.1
 """Time in which penetration beyond what the load explains is pushed out [s]. Shorter pumps energy
@@ -53,6 +54,13 @@ RELAXATION_SWEEPS = 25
 RELAXATION_SPEED = 0.02
 """Greatest change of a contact's velocity in a sweep at which sweeps stop [m/s]."""
 
+FAR_SPEED = 0.2
+"""Greatest change of a contact's velocity in a sweep above which sweeps go on to the last [m/s]:
+a light block between heavy ones, whose forces grow by little in each."""
+
+LAST_SWEEPS = 200
+"""Most sweeps of an island whose forces are still that far from settled."""
+
 RELAXATION_STIFFNESS = 30.0
 """Stiffness of a contact in relaxation times its flexibility [-]; stiffer converges more slowly."""
 
@@ -71,7 +79,7 @@ SAME_NORMAL = 0.7
 """Least cosine between the normals of one vertex's contact in two steps that share memory [-]."""
 
 SAME_FACE = 0.999
-"""Cosine above which two contacts of one vertex with the terrain count as one [-]."""
+"""Cosine above which two edges, or two contacts of one vertex, count as in one line [-]."""
 
 SLACK_RATIO = 5e-3
 """Distance over block size within which contacts are candidates even at rest [-]."""

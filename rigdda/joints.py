@@ -89,7 +89,8 @@ def cut(
         cells = _join_bridges(_cells(source, joints, scale, rng), joints, block_area, rng)
         mean = source.area / len(cells)
         if abs(mean / block_area - 1.0) <= AREA_TOLERANCE:
-            return [np.array(c.exterior.coords)[:-1] for c in cells]
+            plain = shapely.simplify(cells, 1e-9 * source.length)  # no corners within an edge
+            return [np.array(c.exterior.coords)[:-1] for c in plain]
         scale *= math.sqrt(block_area / mean)
     raise BadInput(
         "source: block_area",

@@ -216,6 +216,7 @@ def pack_parameters(
     free = [i for i, b in enumerate(scene.blocks) if not b.fixed]
     area = [bodies["mass"][i] / scene.blocks[i].density for i in free]
     size = math.sqrt(np.mean(area))
+    weight = np.mean(bodies["mass"][free]) * (scene.gravity or 9.81)
     pairs = [[scene.interface(a, b) for b in names] for a in names]
     floor = -np.inf if scene.terrain is None else scene.terrain.points[:, 1].min() - FALL_BELOW
     return Parameters(
@@ -224,6 +225,7 @@ def pack_parameters(
         scene.gravity,
         scene.damping,
         scene.damping_when == "contact",
+        float(weight),
         settings.penetration or PENETRATION_RATIO * size,
         SLACK_RATIO * size,
         settings.tolerance,

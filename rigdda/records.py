@@ -166,6 +166,7 @@ class Parameters(NamedTuple):
     gravity: float
     damping: float
     damping_in_contact_only: bool
+    block_weight: float  # mean of the free blocks [N]
     penetration: float
     slack: float
     tolerance: float

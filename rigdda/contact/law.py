@@ -186,7 +186,7 @@ def prepare(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
     if b >= 0 and bodies[b].status == AWAKE:
         gravity, mass_b = 0.0, bodies[b].mass
     weight = carried_weight(bodies[a].mass, mass_b, p)
-    most = GREATEST_LOAD * weight
+    most = GREATEST_LOAD * max(weight, p.block_weight)
     c[k].memory_shear *= most / max(c[k].memory_normal, most)
     c[k].memory_normal = min(c[k].memory_normal, most)
     c[k].steady = min(c[k].steady, most)

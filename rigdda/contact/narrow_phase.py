@@ -7,7 +7,7 @@ the contact out, so a fast block cannot pass a thin wall.
 
 from __future__ import annotations
 
-from rigdda.constants import AWAKE
+from rigdda.constants import AWAKE, SAME_FACE
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
 
@@ -35,11 +35,11 @@ def face_of_contact(
     (dx, dy) is the displacement of j relative to i over the step, `spread` what rotation adds.
     The best edge comes with its rank: time of entry, and its gap for the shallow ones.
     """
-    time, depth, best = -1.0, -1e300, -1
+    time, depth, best, nearest = -1.0, -1e300, -1, -1
     corner_x, corner_y = outlines.world_x, outlines.world_y
     for edge in range(edges):
         nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
-        gap, _ = axis_gap(
+        gap, corner = axis_gap(
             nx, ny, corner_x[i, edge], corner_y[i, edge], corner_x, corner_y, j, corners
         )
         approach = -(nx * dx + ny * dy)
@@ -49,8 +49,29 @@ def face_of_contact(
         if gap > slack:
             entry = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
         if entry > time or (entry == time and gap > depth):
-            time, depth, best = entry, gap, edge
-    return True, time, depth, best
+            time, depth, best, nearest = entry, gap, edge, corner
+    return True, time, depth, edge_over_corner(outlines, i, best, edges, j, nearest)
+
+
+@kernel
+def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, corner: int) -> int:
+    """Return the edge of i, nearly in line with `edge`, that lies over a corner of j.
+
+    Of edges in one line rounding alone decides which is the best face.
+    """
+    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+    x, y = outlines.world_x[j, corner], outlines.world_y[j, corner]
+    for _ in range(edges):
+        end = edge + 1 if edge + 1 < edges else 0
+        beyond_end = ny * (outlines.world_x[i, end] - x) > nx * (outlines.world_y[i, end] - y)
+        before_start = ny * (outlines.world_x[i, edge] - x) < nx * (outlines.world_y[i, edge] - y)
+        step = (1 if beyond_end else 0) - (1 if before_start else 0)
+        near = (edge + step) % edges
+        dot = nx * outlines.normal_x[i, near] + ny * outlines.normal_y[i, near]
+        if step == 0 or dot < SAME_FACE:
+            break
+        edge = near
+    return edge
 
 
 @kernel

@@ -9,7 +9,13 @@ from the forces of the last step are enough while blocks move; at rest the globa
 from __future__ import annotations
 
 from rigdda.assembly.springs import normal_row, shear_row
-from rigdda.constants import RELAXATION_SPEED, RELAXATION_STIFFNESS, RELAXATION_SWEEPS
+from rigdda.constants import (
+    FAR_SPEED,
+    LAST_SWEEPS,
+    RELAXATION_SPEED,
+    RELAXATION_STIFFNESS,
+    RELAXATION_SWEEPS,
+)
 from rigdda.kernel import kernel
 from rigdda.records import Contacts, Floats, Ints, Matrix, Work
 
@@ -148,8 +154,9 @@ def relax_forces(c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int
     for place in range(count):
         pack_row(c, work.contact_item[low + place], m, work, place, dt)
     limit = RELAXATION_SPEED * dt / (2.0 * RELAXATION_STIFFNESS)
+    far = limit * FAR_SPEED / RELAXATION_SPEED
     sweeps, worst = 0, 1e300
-    while sweeps < RELAXATION_SWEEPS and worst > limit:
+    while (sweeps < RELAXATION_SWEEPS and worst > limit) or (sweeps < LAST_SWEEPS and worst > far):
         worst = sweep(work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps % 2 == 1)
         sweeps += 1
     for place in range(count):

@@ -204,9 +204,10 @@ def test_a_bad_site_file_is_one_line(
     [
         ("x = 20.0\nheight = -2.0", ("height", "-2", "above 0")),
         ("x = nan\nheight = 2.0", ("x", "nan", "finite")),
+        ("x = 20.0\nheight = 2.0\ncolour = 3", ("colour",)),
         ("x = 400.0\nheight = 2.0", ("wall x", "400", "stay on the terrain")),
     ],
-    ids=["negative height", "NaN", "off the slope"],
+    ids=["negative height", "NaN", "unknown field", "off the slope"],
 )
 def test_a_bad_layout_file_is_one_line(
     table: str, named: tuple[str, ...], toml: Path, tmp_path: Path

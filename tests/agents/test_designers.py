@@ -86,8 +86,9 @@ def test_streams_of_release_seeds_never_meet() -> None:
     [
         (1, Plan(1, 2, 0)),
         (16, Plan(1, 2, 3)),
-        (80, Plan(5, 2, 16)),
-        (240, Plan(8, 3, 32)),
+        (80, Plan(2, 2, 16)),
+        (240, Plan(6, 5, 19)),
+        (320, Plan(8, 5, 25)),
         (400, Plan(8, 5, 32)),
         (10_000, Plan(8, 5, 32)),
     ],

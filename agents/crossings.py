@@ -101,7 +101,6 @@ def _ensemble(text: bytes, seeds: tuple[int, ...]) -> Ensemble:
     zone = site.barrier_zone
     stations = np.linspace(zone.start, zone.end - zone.min_thickness, STATIONS)
     lines = (*stations.tolist(), site.road.start)
-    ground = np.array([site.profile.height(x) for x in lines])
 
     def one(job: tuple[int, int]) -> tuple[NDArray[np.void], float, float]:
         release, seed = job
@@ -114,7 +113,7 @@ def _ensemble(text: bytes, seeds: tuple[int, ...]) -> Ensemble:
             run.events["target"],
             run.events["block"],
         )
-        out["height"] = run.events["y"] - ground[run.events["target"]]
+        out["height"] = run.events["height"]
         out["radius"], out["mass"] = radius[out["block"]], mass[out["block"]]
         out["speed"], out["energy"] = run.events["speed"], run.events["energy"]
         return out, float(mass.sum()), float(radius.mean())

@@ -75,11 +75,10 @@ def _envelope(text: bytes) -> Envelope:
         site.motion.duration,
         stations=lines.tolist(),
     )
-    ground = np.array([site.profile.height(x) for x in lines])
     passing = [np.concatenate([run.crossings(i) for run in runs]) for i in range(STATIONS)]
     out = Envelope(
         energy=np.array([_quantile(p["energy"]) for p in passing]),
-        bounce=np.array([_quantile(p["y"] - y) for p, y in zip(passing, ground, strict=True)]),
+        bounce=np.array([_quantile(p["height"]) for p in passing]),
         deposit=np.mean([_deposit(site, run) for run in runs], axis=0),
     )
     for array in (out.energy, out.bounce, out.deposit):

@@ -58,6 +58,8 @@ def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float, p: Pa
             gauges.watch_energy[i] = max(gauges.watch_energy[i], kinetic_energy(bodies, i))
         while gauges.next_station[i] < stations and x >= gauges.station[gauges.next_station[i]]:
             s = gauges.next_station[i]
-            events = write_event(gauges, events, time, CROSSING, bodies, i, s, x, bodies[i].y, 0.0)
+            y = bodies[i].y
+            height = y - gauges.station_ground[s]
+            events = write_event(gauges, events, time, CROSSING, bodies, i, s, x, y, height)
             gauges.next_station[i] += 1
     return events

@@ -25,7 +25,7 @@ from rigdda.records import (
     Work,
 )
 from rigdda.run import EVENT
-from rigdda.scene import Scene
+from rigdda.scene import Scene, Terrain
 from rigdda.settings import Settings
 
 FALL_BELOW = 20.0
@@ -194,6 +194,7 @@ def pack_gauges(scene: Scene, stations: NDArray[np.float64], watch: tuple[float,
     terrain = scene.terrain
     return Gauges(
         stations,
+        np.array([_ground(terrain, x) for x in stations]),
         np.searchsorted(stations, start, side="right").astype(np.int64),
         np.array([terrain.height(b.x) for b in scene.barriers] if terrain else []),
         np.full((blocks, barriers), -np.inf),
@@ -202,6 +203,12 @@ def pack_gauges(scene: Scene, stations: NDArray[np.float64], watch: tuple[float,
         np.zeros(blocks),
         np.zeros(event_room(blocks, len(stations), barriers), dtype=EVENT).view(np.recarray),
     )
+
+
+def _ground(terrain: Terrain | None, x: float) -> float:
+    """Return the elevation of the highest ground at x, 0 where there is none [m]."""
+    points = terrain.points[:, 0] if terrain else np.array([np.inf])
+    return terrain.height(x) if terrain and points.min() <= x <= points.max() else 0.0
 
 
 def event_room(blocks: int, stations: int, barriers: int) -> int:

@@ -149,6 +149,7 @@ class Gauges(NamedTuple):
     """What is watched during a run."""
 
     station: Floats  # (K,) ascending chainages [m]
+    station_ground: Floats  # (K,) elevation of the highest ground there [m]
     next_station: Ints  # (N,) first station a block has not passed
     barrier_ground: Floats  # (B,) elevation from which impact heights count [m]
     last_touch: Floats  # (N, B) time of the last touch [s]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,7 +35,8 @@ EVENT = np.dtype(
     ]
 )
 """One event. target: index of the barrier or station. x, y: contact point of a hit, centroid at a
-crossing [m]. height: of that point above the ground [m]. speed: of the centroid [m/s]. energy:
+crossing [m]. height: of that point above the highest ground
+there, above 0 where there is none [m]. speed: of the centroid [m/s]. energy:
 translational and rotational, just before a hit [J]."""
 
 
@@ -107,7 +109,10 @@ class Run:
                 data = {name: stored[name] for name in stored.files}
             scene = scene_from_json(data.pop("scene").tobytes())
             return cls(scene=scene, **data)
-        except (KeyError, ValueError, TypeError, zipfile.BadZipFile, msgspec.MsgspecError):
+        except (
+            KeyError, ValueError, TypeError, EOFError, OSError, zlib.error,
+            zipfile.BadZipFile, msgspec.MsgspecError,
+        ):  # fmt: skip
             raise BadInput("run file", str(path), "name a .npz file that Run.save wrote") from None
 
     def to_rerun(self, path: str | os.PathLike[str], marks: Marks | None = None) -> None:

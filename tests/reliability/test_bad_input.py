@@ -58,6 +58,12 @@ def layout(text: str) -> Callable[[], tuple[Wall, ...]]:
     return load
 
 
+def empty(path):
+    """Make an empty file."""
+    path.touch()
+    return path
+
+
 CASES = {
     "crossing polygon": (lambda _: Block([(0, 0), (1, 1), (1, 0), (0, 1)]), "block vertices"),
     "no area": (lambda _: Block([(0, 0), (1, 0), (2, 0)]), "block vertices"),
@@ -102,6 +108,7 @@ CASES = {
     "seed 1.5": (lambda _: Site.load("quick").realise((), 1.5), "seed"),
     "wall off the slope": (lambda _: Site.load("quick").realise((Wall(-99.0, 1.0),)), "wall x"),
     "missing run": (lambda folder: Run.load(folder / "none.npz"), "run file"),
+    "empty run": (lambda folder: Run.load(empty(folder / "empty.npz")), "run file"),
     "missing layout": (lambda folder: load_layout(folder / "none.toml"), "layout"),
     "layout height": (layout("[[barriers]]\nx = 1.0\nheight = -1.0"), "wall height"),
     "layout TOML": (layout("[[barriers]"), "layout"),

@@ -135,7 +135,7 @@ def _rock(site: Site) -> dict[str, ArrayLike]:
     barrier = "concrete" if "concrete" in site.surfaces else "rock"
     names = (site.slope.surface, source.surface, barrier)
     met = [site.surfaces[name] for name in names]
-    pairs = [value for s in met for value in (s.friction_deg / 90.0, s.restitution)]
+    pairs = [value for s in met for value in (s.friction_deg / 90.0, s.restitution or 0.0)]
     extent = np.array([x.min(), x.max(), y.min(), y.max()]) / LENGTH
     return {
         "surfaces": [*pairs, site.scatter.friction_deg / 10.0],

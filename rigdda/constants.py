@@ -72,6 +72,13 @@ QUIET_SPEED = 0.1
 """Speed below which all blocks of an island are solved together, accurately; faster islands of
 several blocks are relaxed [m/s]."""
 
+SHORT_PROFILE = 40
+"""Mean length of the rows of a matrix, in numbers, up to which it is factorised [-]: about 13
+blocks to the left of the diagonal. Longer, and conjugate gradients are cheaper."""
+
+PIN_RECOVERY = 0.2
+"""Share of the distance of a fixed point from its place that is mended in a step [-]."""
+
 ENERGY_HALVINGS = 4
 """Times restitution is halved when an eccentric impact would gain energy; then it is plastic."""
 
@@ -107,7 +114,10 @@ AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3
 # state of a contact
 OPEN, STICK, SLIP = 0, 1, 2
 # kind of a contact in one step
-REST, NEW, IMPACT, SHOCK, MOVING = 0, 1, 2, 3, 4
+REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN = 0, 1, 2, 3, 4, 5, 6, 7
 # why the step loop returned
 DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE = 0, 1, 2, 3
+# solver
+AUTO, PCG, BLOCK_PCG, SOR, DIRECT = 0, 1, 2, 3, 4
 TERRAIN = -1
+PLAIN_CONTACT = -1.0

@@ -7,9 +7,9 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
-from rigdda.constants import IMPACT, MOVING, OPEN, SHOCK, STEADY_RATE
+from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, SHOCK, STEADY_RATE
 from rigdda.kernel import kernel
-from rigdda.open_close import assemble_blocks
+from rigdda.open_close import assemble_blocks, load_moment
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
 
 
@@ -21,11 +21,35 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
     post-correction. Corners come from the angle and body coordinates, so area is kept exactly.
     """
     cos, sin = math.cos(bodies[i].theta), math.sin(bodies[i].theta)
-    n = bodies[i].count
-    for k in range(n):
+    for k in range(bodies[i].count):
         x, y = outlines.body_x[i, k], outlines.body_y[i, k]
         outlines.world_x[i, k] = bodies[i].x + cos * x - sin * y
         outlines.world_y[i, k] = bodies[i].y + sin * x + cos * y
+    place_normals(bodies, outlines, i)
+
+
+@kernel
+def move_corners(bodies: Bodies, outlines: Outlines, i: int, m: Matrix, s: int) -> None:
+    """Move the corners of body i by the linear displacement function (equation 2) alone.
+
+    What the post-correction replaces: body i expands as it turns.
+    """
+    u, v = m.d[s, 0] + m.residual[s, 0], m.d[s, 1] + m.residual[s, 1]
+    r = m.d[s, 2] + m.residual[s, 2]
+    bodies[i].radius = 0.0
+    for k in range(bodies[i].count):
+        x = outlines.world_x[i, k] - bodies[i].x + u
+        y = outlines.world_y[i, k] - bodies[i].y + v
+        outlines.world_x[i, k] += u - y * r
+        outlines.world_y[i, k] += v + x * r
+        bodies[i].radius = max(bodies[i].radius, math.hypot(x - y * r, y + x * r))
+    place_normals(bodies, outlines, i)
+
+
+@kernel
+def place_normals(bodies: Bodies, outlines: Outlines, i: int) -> None:
+    """Set the edge normals of body i from its corners."""
+    n = bodies[i].count
     for k in range(n):
         end = k + 1 if k + 1 < n else 0
         ex = outlines.world_x[i, end] - outlines.world_x[i, k]
@@ -86,7 +110,7 @@ def account(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters,
     ledger: NDArray, gauges: Gauges,
 ) -> None:  # fmt: skip
-    """Add the work of contact forces, damping and gravity in this step to the ledger."""
+    """Add the work of contacts, damping, loads and supports in this step to the ledger."""
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     for s in range(b1 - b0):
         i = work.block_item[b0 + s]
@@ -94,7 +118,13 @@ def account(
         slow = m.d[s, 0] ** 2 + m.d[s, 1] ** 2
         slow = bodies[i].mass * slow + bodies[i].inertia * m.d[s, 2] ** 2
         ledger[2] -= drag * slow / p.dt
-        ledger[3] -= bodies[i].mass * p.gravity * (m.d[s, 1] + m.residual[s, 1])
+        ledger[3] += bodies[i].force_x * m.d[s, 0] + bodies[i].force_y * m.d[s, 1]
+        ledger[3] += load_moment(bodies, i) * m.d[s, 2]
+        ledger[3] += bodies[i].mass * (work.field[0] - p.gravity_x) * m.d[s, 0]
+        ledger[3] += bodies[i].mass * (work.field[1] - p.gravity_y) * m.d[s, 1]
+        # an impulse that acts early or late in the step lifts or lowers the block
+        lift = p.gravity_x * m.residual[s, 0] + p.gravity_y * m.residual[s, 1]
+        ledger[1] -= bodies[i].mass * lift
     for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
         if c[k].state == OPEN:
@@ -106,6 +136,9 @@ def account(
             j = work.slot[c[k].b]
             dn += along(normal_row(c, k, False), m.d[j])
             ds += along(shear_row(c, k, False), m.d[j])
+        if c[k].kind == BOLT or c[k].kind == PIN:
+            ledger[4] += c[k].normal * dn + c[k].shear * ds
+            continue
         ledger[0] += c[k].shear * ds
         ledger[1] += c[k].normal * dn
         if c[k].b >= p.blocks:

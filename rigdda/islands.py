@@ -28,10 +28,18 @@ def joins(bodies: Bodies, c: Contacts, k: int) -> bool:
 
 
 @kernel
-def join_blocks(bodies: Bodies, c: Contacts, count: int, parent: NDArray, blocks: int) -> None:
-    """Join the blocks that contacts couple, in a union-find; a root is the smallest index."""
+def join_blocks(
+    bodies: Bodies, c: Contacts, count: int, parent: NDArray, blocks: int, apart: bool
+) -> None:
+    """Join the blocks that contacts couple, or all, in a union-find; a root is the least index."""
     for i in range(blocks):
         parent[i] = i
+    if not apart:
+        first = -1
+        for i in range(blocks):
+            if bodies[i].status == AWAKE:
+                first = i if first < 0 else first
+                parent[i] = first
     for k in range(count):
         if joins(bodies, c, k):
             i, j = root(parent, c[k].a), root(parent, c[k].b)
@@ -39,7 +47,9 @@ def join_blocks(bodies: Bodies, c: Contacts, count: int, parent: NDArray, blocks
 
 
 @kernel
-def find_islands(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int) -> int:
+def find_islands(
+    bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int, apart: bool
+) -> int:
     """List blocks and contacts island by island in `work`; the root is the smallest index.
 
     Returns
@@ -48,7 +58,7 @@ def find_islands(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: in
         Number of islands.
     """
     parent, slot = work.parent, work.slot
-    join_blocks(bodies, c, count, parent, blocks)
+    join_blocks(bodies, c, count, parent, blocks, apart)
     islands = 0
     for s in range(len(work.block_start)):
         work.block_start[s] = work.contact_start[s] = 0

@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 from rigdda.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.assembly.springs import add_block, add_force, along, normal_row, shear_row
 from rigdda.constants import (
+    AUTO,
+    BLOCK_PCG,
+    BOLT,
+    DIRECT,
     ENERGY_HALVINGS,
     FLIPS,
     FRICTION_TOLERANCE,
@@ -20,10 +24,14 @@ from rigdda.constants import (
     MOVING,
     OPEN,
     OPENING_TOLERANCE,
+    PIN,
+    PLAIN,
     QUIET_SPEED,
     REST,
     SHOCK_SPEED,
+    SHORT_PROFILE,
     SLIP,
+    SOR,
     STICK,
     WAIT_STEPS,
 )
@@ -33,6 +41,8 @@ from rigdda.kernel import kernel
 from rigdda.linear.direct import solve_block
 from rigdda.linear.pcg import solve_pcg
 from rigdda.linear.psor import relax_forces
+from rigdda.linear.skyline import profile, solve_skyline
+from rigdda.linear.sor import solve_sor
 from rigdda.motion import top_speed
 from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
 
@@ -48,10 +58,19 @@ def damping_of(bodies: Bodies, i: int, p: Parameters) -> float:
 
 
 @kernel
+def load_moment(bodies: Bodies, i: int) -> float:
+    """Return the moment of the dead loads of block i about its centroid [N m]."""
+    if bodies[i].moment_cos == 0.0 and bodies[i].moment_sin == 0.0:
+        return 0.0
+    theta = bodies[i].theta
+    return bodies[i].moment_cos * math.cos(theta) + bodies[i].moment_sin * math.sin(theta)
+
+
+@kernel
 def assemble_blocks(
     bodies: Bodies, m: Matrix, work: Work, low: int, high: int, p: Parameters
 ) -> None:
-    """Set the diagonal blocks and forces of inertia, damping and weight."""
+    """Set the diagonal blocks and forces of inertia, damping, weight and loads."""
     for place in range(low, high):
         i, s = work.block_item[place], place - low
         alpha = damping_of(bodies, i, p)
@@ -64,8 +83,10 @@ def assemble_blocks(
         m.diagonal[s, 2, 2] = inertia
         m.rhs[s, 0] = inertia_force(bodies[i].mass, bodies[i].vx, p.dt)
         m.rhs[s, 1] = inertia_force(bodies[i].mass, bodies[i].vy, p.dt)
-        m.rhs[s, 1] -= bodies[i].mass * p.gravity
         m.rhs[s, 2] = inertia_force(bodies[i].inertia, bodies[i].omega, p.dt)
+        m.rhs[s, 0] += bodies[i].mass * work.field[0] + bodies[i].force_x
+        m.rhs[s, 1] += bodies[i].mass * work.field[1] + bodies[i].force_y
+        m.rhs[s, 2] += load_moment(bodies, i)
 
 
 @kernel
@@ -82,10 +103,15 @@ def assemble_contact(
     normal = c[k].kappa * (c[k].bias + dt * c[k].un)
     shear = c[k].memory_shear + c[k].kappa * dt * c[k].us
     en, es = normal_row(c, k, True), shear_row(c, k, True)
+    bolt = c[k].kind == BOLT
+    if bolt and c[k].state == SLIP:  # it yields
+        stiffness, normal = 0.0, -c[k].tension
     add_block(m.diagonal[i], stiffness, en, en)
     add_force(m.rhs[i], normal, en)
     stick = c[k].state == STICK
-    if stick:
+    if bolt:
+        pass
+    elif stick:
         add_block(m.diagonal[i], stiffness, es, es)
         add_force(m.rhs[i], shear, es)
     elif coupled:
@@ -100,6 +126,8 @@ def assemble_contact(
     add_block(m.diagonal[j], stiffness, fn, fn)
     add_block(m.off[c[k].pair], stiffness, en, fn)
     add_force(m.rhs[j], normal, fn)
+    if bolt:
+        return
     if stick:
         add_block(m.diagonal[j], stiffness, fs, fs)
         add_block(m.off[c[k].pair], stiffness, es, fs)
@@ -125,11 +153,27 @@ def spring_forces(
 
 
 @kernel
+def next_state_of_link(c: Contacts, k: int, normal: float, shear: float) -> int:
+    """Let a bolt yield, or no more: SLIP stands for yielding; a pin holds whatever its force."""
+    c[k].normal, c[k].shear = max(normal, -c[k].tension), 0.0 if c[k].kind == BOLT else shear
+    state = SLIP if normal < -c[k].tension else STICK
+    if state == c[k].state:
+        return NONE
+    if c[k].flips >= FLIPS:
+        return LOCKED
+    c[k].flips += 1
+    c[k].state = state
+    return MOVED
+
+
+@kernel
 def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) -> int:
     """Move contact k to the state that its forces ask for; returns NONE, MOVED or LOCKED.
 
     A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
     """
+    if c[k].kind == BOLT or c[k].kind == PIN:
+        return next_state_of_link(c, k, normal, shear)
     state = c[k].state
     tension = -OPENING_TOLERANCE * weight
     if state == OPEN:
@@ -182,6 +226,20 @@ def update_states(
 
 
 @kernel
+def solve_island(m: Matrix, n: int, pairs: int, p: Parameters) -> int:
+    """Solve for the displacements of an island; returns the iterations, 0 of a direct solution."""
+    if p.solver == SOR:
+        return solve_sor(m, n, pairs, p.tolerance, p.relaxation)
+    if p.solver == DIRECT or p.solver == AUTO:
+        count = profile(m, n, pairs)
+        longest = len(m.factor) if p.solver == DIRECT else SHORT_PROFILE * 3 * n
+        if count <= min(longest, len(m.factor)):
+            solve_skyline(m, n, pairs, count)
+            return 0
+    return solve_pcg(m, n, pairs, p.tolerance, p.solver == BLOCK_PCG)
+
+
+@kernel
 def solve_states(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, pairs: int, p: Parameters,
     counters: NDArray,
@@ -204,7 +262,7 @@ def solve_states(
             solve_block(m.diagonal[0], m.rhs[0], m.d[0])
         else:
             counters[3] += 1
-            counters[4] += solve_pcg(m, n, pairs, p.tolerance)
+            counters[4] += solve_island(m, n, pairs, p)
         moved, locked = update_states(bodies, c, m, work, c0, c1, p)
         if moved == 0:
             return locked == 0
@@ -250,17 +308,23 @@ def relax(
     for item in range(c0, c1):
         k = work.contact_item[item]
         within = c[k].friction * c[k].normal > abs(c[k].shear)
+        kind = c[k].kind
+        if kind == BOLT or kind == PIN:
+            c[k].state = SLIP if c[k].normal == -c[k].tension else STICK
+            continue
         c[k].state = OPEN if c[k].normal == 0.0 else (STICK if within else SLIP)
-        if c[k].kind != IMPACT:
+        if kind != IMPACT and kind != PLAIN:
             c[k].kind = MOVING
 
 
 @kernel
 def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int, dt: float) -> float:
-    """Return the work of the contact forces of an island in this step [J]."""
+    """Return the work of the contact forces of an island in this step [J], supports left out."""
     total = 0.0
     for item in range(low, high):
         k = work.contact_item[item]
+        if c[k].kind == BOLT or c[k].kind == PIN:
+            continue
         i = work.slot[c[k].a]
         j = work.slot[c[k].b] if c[k].pair >= 0 else -1
         dn = along(normal_row(c, k, True), m.d[i])

@@ -8,28 +8,46 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.constants import AWAKE, FIXED, PENETRATION_RATIO, SLACK_RATIO
+from rigdda.constants import (
+    AWAKE,
+    BOLT,
+    FIXED,
+    PENETRATION_RATIO,
+    PIN,
+    PLAIN_CONTACT,
+    SLACK_RATIO,
+    TERRAIN,
+)
 from rigdda.correction import place_corners
 from rigdda.geometry import polygon_properties
 from rigdda.linear.psor import COLUMNS
 from rigdda.records import (
     BODY,
     CONTACT,
+    LINK,
     Bodies,
     Contacts,
+    Floats,
     Gauges,
     Ground,
+    Links,
     Matrix,
     Outlines,
     Parameters,
+    Shaking,
     Work,
 )
 from rigdda.run import EVENT
 from rigdda.scene import Scene, Terrain
-from rigdda.settings import Settings
+from rigdda.settings import SOLVERS, Settings
+from rigdda.supports import FixedPoint
 
 FALL_BELOW = 20.0
 """Depth below the lowest terrain at which a block that left the site is retired [m]."""
+
+
+MOST_BANDWIDTH = 64
+"""Blocks to the left of the diagonal, on average, up to which a skyline is kept room for."""
 
 
 class Arrays(NamedTuple):
@@ -38,6 +56,8 @@ class Arrays(NamedTuple):
     bodies: Bodies
     outlines: Outlines
     ground: Ground
+    links: Links
+    shaking: Shaking
     now: Contacts
     before: Contacts
     matrix: Matrix
@@ -69,6 +89,8 @@ def pack(
         bodies,
         outlines,
         pack_ground(scene, names),
+        pack_links(scene, bodies),
+        pack_shaking(scene),
         empty_contacts(room),
         empty_contacts(room),
         empty_matrix(blocks, room),
@@ -101,7 +123,59 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
         if block and not block.fixed:
             bodies["vx"][i], bodies["vy"][i], bodies["omega"][i] = block.velocity
         place_corners(bodies, outlines, i)
+        for load in scene.loads:
+            if load.block == i:
+                _add_load(bodies, i, *load.resultant(area, centre))
     return bodies, outlines
+
+
+def _add_load(bodies: Bodies, i: int, force: Floats, point: Floats) -> None:
+    """Add a dead load on body i at the start; its arm turns with the body."""
+    (fx, fy), (x, y) = force, point - (bodies["x"][i], bodies["y"][i])
+    bodies["force_x"][i] += fx
+    bodies["force_y"][i] += fy
+    bodies["moment_cos"][i] += x * fy - y * fx
+    bodies["moment_sin"][i] -= x * fx + y * fy
+
+
+def pack_links(scene: Scene, bodies: Bodies) -> Links:
+    """Return the supports in order of their first block."""
+
+    def anchor(block: int, point: tuple[float, float]) -> tuple[float, float]:
+        if block == TERRAIN:
+            return point
+        return point[0] - bodies["x"][block], point[1] - bodies["y"][block]
+
+    links = np.zeros(len(scene.supports), dtype=LINK).view(np.recarray)
+    for link, support in zip(links, scene.supports, strict=True):
+        link["yielding"] = math.inf
+        if isinstance(support, FixedPoint):
+            link["kind"], link["a"], link["b"] = PIN, support.block, TERRAIN
+            link["ax"], link["ay"] = anchor(support.block, support.point)
+            link["bx"], link["by"] = support.point
+            continue
+        block_b = TERRAIN if support.block_b is None else support.block_b
+        link["kind"], link["a"], link["b"] = BOLT, support.block_a, block_b
+        link["ax"], link["ay"] = anchor(support.block_a, support.point_a)
+        link["bx"], link["by"] = anchor(block_b, support.point_b)
+        link["stiffness"], link["prestress"] = support.stiffness, support.prestress
+        link["length"] = math.dist(support.point_a, support.point_b)
+        if support.yield_force is not None:
+            link["yielding"] = support.yield_force
+    return links[np.argsort(links["a"], kind="stable")]
+
+
+def pack_shaking(scene: Scene) -> Shaking:
+    """Return the motion of the ground with its integrals over time."""
+    history = np.zeros((0, 3)) if scene.base_motion is None else scene.base_motion
+    t, x, y = np.ascontiguousarray(history.T)
+    sums = (np.concatenate([np.zeros(min(len(t), 1)), cumulative(t, a)]) for a in (x, y))
+    return Shaking(t, x, y, *sums)
+
+
+def cumulative(t: Floats, a: Floats) -> Floats:
+    """Return the integral of a polygon up to each of its corners but the first."""
+    return np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))
 
 
 def pack_ground(scene: Scene, names: list[str]) -> Ground:
@@ -157,8 +231,22 @@ def empty_matrix(blocks: int, room: int) -> Matrix:
         np.zeros((room, 3, 3)),
         np.zeros(room, dtype=np.int64),
         np.zeros(room, dtype=np.int64),
-        *(np.zeros((blocks, 3)) for _ in range(6)),
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+        np.zeros(blocks, dtype=np.int64),
+        np.zeros(3 * blocks, dtype=np.int64),
+        np.zeros(profile_room(blocks)),
+        np.zeros(2 * room, dtype=np.int64),
     )
+
+
+def profile_room(blocks: int) -> int:
+    """Return the entries of a skyline that are kept room for; longer ones are not factorised."""
+    return 9 * blocks * min(blocks, MOST_BANDWIDTH)
 
 
 def empty_work(bodies: int, room: int) -> Work:
@@ -184,6 +272,7 @@ def empty_work(bodies: int, room: int) -> Work:
         np.zeros((room, COLUMNS)),
         whole(room),
         whole(room),
+        np.zeros(2),
     )
 
 
@@ -223,13 +312,22 @@ def pack_parameters(
     free = [i for i, b in enumerate(scene.blocks) if not b.fixed]
     area = [bodies["mass"][i] / scene.blocks[i].density for i in free]
     size = math.sqrt(np.mean(area))
-    weight = np.mean(bodies["mass"][free]) * (scene.gravity or 9.81)
+    gx, gy = scene.gravity_vector
+    gravity = math.hypot(gx, gy)
+    shaken = scene.base_motion is not None
+    static = settings.mode == "static"
+    weight = np.mean(bodies["mass"][free]) * (gravity or 9.81)
     pairs = [[scene.interface(a, b) for b in names] for a in names]
-    floor = -np.inf if scene.terrain is None else scene.terrain.points[:, 1].min() - FALL_BELOW
+    if scene.terrain is None or gx != 0.0 or gy >= 0.0:
+        floor = -np.inf
+    else:
+        floor = scene.terrain.points[:, 1].min() - FALL_BELOW
     return Parameters(
         len(scene.blocks),
         settings.dt,
-        scene.gravity,
+        gx,
+        gy,
+        gravity,
         scene.damping,
         scene.damping_when == "contact",
         float(weight),
@@ -237,8 +335,18 @@ def pack_parameters(
         SLACK_RATIO * size,
         settings.tolerance,
         settings.open_close_iterations,
-        settings.sleeping,
+        static,
+        settings.post_correction,
+        settings.islands,
+        SOLVERS.index(settings.solver),
+        settings.relaxation,
+        settings.sleeping and not (static or shaken or scene.supports),
         float(floor),
         np.tan(np.radians([[s.friction_deg for s in row] for row in pairs])),
-        np.array([[s.restitution for s in row] for row in pairs]),
+        np.array(
+            [
+                [PLAIN_CONTACT if s.restitution is None else s.restitution for s in row]
+                for row in pairs
+            ]
+        ),
     )

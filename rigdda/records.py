@@ -37,6 +37,10 @@ BODY = _record(
     island=int,  # island in which a sleeping body fell asleep
     touching=int,  # 1 if a contact was closed in the last step
     wait=int,  # steps until its island is solved as a whole again
+    force_x=float,  # dead load [N]
+    force_y=float,
+    moment_cos=float,  # its moment is moment_cos cos(theta) + moment_sin sin(theta) [N m]
+    moment_sin=float,
 )
 """State of a body. Angle and body coordinates are the state, so area is kept."""
 
@@ -59,6 +63,8 @@ CONTACT = _record(
     us=float,
     friction=float,  # tan phi
     restitution=float,
+    cohesion=float,  # shear force that an unbroken joint bears without normal force [N]
+    tension=float,  # tension that it, or a bolt before it yields, bears [N]
     stiffness=float,  # of the contact at rest [N/m]
     kappa=float,  # in this step [N/m]
     bias=float,  # displacement at which the spring is free [m], see contact.law
@@ -70,16 +76,33 @@ CONTACT = _record(
     shear=float,
     lag=float,  # shear force of a slipping contact in the current iteration [N]
     state=int,  # OPEN, STICK, SLIP
-    kind=int,  # REST, NEW, IMPACT, SHOCK
+    kind=int,  # REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN
     flips=int,
     pair=int,  # off-diagonal block of the pair of bodies, -1: no coupling
 )
 """One contact in one step."""
 
+LINK = _record(
+    a=int,  # block
+    b=int,  # block or TERRAIN
+    kind=int,  # BOLT or PIN
+    ax=float,  # anchors in body coordinates, in the ground where b is TERRAIN [m]
+    ay=float,
+    bx=float,
+    by=float,
+    stiffness=float,  # [N/m]
+    prestress=float,  # [N]
+    yielding=float,  # tension at which it yields [N]
+    length=float,  # at which the tension is `prestress`; grows as it yields [m]
+)
+"""One support."""
+
 Bodies = NDArray[np.void]
 """(M,) array of BODY."""
 Contacts = NDArray[np.void]
 """(C,) array of CONTACT."""
+Links = NDArray[np.void]
+"""Array of LINK in order of a."""
 
 
 class Outlines(NamedTuple):
@@ -122,6 +145,10 @@ class Matrix(NamedTuple):
     direction: Floats
     product: Floats
     scaled: Floats
+    first: Ints  # (N,) leftmost block of a row, or head of its chain of neighbours
+    row: Ints  # (3 N,) place in `factor` of column 0 of a scalar row
+    factor: Floats  # Cholesky factor within the profile
+    next: Ints  # (2 pairs,) next entry in a chain of neighbours, -1 at its end
 
 
 class Work(NamedTuple):
@@ -143,6 +170,7 @@ class Work(NamedTuple):
     row: Floats  # (C, columns) contacts of one island, see linear.psor
     row_i: Ints  # (C,) slots of their bodies, -1: no unknowns
     row_j: Ints
+    field: Floats  # (2,) acceleration of free blocks in this step [m/s2]
 
 
 class Gauges(NamedTuple):
@@ -159,12 +187,24 @@ class Gauges(NamedTuple):
     event: NDArray[np.void]
 
 
+class Shaking(NamedTuple):
+    """Acceleration of the ground: a polygon over time."""
+
+    time: Floats  # (K,) never falling [s]
+    x: Floats  # (K,) [m/s2]
+    y: Floats
+    sum_x: Floats  # (K,) integrals up to then [m/s]
+    sum_y: Floats
+
+
 class Parameters(NamedTuple):
     """Numbers of the scene and the settings."""
 
     blocks: int
     dt: float
-    gravity: float
+    gravity_x: float  # [m/s2]
+    gravity_y: float
+    gravity: float  # its magnitude
     damping: float
     damping_in_contact_only: bool
     block_weight: float  # mean of the free blocks [N]
@@ -172,13 +212,18 @@ class Parameters(NamedTuple):
     slack: float
     tolerance: float
     iterations: int
+    static: bool
+    post_correction: bool
+    islands: bool
+    solver: int  # AUTO, PCG, BLOCK_PCG, SOR, DIRECT
+    relaxation: float
     sleeping: bool
     floor: float  # a centroid below it is retired [m]
     friction: Floats  # (surfaces, surfaces) tan phi
-    restitution: Floats
+    restitution: Floats  # PLAIN_CONTACT: the paper's penalty contact
 
 
-LEDGER = ("friction", "impact", "damping", "gravity")
+LEDGER = ("friction", "impact", "damping", "external", "links")
 """Work done on the blocks so far [J]: entries of the ledger array."""
 
 COUNTERS = (

@@ -8,6 +8,7 @@ layers.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import subprocess
@@ -277,7 +278,7 @@ def _scalars(run: Run, marks: Marks) -> dict[str, Floats]:
     height = run.poses[:, free, 1] - _frame(run.scene)[1]
     out = {
         "kinetic_energy": 0.5 * (squared @ mass + omega**2 @ inertia),
-        "potential_energy": run.scene.gravity * (height @ mass),
+        "potential_energy": math.hypot(*run.scene.gravity_vector) * (height @ mass),
         "greatest_speed": np.sqrt(squared.max(axis=1)),
         "moving": np.count_nonzero(squared > MOVING**2, axis=1).astype(np.float64),
     }

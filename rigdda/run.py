@@ -16,10 +16,15 @@ from numpy.typing import NDArray
 from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.gauges import CROSSING, HIT
+from rigdda.loads import BodyForce, LineLoad, PointLoad
 from rigdda.scene import Block, Scene, Surface, Terrain, Wall
+from rigdda.supports import Bolt, FixedPoint
 
 if TYPE_CHECKING:
     from rigdda.replay import Marks
+
+LOADS = {kind.__name__: kind for kind in (PointLoad, LineLoad, BodyForce)}
+SUPPORTS = {kind.__name__: kind for kind in (FixedPoint, Bolt)}
 
 EVENT = np.dtype(
     [
@@ -152,6 +157,9 @@ def scene_to_json(scene: Scene) -> bytes:
             "surfaces": scene.surfaces,
             "barriers": scene.barriers,
             "interfaces": [[*pair, surface] for pair, surface in scene.interfaces.items()],
+            "loads": [[type(load).__name__, load] for load in scene.loads],
+            "supports": [[type(support).__name__, support] for support in scene.supports],
+            "base_motion": scene.base_motion is not None and scene.base_motion.tolist(),
             "gravity": scene.gravity,
             "damping": scene.damping,
             "damping_when": scene.damping_when,
@@ -175,5 +183,8 @@ def scene_from_json(text: bytes) -> Scene:
         surfaces={name: Surface(**s) for name, s in data.pop("surfaces").items()},
         barriers=tuple(Wall(**b) for b in data.pop("barriers")),
         interfaces={(a, b): Surface(**s) for a, b, s in data.pop("interfaces")},
+        loads=tuple(LOADS[name](**load) for name, load in data.pop("loads")),
+        supports=tuple(SUPPORTS[name](**support) for name, support in data.pop("supports")),
+        base_motion=data.pop("base_motion") or None,
         **data,
     )

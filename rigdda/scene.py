@@ -13,6 +13,8 @@ from shapely.validation import explain_validity
 
 from rigdda import check
 from rigdda.errors import BadInput
+from rigdda.loads import Load, vector
+from rigdda.supports import FixedPoint, Support
 
 RIGHT_ANGLE_DEG = 90.0
 
@@ -25,8 +27,12 @@ class Surface:
     ----------
     friction_deg : float
         Coulomb friction angle [deg], from 0 to below 90.
-    restitution : float
-        Coefficient of restitution of a central impact, 0 (plastic) to 1.
+    cohesion, tension : float
+        Strength of a joint that is closed at the start, in shear beside friction and in tension
+        [Pa]; it breaks once, as a whole.
+    restitution : float or None
+        Coefficient of restitution of a central impact, 0 (plastic) to 1. None: the paper's plain
+        penalty contact, whose rebound is what step and stiffness make of it.
 
     Raises
     ------
@@ -35,11 +41,16 @@ class Surface:
     """
 
     friction_deg: float = 30.0
-    restitution: float = 0.0
+    cohesion: float = 0.0
+    tension: float = 0.0
+    restitution: float | None = 0.0
 
     def __post_init__(self) -> None:
         check.number("friction_deg", self.friction_deg, 0.0, 89.9)
-        check.number("restitution", self.restitution, 0.0, 1.0)
+        check.number("cohesion", self.cohesion, 0.0)
+        check.number("tension", self.tension, 0.0)
+        if self.restitution is not None:
+            check.number("restitution", self.restitution, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -227,18 +238,26 @@ class Scene:
         Fixed walls; their surface is "concrete" where the scene defines it, else "rock".
     interfaces : mapping of (str, str) to Surface
         Properties for pairs of surfaces, instead of the smaller of each.
-    gravity : float
-        Gravity [m/s2], acting downwards.
+    loads : sequence of PointLoad, LineLoad or BodyForce
+        Dead loads.
+    supports : sequence of FixedPoint or Bolt
+        Supports.
+    gravity : float or (gx, gy)
+        Gravity [m/s2], a number acts downwards.
     damping : float
         Mass-proportional damping coefficient alpha [1/s] (Koo and Chern 1998, damping force).
     damping_when : {"always", "contact"}
         "always" is the paper's: a fall is capped at g/alpha, 16 m/s for 0.6 1/s, so energies at a
         barrier stay low. "contact" damps only blocks that touch something.
+    base_motion : (m, 3) array_like, optional
+        Time [s] and acceleration of the ground, x and y [m/s2]; linear in between, a repeated time
+        makes a jump; before and after it the ground does not accelerate. Motion is computed
+        relative to the ground.
 
     Raises
     ------
     BadInput
-        If a name has no surface or a value is outside its range.
+        If a name has no surface, an index no block or a value is outside its range.
     """
 
     terrain: Terrain | None
@@ -250,20 +269,29 @@ class Scene:
     interfaces: Mapping[tuple[str, str], Surface] = field(
         default_factory=lambda: MappingProxyType({})
     )
-    gravity: float = 9.81
+    loads: tuple[Load, ...] = ()
+    supports: tuple[Support, ...] = ()
+    gravity: float | tuple[float, float] = 9.81
     damping: float = 0.0
     damping_when: str = "always"
+    base_motion: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("blocks", "barriers"):
+        for name in ("blocks", "barriers", "loads", "supports"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         object.__setattr__(self, "surfaces", dict(self.surfaces))
         object.__setattr__(self, "interfaces", dict(self.interfaces))
-        check.number("gravity", self.gravity, 0.0)
+        if isinstance(self.gravity, Sequence):
+            object.__setattr__(self, "gravity", vector("gravity", self.gravity))
+        else:
+            check.number("gravity", self.gravity, 0.0)
         check.number("damping", self.damping, 0.0)
         check.one_of("damping_when", self.damping_when, ("always", "contact"))
         if not any(not b.fixed for b in self.blocks):
             raise BadInput("blocks", f"{len(self.blocks)} blocks", "give at least one free block")
+        self._check_loads()
+        if self.base_motion is not None:
+            object.__setattr__(self, "base_motion", _history(self.base_motion))
         for i, block in enumerate(self.blocks):
             self._known(f"block {i}: surface", block.surface)
         for i, name in enumerate(self.terrain.surfaces if self.terrain else ()):
@@ -277,6 +305,26 @@ class Scene:
             self._known("barrier surface", self.barrier_surface)
             for barrier in self.barriers:
                 barrier.outline(self.terrain)
+
+    def _check_loads(self) -> None:
+        for i, load in enumerate(self.loads):
+            self._is_block(f"loads[{i}]: block", load.block)
+        for i, support in enumerate(self.supports):
+            if isinstance(support, FixedPoint):
+                self._is_block(f"supports[{i}]: block", support.block)
+            else:
+                self._is_block(f"supports[{i}]: block_a", support.block_a)
+                if support.block_b is not None:
+                    self._is_block(f"supports[{i}]: block_b", support.block_b)
+
+    def _is_block(self, where: str, index: int) -> None:
+        if index >= len(self.blocks):
+            raise BadInput(where, index, f"give the index of one of {len(self.blocks)} blocks")
+
+    @property
+    def gravity_vector(self) -> tuple[float, float]:
+        """Acceleration of gravity (gx, gy) [m/s2]."""
+        return self.gravity if isinstance(self.gravity, tuple) else (0.0, -self.gravity)
 
     def _known(self, where: str, name: str) -> None:
         if name not in self.surfaces:
@@ -296,8 +344,28 @@ class Scene:
         a, b = self.surfaces[first], self.surfaces[second]
         return Surface(
             friction_deg=min(a.friction_deg, b.friction_deg),
-            restitution=min(a.restitution, b.restitution),
+            cohesion=min(a.cohesion, b.cohesion),
+            tension=min(a.tension, b.tension),
+            restitution=None
+            if a.restitution is None or b.restitution is None
+            else min(a.restitution, b.restitution),
         )
+
+
+def _history(value: ArrayLike) -> NDArray[np.float64]:
+    """Return a history of ground acceleration as a read-only (m, 3) array."""
+    try:
+        history = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        history = np.zeros(0)
+    if history.ndim != 2 or history.shape[1:] != (3,) or len(history) < 2:
+        raise BadInput("base_motion", value, "give at least two rows (time, ax, ay)")
+    if not np.isfinite(history).all():
+        raise BadInput("base_motion", "NaN or infinity", "give finite numbers")
+    if (np.diff(history[:, 0]) < 0.0).any() or history[0, 0] < 0.0:
+        raise BadInput("base_motion", "times", "give times from 0 on that never fall")
+    history.setflags(write=False)
+    return history
 
 
 def convex_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from rigdda import check
 
+SOLVERS = ("auto", "pcg", "block-pcg", "sor", "direct")
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
@@ -25,6 +27,20 @@ class Settings:
         the top of a tall stack drown in the error of the large ones at its base.
     open_close_iterations : int
         Most open-close iterations in a step; nearly all steps need 1 to 3.
+    mode : {"dynamic", "static"}
+        "static" starts every step at rest: steps are then increments of load, not of time.
+    solver : {"auto", "pcg", "block-pcg", "sor", "direct"}
+        Of islands at rest. "pcg": conjugate gradients with the inverse diagonal, the paper's;
+        "block-pcg": with the inverse 3x3 blocks; "sor": the original successive over-relaxation;
+        "direct": Cholesky factors within the profile. "auto": direct where the profile is short,
+        which it is for small islands and for stacks, else "pcg".
+    relaxation : float
+        Over-relaxation factor of "sor" [-], above 0 and below 2.
+    post_correction : bool
+        Turn blocks exactly after each step. False moves their corners by the linear displacement
+        function of the solve, so that blocks expand as they turn (Figs 1 to 3).
+    islands : bool
+        Solve each cluster of blocks that touch on its own. False: all blocks in one system.
     sleeping : bool
         Let blocks at rest sleep until they are disturbed. They cost nothing then.
 
@@ -38,6 +54,11 @@ class Settings:
     penetration: float | None = None
     tolerance: float = 1e-7
     open_close_iterations: int = 12
+    mode: str = "dynamic"
+    solver: str = "auto"
+    relaxation: float = 1.5
+    post_correction: bool = True
+    islands: bool = True
     sleeping: bool = True
 
     def __post_init__(self) -> None:
@@ -46,3 +67,6 @@ class Settings:
             check.number("penetration", self.penetration, 0.0, open_low=True)
         check.number("tolerance", self.tolerance, 0.0, 1e-2, open_low=True)
         check.integer("open_close_iterations", self.open_close_iterations, 1)
+        check.one_of("mode", self.mode, ("dynamic", "static"))
+        check.one_of("solver", self.solver, SOLVERS)
+        check.number("relaxation", self.relaxation, 0.0, 1.99, open_low=True)

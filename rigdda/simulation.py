@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check
-from rigdda.constants import BAD_STATE, CONTACTS_FULL, EVENTS_FULL, OPEN
+from rigdda.constants import BAD_STATE, BOLT, CONTACTS_FULL, EVENTS_FULL, OPEN, PIN, PLAIN
+from rigdda.contact.links import anchor
 from rigdda.errors import BadInput, Diverged
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
 from rigdda.records import COUNTERS, LEDGER
@@ -19,6 +20,7 @@ from rigdda.run import EVENT, Run
 from rigdda.scene import Scene
 from rigdda.settings import Settings
 from rigdda.step import advance
+from rigdda.supports import FixedPoint, Support
 
 CONTACT = np.dtype(
     [
@@ -41,13 +43,21 @@ STATES = np.array(["open", "stick", "slip"])
 
 
 class Energy(NamedTuple):
-    """Energies of all blocks now, and work done on them so far [J]."""
+    """Energies of all blocks now, and work done on them so far [J].
+
+    `elastic` is stored in bolts and plain contacts. `friction`, `damping` and `impact` are what
+    shear forces, damping and the normal forces of contacts did, less what springs store: negative
+    where they took energy. `external` is the work of loads and of the motion of the ground.
+    kinetic + potential + elastic grows by the sum of the four.
+    """
 
     kinetic: float
     potential: float
+    elastic: float
     friction: float
-    impact: float
     damping: float
+    impact: float
+    external: float
 
 
 class Diagnostics(NamedTuple):
@@ -106,6 +116,7 @@ class Simulation:
         self._counters = np.zeros(len(COUNTERS), dtype=np.int64)
         self._ledger = np.zeros(len(LEDGER))
         self._deepest = np.zeros(1)
+        self._elastic_at_start = self._elastic()
         self._events: list[NDArray[np.void]] = []
 
     @property
@@ -134,8 +145,9 @@ class Simulation:
     def contacts(self) -> NDArray[np.void]:
         """Return the contacts of the last step as a structured array, see `CONTACT`."""
         c, n = self._now, self._counters[5]
-        out = np.zeros(n, dtype=CONTACT)
         c = c[:n]
+        c = c[(c["kind"] != BOLT) & (c["kind"] != PIN)]
+        out = np.zeros(len(c), dtype=CONTACT)
         out["block_a"], out["block_b"] = c["a"], c["b"]
         for name in ("x", "y", "nx", "ny"):
             out[name] = c[name]
@@ -146,20 +158,52 @@ class Simulation:
         out["penetration"] = np.maximum(-c["gap"], 0.0)
         return out
 
+    def supports(self) -> NDArray[np.float64]:
+        """Return the force of each support on its (first) block in the last step, (S, 2) [N]."""
+        c = self._now[: self._counters[5]]
+        c = c[(c["kind"] == BOLT) | (c["kind"] == PIN)]
+        out = np.zeros((len(self.scene.supports), 2))
+        order = np.argsort([_first_block(s) for s in self.scene.supports], kind="stable")
+        fx = c["normal"] * c["nx"] - c["shear"] * c["ny"]
+        fy = c["normal"] * c["ny"] + c["shear"] * c["nx"]
+        out[order[c["key"]]] = np.stack([fx, fy], axis=1)
+        return out
+
+    def _elastic(self) -> float:
+        """Return the energy stored in bolts and plain contacts now [J]."""
+        b, links = self._arrays.bodies, self._arrays.links
+        total = 0.0
+        for link in links[links["kind"] == BOLT]:
+            ends = [
+                np.array(anchor(b, int(link[i]), float(link[x]), float(link[y])))
+                for i, x, y in (("a", "ax", "ay"), ("b", "bx", "by"))
+            ]
+            force = link["prestress"] + link["stiffness"] * (
+                np.hypot(*(ends[0] - ends[1])) - link["length"]
+            )
+            total += 0.5 * force**2 / link["stiffness"]
+        c = self._now[: self._counters[5]]
+        c = c[(c["kind"] == PLAIN) & (c["state"] != OPEN)]
+        return float(total + 0.5 * (c["stiffness"] * np.minimum(c["gap"], 0.0) ** 2).sum())
+
     def energy(self) -> Energy:
         """Return the energies of the free blocks now and the work done on them so far."""
         b, n = self._arrays.bodies, len(self.scene.blocks)
         free = np.array([not block.fixed for block in self.scene.blocks])
         speed = b["vx"][:n] ** 2 + b["vy"][:n] ** 2
         kinetic = 0.5 * (b["mass"][:n] * speed + b["inertia"][:n] * b["omega"][:n] ** 2)
-        potential = self.scene.gravity * b["mass"][:n] * b["y"][:n]
-        work = dict(zip(LEDGER, self._ledger, strict=True))
+        gx, gy = self.scene.gravity_vector
+        potential = -b["mass"][:n] * (gx * b["x"][:n] + gy * b["y"][:n])
+        work = dict(zip(LEDGER, self._ledger.tolist(), strict=True))
+        elastic = self._elastic()
         return Energy(
             float(kinetic[free].sum()),
             float(potential[free].sum()),
-            float(work["friction"]),
-            float(work["impact"]),
-            float(work["damping"]),
+            elastic,
+            work["friction"],
+            work["damping"],
+            work["impact"] + work["links"] + elastic - self._elastic_at_start,
+            work["external"],
         )
 
     @property
@@ -192,6 +236,8 @@ class Simulation:
                 a.bodies,
                 a.outlines,
                 a.ground,
+                a.links,
+                a.shaking,
                 self._now,
                 self._before,
                 a.matrix,
@@ -280,6 +326,10 @@ class Simulation:
             matrix=empty_matrix(len(self.scene.blocks), room),
             work=empty_work(len(bodies), room)._replace(sorted=order),
         )
+
+
+def _first_block(support: Support) -> int:
+    return support.block if isinstance(support, FixedPoint) else support.block_a
 
 
 def simulate_many(

@@ -230,8 +230,10 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             ),
             surfaces={
                 name: Surface(
-                    friction_deg=min(max(s.friction_deg + shift, 0.0), 85.0),
-                    restitution=s.restitution,
+                    min(max(s.friction_deg + shift, 0.0), 85.0),
+                    s.cohesion,
+                    s.tension,
+                    s.restitution,
                 )
                 for name, s in self.surfaces.items()
             },

@@ -17,7 +17,8 @@ from rigdda.constants import (
     TERRAIN,
 )
 from rigdda.contact.broad_phase import overlapping_pairs, sort_by_low, sweep_boxes
-from rigdda.contact.law import prepare
+from rigdda.contact.law import prepare, strike_at_once
+from rigdda.contact.links import add_link, yield_bolts
 from rigdda.contact.narrow_phase import collide_pair
 from rigdda.contact.terrain_phase import collide_terrain
 from rigdda.contact.transfer import copy_contact, index_by_body, recall
@@ -27,6 +28,7 @@ from rigdda.correction import (
     is_struck,
     keep_memory,
     move_block,
+    move_corners,
     place_corners,
 )
 from rigdda.gauges import note_hits, note_passage
@@ -39,11 +41,14 @@ from rigdda.records import (
     Contacts,
     Gauges,
     Ground,
+    Links,
     Matrix,
     Outlines,
     Parameters,
+    Shaking,
     Work,
 )
+from rigdda.shaking import set_field
 from rigdda.sleep import wake_neighbours, watch_quiet
 
 
@@ -87,7 +92,7 @@ def keep_asleep(
 
 @kernel
 def detect(
-    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, old: Contacts,
+    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, c: Contacts, old: Contacts,
     old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
@@ -96,7 +101,7 @@ def detect(
     if pairs < 0:
         return -1
     room = len(c) - outlines.world_x.shape[1] - 4
-    count = q = 0
+    count = q = link = 0
     for a in range(p.blocks):
         if bodies[a].status == ASLEEP:
             count = keep_asleep(bodies, c, count, old, work, a, gauges, time, p)
@@ -109,9 +114,15 @@ def detect(
             if count >= 0:
                 recall(c, first, count, old, work.first)
             for k in range(first, count):
-                prepare(bodies, c, k, p)
+                prepare(bodies, c, k, work, p)
+            strike_at_once(bodies, c, first, count, p)
+            while link < len(links) and links[link].a == a and count <= room:
+                add_link(bodies, links, link, c, count, p)
+                count, link = count + 1, link + 1
         if count < 0 or count > room:
             return -1
+        while link < len(links) and links[link].a <= a:
+            link += 1
     return count
 
 
@@ -121,7 +132,7 @@ def solve_and_move(
     gauges: Gauges, time: float, p: Parameters, counters: NDArray, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Settle every island, note hits, then move its blocks; returns a bad block or -1."""
-    islands = find_islands(bodies, c, count, work, p.blocks)
+    islands = find_islands(bodies, c, count, work, p.blocks, p.islands)
     bad = -1
     for s in range(islands):
         c0, c1 = work.contact_start[s], work.contact_start[s + 1]
@@ -141,7 +152,10 @@ def solve_and_move(
                 bad = i
             elif bodies[i].y < p.floor:
                 bodies[i].status = RETIRED
-            place_corners(bodies, outlines, i)
+            if p.post_correction:
+                place_corners(bodies, outlines, i)
+            else:
+                move_corners(bodies, outlines, i, m, place - work.block_start[s])
     for k in range(count):
         if c[k].state != OPEN:
             bodies[c[k].a].touching = 1
@@ -152,11 +166,18 @@ def solve_and_move(
     return bad
 
 
+@kernel
+def rest_all(bodies: Bodies) -> None:
+    """Take the velocity from every block: static mode."""
+    for i in range(len(bodies)):
+        bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
+
+
 @entry_kernel
 def advance(
-    bodies: Bodies, outlines: Outlines, ground: Ground, now: Contacts, before: Contacts,
-    m: Matrix, work: Work, gauges: Gauges, p: Parameters, counters: NDArray, ledger: NDArray,
-    deepest: NDArray, steps: int,
+    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
+    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters,
+    counters: NDArray, ledger: NDArray, deepest: NDArray, steps: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Take up to `steps` steps.
 
@@ -180,7 +201,12 @@ def advance(
         if room < p.blocks * (len(gauges.station) + len(gauges.absorbed)):
             return EVENTS_FULL, -1, swapped
         time = (counters[0] + 1) * p.dt
-        count = detect(bodies, outlines, ground, before, now, counters[5], work, gauges, time, p)
+        if p.static:
+            rest_all(bodies)
+        set_field(work, shaking, counters[0] * p.dt, time, p)
+        count = detect(
+            bodies, outlines, ground, links, before, now, counters[5], work, gauges, time, p
+        )
         if count < 0:
             return CONTACTS_FULL, -1, swapped
         now, before = before, now
@@ -192,6 +218,7 @@ def advance(
         bad = solve_and_move(
             bodies, outlines, now, count, m, work, gauges, time, p, counters, ledger
         )
+        yield_bolts(bodies, links)
         counters[6] = note_passage(bodies, gauges, counters[6], time, p)
         counters[0] += 1
         if bad >= 0:

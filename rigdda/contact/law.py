@@ -18,6 +18,7 @@ impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is 
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
          blocks, and carries on with it as if they had always touched.
 shock    b = 0: a closed contact that the rest of its island drives together, a plastic impact.
+plain    b = -2 g and u_0 taken as 0: a penalty spring on the gap, the paper's contact.
 =======  ====================================================================================
 
 The shear spring is the same on the shear velocity, from the shear force of the last step, limited
@@ -36,6 +37,8 @@ from rigdda.constants import (
     MOVING,
     NEW,
     OPEN,
+    PLAIN,
+    PLAIN_CONTACT,
     RECOVERY_SPEED,
     RECOVERY_TIME,
     REST,
@@ -45,7 +48,7 @@ from rigdda.constants import (
     UNLOADED,
 )
 from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contacts, Parameters
+from rigdda.records import Bodies, Contacts, Parameters, Work
 
 
 @kernel
@@ -178,13 +181,58 @@ def set_new(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
 
 
 @kernel
-def prepare(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
+def set_plain(c: Contacts, k: int, weight: float, p: Parameters) -> None:
+    """Make contact k the paper's penalty spring on the displacement of the step.
+
+    N = k_n (-gap - d_n) and S = S_0 - k_n d_s: the law above with u_0 = 0. It has no memory of
+    speed, so its rebound is what step and stiffness make of it.
+    """
+    c[k].kind = PLAIN
+    c[k].stiffness = weight / p.penetration
+    c[k].kappa = 0.5 * c[k].stiffness
+    c[k].bias = -2.0 * c[k].gap
+    c[k].un = c[k].us = 0.0
+    if c[k].gap <= 0.0 and c[k].state == OPEN:
+        c[k].state = STICK
+
+
+@kernel
+def strike(bodies: Bodies, c: Contacts, k: int, time: float, pull: float, p: Parameters) -> float:
+    """Set arms and velocities of contact k at `time` in the step; returns the closing speed."""
+    set_arms(bodies, c, k, time)
+    set_velocities(bodies, c, k)
+    c[k].share = 1.0 - time / p.dt
+    return -c[k].un + pull * time
+
+
+@kernel
+def strike_at_once(bodies: Bodies, c: Contacts, low: int, high: int, p: Parameters) -> None:
+    """Let impacts of the same two blocks act at the time of the earlier one.
+
+    Impulses at different times would act on arms that the earlier one has changed, and angular
+    momentum would not be kept.
+    """
+    for k in range(low + 1, high):
+        j = k - 1
+        if c[k].kind != IMPACT or c[j].kind != IMPACT or c[k].b != c[j].b or c[k].b < 0:
+            continue
+        if c[k].share == c[j].share or bodies[c[k].b].status != AWAKE:
+            continue
+        late = k if c[k].share < c[j].share else j
+        time = (1.0 - max(c[k].share, c[j].share)) * p.dt
+        closing = max(strike(bodies, c, late, time, 0.0, p), 0.0)
+        set_impact(c, late, closing, effective_mass(bodies, c, late), p)
+
+
+@kernel
+def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, p: Parameters) -> None:
     """Set the law of contact k for this step from its geometry and memory."""
     a, b = c[k].a, c[k].b
-    gravity = p.gravity
+    # free relative acceleration along the normal is that of gravity
+    pull = -(work.field[0] * c[k].nx + work.field[1] * c[k].ny)
     mass_b = 0.0
     if b >= 0 and bodies[b].status == AWAKE:
-        gravity, mass_b = 0.0, bodies[b].mass
+        pull, mass_b = 0.0, bodies[b].mass
     weight = carried_weight(bodies[a].mass, mass_b, p)
     most = GREATEST_LOAD * max(weight, p.block_weight)
     c[k].memory_shear *= most / max(c[k].memory_normal, most)
@@ -195,26 +243,21 @@ def prepare(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
     c[k].friction = p.friction[surface, c[k].other]
     c[k].restitution = p.restitution[surface, c[k].other]
     c[k].flips = 0
-    c[k].share = 0.5
-    set_arms(bodies, c, k, 0.5 * p.dt)
-    set_velocities(bodies, c, k)
-    # free relative acceleration along the normal is that of gravity
-    pull = gravity * c[k].ny
+    c[k].cohesion = c[k].tension = 0.0
+    strike(bodies, c, k, 0.5 * p.dt, pull, p)
+    if c[k].restitution == PLAIN_CONTACT:
+        set_plain(c, k, weight, p)
+        return
     threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
     gap = max(c[k].gap, 0.0)
     mean = -c[k].un + 0.5 * pull * p.dt
     if c[k].state == OPEN and mean > threshold and gap < mean * p.dt:
-        time = gap / mean
-        set_arms(bodies, c, k, time)
-        set_velocities(bodies, c, k)
-        closing = -c[k].un + pull * time
+        closing = strike(bodies, c, k, gap / mean, pull, p)
         if closing > threshold:
-            c[k].share = 1.0 - time / p.dt
             set_impact(c, k, closing, effective_mass(bodies, c, k), p)
             c[k].state = STICK
             return
-        set_arms(bodies, c, k, 0.5 * p.dt)
-        set_velocities(bodies, c, k)
+        strike(bodies, c, k, 0.5 * p.dt, pull, p)
     if c[k].state != OPEN:
         set_rest(c, k, most, p)
         return

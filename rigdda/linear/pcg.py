@@ -1,10 +1,14 @@
-"""Conjugate gradients preconditioned by the inverse of the diagonal (Koo and Chern 1998)."""
+"""Conjugate gradients preconditioned by the inverse of the diagonal (Koo and Chern 1998).
+
+Or, for comparison, by the inverses of the 3x3 blocks on it.
+"""
 
 from __future__ import annotations
 
 from numpy.typing import NDArray
 
 from rigdda.kernel import kernel
+from rigdda.linear.direct import solve_block
 from rigdda.records import Matrix
 
 
@@ -30,10 +34,15 @@ def multiply(m: Matrix, n: int, pairs: int, x: NDArray, y: NDArray) -> None:
 
 
 @kernel
-def precondition(m: Matrix, n: int) -> float:
-    """Set scaled = residual / diagonal and return their product."""
+def precondition(m: Matrix, n: int, by_block: bool) -> float:
+    """Set scaled = residual / diagonal, entries or 3x3 blocks, and return their product."""
     product = 0.0
     for i in range(n):
+        if by_block:
+            solve_block(m.diagonal[i], m.residual[i], m.scaled[i])
+            for j in range(3):
+                product += m.residual[i, j] * m.scaled[i, j]
+            continue
         for j in range(3):
             r = m.residual[i, j]
             z = r / m.diagonal[i, j, j]
@@ -43,7 +52,7 @@ def precondition(m: Matrix, n: int) -> float:
 
 
 @kernel
-def solve_pcg(m: Matrix, n: int, pairs: int, tolerance: float) -> int:
+def solve_pcg(m: Matrix, n: int, pairs: int, tolerance: float, by_block: bool) -> int:
     """Solve K d = rhs from the start value in m.d, in place.
 
     Stops when the residual, in the norm of the preconditioner, is below `tolerance` times the
@@ -60,7 +69,7 @@ def solve_pcg(m: Matrix, n: int, pairs: int, tolerance: float) -> int:
         for j in range(3):
             m.residual[i, j] = m.rhs[i, j] - m.product[i, j]
             scale += m.rhs[i, j] ** 2 / m.diagonal[i, j, j]
-    rho = precondition(m, n)
+    rho = precondition(m, n, by_block)
     for i in range(n):
         for j in range(3):
             m.direction[i, j] = m.scaled[i, j]
@@ -77,7 +86,7 @@ def solve_pcg(m: Matrix, n: int, pairs: int, tolerance: float) -> int:
             for j in range(3):
                 m.d[i, j] += alpha * m.direction[i, j]
                 m.residual[i, j] -= alpha * m.product[i, j]
-        before, rho = rho, precondition(m, n)
+        before, rho = rho, precondition(m, n, by_block)
         beta = rho / before
         for i in range(n):
             for j in range(3):

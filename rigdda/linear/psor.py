@@ -8,10 +8,15 @@ from the forces of the last step are enough while blocks move; at rest the globa
 
 from __future__ import annotations
 
+import math
+
 from rigdda.assembly.springs import normal_row, shear_row
 from rigdda.constants import (
+    BOLT,
     FAR_SPEED,
     LAST_SWEEPS,
+    PIN,
+    PLAIN,
     RELAXATION_SPEED,
     RELAXATION_STIFFNESS,
     RELAXATION_SWEEPS,
@@ -20,11 +25,11 @@ from rigdda.kernel import kernel
 from rigdda.records import Contacts, Floats, Ints, Matrix, Work
 
 # columns of work.row: rows of a and b along the normal and the shear direction, then by direction
-# gain [N/m], free displacement [m], force [N]; friction
+# gain [N/m], free displacement [m], force [N]; friction, and forces that it bears beside [N]
 NORMAL_A, NORMAL_B, SHEAR_A, SHEAR_B = 0, 3, 6, 9
 GAIN, FREE, SOFT, FORCE = 12, 14, 16, 18
-FRICTION = 20
-COLUMNS = 21
+FRICTION, COHESION, TENSION = 20, 21, 22
+COLUMNS = 23
 
 
 @kernel
@@ -51,18 +56,24 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, dt: float) 
         row[place, NORMAL_B + q], row[place, SHEAR_B + q] = fn[q], fs[q]
     soft_n = flexibility(m, i, en) + flexibility(m, j, fn)
     soft_s = flexibility(m, i, es) + flexibility(m, j, fs)
+    own = old.kind == PLAIN or old.kind == BOLT or old.kind == PIN
     # stiff against the inertia of the blocks; relaxation starts from the forces of the last step,
     # of which the law keeps the part that lasts: the rest may be impulses
-    kappa = RELAXATION_STIFFNESS / soft_n
+    kappa = old.kappa if own else RELAXATION_STIFFNESS / soft_n
     carried = old.memory_normal
     row[place, GAIN], row[place, SOFT] = kappa / (1.0 + 2.0 * kappa * soft_n), 1.0 / kappa
-    row[place, FREE] = old.bias - carried / old.kappa + old.steady / kappa + dt * old.un
-    kappa = RELAXATION_STIFFNESS / soft_s
+    row[place, FREE] = old.bias + dt * old.un
+    if not own:
+        row[place, FREE] += old.steady / kappa - carried / old.kappa
+    kappa = old.kappa if own else RELAXATION_STIFFNESS / soft_s
     row[place, GAIN + 1], row[place, SOFT + 1] = kappa / (1.0 + 2.0 * kappa * soft_s), 1.0 / kappa
     lasting = old.steady / carried if carried > 0.0 else 0.0
+    if own:
+        lasting = 1.0
     row[place, FREE + 1] = lasting * old.memory_shear / kappa + dt * old.us
     row[place, FORCE], row[place, FORCE + 1] = carried, old.memory_shear
-    row[place, FRICTION] = old.friction
+    row[place, FRICTION], row[place, TENSION] = old.friction, old.tension
+    row[place, COHESION] = math.inf if old.kind == PIN else old.cohesion
     push(row, place, NORMAL_A, i, j, m.d, m.scaled, carried)
     push(row, place, SHEAR_A, i, j, m.d, m.scaled, old.memory_shear)
 
@@ -105,12 +116,14 @@ def sweep(
         i, j = row_i[place], row_j[place]
         force = row[place, FORCE]
         off = row[place, FREE] - 2.0 * relative(row, place, NORMAL_A, i, j, d)
-        normal = max(force + row[place, GAIN] * (off - force * row[place, SOFT]), 0.0)
+        normal = force + row[place, GAIN] * (off - force * row[place, SOFT])
+        normal = max(normal, -row[place, TENSION])
         if normal != force:
             push(row, place, NORMAL_A, i, j, d, inverse, normal - force)
             row[place, FORCE] = normal
             worst = max(worst, abs(normal - force) * row[place, SOFT])
-        force, limit = row[place, FORCE + 1], row[place, FRICTION] * normal
+        force = row[place, FORCE + 1]
+        limit = row[place, COHESION] + row[place, FRICTION] * max(normal, 0.0)
         if limit == 0.0 and force == 0.0:
             continue
         off = row[place, FREE + 1] - 2.0 * relative(row, place, SHEAR_A, i, j, d)

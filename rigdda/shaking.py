@@ -1,0 +1,37 @@
+"""The acceleration that gravity and the motion of the ground give free blocks."""
+
+from __future__ import annotations
+
+from rigdda.kernel import kernel
+from rigdda.records import Floats, Parameters, Shaking, Work
+
+
+@kernel
+def velocity(t: Floats, a: Floats, total: Floats, time: float) -> float:
+    """Return the integral up to `time` of a polygon with corners (t, a) [m/s]."""
+    if len(t) == 0 or time <= t[0]:
+        return 0.0
+    low, high = 0, len(t)  # the last corner at or before `time`
+    while high - low > 1:
+        mid = (low + high) // 2
+        if t[mid] <= time:
+            low = mid
+        else:
+            high = mid
+    if low == len(t) - 1:
+        return total[low]
+    past = time - t[low]
+    slope = (a[low + 1] - a[low]) / (t[low + 1] - t[low])
+    return total[low] + past * (a[low] + 0.5 * slope * past)
+
+
+@kernel
+def set_field(work: Work, shaking: Shaking, start: float, end: float, p: Parameters) -> None:
+    """Set the acceleration of free blocks relative to the ground, averaged over a step."""
+    work.field[0], work.field[1] = p.gravity_x, p.gravity_y
+    if len(shaking.time) > 0:
+        t, x, y = shaking.time, shaking.x, shaking.y
+        gain_x = velocity(t, x, shaking.sum_x, end) - velocity(t, x, shaking.sum_x, start)
+        gain_y = velocity(t, y, shaking.sum_y, end) - velocity(t, y, shaking.sum_y, start)
+        work.field[0] -= gain_x / (end - start)
+        work.field[1] -= gain_y / (end - start)

@@ -1,0 +1,85 @@
+"""Supports of blocks: the paper's fixed point and rock bolt."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rigdda import check
+from rigdda.errors import BadInput
+from rigdda.loads import vector
+
+
+@dataclass(frozen=True, slots=True)
+class FixedPoint:
+    """A point of a block that stays where it is; the block may turn about it.
+
+    Parameters
+    ----------
+    block : int
+        Index of the block.
+    point : (x, y)
+        The point at the start [m].
+
+    Raises
+    ------
+    BadInput
+        If a value is not a finite number.
+    """
+
+    block: int
+    point: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        check.integer("fixed point: block", self.block, 0)
+        object.__setattr__(self, "point", vector("fixed point: point", self.point))
+
+
+@dataclass(frozen=True, slots=True)
+class Bolt:
+    """A rock bolt: a spring between two blocks, or between a block and the ground.
+
+    Parameters
+    ----------
+    block_a, point_a : int, (x, y)
+        Block at one end and where it is anchored at the start [m].
+    block_b, point_b : int or None, (x, y)
+        The other end; None: anchored in the ground.
+    stiffness : float
+        Tension per elongation, per metre of slope width [N/m].
+    prestress : float
+        Tension at the start [N].
+    yield_force : float or None
+        Tension at which it yields, perfectly plastic [N]; None: never.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or out of its range, or both ends are at one point or block.
+    """
+
+    block_a: int
+    point_a: tuple[float, float]
+    block_b: int | None
+    point_b: tuple[float, float]
+    stiffness: float
+    prestress: float = 0.0
+    yield_force: float | None = None
+
+    def __post_init__(self) -> None:
+        check.integer("bolt: block_a", self.block_a, 0)
+        if self.block_b is not None:
+            check.integer("bolt: block_b", self.block_b, 0)
+            if self.block_b == self.block_a:
+                raise BadInput("bolt: block_b", self.block_b, "give another block than block_a")
+        object.__setattr__(self, "point_a", vector("bolt: point_a", self.point_a))
+        object.__setattr__(self, "point_b", vector("bolt: point_b", self.point_b))
+        if math.dist(self.point_a, self.point_b) < 1e-6:
+            raise BadInput("bolt: point_b", self.point_b, "put it apart from point_a")
+        check.number("bolt: stiffness", self.stiffness, 0.0, open_low=True)
+        check.number("bolt: prestress", self.prestress, 0.0)
+        if self.yield_force is not None:
+            check.number("bolt: yield_force", self.yield_force, self.prestress)
+
+
+Support = FixedPoint | Bolt

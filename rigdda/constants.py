@@ -8,6 +8,10 @@ IMPACT_STIFFNESS = 1e4
 """Stiffness of an impact and of a new contact, times effective mass / dt^2 [-]. The velocity after
 an impact misses its target by half the inverse of this, 5e-5 of the change."""
 
+START_STIFFNESS = 1e3
+"""Factor of that in the first step of a simulation [-]: the blocks of a stack give way one after
+the other, and a tall one must start without a jolt."""
+
 IMPACT_SPEED = 0.05
 """Least closing speed of an impact [m/s], below it a contact closes as a spring at rest."""
 
@@ -52,7 +56,14 @@ RELAXATION_SWEEPS = 25
 """Most sweeps over the forces of an island in motion in a step."""
 
 RELAXATION_SPEED = 0.02
-"""Greatest change of a contact's velocity in a sweep at which sweeps stop [m/s]."""
+"""Greatest change of a contact's velocity in a sweep at which sweeps stop [m/s]; in an island
+slower than QUIET_SPEED less in proportion, so that it comes to rest."""
+
+QUIET_SWEEPS = 100
+"""Most sweeps in a step over an island slower than QUIET_SPEED."""
+
+LEAST_QUIET = 1e-3
+"""Least share of RELAXATION_SPEED that is asked for [-]."""
 
 FAR_SPEED = 0.2
 """Greatest change of a contact's velocity in a sweep above which sweeps go on to the last [m/s]:

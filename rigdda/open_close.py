@@ -298,13 +298,14 @@ def relax(
     island: int,
     p: Parameters,
     counters: NDArray,
+    speed: float,
 ) -> None:
     """Find the forces of an island by projected relaxation, from those of the last step."""
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
     counters[2] += 1
-    counters[8] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt)
+    counters[8] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt, speed)
     for item in range(c0, c1):
         k = work.contact_item[item]
         within = c[k].friction * c[k].normal > abs(c[k].shear)
@@ -337,16 +338,24 @@ def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int, dt: flo
 
 
 @kernel
-def is_quiet(bodies: Bodies, work: Work, low: int, high: int) -> bool:
-    """Return whether the blocks low:high are slow, and did not fail to settle a moment ago."""
-    quiet = True
+def island_speed(bodies: Bodies, work: Work, low: int, high: int) -> float:
+    """Return the greatest speed of the blocks low:high [m/s]."""
+    speed = 0.0
+    for place in range(low, high):
+        speed = max(speed, top_speed(bodies, work.block_item[place]))
+    return speed
+
+
+@kernel
+def is_waiting(bodies: Bodies, work: Work, low: int, high: int) -> bool:
+    """Return whether one of the blocks low:high did not settle a moment ago; counts down."""
+    waiting = False
     for place in range(low, high):
         i = work.block_item[place]
         if bodies[i].wait > 0:
             bodies[i].wait -= 1
-            quiet = False
-        quiet = quiet and top_speed(bodies, i) <= QUIET_SPEED
-    return quiet
+            waiting = True
+    return waiting
 
 
 @kernel
@@ -371,7 +380,9 @@ def open_close(
         bouncing = bouncing or (c[k].kind == IMPACT and c[k].bias > 0.0)
     pairs = pair_blocks(bodies, c, m, work, c0, c1)
     b0, b1 = work.block_start[island], work.block_start[island + 1]
-    relaxing = b1 - b0 > 1 and not is_quiet(bodies, work, b0, b1)
+    speed = island_speed(bodies, work, b0, b1)
+    waiting = is_waiting(bodies, work, b0, b1)
+    relaxing = b1 - b0 > 1 and (waiting or speed > QUIET_SPEED)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
             relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)
@@ -379,7 +390,7 @@ def open_close(
                 for place in range(b0, b1):
                     bodies[work.block_item[place]].wait = WAIT_STEPS
         if relaxing:
-            relax(bodies, c, m, work, island, p, counters)
+            relax(bodies, c, m, work, island, p, counters, speed)
         if not bouncing or impact_work(c, m, work, c0, c1, p.dt) <= 0.0:
             return
         for item in range(c0, c1):

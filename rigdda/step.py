@@ -114,7 +114,7 @@ def detect(
             if count >= 0:
                 recall(c, first, count, old, work.first)
             for k in range(first, count):
-                prepare(bodies, c, k, work, p)
+                prepare(bodies, c, k, work, time <= 1.5 * p.dt, p)
             strike_at_once(bodies, c, first, count, p)
             while link < len(links) and links[link].a == a and count <= room:
                 add_link(bodies, links, link, c, count, p)

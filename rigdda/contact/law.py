@@ -11,8 +11,8 @@ What differs is the bias b:
 
 =======  ====================================================================================
 at rest  b = N_0 / k_n, the force carried over from the last step. Penetration beyond what N_0
-         explains is pushed out slowly. An open gap g gives b = -g: the contact closes within
-         the step, at most.
+         explains is pushed out slowly, a small gap closed so. An open gap g gives b = -g: the
+         contact closes within the step, at most.
 impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
          impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
@@ -43,6 +43,7 @@ from rigdda.constants import (
     RECOVERY_TIME,
     REST,
     SHOCK,
+    START_STIFFNESS,
     STICK,
     STIFFNESS_CHANGE,
     UNLOADED,
@@ -169,14 +170,16 @@ def set_rest(c: Contacts, k: int, most: float, p: Parameters) -> None:
     else:
         c[k].bias = elastic
         if c[k].memory_normal < most:
-            c[k].bias += recovery(-c[k].gap - elastic, p.dt)
+            surplus = max(-c[k].gap - elastic, 0.0) - max(c[k].gap, 0.0)
+            c[k].bias += recovery(surplus, p.dt)
 
 
 @kernel
-def set_new(bodies: Bodies, c: Contacts, k: int, p: Parameters) -> None:
+def set_new(bodies: Bodies, c: Contacts, k: int, start: bool, p: Parameters) -> None:
     """Make contact k one that closes now, or may close, without an impact."""
     c[k].kind = NEW
-    c[k].kappa = max(impact_stiffness(effective_mass(bodies, c, k), p.dt), c[k].stiffness)
+    stiffness = impact_stiffness(effective_mass(bodies, c, k), p.dt)
+    c[k].kappa = max(START_STIFFNESS * stiffness if start else stiffness, c[k].stiffness)
     c[k].bias = -c[k].gap if c[k].gap > 0.0 else recovery(-c[k].gap, p.dt)
 
 
@@ -225,8 +228,8 @@ def strike_at_once(bodies: Bodies, c: Contacts, low: int, high: int, p: Paramete
 
 
 @kernel
-def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, p: Parameters) -> None:
-    """Set the law of contact k for this step from its geometry and memory."""
+def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Parameters) -> None:
+    """Set the law of contact k for this step, at the `start` the first, from geometry and memory."""
     a, b = c[k].a, c[k].b
     # free relative acceleration along the normal is that of gravity
     pull = -(work.field[0] * c[k].nx + work.field[1] * c[k].ny)
@@ -261,7 +264,7 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, p: Parameters) -> N
     if c[k].state != OPEN:
         set_rest(c, k, most, p)
         return
-    set_new(bodies, c, k, p)
+    set_new(bodies, c, k, start, p)
     # what touches starts closed: in a stack no block moves before those below it are held
     if gap - mean * p.dt < p.penetration:
         c[k].state = STICK

@@ -15,8 +15,11 @@ from rigdda.constants import (
     BOLT,
     FAR_SPEED,
     LAST_SWEEPS,
+    LEAST_QUIET,
     PIN,
     PLAIN,
+    QUIET_SPEED,
+    QUIET_SWEEPS,
     RELAXATION_SPEED,
     RELAXATION_STIFFNESS,
     RELAXATION_SWEEPS,
@@ -153,10 +156,13 @@ def sort_by_height(c: Contacts, item: Ints, low: int, high: int) -> None:
 
 
 @kernel
-def relax_forces(c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int, dt: float) -> int:
+def relax_forces(
+    c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int, dt: float, speed: float
+) -> int:
     """Sweep to and fro over the contacts low:high until their forces settle; returns the sweeps.
 
-    The matrix holds inertia and weight only; m.d is set to the displacements.
+    The matrix holds inertia and weight only; m.d is set to the displacements. `speed` is the
+    greatest of the island [m/s].
     """
     for s in range(n):
         for q in range(3):
@@ -166,10 +172,12 @@ def relax_forces(c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int
     sort_by_height(c, work.contact_item, low, high)
     for place in range(count):
         pack_row(c, work.contact_item[low + place], m, work, place, dt)
-    limit = RELAXATION_SPEED * dt / (2.0 * RELAXATION_STIFFNESS)
-    far = limit * FAR_SPEED / RELAXATION_SPEED
+    scale = dt / (2.0 * RELAXATION_STIFFNESS)
+    share = min(max(speed / QUIET_SPEED, LEAST_QUIET), 1.0)
+    limit, far = share * RELAXATION_SPEED * scale, FAR_SPEED * scale
+    most = QUIET_SWEEPS if share < 1.0 else RELAXATION_SWEEPS
     sweeps, worst = 0, 1e300
-    while (sweeps < RELAXATION_SWEEPS and worst > limit) or (sweeps < LAST_SWEEPS and worst > far):
+    while (sweeps < most and worst > limit) or (sweeps < LAST_SWEEPS and worst > far):
         worst = sweep(work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps % 2 == 1)
         sweeps += 1
     for place in range(count):

@@ -39,6 +39,9 @@ RECOVERY_TIME = 0.1
 """Time in which penetration beyond what the load explains is pushed out [s]. Shorter pumps energy
 into piles, longer leaves visible overlap."""
 
+PUSHED = 0.1
+"""Least load, over the weight of the heavier body, under which penetration is pushed out [-]."""
+
 RECOVERY_SPEED = 0.2
 """Greatest speed of that push [m/s]; adds at most v^2/2 = 0.02 J/kg."""
 
@@ -89,6 +92,9 @@ blocks to the left of the diagonal. Longer, and conjugate gradients are cheaper.
 
 PIN_RECOVERY = 0.2
 """Share of the distance of a fixed point from its place that is mended in a step [-]."""
+
+SMALL_ISLAND = 2
+"""Most blocks of an island that is solved as a whole at any speed."""
 
 ENERGY_HALVINGS = 4
 """Times restitution is halved when an eccentric impact would gain energy; then it is plastic."""

@@ -63,11 +63,12 @@ def place_normals(bodies: Bodies, outlines: Outlines, i: int) -> None:
 def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> None:
     """Add the force of contact k to slot i, and to the mean time of the impacts of its block.
 
-    m.residual sums forces; m.direction sums normal forces of impacts and their moments in time.
+    m.residual sums forces; m.direction sums normal forces that do not act all through the step,
+    and their moments in time.
     """
     add_force(m.residual[i], c[k].normal, normal_row(c, k, of_a))
     add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
-    if c[k].kind == IMPACT:
+    if c[k].share != 0.5:
         m.direction[i, 0] += c[k].normal
         m.direction[i, 1] += c[k].normal * (c[k].share - 0.5)
 

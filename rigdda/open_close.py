@@ -31,6 +31,7 @@ from rigdda.constants import (
     SHOCK_SPEED,
     SHORT_PROFILE,
     SLIP,
+    SMALL_ISLAND,
     SOR,
     STICK,
     WAIT_STEPS,
@@ -382,7 +383,7 @@ def open_close(
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     speed = island_speed(bodies, work, b0, b1)
     waiting = is_waiting(bodies, work, b0, b1)
-    relaxing = b1 - b0 > 1 and (waiting or speed > QUIET_SPEED)
+    relaxing = b1 - b0 > 1 and (waiting or (b1 - b0 > SMALL_ISLAND and speed > QUIET_SPEED))
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
             relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)

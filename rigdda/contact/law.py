@@ -39,6 +39,7 @@ from rigdda.constants import (
     OPEN,
     PLAIN,
     PLAIN_CONTACT,
+    PUSHED,
     RECOVERY_SPEED,
     RECOVERY_TIME,
     REST,
@@ -156,10 +157,11 @@ def recovery(surplus: float, dt: float) -> float:
 
 
 @kernel
-def set_rest(c: Contacts, k: int, most: float, p: Parameters) -> None:
+def set_rest(c: Contacts, k: int, weight: float, most: float, p: Parameters) -> None:
     """Make contact k a spring that carries on with the force of the last step.
 
-    Under more than `most` [N] penetration is not pushed out: a wedged block is left in peace.
+    Penetration is not pushed out under more than `most` [N], which leaves a wedged block in peace,
+    nor under next to no load, where blocks that collide would gain energy.
     """
     c[k].kind = REST
     c[k].kappa = c[k].stiffness
@@ -169,7 +171,7 @@ def set_rest(c: Contacts, k: int, most: float, p: Parameters) -> None:
         c[k].bias = -c[k].gap
     else:
         c[k].bias = elastic
-        if c[k].memory_normal < most:
+        if PUSHED * weight < c[k].memory_normal < most:
             surplus = max(-c[k].gap - elastic, 0.0) - max(c[k].gap, 0.0)
             c[k].bias += recovery(surplus, p.dt)
 
@@ -180,7 +182,7 @@ def set_new(bodies: Bodies, c: Contacts, k: int, start: bool, p: Parameters) -> 
     c[k].kind = NEW
     stiffness = impact_stiffness(effective_mass(bodies, c, k), p.dt)
     c[k].kappa = max(START_STIFFNESS * stiffness if start else stiffness, c[k].stiffness)
-    c[k].bias = -c[k].gap if c[k].gap > 0.0 else recovery(-c[k].gap, p.dt)
+    c[k].bias = -max(c[k].gap, 0.0)
 
 
 @kernel
@@ -210,26 +212,30 @@ def strike(bodies: Bodies, c: Contacts, k: int, time: float, pull: float, p: Par
 
 @kernel
 def strike_at_once(bodies: Bodies, c: Contacts, low: int, high: int, p: Parameters) -> None:
-    """Let impacts of the same two blocks act at the time of the earlier one.
+    """Let all contacts of two blocks that collide act at the time of the first impact.
 
     Impulses at different times would act on arms that the earlier one has changed, and angular
     momentum would not be kept.
     """
-    for k in range(low + 1, high):
-        j = k - 1
-        if c[k].kind != IMPACT or c[j].kind != IMPACT or c[k].b != c[j].b or c[k].b < 0:
+    first = low
+    for k in range(low, high):
+        if k + 1 < high and c[k + 1].b == c[first].b:
             continue
-        if c[k].share == c[j].share or bodies[c[k].b].status != AWAKE:
-            continue
-        late = k if c[k].share < c[j].share else j
-        time = (1.0 - max(c[k].share, c[j].share)) * p.dt
-        closing = max(strike(bodies, c, late, time, 0.0, p), 0.0)
-        set_impact(c, late, closing, effective_mass(bodies, c, late), p)
+        b, share = c[first].b, 0.0
+        for j in range(first, k + 1):
+            if c[j].kind == IMPACT:
+                share = max(share, c[j].share)
+        if share > 0.0 and b >= 0 and bodies[b].status == AWAKE:
+            for j in range(first, k + 1):
+                closing = strike(bodies, c, j, (1.0 - share) * p.dt, 0.0, p)
+                if c[j].kind == IMPACT:
+                    set_impact(c, j, max(closing, 0.0), effective_mass(bodies, c, j), p)
+        first = k + 1
 
 
 @kernel
 def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Parameters) -> None:
-    """Set the law of contact k for this step, at the `start` the first, from geometry and memory."""
+    """Set the law of contact k from its geometry and memory; `start` is the very first step."""
     a, b = c[k].a, c[k].b
     # free relative acceleration along the normal is that of gravity
     pull = -(work.field[0] * c[k].nx + work.field[1] * c[k].ny)
@@ -262,7 +268,7 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
             return
         strike(bodies, c, k, 0.5 * p.dt, pull, p)
     if c[k].state != OPEN:
-        set_rest(c, k, most, p)
+        set_rest(c, k, weight, most, p)
         return
     set_new(bodies, c, k, start, p)
     # what touches starts closed: in a stack no block moves before those below it are held

@@ -1,0 +1,88 @@
+"""A tall block that falls back from a tilt and rocks over (Housner 1963)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.integrate import quad
+
+from rigdda.scene import Block, Scene, Terrain
+from rigdda.validation.case import Case, Check, Lab, Measured
+from rigdda.validation.scenes import FLAT, GRAVITY, polygon, rock
+
+WIDTH, HEIGHT = 1.0, 4.0
+"""Sides of the block [m]."""
+
+HALF = math.atan2(WIDTH, HEIGHT)
+"""Angle of the diagonal to the side [rad]: the tilt at which the block topples."""
+
+TILT = 0.5 * HALF
+"""First tilt [rad]."""
+
+PULL = 0.75 * GRAVITY / (0.5 * math.hypot(WIDTH, HEIGHT))
+"""p^2 = 3 g/(4 R): th'' = -p^2 sin(al - th) of a solid rectangle about its corner [1/s2]."""
+
+
+def time_to_impact() -> float:
+    """Return the time [s] from the first tilt to the impact, exactly: the integral of dth/th'.
+
+    th'^2 = 2 p^2 (cos(al - th0) - cos(al - th)); th = th0 - s^2 takes the root out of it.
+    """
+
+    def slowness(s: float) -> float:
+        if s == 0.0:
+            return 2.0 / math.sqrt(2.0 * PULL * math.sin(HALF - TILT))
+        gained = math.cos(HALF - TILT) - math.cos(HALF - TILT + s * s)
+        return 2.0 * s / math.sqrt(2.0 * PULL * gained)
+
+    return float(quad(slowness, 0.0, math.sqrt(TILT), epsabs=1e-12, epsrel=1e-12)[0])
+
+
+def rate_at_impact(tilt: float) -> float:
+    """Return the rate [rad/s] at tilt 0 of a block whose greatest tilt is `tilt` [rad]."""
+    return math.sqrt(2.0 * PULL * (math.cos(HALF - tilt) - math.cos(HALF)))
+
+
+def time_to_zero(angle: float, rate: float, before: float, dt: float) -> float:
+    """Return the time [s] in which a tilt [rad] falls to 0, at the acceleration of the last step.
+
+    `rate` and `before` are the rates of fall [rad/s] now and a step ago.
+    """
+    gain = (rate - before) / dt
+    return 2.0 * angle / (rate + math.sqrt(rate * rate + 2.0 * gain * angle))
+
+
+def measure(lab: Lab) -> tuple[Measured, Measured]:
+    """Let the block fall back, strike and rock over to its next greatest tilt."""
+    corners = [(0.0, 0.0), (WIDTH, 0.0), (WIDTH, HEIGHT), (0.0, HEIGHT)]
+    block = Block(polygon(corners, angle=TILT))
+    sim = lab.simulate(Scene(Terrain(FLAT), (block,), rock(60.0)))
+    angle, rate = [TILT], [0.0]
+    while len(rate) < 3 or rate[-1] > rate[-2]:  # the rate of fall grows until the impact
+        sim.step()
+        angle.append(TILT + sim.poses[0, 2])
+        rate.append(-sim.velocities[0, 2])
+    time = sim.time - lab.dt + time_to_zero(angle[-2], rate[-2], rate[-3], lab.dt)
+    while sim.velocities[0, 2] < 0.0:
+        sim.step()
+        angle.append(TILT + sim.poses[0, 2])
+    after = rate_at_impact(-float(np.min(angle)))
+    ratio = after / rate_at_impact(TILT)
+    return (
+        Measured(time, time_to_impact()),
+        Measured(ratio, 1.0 - 1.5 * math.sin(HALF) ** 2),
+    )
+
+
+CASES = (
+    Case(
+        "rocking",
+        (
+            Check("time to impact", "integral of dth/th' (Housner 1963)", "s", 1e-3, "relative"),
+            Check("rate after/before", "1 - 3/2 sin^2 al (Housner 1963)", "-", 2e-2, "relative"),
+        ),
+        measure,
+        smooth=True,
+    ),
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -98,24 +99,29 @@ def write_studies(path: Path, studies: Iterable[Convergence]) -> None:
 
 
 def table(results: Iterable[Result]) -> Table:
-    """Return the table of figures; an error that misses its bar has a mark."""
+    """Return the table of figures, at most 80 wide; an error that misses its bar has a mark."""
     out = empty_table(("case", "closed form", "computed", "error", "bar", "us/s"))
-    for r in results:
-        out.add_row(
-            f"{r.case}\n  {r.check.quantity} [{r.check.unit}]",
-            "-" if r.check.error == "bound" else f"{r.exact:.6g}",
-            f"{r.computed:.6g}",
-            f"{r.error:.2g}{'' if r.passed else ' !'}",
-            f"{r.check.bar:.2g}",
-            f"{r.cpu:.0f}",
-        )
+    for name, figures in groupby(results, lambda result: result.case):
+        for i, r in enumerate(figures):
+            if i == 0:
+                out.add_row(name, "", "", "", "", f"{r.cpu:.0f}")
+            unit = "" if r.check.unit == "-" else f" [{r.check.unit}]"
+            out.add_row(
+                f"  {r.check.quantity}{unit}",
+                "-" if r.check.error == "bound" else f"{r.exact:.6g}",
+                f"{r.computed:.6g}",
+                f"{r.error:.1e}{'  ' if r.passed else ' !'}",
+                f"{r.check.bar:.0e}",
+            )
     return out
 
 
 def convergence_table(studies: Iterable[Convergence]) -> Table:
     """Return the table of errors by step and of observed orders."""
     out = empty_table(("case", *(f"{1e3 * dt:g} ms" for dt in STEPS), "order"))
-    for s in studies:
-        order = f"{s.order:.2f}" if math.isfinite(s.order) else "-"
-        out.add_row(f"{s.case}\n  {s.quantity}", *(f"{e:.2g}" for e in s.errors), order)
+    for name, figures in groupby(studies, lambda study: study.case):
+        out.add_row(name)
+        for s in figures:
+            order = f"{s.order:.2f}" if math.isfinite(s.order) else "-"
+            out.add_row(f"  {s.quantity}", *(f"{e:.1e}" for e in s.errors), order)
     return out

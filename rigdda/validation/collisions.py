@@ -53,9 +53,9 @@ CASES = (
     Case(
         "collisions",
         (
-            Check("change of momentum", "none: Newton III", "-", 1e-10, "bound"),
-            Check("change of angular momentum", "none: Newton III", "-", 1e-6, "bound"),
-            Check("gain of kinetic energy", "none: passive contact", "-", 1e-9, "bound"),
+            Check("momentum", "none: Newton III", "-", 1e-10, "bound"),
+            Check("angular momentum", "none: Newton III", "-", 1e-6, "bound"),
+            Check("gain of energy", "none: passive contact", "-", 1e-9, "bound"),
         ),
         measure,
     ),

@@ -24,7 +24,7 @@ def measure(lab: Lab) -> tuple[Measured]:
 CASES = (
     Case(
         "energy-ledger",
-        (Check("gap over released energy", "none: first law", "-", 1e-3, "bound"),),
+        (Check("gap over release", "none: first law", "-", 1e-3, "bound"),),
         measure,
     ),
 )

@@ -123,7 +123,7 @@ def measure_balance(lab: Lab) -> tuple[Measured, Measured]:
 
 def case(name: str, change: str, measure: Callable[[Lab], Sequence[Measured]]) -> Case:
     """Return the case of one change."""
-    check = Check("change of poses over way", f"none: {change}", "-", 1e-6, "bound")
+    check = Check("change over way", f"none: {change}", "-", 1e-6, "bound")
     return Case(name, (check,), measure)
 
 
@@ -134,8 +134,8 @@ CASES = (
     Case(
         "mass-balance",
         (
-            Check("sum of the fractions", "1", "-", 0.0, "absolute"),
-            Check("released mass, reordered", "that of the first order", "kg", 1e-12, "relative"),
+            Check("sum of fractions", "1", "-", 0.0, "absolute"),
+            Check("reordered mass", "that of the first order", "kg", 1e-12, "relative"),
         ),
         measure_balance,
     ),

@@ -113,9 +113,9 @@ def slide_case(
 
 
 HOLDS = (
-    Check("creep from 1 s to 60 s", "none: phi > th", "m", 1e-4, "bound"),
+    Check("creep, 1-60 s", "none: phi > th", "m", 1e-4, "bound"),
     # rounding of 10,000 steps
-    Check("creep from 10 s to 60 s", "none: phi > th", "m", 1e-8, "bound"),
+    Check("creep, 10-60 s", "none: phi > th", "m", 1e-8, "bound"),
 )
 
 CASES = (

@@ -51,10 +51,10 @@ CASES = (
     Case(
         "thin-wall",
         (
-            Check("blocks that arrive", "all", "-", 0.0, "absolute"),
-            Check("centroids that pass", "none: rigid", "-", 0.0, "bound"),
+            Check("arrive", "all", "-", 0.0, "absolute"),
+            Check("centroids pass", "none: rigid", "-", 0.0, "bound"),
             # deeper, a corner would show on the far side
-            Check("depth of a corner", "none: rigid", "m", WALL.thickness, "bound"),
+            Check("corner depth", "none: rigid", "m", WALL.thickness, "bound"),
         ),
         measure,
     ),

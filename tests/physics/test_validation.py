@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
-from rigdda.validation import Case, Check, Measured, evaluate, ready
+from rigdda.validation import Case, Check, Measured, evaluate, ready, rocking, rotation, slides
 from rigdda.validation.convergence import Convergence
 
 CASES = [
@@ -39,3 +41,23 @@ def test_order_of_convergence():
     assert Convergence("", "", (4e-3, 1e-3, 2.5e-4, 6.25e-5)).order == pytest.approx(2.0)
     assert Convergence("", "", (1e-3, 5e-4, 1e-14, 0.0)).order == pytest.approx(1.0)
     assert Convergence("", "", (0.0,) * 4).order != Convergence("", "", (0.0,) * 4).order
+
+
+def test_exact_time_of_the_rocking_block():
+    """0.69834 s from half the critical tilt, computed elsewhere for half sides of 0.5 and 2 m."""
+    assert rocking.time_to_impact(0.5 * rocking.HALF) == pytest.approx(0.69834, abs=5e-6)
+
+
+def test_small_tilts_agree_with_housner():
+    """His linear solution, acosh(1/(1 - th0/al))/p, holds for slender blocks."""
+    linear = math.acosh(2.0) / math.sqrt(rocking.PULL)
+    assert rocking.time_to_impact(0.5 * rocking.HALF) == pytest.approx(linear, rel=1e-2)
+
+
+def test_growth_law_is_near_its_short_form():
+    for angle in (1e-4, 1e-3, 1e-2):
+        assert rotation.growth(angle) == pytest.approx(math.expm1(2.0 * math.pi * angle), rel=1e-3)
+
+
+def test_newmark_pulse():
+    assert slides.newmark(0.5, 0.2, 0.3) == pytest.approx(0.3311, abs=5e-5)

@@ -49,7 +49,7 @@ def runs(cases: Sequence[Case]) -> int:
 
 
 def validate(
-    cases: Sequence[Case], out: Path, tick: Callable[[int, str], None]
+    cases: Sequence[Case], seed: int, out: Path, tick: Callable[[int, str], None]
 ) -> tuple[list[Result], list[Convergence]]:
     """Run cases, then the convergence of the smooth ones; write each table as it grows."""
     evaluate(FLIGHT[0])  # compiles, or loads what is compiled: no case is to pay for that
@@ -57,11 +57,11 @@ def validate(
     studies: list[Convergence] = []
     for done, case in enumerate(cases):
         tick(done, case.name)
-        results += evaluate(case)
+        results += evaluate(case, seed=seed)
         write_results(out / "validate.csv", results)
     for done, case in enumerate([case for case in cases if case.smooth], len(cases)):
         tick(done, f"{case.name}: order of convergence")
-        studies += converge(case)
+        studies += converge(case, seed)
         write_studies(out / "convergence.csv", studies)
     return results, studies
 

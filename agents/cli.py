@@ -174,10 +174,11 @@ def design(
 @click.option("--only", multiple=True, metavar="NAME",
               help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
 @click.option("--slow", is_flag=True, help="Run the cases that take long as well.")
+@seed_option("Seed of the random shapes, speeds and offsets.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path),
               default=Path("runs/validate"), show_default=True,
               help="Folder to write into.")  # fmt: skip
-def validate(only: tuple[str, ...], slow: bool, out: Path) -> None:
+def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path) -> None:
     """Compare computed motions with closed forms, and the observed order of convergence.
 
     Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
@@ -188,7 +189,7 @@ def validate(only: tuple[str, ...], slow: bool, out: Path) -> None:
     cases = accuracy.choose(only, slow)
     out.mkdir(parents=True, exist_ok=True)
     with kept(out), progress(accuracy.runs(cases)) as tick:
-        results, studies = accuracy.validate(cases, out, tick)
+        results, studies = accuracy.validate(cases, seed, out, tick)
     show(accuracy.table(results))
     if studies:
         show(accuracy.convergence_table(studies))

@@ -18,12 +18,14 @@ from rigdda.simulation import Simulation
 
 
 class Lab:
-    """Where a case simulates: the step it is to use, and a meter of what that costs.
+    """Where a case simulates: its step, its random numbers, and a meter of what it costs.
 
     Parameters
     ----------
     dt : float
         Time step [s].
+    seed : int
+        Which random shapes, speeds and offsets a case draws.
 
     Attributes
     ----------
@@ -31,12 +33,17 @@ class Lab:
         Processor time spent in steps, and the time they simulated [s].
     """
 
-    def __init__(self, dt: float):
-        self.dt, self.cpu, self.simulated = dt, 0.0, 0.0
+    def __init__(self, dt: float, seed: int = 0):
+        self.dt, self.seed = dt, seed
+        self.cpu, self.simulated = 0.0, 0.0
 
     def simulate(self, scene: Scene, dt: float | None = None, **settings: Any) -> Metered:
         """Return the scene in motion, at the step of the lab or at `dt` [s]."""
         return Metered(self, scene, Settings(dt=dt or self.dt, **settings))
+
+    def random(self, *which: int) -> np.random.Generator:
+        """Return the random numbers of one of the experiments of a case."""
+        return np.random.default_rng((self.seed, *which))
 
     def steps(self, duration: float) -> int:
         """Return the number of steps in `duration` [s]."""
@@ -154,7 +161,7 @@ class Result:
         )
 
 
-def evaluate(case: Case, dt: float | None = None) -> tuple[Result, ...]:
+def evaluate(case: Case, dt: float | None = None, seed: int = 0) -> tuple[Result, ...]:
     """Run a case and return its figures.
 
     Parameters
@@ -163,8 +170,10 @@ def evaluate(case: Case, dt: float | None = None) -> tuple[Result, ...]:
         What to run.
     dt : float, optional
         Time step [s]; that of the case, or the default one, if it is not given.
+    seed : int
+        Which random shapes, speeds and offsets it draws.
     """
-    lab = Lab(dt or case.dt or Settings().dt)
+    lab = Lab(dt or case.dt or Settings().dt, seed)
     try:
         measured = case.measure(lab)
     except Diverged:

@@ -12,9 +12,8 @@ PAIRS = 300
 """Random pairs; blocks that part in free space do not meet again."""
 
 
-def pair(seed: int) -> Scene:
+def pair(rng: np.random.Generator) -> Scene:
     """Return two random blocks that fly at each other."""
-    rng = np.random.default_rng(seed)
     blocks = []
     for side in (-1.0, 1.0):
         corners = polygon(rough(rng, int(rng.integers(3, 9))), (1.5 * side, rng.uniform(-0.5, 0.5)))
@@ -45,7 +44,7 @@ def drift(lab: Lab, scene: Scene) -> tuple[float, float, float]:
 
 def measure(lab: Lab) -> list[Measured]:
     """Let all pairs collide."""
-    columns = zip(*(drift(lab, pair(seed)) for seed in range(PAIRS)), strict=True)
+    columns = zip(*(drift(lab, pair(lab.random(i))) for i in range(PAIRS)), strict=True)
     return [Measured(column) for column in columns]
 
 

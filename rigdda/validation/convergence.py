@@ -38,9 +38,9 @@ class Convergence:
         return float(np.polyfit(step, error, 1)[0])
 
 
-def converge(case: Case) -> tuple[Convergence, ...]:
+def converge(case: Case, seed: int = 0) -> tuple[Convergence, ...]:
     """Run a case at all steps."""
-    runs = [evaluate(case, dt) for dt in STEPS]
+    runs = [evaluate(case, dt, seed) for dt in STEPS]
     return tuple(
         Convergence(case.name, check.quantity, tuple(run[i].error for run in runs))
         for i, check in enumerate(case.checks)

@@ -25,6 +25,7 @@ DROP = 5.0
 RESTITUTIONS = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9)
 PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
 STEPS = (1e-4, 3e-4, 1e-3, 3e-3, 5e-3, 1e-2)
+HITS = 1000
 DENSITIES = (1.0, 1e2, 1e4, 1e6)
 """Of blocks of 1 m2: as many kilogrammes."""
 
@@ -57,9 +58,8 @@ def measure_restitution(lab: Lab, restitution: float) -> tuple[Measured]:
     return (Measured(found, restitution),)
 
 
-def oblique_hit(seed: int) -> Scene:
+def oblique_hit(rng: np.random.Generator) -> Scene:
     """Return a random block that hits flat ground obliquely, without gravity."""
-    rng = np.random.default_rng(seed)
     corners = polygon(rough(rng, int(rng.integers(3, 9))), (0.0, 1.5))
     restitution, friction = rng.uniform(0.0, 0.9), rng.uniform(0.0, 60.0)
     velocity = (rng.uniform(-15.0, 15.0), rng.uniform(-15.0, -1.0), rng.uniform(-10.0, 10.0))
@@ -81,8 +81,9 @@ def greatest_gain(lab: Lab, scene: Scene, time: float) -> float:
 
 
 def measure_hits(lab: Lab) -> tuple[Measured]:
-    """Throw 1,000 random blocks at the ground."""
-    return (Measured([greatest_gain(lab, oblique_hit(seed), 0.5) for seed in range(1000)]),)
+    """Throw random blocks at the ground."""
+    gains = [greatest_gain(lab, oblique_hit(lab.random(hit)), 0.5) for hit in range(HITS)]
+    return (Measured(gains),)
 
 
 def restitution_case(e: float) -> Case:

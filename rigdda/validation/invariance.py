@@ -25,9 +25,9 @@ MOVE, TURN, ORDER = np.array([5000.0, 2000.0]), math.radians(25.0), (2, 0, 3, 1)
 """Rigid motion [m, rad] and new order of the blocks."""
 
 
-def parts() -> list[tuple[Floats, tuple[float, float, float]]]:
+def parts(lab: Lab) -> list[tuple[Floats, tuple[float, float, float]]]:
     """Return corners and velocities of four blocks that are well apart."""
-    rng = np.random.default_rng(5)
+    rng = lab.random()
     places = [(-30.0, 24.2), (-12.0, 11.5), (5.0, 4.5), (22.0, -4.0)]
     return [
         (polygon(rough(rng, n), p), (2.0, -1.0, w))
@@ -54,7 +54,7 @@ def flight(
     """
     blocks = []
     for i in order:
-        corners, (vx, vy, omega) = parts()[i]
+        corners, (vx, vy, omega) = parts(lab)[i]
         x, y = turn(np.array([vx, vy]))
         blocks.append(Block(place(corners), velocity=(x, y, -omega if mirror else omega)))
     chain = place(SLOPE)
@@ -70,7 +70,7 @@ def flight(
 def measured(lab: Lab, poses: Floats) -> tuple[Measured]:
     """Return the distance of poses from those of the unchanged scene, over the way they made."""
     plain = flight(lab)
-    start = np.array([polygon_properties(corners)[1] for corners, _ in parts()])
+    start = np.array([polygon_properties(corners)[1] for corners, _ in parts(lab)])
     way = np.linalg.norm(plain[:, :2] - start, axis=1)
     return (Measured(np.linalg.norm(poses - plain, axis=1) / way),)
 
@@ -105,7 +105,7 @@ def measure_turn(lab: Lab) -> tuple[Measured]:
 def measure_balance(lab: Lab) -> tuple[Measured, Measured]:
     """Release the site `quick` with its blocks in two orders: no mass is lost or gained."""
     site = Site.load("quick")
-    scene = site.realise()
+    scene = site.realise(seed=lab.seed)
     total, mass = [], []
     for step in (1, -1):
         new = Scene(scene.terrain, scene.blocks[::step], scene.surfaces, damping=scene.damping)

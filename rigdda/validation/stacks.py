@@ -17,15 +17,13 @@ SPACING = 1.1
 """Distance of the cubes of a row of the pyramid [m]: neighbours do not touch."""
 
 
-def tower(count: int) -> tuple[Block, ...]:
+def tower(rng: np.random.Generator, count: int) -> tuple[Block, ...]:
     """Return one-metre cubes on one another, slightly out of line."""
-    rng = np.random.default_rng(count)
     return tuple(box(x, 0.5 + i) for i, x in enumerate(rng.uniform(-OFFSET, OFFSET, count)))
 
 
-def pyramid(rows: int) -> tuple[Block, ...]:
+def pyramid(rng: np.random.Generator, rows: int) -> tuple[Block, ...]:
     """Return rows of cubes, each row with one less, on the gaps of the row below."""
-    rng = np.random.default_rng(rows)
     return tuple(
         box(SPACING * (i + 0.5 * row) + rng.uniform(-OFFSET, OFFSET), 0.5 + row)
         for row in range(rows)
@@ -33,9 +31,10 @@ def pyramid(rows: int) -> tuple[Block, ...]:
     )
 
 
-def heavy_on_light(ratio: float) -> tuple[Block, ...]:
+def heavy_on_light(rng: np.random.Generator, ratio: float) -> tuple[Block, ...]:
     """Return a cube of 2.6 t on one whose mass is smaller by `ratio`."""
-    return box(0.0, 0.5, density=2600.0 / ratio), box(OFFSET, 1.5)
+    low, high = rng.uniform(-OFFSET, OFFSET, 2)
+    return box(low, 0.5, density=2600.0 / ratio), box(high, 1.5)
 
 
 def measure(lab: Lab, blocks: Sequence[Block]) -> tuple[Measured, Measured, Measured]:
@@ -51,7 +50,9 @@ def measure(lab: Lab, blocks: Sequence[Block]) -> tuple[Measured, Measured, Meas
     return Measured(moved), Measured(speed), Measured(sim.diagnostics.penetration)
 
 
-def case(name: str, make: Callable[[], Sequence[Block]], deepest: float, slow: bool) -> Case:
+def case(
+    name: str, make: Callable[[np.random.Generator], Sequence[Block]], deepest: float, slow: bool
+) -> Case:
     """Return the case of blocks that must not sink by more than `deepest` [m]."""
     return Case(
         name,
@@ -60,17 +61,17 @@ def case(name: str, make: Callable[[], Sequence[Block]], deepest: float, slow: b
             Check("speed at end", "none: it is at rest", "m/s", 1e-4, "bound"),
             Check("penetration", "none: rigid", "m", deepest, "bound"),
         ),
-        lambda lab: measure(lab, make()),
+        lambda lab: measure(lab, make(lab.random())),
         slow=slow,
     )
 
 
 CASES = (
-    case("stack-10", lambda: tower(10), 1e-3, False),
-    case("stack-25", lambda: tower(25), 1e-3, False),
-    case("stack-50", lambda: tower(50), 4e-4, False),
-    case("stack-100", lambda: tower(100), 1e-4, True),
-    case("pyramid-55", lambda: pyramid(10), 1e-3, False),
-    case("mass-1-100", lambda: heavy_on_light(100.0), 1e-3, False),
-    case("mass-1-1000", lambda: heavy_on_light(1000.0), 5e-3, False),
+    case("stack-10", lambda rng: tower(rng, 10), 1e-3, False),
+    case("stack-25", lambda rng: tower(rng, 25), 1e-3, False),
+    case("stack-50", lambda rng: tower(rng, 50), 4e-4, False),
+    case("stack-100", lambda rng: tower(rng, 100), 1e-4, True),
+    case("pyramid-55", lambda rng: pyramid(rng, 10), 1e-3, False),
+    case("mass-1-100", lambda rng: heavy_on_light(rng, 100.0), 1e-3, False),
+    case("mass-1-1000", lambda rng: heavy_on_light(rng, 1000.0), 5e-3, False),
 )

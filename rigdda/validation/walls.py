@@ -16,9 +16,8 @@ FLIGHT = 0.3
 """Longest time to the wall [s]."""
 
 
-def shot(seed: int) -> Scene:
+def shot(rng: np.random.Generator) -> Scene:
     """Return a random convex block that flies at the wall at 5 to 100 m/s."""
-    rng = np.random.default_rng(seed)
     radius = rng.uniform(0.3, 1.5)
     corners = rough(rng, int(rng.integers(3, 9)), radius)
     speed, climb = rng.uniform(5.0, 100.0), np.radians(rng.uniform(-45.0, 45.0))
@@ -43,7 +42,9 @@ def fly(lab: Lab, scene: Scene) -> tuple[bool, bool, float]:
 
 def measure(lab: Lab) -> tuple[Measured, Measured, Measured]:
     """Throw all blocks."""
-    arrived, passed, deepest = zip(*(fly(lab, shot(s)) for s in range(SHOTS)), strict=True)
+    arrived, passed, deepest = zip(
+        *(fly(lab, shot(lab.random(i))) for i in range(SHOTS)), strict=True
+    )
     return Measured(sum(arrived), SHOTS), Measured(sum(passed)), Measured(deepest)
 
 

@@ -86,6 +86,11 @@ def write_outcomes(
         for i, barrier in enumerate(outcome.barriers):
             row |= {f"barrier_{i}_{name}": getattr(barrier, name) for name in HIT}
         rows.append(row)
+    write_rows(path, rows)
+
+
+def write_rows(path: str | os.PathLike[str], rows: Sequence[dict[str, Any]]) -> None:
+    """Write a CSV file with one row a dictionary, all with the same keys."""
     with atomic(path) as part, part.open("w", newline="") as file:
         table = csv.DictWriter(file, rows[0])
         table.writeheader()
@@ -94,7 +99,7 @@ def write_outcomes(
 
 def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
     """Return the table of means over releases."""
-    table = _table(("", "mean", "95 % interval"))
+    table = empty_table(("", "mean", "95 % interval"))
 
     def add(words: str, unit: str, factor: float, values: list[float], low: float = 0.0) -> None:
         sample = factor * np.array(values)
@@ -115,7 +120,7 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
 
 def designs(cases: Iterable[tuple[str, Evaluation]]) -> Table:
     """Return the table of verified layouts, at most 80 characters wide."""
-    table = _table(("layout", "debris [%] (95 %)", "objective (95 %)", "cost"))
+    table = empty_table(("layout", "debris [%] (95 %)", "objective (95 %)", "cost"))
     for name, e in cases:
         low, high = e.debris_ci
         debris = f"{100 * e.debris:.1f} ({_span((100 * low, 100 * high), '.1f')})"
@@ -125,7 +130,7 @@ def designs(cases: Iterable[tuple[str, Evaluation]]) -> Table:
 
 def sites(found: Iterable[Site]) -> Table:
     """Return the table of sites."""
-    table = _table(("site", "height [m]", "blocks", "road [m]", "description"))
+    table = empty_table(("site", "height [m]", "blocks", "road [m]", "description"))
     for site in found:
         heights = [y for _, y in site.slope.points]
         road = f"{site.road.start:g} to {site.road.end:g}"
@@ -140,7 +145,7 @@ def describe(wall: Wall) -> str:
     return f"wall at {wall.x:.1f} m, {wall.height:.1f} m high, {wall.thickness:.1f} m thick"
 
 
-def _table(head: Sequence[str]) -> Table:
+def empty_table(head: Sequence[str]) -> Table:
     """Return an empty table: words on the left, numbers to the right."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

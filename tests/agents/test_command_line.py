@@ -20,7 +20,7 @@ from agents import DESIGNERS
 from rigdda import Site
 
 TINY = ("--simulations", "24", "--verify", "4")
-COMMANDS = ("sites", "simulate", "design", "replay")
+COMMANDS = ("sites", "simulate", "design", "validate", "replay")
 
 
 def rig(*arguments: object, folder: Path, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
@@ -233,6 +233,7 @@ def test_a_bad_layout_file_is_one_line(
         (("replay", "none.rrd"), ("none.rrd", "existing")),
         (("replay", "none.npz"), ("none.npz", "existing")),
         (("simulate",), ("SITE",)),
+        (("validate", "--only", "perpetual"), ("--only", "perpetual", "free-fall")),
         (("simulate", "quick", "--colour"), ("--colour",)),
         (("dance",), ("dance",)),
     ],
@@ -243,6 +244,15 @@ def test_bad_arguments_are_one_line(
     line = refused(*arguments, folder=tmp_path)
     assert all(word in line for word in named), line
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_accuracy_suite_is_a_table(tmp_path: Path) -> None:
+    words = run("validate", "--only", "damped-fall", "--out", "it", folder=tmp_path)
+    figures, orders = rows(tmp_path / "it/validate.csv"), rows(tmp_path / "it/convergence.csv")
+    assert [r["quantity"] for r in figures] == ["way", "speed"]
+    assert all(r["passed"] == "True" and float(r["error"]) < float(r["bar"]) for r in figures)
+    assert all(float(r["order"]) == pytest.approx(2.0, abs=0.1) for r in orders)
+    assert "damped-fall" in words and "order" in words
 
 
 def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:

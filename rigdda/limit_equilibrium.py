@@ -1,0 +1,137 @@
+"""Limit equilibrium of a toppling slope (Goodman and Bray 1976)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigdda import check
+from rigdda.errors import BadInput
+
+
+class Toppling(NamedTuple):
+    """Forces and modes of the blocks of a slope, from its toe upwards; N blocks, per metre.
+
+    Parameters
+    ----------
+    force : (N,) array
+        What each block needs from the next lower one to stay; of the toe block, what it needs
+        from a support. Along the base [N].
+    normal, shear : (N,) arrays
+        Forces of the base on each block [N]; shear acts up the dip.
+    mode : tuple of str
+        "stable", "toppling" or "sliding" of each block.
+    """
+
+    force: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    shear: NDArray[np.float64]
+    mode: tuple[str, ...]
+
+
+def toppling(
+    heights: ArrayLike,
+    width: float,
+    step: float,
+    dip_deg: float,
+    friction_deg: float,
+    unit_weight: float,
+) -> Toppling:
+    r"""Return the limit equilibrium of columns on a stepped base.
+
+    From the top down, block n with the force P_n from the block above needs from the one below
+
+    .. math::
+        P_{n-1,t} = [P_n (M_n - \Delta x \tan\phi) + \tfrac12 W_n (y_n \sin\alpha
+                    - \Delta x \cos\alpha)] / L_n, \qquad
+        P_{n-1,s} = P_n - W_n (\cos\alpha \tan\phi - \sin\alpha) / (1 - \tan^2\phi)
+
+    against toppling and sliding, whichever is more, and none if both are negative. Friction on the
+    sides is fully mobilised. Neighbours meet at the lower of their two tops: at M_n above the base
+    of block n on its upper side, at L_n on its lower side. (Goodman and Bray 1976, Toppling of rock
+    slopes, ASCE Specialty Conference on Rock Engineering, 201-234.)
+
+    Parameters
+    ----------
+    heights : (N,) array_like
+        Heights of the columns from the toe upwards [m].
+    width : float
+        Width of each column along the base [m].
+    step : float
+        Rise of the base from a column to the next higher one, normal to it [m].
+    dip_deg : float
+        Dip alpha of the base of each column [deg].
+    friction_deg : float
+        Friction angle phi of bases and sides [deg], below 45.
+    unit_weight : float
+        Weight of the rock [N/m3].
+
+    Raises
+    ------
+    BadInput
+        If a value is outside its range.
+    """
+    y = np.asarray(heights, dtype=np.float64)
+    if y.ndim != 1 or not len(y) or not (y > step).all():
+        raise BadInput("heights", y.tolist(), "give one height a column, each above the step")
+    check.number("width", width, 0.0, open_low=True)
+    check.number("step", step, 0.0)
+    check.number("dip_deg", dip_deg, 0.0, 89.9)
+    check.number("friction_deg", friction_deg, 0.0, 44.9)
+    check.number("unit_weight", unit_weight, 0.0, open_low=True)
+    sin, cos = math.sin(math.radians(dip_deg)), math.cos(math.radians(dip_deg))
+    tan = math.tan(math.radians(friction_deg))
+    weight = unit_weight * width * y
+    upper = np.minimum(y, np.append(y[1:], 0.0) + step)  # M; nothing is above the last
+    lower = np.minimum(y, np.append(0.0, y[:-1] - step))  # L; 0 at the toe
+    force, mode = np.zeros(len(y)), []
+    above = 0.0
+    for n in reversed(range(len(y))):
+        turning = above * (upper[n] - width * tan) + 0.5 * weight[n] * (y[n] * sin - width * cos)
+        topple = turning / lower[n] if lower[n] > 0.0 else math.copysign(math.inf, turning)
+        slide = above - weight[n] * (cos * tan - sin) / (1.0 - tan * tan)
+        force[n] = max(topple, slide, 0.0)
+        mode.append(_mode(topple, slide))
+        above = force[n]
+    pushed = np.append(force[1:], 0.0) - force
+    normal, shear = weight * cos + pushed * tan, weight * sin + pushed
+    return Toppling(force, normal, shear, tuple(reversed(mode)))
+
+
+def _mode(topple: float, slide: float) -> str:
+    if max(topple, slide) <= 0.0:
+        return "stable"
+    return "toppling" if topple > slide else "sliding"
+
+
+def bolt_force(state: Toppling, friction_deg: float, angle_deg: float) -> float:
+    """Return the tension of a bolt in the toe block [N] that holds a slope against sliding.
+
+    T = P_0 (1 - tan^2 phi)/(cos d + tan phi sin d) for a bolt that dips by d into the base
+    (Goodman and Bray 1976); a horizontal bolt has d = alpha.
+
+    Parameters
+    ----------
+    state : Toppling
+        The slope without the bolt.
+    friction_deg : float
+        Friction angle phi [deg].
+    angle_deg : float
+        Angle d between the bolt and the base [deg].
+    """
+    tan, angle = math.tan(math.radians(friction_deg)), math.radians(angle_deg)
+    return float(state.force[0] * (1.0 - tan * tan) / (math.cos(angle) + tan * math.sin(angle)))
+
+
+def columns(crest: int, above: int, rise: float, fall: float, step: float) -> list[float]:
+    """Return the heights of the columns of a slope from the toe upwards [m].
+
+    Up to the `crest`-th they grow by `rise` - `step` each; the `above` ones beyond it are lower by
+    `fall` + `step` each (Goodman and Bray's a1, a2 and b).
+    """
+    below: Sequence[float] = [n * (rise - step) for n in range(1, crest + 1)]
+    return [*below, *(below[-1] - n * (fall + step) for n in range(1, above + 1))]

@@ -1,0 +1,196 @@
+"""A case of the accuracy suite and what came of it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rigdda.errors import Diverged
+from rigdda.scene import Scene
+from rigdda.settings import Settings
+from rigdda.simulation import Simulation
+
+
+class Lab:
+    """Where a case simulates: its step, its random numbers, and a meter of what it costs.
+
+    Parameters
+    ----------
+    dt : float
+        Time step [s].
+    seed : int
+        Which random shapes, speeds and offsets a case draws.
+
+    Attributes
+    ----------
+    cpu, simulated : float
+        Processor time spent in steps, and the time they simulated [s].
+    """
+
+    def __init__(self, dt: float, seed: int = 0):
+        self.dt, self.seed = dt, seed
+        self.cpu, self.simulated = 0.0, 0.0
+
+    def simulate(self, scene: Scene, dt: float | None = None, **settings: Any) -> Metered:
+        """Return the scene in motion, at the step of the lab or at `dt` [s]."""
+        return Metered(self, scene, Settings(dt=dt or self.dt, **settings))
+
+    def random(self, *which: int) -> np.random.Generator:
+        """Return the random numbers of one of the experiments of a case."""
+        return np.random.default_rng((self.seed, *which))
+
+    def steps(self, duration: float) -> int:
+        """Return the number of steps in `duration` [s]."""
+        return round(duration / self.dt)
+
+
+class Metered(Simulation):
+    """A simulation whose steps are timed; what a case does between them is not."""
+
+    def __init__(self, lab: Lab, scene: Scene, settings: Settings, **gauges: Any):
+        super().__init__(scene, settings, **gauges)
+        self._lab = lab
+
+    def step(self, n: int = 1) -> None:
+        """Take `n` steps and time them."""
+        before = time.process_time()
+        super().step(n)
+        self._lab.cpu += time.process_time() - before
+        self._lab.simulated += n * self.settings.dt
+
+
+class Measured(NamedTuple):
+    """What was computed, one value or several, and what the closed form gives for each."""
+
+    computed: ArrayLike
+    exact: ArrayLike = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One figure of a case.
+
+    Parameters
+    ----------
+    quantity : str
+        What is computed.
+    closed_form : str
+        The equation it is compared with, and its source.
+    unit : str
+        Unit of the quantity; a relative error has none.
+    bar : float
+        The greatest error that passes.
+    error : {"relative", "absolute", "bound"}
+        How the error is taken: over the closed form, in the unit, or the computed value itself,
+        which is then a quantity that ought to be nothing.
+    """
+
+    quantity: str
+    closed_form: str
+    unit: str
+    bar: float
+    error: Literal["relative", "absolute", "bound"]
+
+    def errors(self, computed: np.ndarray, exact: np.ndarray) -> np.ndarray:
+        """Return the error of each value; one that is not a number counts as infinite."""
+        error = computed if self.error == "bound" else np.abs(computed - exact)
+        if self.error == "relative":
+            error = error / np.abs(exact)
+        return np.where(np.isnan(error), math.inf, error)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One computed experiment.
+
+    Parameters
+    ----------
+    name : str
+        Its name on the command line.
+    checks : sequence of Check
+        Its figures.
+    measure : callable
+        Simulates in a `Lab` and returns one `Measured` for each check.
+    dt : float, optional
+        Step instead of the default one [s].
+    slow : bool
+        It takes more than a few seconds.
+    smooth : bool
+        Its error has an order of convergence in the step.
+    """
+
+    name: str
+    checks: tuple[Check, ...]
+    measure: Callable[[Lab], Sequence[Measured]]
+    dt: float | None = None
+    slow: bool = False
+    smooth: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One figure of a case against its bar; of several values, the worst one.
+
+    `cpu` is the processor time of the case's steps per simulated time [us/s].
+    """
+
+    case: str
+    check: Check
+    exact: float
+    computed: float
+    error: float
+    cpu: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the bar holds."""
+        return self.error <= self.check.bar
+
+    def __str__(self) -> str:
+        c = self.check
+        unit = "" if c.error == "relative" else f" {c.unit}"
+        return (
+            f"{self.case}, {c.quantity}: {self.computed:.6g} for {self.exact:.6g} {c.unit}, "
+            f"{c.error} error {self.error:.3g}{unit}, bar {c.bar:g}"
+        )
+
+
+def evaluate(case: Case, dt: float | None = None, seed: int = 0) -> tuple[Result, ...]:
+    """Run a case and return its figures.
+
+    Parameters
+    ----------
+    case : Case
+        What to run.
+    dt : float, optional
+        Time step [s]; that of the case, or the default one, if it is not given.
+    seed : int
+        Which random shapes, speeds and offsets it draws.
+    """
+    lab = Lab(dt or case.dt or Settings().dt, seed)
+    try:
+        measured = case.measure(lab)
+    except Diverged:
+        measured = [Measured(math.nan, math.nan)] * len(case.checks)
+    cpu = 1e6 * lab.cpu / lab.simulated if lab.simulated else math.nan
+    return tuple(
+        _result(case.name, check, one, cpu)
+        for check, one in zip(case.checks, measured, strict=True)
+    )
+
+
+def _result(name: str, check: Check, measured: Measured, cpu: float) -> Result:
+    pairs = np.broadcast_arrays(
+        np.asarray(measured.computed, dtype=np.float64),
+        np.asarray(measured.exact, dtype=np.float64),
+    )
+    computed, exact = (np.atleast_1d(a).ravel() for a in pairs)
+    error = check.errors(computed, exact)
+    k = int(error.argmax())
+    return Result(name, check, float(exact[k]), float(computed[k]), float(error[k]), cpu)

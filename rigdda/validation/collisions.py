@@ -1,0 +1,61 @@
+"""Two blocks that spin and collide in free space keep their momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdda.scene import Block, Scene
+from rigdda.validation.case import Case, Check, Lab, Measured
+from rigdda.validation.scenes import masses, momentum, polygon, rock, rough
+
+PAIRS = 300
+"""Random pairs; blocks that part in free space do not meet again."""
+
+
+def pair(rng: np.random.Generator) -> Scene:
+    """Return two random blocks that fly at each other."""
+    blocks = []
+    for side in (-1.0, 1.0):
+        corners = polygon(rough(rng, int(rng.integers(3, 9))), (1.5 * side, rng.uniform(-0.5, 0.5)))
+        velocity = (-side * rng.uniform(1.0, 10.0), *rng.uniform(-2.0, 2.0, 2))
+        blocks.append(Block(corners, 10.0 ** rng.uniform(2.0, 4.0), velocity=velocity))
+    surface = rock(rng.uniform(0.0, 60.0), rng.choice([0.0, 0.3, 0.6, 0.9]))
+    return Scene(None, tuple(blocks), surface, gravity=0.0)
+
+
+def drift(lab: Lab, scene: Scene) -> tuple[float, float, float]:
+    """Return the greatest change of linear and of angular momentum and growth of energy [-].
+
+    Momenta over the sum of their magnitudes (on an arm of 1 m); growth above the least energy so
+    far, so that small gains add up, over the first energy.
+    """
+    sim = lab.simulate(scene, sleeping=False)
+    linear, angular, start = momentum(sim)
+    scale = float((masses(scene)[0] * np.hypot(*sim.velocities[:, :2].T)).sum())
+    least, worst = start, np.zeros(3)
+    for _ in range(lab.steps(1.5)):
+        sim.step()
+        now, spin, energy = momentum(sim)
+        change = float(np.linalg.norm(now - linear)) / scale, abs(spin - angular) / scale
+        worst = np.maximum(worst, (*change, (energy - least) / start))
+        least = min(least, energy)
+    return float(worst[0]), float(worst[1]), float(worst[2])
+
+
+def measure(lab: Lab) -> list[Measured]:
+    """Let all pairs collide."""
+    columns = zip(*(drift(lab, pair(lab.random(i))) for i in range(PAIRS)), strict=True)
+    return [Measured(column) for column in columns]
+
+
+CASES = (
+    Case(
+        "collisions",
+        (
+            Check("momentum", "none: Newton III", "-", 1e-10, "bound"),
+            Check("angular momentum", "none: Newton III", "-", 1e-6, "bound"),
+            Check("gain of energy", "none: passive contact", "-", 1e-9, "bound"),
+        ),
+        measure,
+    ),
+)

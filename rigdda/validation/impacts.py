@@ -1,0 +1,106 @@
+"""Impacts on the ground: restitution as prescribed, energy that never grows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rigdda.scene import Block, Scene, Terrain
+from rigdda.validation.case import Case, Check, Lab, Measured
+from rigdda.validation.scenes import (
+    FLAT,
+    GRAVITY,
+    box,
+    kinetic_energy,
+    masses,
+    polygon,
+    rock,
+    rough,
+)
+
+DROP = 5.0
+"""Height of the drops [m]."""
+
+RESTITUTIONS = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9)
+PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
+STEPS = (1e-4, 3e-4, 1e-3, 3e-3, 5e-3, 1e-2)
+DENSITIES = (1.0, 1e2, 1e4, 1e6)
+"""Of blocks of 1 m2: as many kilogrammes."""
+
+
+def rebound(lab: Lab, restitution: float, dt: float, phase: float, density: float) -> float:
+    """Return the restitution that the apex after a flat drop shows: sqrt(apex / drop).
+
+    `phase` shifts the drop so that the block touches elsewhere within its step.
+    """
+    drop = DROP + phase * dt * math.sqrt(2.0 * GRAVITY * DROP)
+    block = box(0.0, 0.5 + drop, density=density)
+    sim = lab.simulate(Scene(Terrain(FLAT), (block,), rock(30.0, restitution)), dt)
+    sim.step(math.floor(math.sqrt(2.0 * drop / GRAVITY) / dt) + 2)
+    sim.step(max(0, math.floor(sim.velocities[0, 1] / (GRAVITY * dt)) - 1))
+    before, apex = -math.inf, float(sim.poses[0, 1])
+    while apex > before:
+        sim.step()
+        before, apex = apex, max(apex, float(sim.poses[0, 1]))
+    return math.sqrt(max(apex - 0.5, 0.0) / drop)
+
+
+def measure_restitution(lab: Lab, restitution: float) -> tuple[Measured]:
+    """Drop a square flat, at all steps, phases and masses."""
+    found = [
+        rebound(lab, restitution, dt, phase, density)
+        for dt in STEPS
+        for phase in PHASES
+        for density in DENSITIES
+    ]
+    return (Measured(found, restitution),)
+
+
+def oblique_hit(rng: np.random.Generator) -> Scene:
+    """Return a random block that hits flat ground obliquely, without gravity."""
+    corners = polygon(rough(rng, int(rng.integers(3, 9))), (0.0, 1.5))
+    restitution, friction = rng.uniform(0.0, 0.9), rng.uniform(0.0, 60.0)
+    velocity = (rng.uniform(-15.0, 15.0), rng.uniform(-15.0, -1.0), rng.uniform(-10.0, 10.0))
+    block = Block(corners, velocity=velocity)
+    return Scene(Terrain(FLAT), (block,), rock(friction, restitution), gravity=0.0)
+
+
+def greatest_gain(lab: Lab, scene: Scene, time: float) -> float:
+    """Return the greatest growth of kinetic energy above its least so far, over the first [-]."""
+    sim = lab.simulate(scene, sleeping=False)
+    mass, inertia = masses(scene)
+    least = start = kinetic_energy(sim.velocities, mass, inertia)
+    gain = 0.0
+    for _ in range(lab.steps(time)):
+        sim.step()
+        now = kinetic_energy(sim.velocities, mass, inertia)
+        gain, least = max(gain, now - least), min(least, now)
+    return gain / start
+
+
+def measure_hits(lab: Lab, count: int) -> tuple[Measured]:
+    """Throw random blocks at the ground."""
+    gains = [greatest_gain(lab, oblique_hit(lab.random(hit)), 0.5) for hit in range(count)]
+    return (Measured(gains),)
+
+
+def restitution_case(e: float) -> Case:
+    """Return the case of one coefficient."""
+    check = Check("e from the apex", "e = sqrt(apex / drop)", "-", 0.02, "absolute")
+    return Case(f"restitution-{e:g}", (check,), lambda lab: measure_restitution(lab, e))
+
+
+def hits_case(name: str, count: int, slow: bool) -> Case:
+    """Return the case of many random hits."""
+    # a sum of two squares, each to rounding, over 100 steps
+    check = Check("gain of energy", "none: passive contact", "-", 1e-9, "bound")
+    return Case(name, (check,), lambda lab: measure_hits(lab, count), slow=slow)
+
+
+CASES = (
+    *(restitution_case(e) for e in RESTITUTIONS),
+    hits_case("eccentric-hits", 1_000, False),
+    # what gains is rare, two corners that strike in one step
+    hits_case("eccentric-hits-many", 10_000, True),
+)

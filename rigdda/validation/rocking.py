@@ -1,0 +1,93 @@
+"""A tall block that falls back from a tilt and rocks over (Housner 1963)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.integrate import quad
+
+from rigdda.scene import Block, Scene, Terrain
+from rigdda.validation.case import Case, Check, Lab, Measured
+from rigdda.validation.scenes import FLAT, GRAVITY, polygon, rock
+
+WIDTH, HEIGHT = 1.0, 4.0
+"""Sides of the block [m]."""
+
+HALF = math.atan2(WIDTH, HEIGHT)
+"""Angle of the diagonal to the side [rad]: the tilt at which the block topples."""
+
+TILTS = tuple(0.5 * HALF * (1.0 + 1.6e-3 * k) for k in range(5))
+"""First tilts [rad]; the impact comes 1 ms later from each, elsewhere in a step."""
+
+PULL = 0.75 * GRAVITY / (0.5 * math.hypot(WIDTH, HEIGHT))
+"""p^2 = 3 g/(4 R): th'' = -p^2 sin(al - th) of a solid rectangle about its corner [1/s2]."""
+
+
+def time_to_impact(tilt: float) -> float:
+    """Return the time [s] from the first tilt [rad] to the impact: the integral of dth/th'.
+
+    th'^2 = 2 p^2 (cos(al - th0) - cos(al - th)); th = th0 - s^2 takes the root out of it.
+    """
+
+    def slowness(s: float) -> float:
+        if s == 0.0:
+            return 2.0 / math.sqrt(2.0 * PULL * math.sin(HALF - tilt))
+        gained = math.cos(HALF - tilt) - math.cos(HALF - tilt + s * s)
+        return 2.0 * s / math.sqrt(2.0 * PULL * gained)
+
+    return float(quad(slowness, 0.0, math.sqrt(tilt), epsabs=1e-12, epsrel=1e-12)[0])
+
+
+def rate_at_impact(tilt: float) -> float:
+    """Return the rate [rad/s] at tilt 0 of a block whose greatest tilt is `tilt` [rad]."""
+    return math.sqrt(2.0 * PULL * (math.cos(HALF - tilt) - math.cos(HALF)))
+
+
+def time_to_zero(angle: float, rate: float, before: float, dt: float) -> float:
+    """Return the time [s] in which a tilt [rad] falls to 0, at the acceleration of the last step.
+
+    `rate` and `before` are the rates of fall [rad/s] now and a step ago.
+    """
+    gain = (rate - before) / dt
+    return 2.0 * angle / (rate + math.sqrt(rate * rate + 2.0 * gain * angle))
+
+
+def rock_over(lab: Lab, tilt: float) -> tuple[float, float]:
+    """Let the block fall back, strike and rock over to its next greatest tilt.
+
+    Returns the time to the impact [s] and the rate after it over the rate before [-].
+    """
+    corners = [(0.0, 0.0), (WIDTH, 0.0), (WIDTH, HEIGHT), (0.0, HEIGHT)]
+    block = Block(polygon(corners, angle=tilt))
+    sim = lab.simulate(Scene(Terrain(FLAT), (block,), rock(60.0)))
+    angle, rate = [tilt], [0.0]
+    while len(rate) < 3 or rate[-1] > rate[-2]:  # the rate of fall grows until the impact
+        sim.step()
+        angle.append(tilt + sim.poses[0, 2])
+        rate.append(-sim.velocities[0, 2])
+    time = sim.time - lab.dt + time_to_zero(angle[-2], rate[-2], rate[-3], lab.dt)
+    while sim.velocities[0, 2] < 0.0:
+        sim.step()
+        angle.append(tilt + sim.poses[0, 2])
+    return time, rate_at_impact(-min(angle)) / rate_at_impact(tilt)
+
+
+def measure(lab: Lab) -> tuple[Measured, Measured]:
+    """Compare times and rates from all first tilts."""
+    times, kept = zip(*(rock_over(lab, tilt) for tilt in TILTS), strict=True)
+    exact = np.array([time_to_impact(tilt) for tilt in TILTS])
+    return Measured(times, exact), Measured(kept, 1.0 - 1.5 * math.sin(HALF) ** 2)
+
+
+CASES = (
+    Case(
+        "rocking",
+        (
+            Check("time to impact", "integral of dth/th' (Housner 1963)", "s", 1e-3, "relative"),
+            Check("rate kept", "1 - 3/2 sin^2 al (Housner 1963)", "-", 2e-2, "relative"),
+        ),
+        measure,
+        smooth=True,
+    ),
+)

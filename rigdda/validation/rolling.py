@@ -1,0 +1,75 @@
+"""A regular polygon that rolls down a slope with plastic impacts: the rimless wheel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from rigdda.scene import Block, Scene, Terrain
+from rigdda.validation.case import Case, Check, Lab, Measured
+from rigdda.validation.scenes import GRAVITY, ngon, rock, shifts
+
+SIDES, RADIUS, SLOPE, RATE, DURATION = 16, 1.0, math.radians(8.0), 2.2, 3.0
+"""Corners, circumradius [m], slope [rad], first rate of rotation [rad/s], time [s]."""
+
+
+def wheel(sides: int, radius: float, slope: float, rate: float, time: float) -> float:
+    """Return the way of the centre along the slope [m] (McGeer 1990, with k of a solid polygon).
+
+    It turns about one corner at a time, ph'' = g r sin(ph + th)/(k^2 + r^2) with ph from -pi/n to
+    pi/n; then the next corner strikes and w+/w- = (k^2 + r^2 cos(2 pi/n))/(k^2 + r^2), with
+    k^2 = r^2/6 (1 + 2 cos^2(pi/n)). It must not lift off: w^2 r < g cos(ph + th).
+    """
+    half, r2 = math.pi / sides, radius**2
+    k2 = r2 / 6.0 * (1.0 + 2.0 * math.cos(half) ** 2)
+    kept = (k2 + r2 * math.cos(2.0 * half)) / (k2 + r2)
+
+    def turn(_: float, state: np.ndarray) -> tuple[float, float]:
+        return state[1], GRAVITY * radius * math.sin(state[0] + slope) / (k2 + r2)
+
+    def strike(_: float, state: np.ndarray) -> float:
+        return float(state[0]) - half
+
+    strike.terminal = True  # type: ignore[attr-defined]
+    angle, now, way = -half, 0.0, 0.0
+    while True:
+        part = solve_ivp(
+            turn, (now, time), (angle, rate), "DOP853", events=strike, rtol=1e-12, atol=1e-12
+        )
+        angle, rate = part.y[:, -1]
+        if (part.y[1] ** 2 * radius > GRAVITY * np.cos(part.y[0] + slope)).any():
+            raise ValueError("the wheel lifts off: choose a smaller rate or slope")
+        if part.status == 0:
+            return way + radius * (math.sin(angle) + math.sin(half))
+        way += 2.0 * radius * math.sin(half)
+        now, angle, rate = part.t[-1], -half, kept * rate
+
+
+def measure(lab: Lab) -> tuple[Measured]:
+    """Roll a polygon that starts flat on a face, turning about its lower corner."""
+    half = math.pi / SIDES
+    down = np.array([math.cos(SLOPE), -math.sin(SLOPE)])
+    out = np.array([math.sin(SLOPE), math.cos(SLOPE)])
+    centre = RADIUS * math.cos(half) * out
+    # clockwise about the lower corner: v = -w (-arm_y, arm_x), arm from the corner to the centre
+    arm = centre - RADIUS * math.sin(half) * down
+    velocity = (RATE * arm[1], -RATE * arm[0], -RATE)
+    corners = ngon(SIDES, RADIUS, centre, -0.5 * math.pi + half - SLOPE)
+    block = Block(corners, velocity=velocity)
+    terrain = Terrain([-5.0 * down, 100.0 * down])
+    sim = lab.simulate(Scene(terrain, (block,), rock(60.0)))
+    start = sim.poses
+    sim.step(lab.steps(DURATION))
+    way = shifts(start, sim.poses, down)
+    return (Measured(way, wheel(SIDES, RADIUS, SLOPE, RATE, DURATION)),)
+
+
+def case(name: str, bar: float, dt: float | None = None) -> Case:
+    """Return the case at a step, the default one or `dt` [s]."""
+    check = Check("way in 3 s", "rimless wheel (McGeer 1990)", "m", bar, "relative")
+    return Case(name, (check,), measure, dt=dt)
+
+
+CASES = (case("16-gon", 3e-2), case("16-gon-1ms", 1e-2, 1e-3))

@@ -1,0 +1,137 @@
+"""A block on a plane under Coulomb friction: it slides, or it holds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+import rigdda
+from rigdda.scene import Scene, Terrain
+from rigdda.validation.case import Case, Check, Lab, Measured, Metered
+from rigdda.validation.scenes import FLAT, GRAVITY, box, incline, masses, rock, shifts
+
+LOW = 0.4
+"""Height of a block 1 m wide that slides at 45 degrees without toppling [m]."""
+
+PULSE, YIELD, PULSE_TIME = 0.5, 0.2, 0.3
+"""Newmark's pulse: base acceleration and friction coefficient [g], duration [s]."""
+
+
+def slide(slope_deg: float, friction_deg: float, time: float) -> float:
+    """Return the way [m] from rest: s = g t^2/2 (sin th - cos th tan phi)."""
+    slope, friction = math.radians(slope_deg), math.radians(friction_deg)
+    pull = GRAVITY * (math.sin(slope) - math.cos(slope) * math.tan(friction))
+    return 0.5 * pull * time**2
+
+
+def newmark(pulse: float, limit: float, time: float) -> float:
+    """Return the way [m] of a block on a base under a rectangular pulse (Newmark 1965).
+
+    D = V^2/(2 g N) (1 - N/A), V = A g T, for a pulse A g of T seconds and yield at N g.
+    """
+    speed = pulse * GRAVITY * time
+    return speed**2 / (2.0 * GRAVITY * limit) * (1.0 - limit / pulse)
+
+
+def measure_slide(
+    lab: Lab, slope_deg: float, friction_deg: float, height: float, time: float
+) -> tuple[Measured]:
+    """Let a block slide from rest."""
+    scene, down = incline(slope_deg, friction_deg, 1.0, height)
+    sim = lab.simulate(scene)
+    start = sim.poses
+    sim.step(lab.steps(time))
+    way = shifts(start, sim.poses, down)
+    return (Measured(way, slide(slope_deg, friction_deg, time)),)
+
+
+def measure_creep(lab: Lab, sim: Metered) -> tuple[Measured, Measured]:
+    """Watch a block that holds, from 1 s to 60 s and from 10 s to 60 s."""
+    sim.step(lab.steps(1.0))
+    first = sim.poses[:, :2]
+    sim.step(lab.steps(9.0))
+    later = sim.poses[:, :2]
+    sim.step(lab.steps(50.0))
+    last = sim.poses[:, :2]
+    return (
+        Measured(np.linalg.norm(last - first, axis=1)),
+        Measured(np.linalg.norm(last - later, axis=1)),
+    )
+
+
+def measure_hold(lab: Lab, friction_deg: float) -> tuple[Measured, Measured]:
+    """Watch a block on a slope of 30 degrees that is too rough to slide on."""
+    scene, _ = incline(30.0, friction_deg)
+    return measure_creep(lab, lab.simulate(scene, sleeping=False))
+
+
+def measure_pressed(lab: Lab) -> tuple[Measured, Measured]:
+    """Watch a block that ten times its weight presses into a slope of 30 degrees."""
+    new: Any = rigdda
+    plain, down = incline(30.0, 35.0)
+    weight = GRAVITY * masses(plain)[0][0]
+    force = 10.0 * weight * np.array([down[1], -down[0]])  # into the slope
+    centre = plain.blocks[0].vertices.mean(axis=0)
+    scene = new.Scene(
+        plain.terrain,
+        plain.blocks,
+        plain.surfaces,
+        loads=(new.PointLoad(0, tuple(centre), tuple(force)),),
+    )
+    return measure_creep(lab, lab.simulate(scene, sleeping=False))
+
+
+def measure_newmark(lab: Lab) -> tuple[Measured]:
+    """Shake level ground under a block by one rectangular pulse; it slides to rest."""
+    new: Any = rigdda
+    push = PULSE * GRAVITY
+    history = [(0.0, push, 0.0), (PULSE_TIME, push, 0.0), (PULSE_TIME, 0.0, 0.0)]
+    scene: Scene = new.Scene(
+        Terrain(FLAT),
+        (box(0.0, 0.25, 1.0, 0.5),),
+        rock(math.degrees(math.atan(YIELD))),
+        base_motion=np.array(history),
+    )
+    sim = lab.simulate(scene)
+    sim.step(lab.steps(2.0))
+    return (Measured(abs(sim.poses[0, 0]), newmark(PULSE, YIELD, PULSE_TIME)),)
+
+
+def slide_case(
+    name: str, slope_deg: float, friction_deg: float, height: float, time: float, bar: float
+) -> Case:
+    """Return the case of one slide."""
+    check = Check("way", "g t^2/2 (sin th - cos th tan phi)", "m", bar, "relative")
+    return Case(
+        name,
+        (check,),
+        lambda lab: measure_slide(lab, slope_deg, friction_deg, height, time),
+        smooth=True,
+    )
+
+
+HOLDS = (
+    Check("creep, 1-60 s", "none: phi > th", "m", 1e-4, "bound"),
+    # rounding of 10,000 steps
+    Check("creep, 10-60 s", "none: phi > th", "m", 1e-8, "bound"),
+)
+
+CASES = (
+    slide_case("slide-30-20", 30.0, 20.0, 1.0, 2.0, 1e-4),
+    slide_case("slide-45-30", 45.0, 30.0, LOW, 2.0, 1e-4),
+    slide_case("slide-35-34-2s", 35.0, 34.0, 1.0, 2.0, 2e-3),
+    slide_case("slide-35-34-10s", 35.0, 34.0, 1.0, 10.0, 1e-4),
+    Case("hold-30-30.5", HOLDS, lambda lab: measure_hold(lab, 30.5)),
+    Case("hold-30-35", HOLDS, lambda lab: measure_hold(lab, 35.0)),
+)
+
+PRESSED = Case("hold-pressed", HOLDS, measure_pressed)
+
+NEWMARK = Case(
+    "newmark",
+    (Check("way", "V^2/(2 g N) (1 - N/A), V = A g T (Newmark 1965)", "m", 1e-3, "relative"),),
+    measure_newmark,
+    smooth=True,
+)

@@ -1,0 +1,155 @@
+"""The toppling slope of 16 columns, in static mode, against its limit equilibrium.
+
+The example of Goodman and Bray (1976), which Koo and Chern (1998) compute in Figs 6 to 8 and
+Table 1: base dip 30 deg, columns 10 m wide, base steps of 1 m, rock of 25 kN/m3.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+import rigdda
+from rigdda.limit_equilibrium import Toppling, columns, toppling
+from rigdda.scene import Block, Terrain
+from rigdda.validation.case import Case, Check, Lab, Measured, Metered
+from rigdda.validation.scenes import GRAVITY, Floats, polygon, rock
+
+WIDTH, STEP, DIP_DEG, WEIGHT = 10.0, 1.0, 30.0, 25e3
+"""Width of a column, step of the base [m], dip [deg], unit weight [N/m3]."""
+
+HEIGHTS = columns(crest=10, above=6, rise=5.0, fall=5.0, step=STEP)
+"""Heights of the columns from the toe upwards [m]."""
+
+LIMIT_DEG = 38.15
+"""Friction angle at which forces are compared [deg]; the limit is 38.151."""
+
+BOLTED_DEG = math.degrees(math.atan(0.65))
+"""Friction angle at which a bolt of 2,013 kN in the toe column is needed [deg]."""
+
+STEPS = 2000
+"""Steps of static mode."""
+
+
+def limit(friction_deg: float) -> Toppling:
+    """Return the limit equilibrium of the slope."""
+    return toppling(HEIGHTS, WIDTH, STEP, DIP_DEG, friction_deg, WEIGHT)
+
+
+def slope() -> tuple[Terrain, tuple[Block, ...]]:
+    """Return the stepped base and the columns; the slope rises to the right."""
+    dip = math.radians(DIP_DEG)
+    chain, blocks = [(-40.0, 0.0)], []
+    for n, height in enumerate(HEIGHTS):
+        left, right, base = n * WIDTH, (n + 1) * WIDTH, n * STEP
+        chain += [(left, base), (right, base)] if n else [(right, base)]
+        column = [(left, base), (right, base), (right, base + height), (left, base + height)]
+        blocks.append(Block(polygon(column, angle=dip), density=WEIGHT / GRAVITY))
+    top = len(HEIGHTS) * STEP
+    chain += [(right, top), (right + 40.0, top)]
+    return Terrain(polygon(chain, angle=dip)), tuple(blocks)
+
+
+def relax(lab: Lab, friction_deg: float, bolt: float = 0.0) -> Metered:
+    """Return the slope after static steps, with a horizontal force [N] into the toe column."""
+    new: Any = rigdda
+    terrain, blocks = slope()
+    centre = blocks[0].vertices.mean(axis=0)
+    loads = (new.PointLoad(0, tuple(centre), (bolt, 0.0)),) if bolt else ()
+    scene = new.Scene(terrain, blocks, rock(friction_deg), loads=loads)
+    sim = lab.simulate(scene, mode="static", sleeping=False)
+    sim.step(STEPS)
+    return sim
+
+
+def base_forces(sim: Metered) -> tuple[Floats, Floats]:
+    """Return normal and shear forces of the base on each column [N], shear up the dip."""
+    contacts = sim.contacts()
+    force = np.zeros((len(HEIGHTS), 2))
+    for c in contacts[contacts["block_b"] == -1]:
+        along = np.array([-c["ny"], c["nx"]])
+        normal = np.array([c["nx"], c["ny"]])
+        force[c["block_a"]] += c["normal_force"] * normal + c["shear_force"] * along
+    local = polygon(force, angle=-math.radians(DIP_DEG))
+    return local[:, 1], local[:, 0]
+
+
+def modes(sim: Metered, steps: int) -> list[str]:
+    """Return how each column moves in the next `steps` steps.
+
+    The greater of what rotation moves its top by and what its lower corner slides by; stable where
+    both are under a hundredth of the greatest of all columns.
+    """
+    heel, angle = heels(sim), sim.poses[:, 2]
+    sim.step(steps)
+    turned = np.abs(sim.poses[:, 2] - angle) * np.array(HEIGHTS)
+    slid = np.hypot(*(heels(sim) - heel).T)
+    most = np.maximum(turned, slid)
+    moving = np.where(turned > slid, "toppling", "sliding")
+    return [str(mode) for mode in np.where(most < 0.01 * most.max(), "stable", moving)]
+
+
+def heels(sim: Metered) -> Floats:
+    """Return the lower downhill corners of all columns, (N, 2) [m]."""
+    return np.array([sim.vertices(n)[0] for n in range(len(HEIGHTS))])
+
+
+def measure_forces(lab: Lab) -> tuple[Measured, Measured]:
+    """Compare the 32 base forces."""
+    exact = limit(LIMIT_DEG)
+    normal, shear = base_forces(relax(lab, LIMIT_DEG))
+    return Measured(normal, exact.normal), Measured(shear, exact.shear)
+
+
+def measure_modes(lab: Lab) -> tuple[Measured]:
+    """Count the columns that move otherwise than the limit equilibrium says, below the limit."""
+    found, exact = modes(relax(lab, 38.0), STEPS), limit(38.0).mode
+    return (Measured(sum(a != b for a, b in zip(found, exact, strict=True))),)
+
+
+def displacement(sim: Metered) -> float:
+    """Return the greatest displacement of a column [m]."""
+    start = np.array([b.vertices.mean(axis=0) for b in sim.scene.blocks])
+    return float(np.hypot(*(sim.poses[:, :2] - start).T).max())
+
+
+def measure_standing(lab: Lab) -> tuple[Measured, Measured, Measured]:
+    """Compare a slope above the limit, one with enough of a bolt and one with too little."""
+    return (
+        Measured(displacement(relax(lab, 38.3))),
+        Measured(displacement(relax(lab, BOLTED_DEG, 2150e3))),
+        Measured(float(displacement(relax(lab, BOLTED_DEG, 1500e3)) > 0.1), 1.0),
+    )
+
+
+SOURCE = "limit equilibrium (Goodman, Bray 1976)"
+
+FORCES = Case(
+    "toppling-forces",
+    (
+        Check("base normal forces", SOURCE, "N", 1e-2, "relative"),
+        Check("base shear forces", SOURCE, "N", 1e-2, "relative"),
+    ),
+    measure_forces,
+    slow=True,
+)
+
+MODES = Case(
+    "toppling-modes",
+    (Check("other modes", f"none: {SOURCE}", "-", 0.0, "bound"),),
+    measure_modes,
+    slow=True,
+)
+
+STANDING = Case(
+    "toppling-stands",
+    (
+        Check("moves at 38.3 deg by", f"none: limit 38.151, {SOURCE}", "m", 0.02, "bound"),
+        Check("moves at 2,150 kN by", f"none: limit 2,013, {SOURCE}", "m", 0.02, "bound"),
+        Check("moves at 1,500 kN", f"yes: limit 2,013, {SOURCE}", "-", 0.0, "absolute"),
+    ),
+    measure_standing,
+    slow=True,
+)

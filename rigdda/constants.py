@@ -51,6 +51,12 @@ FRICTION_TOLERANCE = 2e-2
 OPENING_TOLERANCE = 1e-6
 """Tension, relative to the weight a contact carries, that does not open it [-]."""
 
+FEW_MOVING = 16
+"""An island of which less than one contact in so many still changes, is iterated on,"""
+
+PATIENCE = 8
+"""up to so many times the open-close iterations: in an arch joints open one after the other."""
+
 FLIPS = 3
 """A contact that changed between stick and slip, or open and closed, this often in one step keeps
 its state. Nearly every step that does not converge has one such contact."""

@@ -18,12 +18,14 @@ from rigdda.constants import (
     BOLT,
     DIRECT,
     ENERGY_HALVINGS,
+    FEW_MOVING,
     FLIPS,
     FRICTION_TOLERANCE,
     IMPACT,
     MOVING,
     OPEN,
     OPENING_TOLERANCE,
+    PATIENCE,
     PIN,
     PLAIN,
     QUIET_SPEED,
@@ -256,7 +258,8 @@ def solve_states(
         i = work.block_item[b0 + s]
         m.d[s, 0], m.d[s, 1] = bodies[i].vx * p.dt, bodies[i].vy * p.dt
         m.d[s, 2] = bodies[i].omega * p.dt
-    for _ in range(p.iterations):
+    few = 2 + (c1 - c0) // FEW_MOVING
+    for iteration in range(PATIENCE * p.iterations):
         assemble_island(bodies, c, m, work, island, pairs, p)
         counters[1] += 1
         if n == 1:
@@ -267,6 +270,8 @@ def solve_states(
         moved, locked = update_states(bodies, c, m, work, c0, c1, p)
         if moved == 0:
             return locked == 0
+        if iteration >= p.iterations - 1 and moved > few:
+            return False
     return False
 
 

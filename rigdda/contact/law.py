@@ -186,14 +186,14 @@ def set_new(bodies: Bodies, c: Contacts, k: int, start: bool, p: Parameters) -> 
 
 
 @kernel
-def set_plain(c: Contacts, k: int, weight: float, p: Parameters) -> None:
+def set_plain(c: Contacts, k: int, p: Parameters) -> None:
     """Make contact k the paper's penalty spring on the displacement of the step.
 
-    N = k_n (-gap - d_n) and S = S_0 - k_n d_s: the law above with u_0 = 0. It has no memory of
-    speed, so its rebound is what step and stiffness make of it.
+    N = k_n (-gap - d_n) and S = S_0 - k_n d_s: the law above with u_0 = 0, and one k_n for all
+    contacts. It has no memory of speed, so its rebound is what step and stiffness make of it.
     """
     c[k].kind = PLAIN
-    c[k].stiffness = weight / p.penetration
+    c[k].stiffness = p.block_weight / p.penetration
     c[k].kappa = 0.5 * c[k].stiffness
     c[k].bias = -2.0 * c[k].gap
     c[k].un = c[k].us = 0.0
@@ -255,7 +255,7 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
     c[k].cohesion = c[k].tension = 0.0
     strike(bodies, c, k, 0.5 * p.dt, pull, p)
     if c[k].restitution == PLAIN_CONTACT:
-        set_plain(c, k, weight, p)
+        set_plain(c, k, p)
         return
     threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
     gap = max(c[k].gap, 0.0)

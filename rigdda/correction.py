@@ -175,17 +175,19 @@ def is_struck(c: Contacts, work: Work, low: int, high: int) -> bool:
 
 @kernel
 def keep_memory(c: Contacts, k: int, struck: bool) -> None:
-    """Carry the forces of contact k to the next step; an impulse is not carried on.
+    """Carry the forces of contact k to the next step; an impulse does not last.
 
     In an island that was struck every force may be part of an impulse: what the contact carried
-    before stays.
+    before stays. In one that was relaxed only part of a rise counts.
     """
     if c[k].state == OPEN:
-        c[k].memory_normal = c[k].memory_shear = c[k].steady = 0.0
-    elif c[k].kind == MOVING:
-        c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
-        rise = c[k].normal - c[k].steady
-        c[k].steady += rise if rise < 0.0 else STEADY_RATE * rise
+        c[k].memory_normal = c[k].memory_shear = 0.0
+        c[k].start_normal = c[k].start_shear = 0.0
+        return
+    if c[k].kind == MOVING:
+        rise = c[k].normal - c[k].memory_normal
+        c[k].memory_normal += rise if rise < 0.0 else STEADY_RATE * rise
+        c[k].memory_shear = c[k].shear * c[k].memory_normal / c[k].normal
     elif not struck:
         c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
-        c[k].steady = c[k].normal
+    c[k].start_normal, c[k].start_shear = c[k].normal, c[k].shear

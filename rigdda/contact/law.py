@@ -139,7 +139,7 @@ def set_impact(c: Contacts, k: int, closing: float, mass: float, p: Parameters) 
     c[k].kind = IMPACT
     c[k].kappa = impact_stiffness(mass, p.dt)
     c[k].bias = p.dt * c[k].restitution * closing
-    c[k].memory_normal = c[k].memory_shear = 0.0
+    c[k].memory_normal = c[k].memory_shear = c[k].start_normal = c[k].start_shear = 0.0
 
 
 @kernel
@@ -167,7 +167,7 @@ def set_rest(c: Contacts, k: int, weight: float, most: float, p: Parameters) -> 
     c[k].kappa = c[k].stiffness
     elastic = c[k].memory_normal / c[k].stiffness
     if c[k].gap > p.penetration:
-        c[k].memory_normal = 0.0
+        c[k].memory_normal = c[k].start_normal = 0.0
         c[k].bias = -c[k].gap
     else:
         c[k].bias = elastic
@@ -246,7 +246,7 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
     most = GREATEST_LOAD * max(weight, p.block_weight)
     c[k].memory_shear *= most / max(c[k].memory_normal, most)
     c[k].memory_normal = min(c[k].memory_normal, most)
-    c[k].steady = min(c[k].steady, most)
+    c[k].start_normal = min(c[k].start_normal, most)
     c[k].stiffness = rest_stiffness(weight, c, k, p)
     surface = bodies[a].surface
     c[k].friction = p.friction[surface, c[k].other]

@@ -37,7 +37,8 @@ def recall_from(
         c[k].state, c[k].kind = old[m].state, old[m].kind
         c[k].memory_normal = old[m].memory_normal
         c[k].memory_shear = old[m].memory_shear
-        c[k].stiffness, c[k].steady = old[m].stiffness, old[m].steady
+        c[k].start_normal, c[k].start_shear = old[m].start_normal, old[m].start_shear
+        c[k].stiffness = old[m].stiffness
         return True
     return False
 
@@ -51,7 +52,8 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray) -> N
     """
     for k in range(low, high):
         c[k].state, c[k].kind = OPEN, NEW
-        c[k].memory_normal = c[k].memory_shear = c[k].steady = c[k].stiffness = 0.0
+        c[k].memory_normal = c[k].memory_shear = c[k].stiffness = 0.0
+        c[k].start_normal = c[k].start_shear = 0.0
         a, b = c[k].a, c[k].b
         found = recall_from(c, k, old, first[a], first[a + 1], b, 1.0)
         if not found and b != TERRAIN:
@@ -71,9 +73,5 @@ def copy_contact(c: Contacts, k: int, old: Contacts, m: int) -> None:
     )
     c[k].gap, c[k].state, c[k].kind = old[m].gap, old[m].state, old[m].kind
     c[k].memory_normal, c[k].memory_shear = old[m].memory_normal, old[m].memory_shear
-    c[k].steady, c[k].stiffness, c[k].normal, c[k].shear = (
-        old[m].steady,
-        old[m].stiffness,
-        old[m].normal,
-        old[m].shear,
-    )
+    c[k].start_normal, c[k].start_shear = old[m].start_normal, old[m].start_shear
+    c[k].stiffness, c[k].normal, c[k].shear = old[m].stiffness, old[m].normal, old[m].shear

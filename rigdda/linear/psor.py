@@ -60,25 +60,20 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, dt: float) 
     soft_n = flexibility(m, i, en) + flexibility(m, j, fn)
     soft_s = flexibility(m, i, es) + flexibility(m, j, fs)
     own = old.kind == PLAIN or old.kind == BOLT or old.kind == PIN
-    # stiff against the inertia of the blocks; relaxation starts from the forces of the last step,
-    # of which the law keeps the part that lasts: the rest may be impulses
+    # stiff against the inertia of the blocks
     kappa = old.kappa if own else RELAXATION_STIFFNESS / soft_n
-    carried = old.memory_normal
     row[place, GAIN], row[place, SOFT] = kappa / (1.0 + 2.0 * kappa * soft_n), 1.0 / kappa
     row[place, FREE] = old.bias + dt * old.un
     if not own:
-        row[place, FREE] += old.steady / kappa - carried / old.kappa
+        row[place, FREE] += old.memory_normal * (1.0 / kappa - 1.0 / old.kappa)
     kappa = old.kappa if own else RELAXATION_STIFFNESS / soft_s
     row[place, GAIN + 1], row[place, SOFT + 1] = kappa / (1.0 + 2.0 * kappa * soft_s), 1.0 / kappa
-    lasting = old.steady / carried if carried > 0.0 else 0.0
-    if own:
-        lasting = 1.0
-    row[place, FREE + 1] = lasting * old.memory_shear / kappa + dt * old.us
-    row[place, FORCE], row[place, FORCE + 1] = carried, old.memory_shear
+    row[place, FREE + 1] = old.memory_shear / kappa + dt * old.us
+    row[place, FORCE], row[place, FORCE + 1] = old.start_normal, old.start_shear
     row[place, FRICTION], row[place, TENSION] = old.friction, old.tension
     row[place, COHESION] = math.inf if old.kind == PIN else old.cohesion
-    push(row, place, NORMAL_A, i, j, m.d, m.scaled, carried)
-    push(row, place, SHEAR_A, i, j, m.d, m.scaled, old.memory_shear)
+    push(row, place, NORMAL_A, i, j, m.d, m.scaled, old.start_normal)
+    push(row, place, SHEAR_A, i, j, m.d, m.scaled, old.start_shear)
 
 
 @kernel

@@ -15,17 +15,26 @@ from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameter
 
 @kernel
 def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
-    """Set the corners and edge normals of body i from its centroid and angle.
+    """Set the corners and edge normals of body i and of its parts from its centroid and angle.
 
     The exact displacement function (equation 1), which replaces the linear one of the solve: the
     post-correction. Corners come from the angle and body coordinates, so area is kept exactly.
     """
     cos, sin = math.cos(bodies[i].theta), math.sin(bodies[i].theta)
-    n = bodies[i].count
+    place_polygon(outlines, i, bodies[i].x, bodies[i].y, cos, sin)
+    if bodies[i].parts > 1:
+        for part in range(bodies[i].part, bodies[i].part + bodies[i].parts):
+            place_polygon(outlines, part, bodies[i].x, bodies[i].y, cos, sin)
+
+
+@kernel
+def place_polygon(outlines: Outlines, i: int, x0: float, y0: float, cos: float, sin: float) -> None:
+    """Set the corners and edge normals of polygon i of a body with centroid (x0, y0)."""
+    n = outlines.polygon[i].count
     for k in range(n):
-        x, y = outlines.body_x[i, k], outlines.body_y[i, k]
-        outlines.world_x[i, k] = bodies[i].x + cos * x - sin * y
-        outlines.world_y[i, k] = bodies[i].y + sin * x + cos * y
+        x, y = outlines.corner[i, k].x, outlines.corner[i, k].y
+        outlines.world_x[i, k] = x0 + cos * x - sin * y
+        outlines.world_y[i, k] = y0 + sin * x + cos * y
     for k in range(n):
         end = k + 1 if k + 1 < n else 0
         ex = outlines.world_x[i, end] - outlines.world_x[i, k]

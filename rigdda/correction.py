@@ -46,15 +46,11 @@ def place_polygon(outlines: Outlines, i: int, x0: float, y0: float, cos: float, 
 
 @kernel
 def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> None:
-    """Add the force of contact k to slot i, and to the mean time of the impacts of its block.
-
-    m.residual sums forces; m.direction sums normal forces of impacts and their moments in time.
-    """
+    """Add the force of contact k to slot i; m.direction holds the greatest share of its impacts."""
     add_force(m.residual[i], c[k].normal, normal_row(c, k, of_a))
     add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
-    if c[k].kind == IMPACT:
-        m.direction[i, 0] += c[k].normal
-        m.direction[i, 1] += c[k].normal * (c[k].share - 0.5)
+    if c[k].kind == IMPACT and c[k].normal > 0.0:
+        m.direction[i, 0] = max(m.direction[i, 0], c[k].share)
 
 
 @kernel
@@ -66,6 +62,7 @@ def apply_forces(
     Forces are applied equal and opposite here, once more and exactly, so that momentum is kept to
     rounding whatever the residual of the solver. A constant force over the step displaces a block
     by dt^2 F / 2M; an impulse that acts for the share s of the step displaces it by s dt^2 F / M.
+    The first impact sets the share of all, or the corner that hits first would go on until then.
     """
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
@@ -81,8 +78,8 @@ def apply_forces(
             add_contact_force(c, k, m, work.slot[c[k].b], False)
     for s in range(b1 - b0):
         i = work.block_item[b0 + s]
-        late = m.direction[s, 1] / m.direction[s, 0] if m.direction[s, 0] > 0.0 else 0.0
-        late *= p.dt * p.dt
+        share = m.direction[s, 0]
+        late = (share - 0.5) * p.dt * p.dt if share > 0.0 else 0.0
         for j in range(3):
             m.d[s, j] = (m.rhs[s, j] + m.residual[s, j]) / m.diagonal[s, j, j]
         m.residual[s, 0] *= late / bodies[i].mass

@@ -110,17 +110,14 @@ def add_contact(
 @kernel
 def clip_contacts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, edge: int,
-    j: int, shift_x: float, shift_y: float, reach: float, slack: float,
+    j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float,
 ) -> int:  # fmt: skip
     """Add up to two contacts of bodies a and b where the incident edge lies over the face.
 
-    The face of contact is edge `edge` of polygon i, the incident edge is one of polygon j;
+    The face of contact is edge `edge` of polygon i, the incident edge is edge `other` of polygon j;
     (shift_x, shift_y) moves j to where it is at the time of entry. Returns the new number of
     contacts.
     """
-    other = incident_edge(outlines, i, edge, j, outlines.polygon[j].count)
-    if outlines.corner[j, other].inner:
-        return k
     nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
     tx, ty = -ny, nx
     x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
@@ -272,12 +269,14 @@ def collide_parts(
     # corner beside corner, the better face may miss the other body where the second one does not
     for _ in range(2):
         face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
-        if outlines.corner[face, edge].inner:
+        facing = incident_edge(outlines, face, edge, other, outlines.polygon[other].count)
+        if outlines.corner[face, edge].inner or outlines.corner[other, facing].inner:
             return k
         shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
         found = clip_contacts(
-            bodies, outlines, c, k, a, b, face, edge, other, dx * shift, dy * shift, reach, slack
-        )
+            bodies, outlines, c, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
+            reach, slack,
+        )  # fmt: skip
         if found > k or not touching:
             return found
         of_j = not of_j
@@ -296,8 +295,6 @@ def deepest_corner(
     in a row, where rounding decides which of them is the face.
     """
     n = outlines.polygon[j].count
-    if outlines.corner[j, incident_edge(outlines, i, edge, j, n)].inner:
-        return k
     nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
     x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
     gap, corner = axis_gap(nx, ny, x0, y0, outlines.world_x, outlines.world_y, j, n)

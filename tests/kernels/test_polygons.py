@@ -162,10 +162,10 @@ def test_key_in_a_keyhole_stands_still():
 
 def test_two_hooks_lean_on_each_other():
     """Two L's, one across the other's reentrant corner, on the ground."""
-    lower, upper = L, polygon(L, (4.0, 4.0), np.pi)
+    lower, upper = L, polygon(L, (4.0, 3.0), np.pi)
     sim = settle((Block(lower), Block(upper)), 3.0)
     assert_rest(sim)
-    assert sim.poses[1, :2] == pytest.approx(4.0 - sim.poses[0, :2], abs=5e-3)
+    assert sim.poses[1, :2] == pytest.approx([4.0, 3.0] - sim.poses[0, :2], abs=1e-3)
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -198,4 +198,4 @@ def test_no_snag_on_a_cut(speed):
     slider = Block(np.array([(1, 2), (2, 2), (2, 3), (1, 3)], dtype=float), velocity=(speed, 0, 0))
     sim = Simulation(Scene(None, (floor, slider), rock(0.0)), AWAKE)
     sim.step(round(36.0 / speed / sim.settings.dt) if speed > 5 else 2000)
-    assert sim.velocities[1] == pytest.approx([speed, 0.0, 0.0], abs=1e-6)
+    assert sim.velocities[1] == pytest.approx([speed, 0.0, 0.0], abs=1e-3)

@@ -107,7 +107,7 @@ def detect(
                 count = collide_pair(bodies, outlines, c, count, a, work.pairs[2 * q + 1], p)
                 q += 1
             if count >= 0:
-                recall(c, first, count, old, work.first)
+                recall(c, first, count, old, work.first, p.slack)
             for k in range(first, count):
                 prepare(bodies, c, k, p)
         if count < 0 or count > room:

@@ -46,11 +46,15 @@ def place_polygon(outlines: Outlines, i: int, x0: float, y0: float, cos: float, 
 
 @kernel
 def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> None:
-    """Add the force of contact k to slot i; m.direction holds the greatest share of its impacts."""
-    add_force(m.residual[i], c[k].normal, normal_row(c, k, of_a))
-    add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
-    if c[k].kind == IMPACT and c[k].normal > 0.0:
+    """Add the force of contact k to slot i; m.direction holds the greatest share of its impacts.
+
+    An impact that another one forestalls counts, too: its corner stops no later.
+    """
+    if c[k].kind == IMPACT:
         m.direction[i, 0] = max(m.direction[i, 0], c[k].share)
+    if c[k].state != OPEN:
+        add_force(m.residual[i], c[k].normal, normal_row(c, k, of_a))
+        add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
 
 
 @kernel
@@ -71,8 +75,6 @@ def apply_forces(
             m.residual[s, j] = m.direction[s, j] = 0.0
     for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
-        if c[k].state == OPEN:
-            continue
         add_contact_force(c, k, m, work.slot[c[k].a], True)
         if c[k].pair >= 0:
             add_contact_force(c, k, m, work.slot[c[k].b], False)

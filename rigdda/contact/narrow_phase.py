@@ -17,6 +17,9 @@ from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
 TIE = 0.1
 """How much deeper an edge inside a body counts, so that a real edge is the face, over the slack."""
 
+WHIP = 3.0
+"""Greatest speed of a corner after another one was hit, over the speed of the hit [-]."""
+
 TIE_OF_FACES = 0.02
 """How much shallower the face of b must be than that of a to be the face, over the slack."""
 
@@ -264,7 +267,8 @@ def collide_parts(
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + TIE_OF_FACES * slack)
-    reach = (dx * dx + dy * dy) ** 0.5 + spread
+    # an eccentric impact can make the other end of a long block more than twice as fast
+    reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(gap_i, gap_j) <= slack
     # corner beside corner, the better face may miss the other body where the second one does not
     for _ in range(2):

@@ -216,9 +216,7 @@ def collide_all_parts(
         for j in range(bodies[b].part, bodies[b].part + bodies[b].parts):
             if k + 2 > len(c):
                 return -1
-            found = collide_parts(
-                bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk
-            )
+            found = collide_parts(bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk)
             for new in range(k, found):
                 k = keep_nearest(c, first, k, new)
     return k

@@ -85,6 +85,20 @@ def beneath_roof(
 
 
 @kernel
+def place_of_hit(
+    bodies: Bodies, a: int, x: float, y: float, nx: float, ny: float, gap: float, dt: float
+) -> tuple[float, float]:
+    """Return where in the step a corner of block a meets a line, or (x, y) if it never does."""
+    if gap <= 0.0:
+        return x, y
+    dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
+    dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
+    approach = -(nx * dx + ny * dy)
+    time = min(gap / approach, 1.0) if approach > 0.0 else 0.0
+    return x + time * dx, y + time * dy
+
+
+@kernel
 def corners_on_segment(
     bodies: Bodies,
     outlines: Outlines,
@@ -111,14 +125,7 @@ def corners_on_segment(
         gap = below_segment(ground, s, x, y)
         if gap > reach or gap < -bodies[a].radius or outlines.corner[a, vertex].reentrant:
             continue
-        hit_x, hit_y = x, y
-        if gap > 0.0:  # where the corner meets the line
-            dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
-            dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
-            approach = -(nx * dx + ny * dy)
-            if approach > 0.0:
-                time = min(gap / approach, 1.0)
-                hit_x, hit_y = x + time * dx, y + time * dy
+        hit_x, hit_y = place_of_hit(bodies, a, x, y, nx, ny, gap, dt)
         if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0)):
             continue
         if shadowed(ground, s, hit_x, hit_y, gap):

@@ -43,9 +43,7 @@ def recall_from(
 
 
 @kernel
-def recall(
-    c: Contacts, low: int, high: int, old: Contacts, first: NDArray, slack: float
-) -> None:
+def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray, slack: float) -> None:
     """Give each new contact in low:high its memory; without one it starts OPEN.
 
     A contact that has come apart by more than `slack` starts OPEN, too: it closes by an impact.

@@ -171,7 +171,7 @@ def test_two_hooks_lean_on_each_other():
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("turn", [0.0, 0.7, 2.0])
 def test_shapes_come_to_rest_on_the_ground(name, turn):
-    sim = settle((Block(polygon(SHAPES[name], (0.0, 6.0), turn)),), 6.0)
+    sim = settle((Block(polygon(SHAPES[name], (0.0, 6.0), turn)),), 8.0)
     assert_rest(sim)
     assert sim.vertices(0)[:, 1].min() > -1e-3
 
@@ -189,12 +189,9 @@ def test_pile_of_stars_never_overlaps(seed):
 @pytest.mark.parametrize("speed", [1.0, 20.0])
 def test_no_snag_on_a_cut(speed):
     """A square slides without friction over a face that cuts end at: it keeps its speed."""
-    comb = [(0, 0), (40, 0), (40, 2)]
-    for x in range(36, 0, -4):  # notches underneath would be closed: make the top of many corners
-        comb += [(x, 2)]
-    comb += [(0, 2)]
-    comb[1:2] = [p for x in range(2, 39, 4) for p in ((x, 0), (x + 1, 1.9), (x + 1.5, 0))] + [(40, 0)]
-    floor = Block(np.array(comb, dtype=float), fixed=True)
+    teeth = [p for x in range(2, 39, 4) for p in ((x, 0), (x + 1, 1.9), (x + 1.5, 0))]
+    top = [(x, 2) for x in range(40, -1, -4)]
+    floor = Block(np.array([(0, 0), *teeth, (40, 0), *top], dtype=float), fixed=True)
     slider = Block(np.array([(1, 2), (2, 2), (2, 3), (1, 3)], dtype=float), velocity=(speed, 0, 0))
     sim = Simulation(Scene(None, (floor, slider), rock(0.0)), AWAKE)
     sim.step(round(36.0 / speed / sim.settings.dt) if speed > 5 else 2000)

@@ -70,7 +70,7 @@ def convex_parts(vertices: NDArray[np.float64]) -> list[list[int]]:
     for cut in sorted({e for part in parts for e in _edges(part) if e[0] < e[1]}, key=length)[::-1]:
         beside = [p for p in parts if cut in _edges(p) or cut[::-1] in _edges(p)]
         if len(beside) == 2:
-            union = _join_at(*beside, cut)
+            union = _join_at(beside[0], beside[1], cut)
             if is_convex(vertices[union]):
                 parts = [p for p in parts if p not in beside] + [union]
     return parts

@@ -158,7 +158,10 @@ def _join_bridges(
 def _join(
     parts: list[shapely.Polygon | None], beside: list[list[int]], i: int, convex: bool = True
 ) -> None:
-    """Join part i to the neighbour with the longest common edge, if that stays convex."""
+    """Join part i to the neighbour with the longest common edge that gives a convex block.
+
+    Or that gives any simple polygon, if not `convex`.
+    """
     cell = parts[i]
     if cell is None:
         return
@@ -167,6 +170,8 @@ def _join(
         other = parts[j]
         if other is None or j == i:
             continue
+        if not convex:  # where cells were joined, an edge may have lost the node that they share
+            other = shapely.snap(other, cell, 1e-7 * cell.length)
         common = shapely.intersection(cell, other).length
         if common > longest + 1e-9:
             union = shapely.union(cell, other)

@@ -112,7 +112,10 @@ def pack_outlines(polygons: list[NDArray[np.float64]], bodies: Bodies) -> Outlin
         rows += [(i, part) for part in parts if len(parts) > 1]
     shape = (len(rows), max(len(corner) for _, corner in rows))
     outlines = Outlines(
-        *(np.zeros(shape) for _ in range(4)),
+        world_x=np.zeros(shape),
+        world_y=np.zeros(shape),
+        normal_x=np.zeros(shape),
+        normal_y=np.zeros(shape),
         polygon=np.zeros(len(rows), dtype=POLYGON).view(np.recarray),
         corner=np.zeros(shape, dtype=CORNER).view(np.recarray),
     )

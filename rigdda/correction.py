@@ -21,27 +21,22 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
     post-correction. Corners come from the angle and body coordinates, so area is kept exactly.
     """
     cos, sin = math.cos(bodies[i].theta), math.sin(bodies[i].theta)
-    place_polygon(outlines, i, bodies[i].x, bodies[i].y, cos, sin)
-    if bodies[i].parts > 1:
-        for part in range(bodies[i].part, bodies[i].part + bodies[i].parts):
-            place_polygon(outlines, part, bodies[i].x, bodies[i].y, cos, sin)
-
-
-@kernel
-def place_polygon(outlines: Outlines, i: int, x0: float, y0: float, cos: float, sin: float) -> None:
-    """Set the corners and edge normals of polygon i of a body with centroid (x0, y0)."""
-    n = outlines.polygon[i].count
-    for k in range(n):
-        x, y = outlines.corner[i, k].x, outlines.corner[i, k].y
-        outlines.world_x[i, k] = x0 + cos * x - sin * y
-        outlines.world_y[i, k] = y0 + sin * x + cos * y
-    for k in range(n):
-        end = k + 1 if k + 1 < n else 0
-        ex = outlines.world_x[i, end] - outlines.world_x[i, k]
-        ey = outlines.world_y[i, end] - outlines.world_y[i, k]
-        length = math.sqrt(ex * ex + ey * ey)
-        outlines.normal_x[i, k] = ey / length
-        outlines.normal_y[i, k] = -ex / length
+    x0, y0 = bodies[i].x, bodies[i].y
+    last = bodies[i].parts if bodies[i].parts > 1 else 0
+    for place in range(last + 1):  # the outline, then the parts
+        row = i if place == 0 else bodies[i].part + place - 1
+        n = outlines.polygon[row].count
+        for k in range(n):
+            x, y = outlines.corner[row, k].x, outlines.corner[row, k].y
+            outlines.world_x[row, k] = x0 + cos * x - sin * y
+            outlines.world_y[row, k] = y0 + sin * x + cos * y
+        for k in range(n):
+            end = k + 1 if k + 1 < n else 0
+            ex = outlines.world_x[row, end] - outlines.world_x[row, k]
+            ey = outlines.world_y[row, end] - outlines.world_y[row, k]
+            length = math.sqrt(ex * ex + ey * ey)
+            outlines.normal_x[row, k] = ey / length
+            outlines.normal_y[row, k] = -ex / length
 
 
 @kernel

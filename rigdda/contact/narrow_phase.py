@@ -10,18 +10,9 @@ leads through a neighbouring part, and that one has the contact.
 
 from __future__ import annotations
 
-from rigdda.constants import AWAKE, SAME_FACE
+from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
-
-TIE = 0.1
-"""How much deeper an edge inside a body counts, so that a real edge is the face, over the slack."""
-
-WHIP = 3.0
-"""Greatest speed of a corner after another one was hit, over the speed of the hit [-]."""
-
-TIE_OF_FACES = 0.02
-"""How much shallower the face of b must be than that of a to be the face, over the slack."""
 
 
 @kernel
@@ -199,7 +190,9 @@ def collide_pair(
     if bodies[a].parts == 1 and bodies[b].parts == 1:
         return collide_parts(bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0)
     first = k
-    k = collide_all_parts(bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, TIE * p.slack)
+    k = collide_all_parts(
+        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack
+    )
     if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
         k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300)
     return k
@@ -264,8 +257,7 @@ def collide_parts(
     if not possible:
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
-    of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + TIE_OF_FACES * slack)
-    # an eccentric impact can make the other end of a long block more than twice as fast
+    of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
     reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(gap_i, gap_j) <= slack
     # corner beside corner, the better face may miss the other body where the second one does not

@@ -116,6 +116,7 @@ def corners_on_segment(
     spin = abs(bodies[a].omega) * bodies[a].radius * dt
     speed = math.hypot(bodies[a].vx, bodies[a].vy) * dt
     reach = speed + spin + p.gravity * dt * dt + p.slack
+    concave = bodies[a].parts > 1
     lowest = below_segment(ground, s, bodies[a].x, bodies[a].y) - bodies[a].radius
     if lowest > reach:
         return k
@@ -123,7 +124,9 @@ def corners_on_segment(
         key = a * outlines.world_x.shape[1] + vertex
         x, y = outlines.world_x[a, vertex], outlines.world_y[a, vertex]
         gap = below_segment(ground, s, x, y)
-        if gap > reach or gap < -bodies[a].radius or outlines.corner[a, vertex].reentrant:
+        if gap > reach or gap < -bodies[a].radius:
+            continue
+        if concave and outlines.corner[a, vertex].reentrant:
             continue
         hit_x, hit_y = place_of_hit(bodies, a, x, y, nx, ny, gap, dt)
         if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0)):
@@ -168,7 +171,7 @@ def edge_on_ridge(
     reach = math.hypot(dx, dy) + p.gravity * dt * dt + p.slack
     if math.hypot(x - bodies[a].x, y - bodies[a].y) > bodies[a].radius + reach:
         return k
-    left, right = corner - 1, corner
+    left, right, concave = corner - 1, corner, part != a
     best, best_time, best_gap = -1, -1.0, -1e300
     for edge in range(n):
         nx, ny = outlines.normal_x[part, edge], outlines.normal_y[part, edge]
@@ -176,7 +179,7 @@ def edge_on_ridge(
         approach = -(nx * dx + ny * dy)
         if gap > max(approach, 0.0) + p.gravity * dt * dt + p.slack:
             return k
-        inner = outlines.corner[part, edge].inner
+        inner = concave and outlines.corner[part, edge].inner
         if inner and gap <= 0.0:
             continue  # a corner inside the part is pushed out of the block, not into the next part
         time = 0.0
@@ -248,5 +251,5 @@ def collide_terrain(
             if ground.turn[s] < 0.0:
                 for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):
                     found = edge_on_ridge(bodies, outlines, ground, c, k, a, part, s, p)
-                    k = keep_nearest(c, first, k, k) if found > k else k
+                    k = keep_nearest(c, first, k, k) if found > k and part != a else found
     return k

@@ -111,6 +111,18 @@ SAME_NORMAL = 0.7
 SAME_FACE = 0.999
 """Cosine above which two edges, or two contacts of one vertex, count as in one line [-]."""
 
+INNER_EDGE = 0.1
+"""Depth, over the slack, that an edge inside a body counts deeper when the face of contact is
+sought, so that on a tie a real edge is the face [-]."""
+
+OTHER_FACE = 0.02
+"""Depth, over the slack, by which a face of the second body must be the better one [-]: parallel
+faces do not alternate."""
+
+WHIP = 3.0
+"""Speed of a corner after another one was hit, over the speed of the hit, up to which contacts are
+foreseen [-]: an eccentric impact makes the far end of a long block more than twice as fast."""
+
 SLACK_RATIO = 5e-3
 """Distance over block size within which contacts are candidates even at rest [-]."""
 

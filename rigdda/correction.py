@@ -15,17 +15,44 @@ from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameter
 
 @kernel
 def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
-    """Set the corners and edge normals of body i from its centroid and angle.
+    """Set the corners and edge normals of body i and of its parts from its centroid and angle.
 
     The exact displacement function (equation 1), which replaces the linear one of the solve: the
     post-correction. Corners come from the angle and body coordinates, so area is kept exactly.
     """
     cos, sin = math.cos(bodies[i].theta), math.sin(bodies[i].theta)
-    for k in range(bodies[i].count):
-        x, y = outlines.body_x[i, k], outlines.body_y[i, k]
-        outlines.world_x[i, k] = bodies[i].x + cos * x - sin * y
-        outlines.world_y[i, k] = bodies[i].y + sin * x + cos * y
-    place_normals(bodies, outlines, i)
+    for place in range(polygons(bodies, i)):
+        row = polygon_row(bodies, i, place)
+        for k in range(outlines.polygon[row].count):
+            x, y = outlines.corner[row, k].x, outlines.corner[row, k].y
+            outlines.world_x[row, k] = bodies[i].x + cos * x - sin * y
+            outlines.world_y[row, k] = bodies[i].y + sin * x + cos * y
+        place_normals(outlines, row)
+
+
+@kernel
+def polygons(bodies: Bodies, i: int) -> int:
+    """Return how many polygons body i has: its outline, then its parts if it has several."""
+    return 1 + bodies[i].parts if bodies[i].parts > 1 else 1
+
+
+@kernel
+def polygon_row(bodies: Bodies, i: int, place: int) -> int:
+    """Return the row in the outlines of a polygon of body i."""
+    return i if place == 0 else bodies[i].part + place - 1
+
+
+@kernel
+def place_normals(outlines: Outlines, row: int) -> None:
+    """Set the edge normals of a polygon from its corners."""
+    n = outlines.polygon[row].count
+    for k in range(n):
+        end = k + 1 if k + 1 < n else 0
+        ex = outlines.world_x[row, end] - outlines.world_x[row, k]
+        ey = outlines.world_y[row, end] - outlines.world_y[row, k]
+        length = math.sqrt(ex * ex + ey * ey)
+        outlines.normal_x[row, k] = ey / length
+        outlines.normal_y[row, k] = -ex / length
 
 
 @kernel
@@ -37,40 +64,28 @@ def move_corners(bodies: Bodies, outlines: Outlines, i: int, m: Matrix, s: int) 
     u, v = m.d[s, 0] + m.residual[s, 0], m.d[s, 1] + m.residual[s, 1]
     r = m.d[s, 2] + m.residual[s, 2]
     bodies[i].radius = 0.0
-    for k in range(bodies[i].count):
-        x = outlines.world_x[i, k] - bodies[i].x + u
-        y = outlines.world_y[i, k] - bodies[i].y + v
-        outlines.world_x[i, k] += u - y * r
-        outlines.world_y[i, k] += v + x * r
-        bodies[i].radius = max(bodies[i].radius, math.hypot(x - y * r, y + x * r))
-    place_normals(bodies, outlines, i)
-
-
-@kernel
-def place_normals(bodies: Bodies, outlines: Outlines, i: int) -> None:
-    """Set the edge normals of body i from its corners."""
-    n = bodies[i].count
-    for k in range(n):
-        end = k + 1 if k + 1 < n else 0
-        ex = outlines.world_x[i, end] - outlines.world_x[i, k]
-        ey = outlines.world_y[i, end] - outlines.world_y[i, k]
-        length = math.sqrt(ex * ex + ey * ey)
-        outlines.normal_x[i, k] = ey / length
-        outlines.normal_y[i, k] = -ex / length
+    for place in range(polygons(bodies, i)):
+        row = polygon_row(bodies, i, place)
+        for k in range(outlines.polygon[row].count):
+            x = outlines.world_x[row, k] - bodies[i].x + u
+            y = outlines.world_y[row, k] - bodies[i].y + v
+            outlines.world_x[row, k] += u - y * r
+            outlines.world_y[row, k] += v + x * r
+            bodies[i].radius = max(bodies[i].radius, math.hypot(x - y * r, y + x * r))
+        place_normals(outlines, row)
 
 
 @kernel
 def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> None:
-    """Add the force of contact k to slot i, and to the mean time of the impacts of its block.
+    """Add the force of contact k to slot i; m.direction holds the greatest share of its impacts.
 
-    m.residual sums forces; m.direction sums normal forces that do not act all through the step,
-    and their moments in time.
+    An impact that another one forestalls counts, too: its corner stops no later.
     """
-    add_force(m.residual[i], c[k].normal, normal_row(c, k, of_a))
-    add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
-    if c[k].share != 0.5:
-        m.direction[i, 0] += c[k].normal
-        m.direction[i, 1] += c[k].normal * (c[k].share - 0.5)
+    if c[k].kind == IMPACT:
+        m.direction[i, 0] = max(m.direction[i, 0], c[k].share)
+    if c[k].state != OPEN:
+        add_force(m.residual[i], c[k].normal, normal_row(c, k, of_a))
+        add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
 
 
 @kernel
@@ -82,6 +97,7 @@ def apply_forces(
     Forces are applied equal and opposite here, once more and exactly, so that momentum is kept to
     rounding whatever the residual of the solver. A constant force over the step displaces a block
     by dt^2 F / 2M; an impulse that acts for the share s of the step displaces it by s dt^2 F / M.
+    The first impact sets the share of all, or the corner that hits first would go on until then.
     """
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
@@ -90,15 +106,13 @@ def apply_forces(
             m.residual[s, j] = m.direction[s, j] = 0.0
     for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
-        if c[k].state == OPEN:
-            continue
         add_contact_force(c, k, m, work.slot[c[k].a], True)
         if c[k].pair >= 0:
             add_contact_force(c, k, m, work.slot[c[k].b], False)
     for s in range(b1 - b0):
         i = work.block_item[b0 + s]
-        late = m.direction[s, 1] / m.direction[s, 0] if m.direction[s, 0] > 0.0 else 0.0
-        late *= p.dt * p.dt
+        share = m.direction[s, 0]
+        late = (share - 0.5) * p.dt * p.dt if share > 0.0 else 0.0
         for j in range(3):
             m.d[s, j] = (m.rhs[s, j] + m.residual[s, j]) / m.diagonal[s, j, j]
         m.residual[s, 0] *= late / bodies[i].mass

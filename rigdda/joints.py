@@ -16,6 +16,10 @@ from rigdda.errors import BadInput
 SLIVER = 0.35
 """Blocks below this share of the wanted area are joined to a neighbour if that stays convex."""
 
+CHIP = 0.1
+"""Blocks below this share of the wanted area that no union with a neighbour keeps convex are joined
+all the same: a chip makes the heaviest block 1,000 times the lightest, and contacts harder."""
+
 AREA_TOLERANCE = 0.05
 """Accepted relative error of the mean block area; joints are drawn, and their spacings scaled,
 until it is met."""
@@ -61,7 +65,7 @@ def cut(
     block_area: float,
     rng: np.random.Generator,
 ) -> list[NDArray[np.float64]]:
-    """Cut a convex rock mass into convex blocks of a wanted mean area.
+    """Cut a convex rock mass into blocks of a wanted mean area, convex but for those with a chip.
 
     Parameters
     ----------
@@ -145,11 +149,19 @@ def _join_bridges(
         cell = parts[i]
         if cell is not None and cell.area < SLIVER * block_area:
             _join(parts, beside, int(i))
+    for i, cell in enumerate(parts):
+        if cell is not None and cell.area < CHIP * block_area:
+            _join(parts, beside, i, convex=False)
     return [c for c in parts if c is not None]
 
 
-def _join(parts: list[shapely.Polygon | None], beside: list[list[int]], i: int) -> None:
-    """Join part i to the neighbour with the longest common edge, if that stays convex."""
+def _join(
+    parts: list[shapely.Polygon | None], beside: list[list[int]], i: int, convex: bool = True
+) -> None:
+    """Join part i to the neighbour with the longest common edge that gives a convex block.
+
+    Or that gives any simple polygon, if not `convex`.
+    """
     cell = parts[i]
     if cell is None:
         return
@@ -158,12 +170,14 @@ def _join(parts: list[shapely.Polygon | None], beside: list[list[int]], i: int) 
         other = parts[j]
         if other is None or j == i:
             continue
+        if not convex:  # where cells were joined, an edge may have lost the node that they share
+            other = shapely.snap(other, cell, 1e-7 * cell.length)
         common = shapely.intersection(cell, other).length
         if common > longest + 1e-9:
             union = shapely.union(cell, other)
-            if union.geom_type == "Polygon" and (
-                union.convex_hull.area - union.area < 1e-9 * union.area
-            ):
+            hollow = union.convex_hull.area - union.area
+            simple = union.geom_type == "Polygon" and not union.interiors
+            if simple and (hollow < 1e-9 * union.area or not convex):
                 best, longest, joined = j, common, union
     if best >= 0:
         parts[best] = joined.simplify(1e-7 * cell.length)

@@ -19,12 +19,14 @@ from rigdda.constants import (
     TERRAIN,
 )
 from rigdda.correction import place_corners
-from rigdda.geometry import polygon_properties
+from rigdda.geometry import convex_parts, polygon_properties, turns
 from rigdda.linear.psor import COLUMNS
 from rigdda.records import (
     BODY,
     CONTACT,
+    CORNER,
     LINK,
+    POLYGON,
     Bodies,
     Contacts,
     Floats,
@@ -105,17 +107,13 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
     terrain = scene.terrain
     walls = [b.outline(terrain) for b in scene.barriers] if terrain is not None else []
     polygons = [b.vertices for b in scene.blocks] + walls
-    shape = (len(polygons), max(len(p) for p in polygons))
     bodies = np.zeros(len(polygons), dtype=BODY).view(np.recarray)
-    outlines = Outlines(*(np.zeros(shape) for _ in Outlines._fields))
+    outlines = pack_outlines(polygons, bodies)
     for i, polygon in enumerate(polygons):
         area, centre, second = polygon_properties(polygon)
         block = scene.blocks[i] if i < len(scene.blocks) else None
         density = block.density if block else 1.0
-        k = len(polygon)
-        bodies["count"][i] = k
         bodies["x"][i], bodies["y"][i] = centre
-        outlines.body_x[i, :k], outlines.body_y[i, :k] = (polygon - centre).T
         bodies["radius"][i] = np.hypot(*(polygon - centre).T).max()
         bodies["mass"][i], bodies["inertia"][i] = density * area, density * second
         bodies["surface"][i] = names.index(block.surface if block else scene.barrier_surface)
@@ -176,6 +174,35 @@ def pack_shaking(scene: Scene) -> Shaking:
 def cumulative(t: Floats, a: Floats) -> Floats:
     """Return the integral of a polygon up to each of its corners but the first."""
     return np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))
+
+
+def pack_outlines(polygons: list[NDArray[np.float64]], bodies: Bodies) -> Outlines:
+    """Return the outlines and convex parts of bodies, and set where each body's parts are."""
+    rows = [(i, list(range(len(p)))) for i, p in enumerate(polygons)]
+    for i, polygon in enumerate(polygons):
+        parts = convex_parts(polygon)
+        bodies["count"][i], bodies["parts"][i] = len(polygon), len(parts)
+        bodies["part"][i] = i if len(parts) == 1 else len(rows)
+        rows += [(i, part) for part in parts if len(parts) > 1]
+    shape = (len(rows), max(len(corner) for _, corner in rows))
+    outlines = Outlines(
+        world_x=np.zeros(shape),
+        world_y=np.zeros(shape),
+        normal_x=np.zeros(shape),
+        normal_y=np.zeros(shape),
+        polygon=np.zeros(len(rows), dtype=POLYGON).view(np.recarray),
+        corner=np.zeros(shape, dtype=CORNER).view(np.recarray),
+    )
+    for row, (i, number) in enumerate(rows):
+        polygon, corner = polygons[i], outlines.corner[row, : len(number)]
+        about = polygon - polygon_properties(polygon)[1]
+        outlines.polygon["count"][row], outlines.polygon["body"][row] = len(number), i
+        corner["x"], corner["y"] = about[number].T
+        corner["number"] = number
+        corner["inner"] = (np.roll(number, -1) - number) % len(polygon) != 1
+        if bodies["parts"][i] > 1:
+            corner["reentrant"] = turns(polygon)[number] < 0.0
+    return outlines
 
 
 def pack_ground(scene: Scene, names: list[str]) -> Ground:

@@ -1,6 +1,7 @@
 """Arrays that the kernels work on: structured arrays, named tuples of arrays. `pack` fills them.
 
-M bodies: the N blocks of the scene, then its B barriers. P: most corners of a body. S: terrain
+M bodies: the N blocks of the scene, then its B barriers. R: polygons, the M outlines of the bodies,
+then the convex parts of those that are not convex. P: most corners of a polygon. S: terrain
 segments. C: room for contacts.
 """
 
@@ -32,6 +33,8 @@ BODY = _record(
     radius=float,  # of the circumscribed circle about the centroid [m]
     quiet=float,  # time it has been quiet [s]
     count=int,  # corners
+    part=int,  # first polygon of its convex parts: itself where it is convex
+    parts=int,  # number of them
     surface=int,  # index of the surface
     status=int,  # AWAKE, ASLEEP, FIXED, RETIRED
     island=int,  # island in which a sleeping body fell asleep
@@ -106,15 +109,34 @@ Links = NDArray[np.void]
 """Array of LINK in order of a."""
 
 
-class Outlines(NamedTuple):
-    """Corners of bodies, anticlockwise and padded to P."""
+POLYGON = _record(
+    count=int,  # corners
+    body=int,
+)
+"""One outline or convex part."""
 
-    body_x: Floats  # (M, P) about the centroid at theta = 0 [m]
-    body_y: Floats
-    world_x: Floats  # (M, P) now [m]
+CORNER = _record(
+    x=float,  # about the centroid of the body at theta = 0 [m]
+    y=float,
+    number=int,  # the same corner in the outline of the body
+    inner=bool,  # whether the edge that starts here is inside the body
+    reentrant=bool,  # whether the body is concave here
+)
+"""What does not change of one corner of a polygon."""
+
+
+class Outlines(NamedTuple):
+    """Polygons, anticlockwise and padded to P: bodies, then convex parts of non-convex bodies.
+
+    Parts have corners of their body only; an edge inside the body is never a face of contact.
+    """
+
+    world_x: Floats  # (R, P) now [m]
     world_y: Floats
-    normal_x: Floats  # (M, P) outward unit normal of the edge that starts at the corner
+    normal_x: Floats  # (R, P) outward unit normal of the edge that starts at the corner
     normal_y: Floats
+    polygon: NDArray[np.void]  # (R,) of POLYGON
+    corner: NDArray[np.void]  # (R, P) of CORNER
 
 
 class Ground(NamedTuple):

@@ -13,6 +13,7 @@ from shapely.validation import explain_validity
 
 from rigdda import check
 from rigdda.errors import BadInput
+from rigdda.geometry import is_convex
 from rigdda.loads import Load, vector
 from rigdda.supports import FixedPoint, Support
 
@@ -55,7 +56,7 @@ class Surface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """A rigid convex polygon.
+    """A rigid simple polygon, convex or not.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ class Block:
     Raises
     ------
     BadInput
-        If the polygon crosses itself, has no area or is not convex, or a value is not finite.
+        If the polygon crosses itself, repeats a corner or has no area, or a value is not finite.
     """
 
     vertices: NDArray[np.float64]
@@ -93,7 +94,7 @@ class Block:
         if len(velocity) != 3:
             raise BadInput("block velocity", velocity, "give (vx, vy, omega)")
         vx, vy, omega = (check.number("block velocity", v) for v in velocity)
-        object.__setattr__(self, "vertices", convex_polygon("block vertices", vertices))
+        object.__setattr__(self, "vertices", simple_polygon("block vertices", vertices))
         object.__setattr__(
             self, "density", check.number("block density", density, 0.0, open_low=True)
         )
@@ -374,7 +375,21 @@ def convex_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:
     Raises
     ------
     BadInput
-        If the polygon crosses itself, has no area or is not convex.
+        If the polygon crosses itself, repeats a corner, has no area or is not convex.
+    """
+    corners = simple_polygon(where, value)
+    if not is_convex(corners):
+        raise BadInput(where, corners.tolist(), "make it convex, or cut it into convex blocks")
+    return corners
+
+
+def simple_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return the corners of a simple polygon, (n, 2), anticlockwise and read-only.
+
+    Raises
+    ------
+    BadInput
+        If the polygon crosses itself, repeats a corner or has no area.
     """
     corners = check.points(where, value, 3)
     polygon = shapely.Polygon(corners)
@@ -383,13 +398,13 @@ def convex_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:
     size = polygon.length
     if polygon.area < 1e-9 * size**2:
         raise BadInput(where, corners.tolist(), "give it an area")
+    short = np.flatnonzero(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T) < 1e-9 * size)
+    if short.size:
+        raise BadInput(
+            f"{where}[{short[0]}]", corners[short[0]].tolist(), "remove it: the next one repeats it"
+        )
     if not polygon.exterior.is_ccw:
         corners = corners[::-1]
-    edge = np.roll(corners, -1, axis=0) - corners
-    onward = np.roll(edge, -1, axis=0)
-    turn = edge[:, 0] * onward[:, 1] - edge[:, 1] * onward[:, 0]
-    if turn.min() < -1e-9 * size**2:
-        raise BadInput(where, corners.tolist(), "make it convex, or cut it into convex blocks")
     corners = np.ascontiguousarray(corners)
     corners.setflags(write=False)
     return corners

@@ -112,7 +112,7 @@ def detect(
                 count = collide_pair(bodies, outlines, c, count, a, work.pairs[2 * q + 1], p)
                 q += 1
             if count >= 0:
-                recall(c, first, count, old, work.first)
+                recall(c, first, count, old, work.first, p.slack)
             for k in range(first, count):
                 prepare(bodies, c, k, work, time <= 1.5 * p.dt, p)
             strike_at_once(bodies, c, first, count, p)

@@ -1,13 +1,16 @@
-"""Contacts between two convex polygons over a step.
+"""Contacts between two polygons over a step, one convex part against another.
 
 Separating axes with time of entry: of the axes that separate the polygons now, the one that they
 stop separating last is the face of contact. An axis that separates them over the whole step rules
 the contact out, so a fast block cannot pass a thin wall.
+
+Where the last edge to separate two parts, or the one that faces it, is inside its body, the way in
+leads through a neighbouring part, and that one has the contact.
 """
 
 from __future__ import annotations
 
-from rigdda.constants import AWAKE, SAME_FACE
+from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
 
@@ -28,12 +31,13 @@ def axis_gap(
 @kernel
 def face_of_contact(
     outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
-    spread: float, slack: float,
+    spread: float, slack: float, sunk: float,
 ) -> tuple[bool, float, float, int]:  # fmt: skip
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
     (dx, dy) is the displacement of j relative to i over the step, `spread` what rotation adds.
-    The best edge comes with its rank: time of entry, and its gap for the shallow ones.
+    The best edge comes with its rank: time of entry, and its gap for the shallow ones. Edges
+    inside the body count as deeper by `sunk`, so that on a tie the real one is best.
     """
     time, depth, best, nearest = -1.0, -1e300, -1, -1
     corner_x, corner_y = outlines.world_x, outlines.world_y
@@ -45,6 +49,8 @@ def face_of_contact(
         approach = -(nx * dx + ny * dy)
         if gap > max(approach, 0.0) + spread:
             return False, time, depth, edge
+        if sunk > 0.0 and outlines.corner[i, edge].inner:
+            gap -= sunk
         entry = 0.0
         if gap > slack:
             entry = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
@@ -68,7 +74,7 @@ def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, 
         step = (1 if beyond_end else 0) - (1 if before_start else 0)
         near = (edge + step) % edges
         dot = nx * outlines.normal_x[i, near] + ny * outlines.normal_y[i, near]
-        if step == 0 or dot < SAME_FACE:
+        if step == 0 or dot < SAME_FACE or outlines.corner[i, near].inner:
             break
         edge = near
     return edge
@@ -97,33 +103,34 @@ def add_contact(
 
 @kernel
 def clip_contacts(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, swapped: bool,
-    edge: int, shift_x: float, shift_y: float, reach: float,
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, edge: int,
+    j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float,
 ) -> int:  # fmt: skip
-    """Add up to two contacts where the incident edge lies over the face of contact.
+    """Add up to two contacts of bodies a and b where the incident edge lies over the face.
 
-    The face belongs to body a, or to b if `swapped`. (shift_x, shift_y) moves the other body to
-    where it is at the time of entry. Returns the new number of contacts.
+    The face of contact is edge `edge` of polygon i, the incident edge is edge `other` of polygon j;
+    (shift_x, shift_y) moves j to where it is at the time of entry. Returns the new number of
+    contacts.
     """
-    i, j = (b, a) if swapped else (a, b)
-    other = incident_edge(outlines, i, edge, j, bodies[j].count)
     nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
     tx, ty = -ny, nx
     x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
-    end = edge + 1 if edge + 1 < bodies[i].count else 0
+    end = edge + 1 if edge + 1 < outlines.polygon[i].count else 0
     length = tx * (outlines.world_x[i, end] - x0) + ty * (outlines.world_y[i, end] - y0)
-    other_end = other + 1 if other + 1 < bodies[j].count else 0
+    other_end = other + 1 if other + 1 < outlines.polygon[j].count else 0
     # along the face, the incident edge runs from its end (s1) to its start (s2)
     x1, y1 = outlines.world_x[j, other_end], outlines.world_y[j, other_end]
     x2, y2 = outlines.world_x[j, other], outlines.world_y[j, other]
     s1 = tx * (x1 + shift_x - x0) + ty * (y1 + shift_y - y0)
     s2 = tx * (x2 + shift_x - x0) + ty * (y2 + shift_y - y0)
     g1, g2 = nx * (x1 - x0) + ny * (y1 - y0), nx * (x2 - x0) + ny * (y2 - y0)
-    low, high = max(s1, 0.0), min(s2, length)
+    # a corner of j that touches the next edge of a notch, too, may be a little beyond the face
+    start = -slack if outlines.corner[i, edge].reentrant else 0.0
+    stop = length + slack if outlines.corner[i, end].reentrant else length
+    low = s1 if s1 >= start else 0.0
+    high = s2 if s2 <= stop else length
     if high < low:
         return k
-    sign = 1.0 if swapped else -1.0  # the normal points to a
-    size = outlines.world_x.shape[1]
     slope = (g2 - g1) / (s2 - s1) if s2 > s1 else 0.0
     for which in range(2):
         s = low if which == 0 else high
@@ -133,30 +140,43 @@ def clip_contacts(
         if gap > reach:
             continue
         if which == 0:
-            own_corner = s1 < 0.0
+            own_corner = s1 < start
             corner, other_corner = edge, other_end
         else:
-            own_corner = s2 > length
+            own_corner = s2 > stop
             corner, other_corner = end, other
         if own_corner:  # a corner of i on the incident edge
-            owner_body, vertex = i, corner
+            k = add_corner(bodies, outlines, c, k, a, b, i, corner, i, edge, gap)
         else:
-            owner_body, vertex = j, other_corner
-        key = owner_body * size + vertex
-        add_contact(
-            c, k, a, b, key, 1 if owner_body == a else 0, bodies[b].surface,
-            outlines.world_x[owner_body, vertex], outlines.world_y[owner_body, vertex],
-            sign * nx, sign * ny, gap,
-        )  # fmt: skip
-        k += 1
+            k = add_corner(bodies, outlines, c, k, a, b, j, other_corner, i, edge, gap)
     return k
+
+
+@kernel
+def add_corner(
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, owner: int,
+    corner: int, i: int, edge: int, gap: float,
+) -> int:  # fmt: skip
+    """Add the contact of a corner of polygon `owner` with the face `edge` of polygon i.
+
+    Its key is that of the corner of the body, so that parts share the memory of contacts.
+    """
+    sign = 1.0 if outlines.polygon[i].body == b else -1.0  # the normal points to a
+    body = outlines.polygon[owner].body
+    key = body * outlines.world_x.shape[1] + outlines.corner[owner, corner].number
+    add_contact(
+        c, k, a, b, key, 1 if body == a else 0, bodies[b].surface,
+        outlines.world_x[owner, corner], outlines.world_y[owner, corner],
+        sign * outlines.normal_x[i, edge], sign * outlines.normal_y[i, edge], gap,
+    )  # fmt: skip
+    return k + 1
 
 
 @kernel
 def collide_pair(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, p: Parameters
 ) -> int:
-    """Add the contacts of bodies a and b to `c` from entry k; returns the new number."""
+    """Add the contacts of bodies a and b to `c` from entry k; returns the new number, or -1."""
     dt = p.dt
     ax, ay, aw = bodies[a].vx, bodies[a].vy, abs(bodies[a].omega) * bodies[a].radius
     dx, dy, spin = -ax * dt, -ay * dt, aw * dt
@@ -167,50 +187,109 @@ def collide_pair(
         spin += abs(bodies[b].omega) * bodies[b].radius * dt
         fall = 0.0
     spread = spin + fall + p.slack
-    na, nb = bodies[a].count, bodies[b].count
-    possible, time_a, gap_a, edge_a = face_of_contact(
-        outlines, a, na, b, nb, dx, dy, spread, p.slack
+    if bodies[a].parts == 1 and bodies[b].parts == 1:
+        return collide_parts(bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0)
+    first = k
+    k = collide_all_parts(
+        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack
+    )
+    if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
+        k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300)
+    return k
+
+
+@kernel
+def collide_all_parts(
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, dx: float,
+    dy: float, spread: float, slack: float, sunk: float,
+) -> int:  # fmt: skip
+    """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
+    first = k
+    for i in range(bodies[a].part, bodies[a].part + bodies[a].parts):
+        for j in range(bodies[b].part, bodies[b].part + bodies[b].parts):
+            if k + 2 > len(c):
+                return -1
+            found = collide_parts(bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk)
+            for new in range(k, found):
+                k = keep_nearest(c, first, k, new)
+    return k
+
+
+@kernel
+def keep_nearest(c: Contacts, first: int, k: int, new: int) -> int:
+    """Move contact `new` to entry k, or over one of first:k of the same corner with the same face.
+
+    Parts that share a corner, or a face that a cut ends at, find the same contact. Returns the new
+    number.
+    """
+    place = k
+    for m in range(first, k):
+        same = c[m].key == c[new].key and c[m].owner == c[new].owner
+        if same and c[m].nx * c[new].nx + c[m].ny * c[new].ny > SAME_FACE:
+            if c[m].gap <= c[new].gap:
+                return k
+            place = m
+    n = c[new]
+    add_contact(
+        c, place, n.a, n.b, n.key, n.owner, n.other, n.x, n.y, n.nx, n.ny, n.gap
+    )  # fmt: skip
+    return max(k, place + 1)
+
+
+@kernel
+def collide_parts(
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, j: int,
+    dx: float, dy: float, spread: float, slack: float, sunk: float,
+) -> int:  # fmt: skip
+    """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
+
+    (dx, dy) is the displacement of b relative to a over the step; see `face_of_contact`.
+    """
+    ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
+    possible, time_i, gap_i, edge_i = face_of_contact(
+        outlines, i, ni, j, nj, dx, dy, spread, slack, sunk
     )
     if not possible:
         return k
-    possible, time_b, gap_b, edge_b = face_of_contact(
-        outlines, b, nb, a, na, -dx, -dy, spread, p.slack
+    possible, time_j, gap_j, edge_j = face_of_contact(
+        outlines, j, nj, i, ni, -dx, -dy, spread, slack, sunk
     )
     if not possible:
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
-    swapped = time_b > time_a or (time_b == time_a and gap_b > gap_a + 0.02 * p.slack)
-    reach = (dx * dx + dy * dy) ** 0.5 + spread
+    of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
+    reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
+    touching = max(gap_i, gap_j) <= slack
     # corner beside corner, the better face may miss the other body where the second one does not
-    for face in range(2):
-        of_b = swapped if face == 0 else not swapped
-        edge, time = (edge_b, time_b) if of_b else (edge_a, time_a)
-        shift = min(time, 1.0) if not of_b else -min(time, 1.0)
+    for _ in range(2):
+        face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
+        facing = incident_edge(outlines, face, edge, other, outlines.polygon[other].count)
+        if outlines.corner[face, edge].inner or outlines.corner[other, facing].inner:
+            return k
+        shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
         found = clip_contacts(
-            bodies, outlines, c, k, a, b, of_b, edge, dx * shift, dy * shift, reach
-        )
-        if found > k or max(gap_a, gap_b) > p.slack:
+            bodies, outlines, c, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
+            reach, slack,
+        )  # fmt: skip
+        if found > k or not touching:
             return found
-    return deepest_corner(bodies, outlines, c, k, a, b, swapped, edge_b if swapped else edge_a)
+        of_j = not of_j
+    face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
+    return deepest_corner(bodies, outlines, c, k, a, b, face, edge, other)
 
 
 @kernel
 def deepest_corner(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, swapped: bool,
-    edge: int,
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, edge: int,
+    j: int,
 ) -> int:  # fmt: skip
-    """Add the contact of the nearest corner of one body with the line of a face of the other.
+    """Add the contact of the nearest corner of polygon j with the line of an edge of polygon i.
 
     For bodies that touch although the face does not reach over the corner: nearly parallel edges
     in a row, where rounding decides which of them is the face.
     """
-    i, j = (b, a) if swapped else (a, b)
+    n = outlines.polygon[j].count
     nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
     x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
-    gap, corner = axis_gap(nx, ny, x0, y0, outlines.world_x, outlines.world_y, j, bodies[j].count)
-    sign = 1.0 if swapped else -1.0
-    add_contact(
-        c, k, a, b, j * outlines.world_x.shape[1] + corner, 1 if j == a else 0, bodies[b].surface,
-        outlines.world_x[j, corner], outlines.world_y[j, corner], sign * nx, sign * ny, gap,
-    )  # fmt: skip
-    return k + 1
+    gap, corner = axis_gap(nx, ny, x0, y0, outlines.world_x, outlines.world_y, j, n)
+    return add_corner(bodies, outlines, c, k, a, b, j, corner, i, edge, gap)

@@ -1,7 +1,8 @@
 """Contacts of a block with the terrain over a step.
 
 Corners of the block against segments, and convex corners of the terrain against edges of the
-block. Segments are lengthened into the ground at concave corners, or blocks fall through there.
+convex parts of the block. Segments are lengthened into the ground at concave corners, or blocks
+fall through there.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import math
 
 from rigdda.constants import SAME_FACE, TERRAIN
-from rigdda.contact.narrow_phase import add_contact
+from rigdda.contact.narrow_phase import add_contact, keep_nearest
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Contacts, Ground, Outlines, Parameters, Work
 
@@ -46,6 +47,58 @@ def shadowed(ground: Ground, s: int, x: float, y: float, gap: float) -> bool:
 
 
 @kernel
+def crosses_segment(ground: Ground, s: int, x0: float, y0: float, x1: float, y1: float) -> bool:
+    """Return whether the line from (x0, y0) to (x1, y1) crosses segment s."""
+    g0, g1 = below_segment(ground, s, x0, y0), below_segment(ground, s, x1, y1)
+    if g0 * g1 >= 0.0:
+        return False
+    x, y = x0 + g0 / (g0 - g1) * (x1 - x0), y0 + g0 / (g0 - g1) * (y1 - y0)
+    tx, ty = ground.normal_y[s], -ground.normal_x[s]
+    return 0.0 < tx * (x - ground.x[s]) + ty * (y - ground.y[s]) < ground.length[s]
+
+
+@kernel
+def beneath_roof(
+    bodies: Bodies, outlines: Outlines, ground: Ground, a: int, vertex: int, s: int, gap: float
+) -> bool:
+    """Return whether a corner of block a under segment s lies in the air beneath an overhang.
+
+    Another segment is between them then. A corner that was pushed right through something thin is
+    no such case: the block still reaches through segment s.
+    """
+    x, y = outlines.world_x[a, vertex], outlines.world_y[a, vertex]
+    foot_x, foot_y = x - gap * ground.normal_x[s], y - gap * ground.normal_y[s]
+    between = False
+    for other in range(len(ground.length)):
+        between = between or crosses_segment(ground, other, x, y, foot_x, foot_y)
+    if not between:
+        return False
+    for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):
+        n, mean_x, mean_y, its = outlines.polygon[part].count, 0.0, 0.0, False
+        for k in range(n):
+            its = its or outlines.corner[part, k].number == vertex
+            mean_x += outlines.world_x[part, k] / n
+            mean_y += outlines.world_y[part, k] / n
+        if its and not crosses_segment(ground, s, mean_x, mean_y, x, y):
+            return True
+    return False
+
+
+@kernel
+def place_of_hit(
+    bodies: Bodies, a: int, x: float, y: float, nx: float, ny: float, gap: float, dt: float
+) -> tuple[float, float]:
+    """Return where in the step a corner of block a meets a line, or (x, y) if it never does."""
+    if gap <= 0.0:
+        return x, y
+    dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
+    dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
+    approach = -(nx * dx + ny * dy)
+    time = min(gap / approach, 1.0) if approach > 0.0 else 0.0
+    return x + time * dx, y + time * dy
+
+
+@kernel
 def corners_on_segment(
     bodies: Bodies,
     outlines: Outlines,
@@ -63,6 +116,7 @@ def corners_on_segment(
     spin = abs(bodies[a].omega) * bodies[a].radius * dt
     speed = math.hypot(bodies[a].vx, bodies[a].vy) * dt
     reach = speed + spin + p.gravity * dt * dt + p.slack
+    concave = bodies[a].parts > 1
     lowest = below_segment(ground, s, bodies[a].x, bodies[a].y) - bodies[a].radius
     if lowest > reach:
         return k
@@ -72,17 +126,14 @@ def corners_on_segment(
         gap = below_segment(ground, s, x, y)
         if gap > reach or gap < -bodies[a].radius:
             continue
-        hit_x, hit_y = x, y
-        if gap > 0.0:  # where the corner meets the line
-            dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
-            dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
-            approach = -(nx * dx + ny * dy)
-            if approach > 0.0:
-                time = min(gap / approach, 1.0)
-                hit_x, hit_y = x + time * dx, y + time * dy
+        if concave and outlines.corner[a, vertex].reentrant:
+            continue
+        hit_x, hit_y = place_of_hit(bodies, a, x, y, nx, ny, gap, dt)
         if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0)):
             continue
         if shadowed(ground, s, hit_x, hit_y, gap):
+            continue
+        if gap < -p.slack and beneath_roof(bodies, outlines, ground, a, vertex, s, gap):
             continue
         again = False
         for m in range(first, k):  # one face, cut in two segments
@@ -104,49 +155,54 @@ def edge_on_ridge(
     c: Contacts,
     k: int,
     a: int,
+    part: int,
     corner: int,
     p: Parameters,
 ) -> int:
-    """Add the contact of a convex terrain corner with an edge of block a, if there is one.
+    """Add the contact of a convex terrain corner with an edge of a part of block a, if it has one.
 
     The edge is the last to separate the corner from the block; its normal must lie between those
     of the two segments, or a corner of the block is in contact instead.
     """
     x, y = ground.x[corner], ground.y[corner]
-    dt, n = p.dt, bodies[a].count
+    dt, n = p.dt, outlines.polygon[part].count
     dx = -(bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
     dy = -(bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
     reach = math.hypot(dx, dy) + p.gravity * dt * dt + p.slack
     if math.hypot(x - bodies[a].x, y - bodies[a].y) > bodies[a].radius + reach:
         return k
-    left, right = corner - 1, corner
+    left, right, concave = corner - 1, corner, part != a
     best, best_time, best_gap = -1, -1.0, -1e300
     for edge in range(n):
-        nx, ny = outlines.normal_x[a, edge], outlines.normal_y[a, edge]
-        gap = nx * (x - outlines.world_x[a, edge]) + ny * (y - outlines.world_y[a, edge])
+        nx, ny = outlines.normal_x[part, edge], outlines.normal_y[part, edge]
+        gap = nx * (x - outlines.world_x[part, edge]) + ny * (y - outlines.world_y[part, edge])
         approach = -(nx * dx + ny * dy)
         if gap > max(approach, 0.0) + p.gravity * dt * dt + p.slack:
             return k
+        inner = concave and outlines.corner[part, edge].inner
+        if inner and gap <= 0.0:
+            continue  # a corner inside the part is pushed out of the block, not into the next part
         time = 0.0
         if gap > p.slack:
             time = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
         # the normal out of the ground is opposite to that of the edge
         after_left = ground.normal_x[left] * -ny - ground.normal_y[left] * -nx <= 1e-9
         before_right = -nx * ground.normal_y[right] + ny * ground.normal_x[right] <= 1e-9
-        if not (after_left and before_right):
+        fits = after_left and before_right and not inner
+        if not fits:
             gap -= 0.1 * p.slack  # near a tie prefer an edge that fits
         if time > best_time or (time == best_time and gap > best_gap):
-            best, best_time, best_gap = (edge if after_left and before_right else -1), time, gap
+            best, best_time, best_gap = (edge if fits else -1), time, gap
     if best < 0:
         return k
-    nx, ny = outlines.normal_x[a, best], outlines.normal_y[a, best]
-    gap = nx * (x - outlines.world_x[a, best]) + ny * (y - outlines.world_y[a, best])
+    nx, ny = outlines.normal_x[part, best], outlines.normal_y[part, best]
+    gap = nx * (x - outlines.world_x[part, best]) + ny * (y - outlines.world_y[part, best])
     time = min(best_time, 1.0) if gap > 0.0 else 0.0
     end = best + 1 if best + 1 < n else 0
-    ex = outlines.world_x[a, end] - outlines.world_x[a, best]
-    ey = outlines.world_y[a, end] - outlines.world_y[a, best]
-    along = (x + time * dx - outlines.world_x[a, best]) * ex
-    along += (y + time * dy - outlines.world_y[a, best]) * ey
+    ex = outlines.world_x[part, end] - outlines.world_x[part, best]
+    ey = outlines.world_y[part, end] - outlines.world_y[part, best]
+    along = (x + time * dx - outlines.world_x[part, best]) * ex
+    along += (y + time * dy - outlines.world_y[part, best]) * ey
     # a corner inside the block counts even where edges in one line make the choice of edge a tie
     if gap > 0.0 and (along < 0.0 or along > ex * ex + ey * ey):
         return k
@@ -189,9 +245,11 @@ def collide_terrain(
                 or max(ground.y[s], ground.y[s + 1]) < work.low_y[a]
             ):
                 continue
-            if k + outlines.world_x.shape[1] + 2 > len(c):
+            if k + outlines.world_x.shape[1] + bodies[a].parts + 2 > len(c):
                 return -1
             k = corners_on_segment(bodies, outlines, ground, c, k, first, a, s, p)
             if ground.turn[s] < 0.0:
-                k = edge_on_ridge(bodies, outlines, ground, c, k, a, s, p)
+                for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):
+                    found = edge_on_ridge(bodies, outlines, ground, c, k, a, part, s, p)
+                    k = keep_nearest(c, first, k, k) if found > k and part != a else found
     return k

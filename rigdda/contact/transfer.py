@@ -44,8 +44,10 @@ def recall_from(
 
 
 @kernel
-def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray) -> None:
+def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray, slack: float) -> None:
     """Give each new contact in low:high its memory; without one it starts OPEN.
+
+    A contact that has come apart by more than `slack` starts OPEN, too: it closes by an impact.
 
     Bodies change sides (a, b) when one of them falls asleep or wakes, so a pair is looked up both
     ways; its forces keep their sign, since normal and shear turn round together.
@@ -54,6 +56,8 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray) -> N
         c[k].state, c[k].kind = OPEN, NEW
         c[k].memory_normal = c[k].memory_shear = c[k].stiffness = 0.0
         c[k].start_normal = c[k].start_shear = 0.0
+        if c[k].gap > slack:
+            continue
         a, b = c[k].a, c[k].b
         found = recall_from(c, k, old, first[a], first[a + 1], b, 1.0)
         if not found and b != TERRAIN:

@@ -22,13 +22,20 @@ def cut_site(seed: int) -> list[np.ndarray]:
 
 
 def check(source: shapely.Polygon, blocks: list[np.ndarray], block_area: float) -> None:
-    """Assert what every cut must give: all the rock, in convex blocks that do not overlap."""
+    """Assert what every cut must give: all the rock, in blocks that do not overlap, no chips.
+
+    A block is concave only where it took in a chip, so what it lacks to be convex is small.
+    """
     cells = [shapely.Polygon(b) for b in blocks]
     areas = np.array([c.area for c in cells])
     assert areas.sum() == pytest.approx(source.area, rel=1e-9)
     assert areas.mean() == pytest.approx(block_area, rel=0.1)
-    for block in blocks:
-        Block(block)  # raises unless convex
+    assert areas.min() > 0.1 * block_area
+    for block, cell in zip(blocks, cells, strict=True):
+        Block(block)  # raises unless simple
+        assert cell.convex_hull.area - cell.area < 0.5 * block_area
+    concave = sum(cell.convex_hull.area - cell.area > 1e-6 * cell.area for cell in cells)
+    assert concave <= 0.05 * len(cells) + 1
     tree = shapely.STRtree(cells)
     for i, j in tree.query(cells, predicate="intersects").T:
         if i < j:

@@ -67,7 +67,7 @@ def empty(path):
 CASES = {
     "crossing polygon": (lambda _: Block([(0, 0), (1, 1), (1, 0), (0, 1)]), "block vertices"),
     "no area": (lambda _: Block([(0, 0), (1, 0), (2, 0)]), "block vertices"),
-    "concave": (lambda _: Block([(0, 0), (2, 0), (2, 2), (1, 0.5)]), "block vertices"),
+    "repeated corner": (lambda _: Block([(0, 0), (2, 0), (2, 0), (1, 1)]), "block vertices[1]"),
     "two corners": (lambda _: Block([(0, 0), (1, 0)]), "block vertices"),
     "NaN corner": (lambda _: Block([(0, 0), (1, 0), (NAN, 1)]), "block vertices[2]"),
     "words": (lambda _: Block("words"), "block vertices"),
@@ -86,6 +86,7 @@ CASES = {
     "restitution 1.5": (lambda _: Surface(restitution=1.5), "restitution"),
     "NaN friction": (lambda _: Surface(friction_deg=NAN), "friction_deg"),
     "dt 0": (lambda _: Settings(dt=0.0), "dt"),
+    "dt too long": (lambda _: Settings(dt=0.021), "dt"),
     "NaN dt": (lambda _: Settings(dt=NAN), "dt"),
     "no iterations": (lambda _: Settings(open_close_iterations=0), "open_close_iterations"),
     "wall off the terrain": (lambda _: scene(barriers=(Wall(500.0, 2.0),)), "wall x"),

@@ -1,7 +1,7 @@
 """Arrays that the kernels work on: structured arrays, named tuples of arrays. `pack` fills them.
 
-M bodies: the N blocks of the scene, then its B barriers. P: most corners of a body. S: terrain
-segments. C: room for contacts.
+M bodies: the N blocks of the scene, its gravity walls, then its walls and fences. B: barriers. P: most
+corners of a body. S: terrain segments. C: room for contacts.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class Ground(NamedTuple):
 class Matrix(NamedTuple):
     """Block-sparse symmetric system of one island: n blocks, 3x3 each."""
 
-    diagonal: Floats  # (N, 3, 3)
+    diagonal: Floats  # (N, 3, 3), N with the gravity walls
     off: Floats  # (pairs, 3, 3) row block pair_i, column block pair_j
     pair_i: Ints
     pair_j: Ints
@@ -151,6 +151,9 @@ class Gauges(NamedTuple):
     station: Floats  # (K,) ascending chainages [m]
     station_ground: Floats  # (K,) elevation of the highest ground there [m]
     next_station: Ints  # (N,) first station a block has not passed
+    barrier: Ints  # (M,) barrier that a body is, -1: rock
+    capacity: Floats  # (B,) energy that a barrier absorbs before it fails [J], inf: it does not
+    fences: int  # barriers that can fail
     barrier_ground: Floats  # (B,) elevation from which impact heights count [m]
     last_touch: Floats  # (N, B) time of the last touch [s]
     absorbed: Floats  # (B,) [J]
@@ -162,7 +165,7 @@ class Gauges(NamedTuple):
 class Parameters(NamedTuple):
     """Numbers of the scene and the settings."""
 
-    blocks: int
+    blocks: int  # bodies that may move: the blocks of the scene and its gravity walls
     dt: float
     gravity: float
     damping: float

@@ -79,7 +79,7 @@ BREAK_TOLERANCE = 1e-4
 """Share of its capacity by which a failing fence may miss it [-]."""
 
 BREAK_SOLVES = 8
-"""Most solutions for the speed with which blocks pass a failing fence; one does for a centred hit."""
+"""Most solutions for the speed with which blocks pass a failing fence; a centred hit takes one."""
 
 SAME_NORMAL = 0.7
 """Least cosine between the normals of one vertex's contact in two steps that share memory [-]."""

@@ -1,14 +1,14 @@
 """Fences: they fail when the energy that they took would exceed their capacity.
 
-An impact on a fence is plastic. If the work of its contact forces in a step would be more than what
-is left of its capacity, the blocks pass through it with a share s of their closing velocities: the
-contacts aim at the velocity -s u_c instead of 0. For impacts in proportion the impulse is then 1 - s
-and the mean velocity 1 + s times that of the plastic impact, so that
+An impact on a fence is plastic. If the work of its contact forces in a step would be more than
+what is left of its capacity, the blocks pass through it with a share s of their closing velocities:
+the contacts aim at the velocity -s u_c instead of 0. For impacts in proportion the impulse is then
+1 - s and the mean velocity 1 + s times that of the plastic impact, so that
 
     W(s) = (1 - s^2) W(0).
 
-The s for which W(s) is what is left is found from there by interpolation in s^2, since friction and
-neighbours bend the law.
+The s for which W(s) is what is left is found from there by regula falsi in s^2, since friction and
+neighbours bend the law (Dowell and Jarratt 1971, BIT 11, 168-174).
 """
 
 from __future__ import annotations
@@ -83,6 +83,7 @@ def break_through(
     # squares of shares with which it takes too much and too little, and by how much
     small, over = 0.0, taken - left
     large, under = 1.0, -left
+    side = 0
     square = 1.0 if left <= 0.0 else 1.0 - left / taken
     for _ in range(BREAK_SOLVES):
         let_pass(c, work, low, high, fence, math.sqrt(square), p.dt)
@@ -90,10 +91,15 @@ def break_through(
         off = work_taken(c, m, work, low, high, fence) - left
         if abs(off) <= tolerance:
             return
+        # regula falsi after Illinois: an end that stays counts half from its second time on
         if off > 0.0:
             small, over = square, off
+            under *= 0.5 if side > 0 else 1.0
+            side = 1
         else:
             large, under = square, off
+            over *= 0.5 if side < 0 else 1.0
+            side = -1
         square = small + (large - small) * over / (over - under)
     if off > 0.0:
         let_go(c, work, low, high, fence, p.dt)
@@ -106,6 +112,8 @@ def limit_fences(
     p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Let an island that was settled break the fences that would take more than they can."""
+    if gauges.fences == 0:
+        return
     low, high = work.contact_start[island], work.contact_start[island + 1]
     for item in range(low, high):
         k = work.contact_item[item]
@@ -124,15 +132,13 @@ def limit_fences(
             counters[6] = write_event(
                 gauges, counters[6], time, FAILED, bodies, c[k].a, barrier, c[k].x, c[k].y, height
             )
-        break_through(
-            bodies, c, m, work, island, fence, left, taken, tolerance, p, counters
-        )
+        break_through(bodies, c, m, work, island, fence, left, taken, tolerance, p, counters)
 
 
 @kernel
-def wake_behind(bodies: Bodies, c: Contacts, count: int, p: Parameters) -> None:
+def wake_behind(bodies: Bodies, c: Contacts, count: int, gauges: Gauges, p: Parameters) -> None:
     """Wake what sleeps against a fence that failed in this step."""
-    for k in range(count):
+    for k in range(count if gauges.fences > 0 else 0):
         b, a = c[k].b, c[k].a
         if b >= p.blocks and bodies[b].status == RETIRED and bodies[a].status == ASLEEP:
             wake_island(bodies, bodies[a].island, p.blocks)

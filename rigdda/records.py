@@ -1,7 +1,7 @@
 """Arrays that the kernels work on: structured arrays, named tuples of arrays. `pack` fills them.
 
-M bodies: the N blocks of the scene, its gravity walls, then its walls and fences. B: barriers. P: most
-corners of a body. S: terrain segments. C: room for contacts.
+M bodies: the N blocks of the scene, its gravity walls, then its walls and fences. B: barriers. P:
+most corners of a body. S: terrain segments. C: room for contacts.
 """
 
 from __future__ import annotations

@@ -35,8 +35,9 @@ CONTACT = np.dtype(
         ("penetration", "f8"),
     ]
 )
-"""One contact. block_b: -1 terrain, N + i barrier i; block_a may be one, a gravity wall. The normal points from b to a; shear is
-positive along the normal turned by +90 degrees. Forces act on a [N]; penetration [m]."""
+"""One contact. block_b: -1 terrain, N + i barrier i; block_a may be one, a gravity wall. The
+normal points from b to a; shear is positive along the normal turned by +90 degrees. Forces act on a
+[N]; penetration [m]."""
 
 STATES = np.array(["open", "stick", "slip"])
 

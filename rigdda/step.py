@@ -129,8 +129,7 @@ def solve_and_move(
         c0, c1 = work.contact_start[s], work.contact_start[s + 1]
         if c1 > c0:
             open_close(bodies, c, m, work, s, p, counters)
-            if gauges.fences > 0:
-                limit_fences(bodies, c, m, work, s, gauges, time, p, counters)
+            limit_fences(bodies, c, m, work, s, gauges, time, p, counters)
             counters[6] = note_hits(bodies, c, work, c0, c1, gauges, counters[6], time)
         struck = is_struck(c, work, c0, c1)
         for item in range(c0, c1):
@@ -153,8 +152,7 @@ def solve_and_move(
                 bodies[c[k].b].touching = 1
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
-        if gauges.fences > 0:
-            wake_behind(bodies, c, count, p)
+        wake_behind(bodies, c, count, gauges, p)
     return bad
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from agents.protocol import Entry
 from envs import Evaluation
 from envs.evaluation import student_interval
-from rigdda import Layout, Outcome, Site, Wall
+from rigdda import Layout, Outcome, Site
+from rigdda.barriers import describe, to_tables
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
@@ -39,6 +40,9 @@ HIT = {
     "total_energy": ("energy of all hits", "kJ", 1e-3),
     "absorbed_energy": ("energy absorbed", "kJ", 1e-3),
     "overtopped": ("blocks that passed", "-", 1.0),
+    "caught": ("mass at rest behind or in it", "%", 100.0),
+    "failed": ("failed", "-", 1.0),
+    "displacement": ("displacement", "m", 1.0),
 }
 """The same of a barrier."""
 
@@ -46,7 +50,7 @@ HIT = {
 class EvaluationsFile:
     """A CSV file with one row an evaluated layout, written as they come.
 
-    `barriers` is a JSON list of [x, height, thickness] in metres. Usable as a context manager.
+    `barriers` is a JSON list of tables as in a layout file. Usable as a context manager.
     """
 
     FIELDS = (
@@ -68,7 +72,7 @@ class EvaluationsFile:
     def add(self, entry: Entry) -> None:
         """Write one row and flush it."""
         e = entry.evaluation
-        barriers = json.dumps([[b.x, b.height, b.thickness] for b in e.layout])
+        barriers = json.dumps(to_tables(e.layout))
         numbers = (len(e.seeds), e.objective, *e.ci, e.debris, *e.debris_ci, e.cost)
         self._rows.writerow((entry.simulations, entry.stage, *numbers, barriers))
         self._file.flush()
@@ -133,11 +137,6 @@ def sites(found: Iterable[Site]) -> Table:
         words = shorten(site.description, 120, placeholder=" ...")
         table.add_row(site.name, f"{max(heights) - min(heights):g}", blocks, road, words)
     return table
-
-
-def describe(wall: Wall) -> str:
-    """Return a barrier in words."""
-    return f"wall at {wall.x:.1f} m, {wall.height:.1f} m high, {wall.thickness:.1f} m thick"
 
 
 def _table(head: Sequence[str]) -> Table:

@@ -460,6 +460,23 @@ def to_tables(layout: Sequence[Barrier]) -> list[dict[str, Any]]:
     return [msgspec.to_builtins(barrier) for barrier in layout]
 
 
+def describe(barrier: Barrier, digits: int = 1) -> str:
+    """Return a barrier in words, lengths with so many digits after the point."""
+
+    def metres(value: float) -> str:
+        return f"{value:.{digits}f} m"
+
+    head = f"{barrier.words} at {metres(barrier.x)}"
+    match barrier:
+        case Ditch():
+            return f"{head}, {metres(barrier.depth)} deep, {metres(barrier.width)} wide"
+        case Embankment():
+            return f"{head}, {metres(barrier.height)} high, crest {metres(barrier.width)} wide"
+        case Fence():
+            return f"{head}, {metres(barrier.height)} high, {barrier.capacity / 1e3:.0f} kJ"
+    return f"{head}, {metres(barrier.height)} high, {metres(barrier.thickness)} thick"
+
+
 def _under(barrier: Standing, ground: Terrain) -> tuple[Floats, Floats]:
     """Return chainages and elevations of the ground's corners under a barrier, its faces included.
 

@@ -21,7 +21,9 @@ def write_event(
 ) -> int:  # fmt: skip
     """Write event n of body i; returns the new number of events."""
     event = gauges.event[n]
-    event.time, event.kind, event.block, event.target = time, kind, i, target
+    rocks = len(gauges.next_station)
+    event.time, event.kind, event.target = time, kind, target
+    event.block = i if i < rocks else rocks + gauges.barrier[i]
     event.x, event.y, event.height = x, y, height
     event.speed = math.hypot(bodies[i].vx, bodies[i].vy)
     event.energy = kinetic_energy(bodies, i)
@@ -30,11 +32,14 @@ def write_event(
 
 @kernel
 def barrier_contact(gauges: Gauges, a: int, b: int) -> tuple[int, int]:
-    """Return block and barrier of a contact of bodies a and b; barrier -1 if it is none of both."""
+    """Return what strikes and what barrier it strikes in a contact of a and b, -1 for no barrier.
+
+    A gravity wall that is carried along strikes other barriers.
+    """
     rocks = len(gauges.next_station)
-    if b >= rocks and a < rocks:
+    if b >= rocks:
         return a, gauges.barrier[b]
-    if a >= rocks and 0 <= b < rocks:
+    if a >= rocks and b >= 0:
         return b, gauges.barrier[a]
     return a, -1
 

@@ -155,7 +155,7 @@ class Gauges(NamedTuple):
     capacity: Floats  # (B,) energy that a barrier absorbs before it fails [J], inf: it does not
     fences: int  # barriers that can fail
     barrier_ground: Floats  # (B,) elevation from which impact heights count [m]
-    last_touch: Floats  # (N, B) time of the last touch [s]
+    last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
     absorbed: Floats  # (B,) [J]
     watch: Floats  # (2,) interval of x
     watch_energy: Floats  # (N,) largest energy in it [J]

@@ -18,6 +18,7 @@ from rerun.chunk import RrdReader
 import rigdda
 from agents import DESIGNERS
 from rigdda import Site
+from rigdda.barriers import to_tables
 
 TINY = ("--simulations", "24", "--verify", "4")
 COMMANDS = ("sites", "simulate", "design", "replay")
@@ -85,12 +86,10 @@ def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -
         kept = line["evaluation"]
         assert float(row["objective"]) == kept["objective"]
         assert int(row["releases"]) == len(kept["seeds"])
-        assert json.loads(row["barriers"]) == [
-            [b["x"], b["height"], b["thickness"]] for b in kept["layout"]
-        ]
+        assert json.loads(row["barriers"]) == kept["layout"]
     assert {row["stage"] for row in table} == {"search", "final", "verification"}
     assert [row["stage"] for row in table[-3:]] == 3 * ["verification"]
-    assert json.loads(table[-1]["barriers"]) == [[b.x, b.height, b.thickness] for b in layout]
+    assert json.loads(table[-1]["barriers"]) == to_tables(layout)
     assert int(table[-1]["simulations"]) <= 24
     for name in ("profile.png", "search.png"):
         width, height = png_size(folder / name)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import gymnasium
 import numpy as np
 import pytest
@@ -60,7 +62,7 @@ def test_the_range_of_every_kind(kind, least, middle, most):
 def test_encoding_is_undone_by_decoding(vector):
     layout = encoding.decode(ZONE, vector, ALL)
     assert encoding.check_layout(ZONE, layout) == layout
-    for before, after in zip(layout, layout[1:], strict=False):
+    for before, after in pairwise(layout):
         assert after.x - before.x - before.extent >= encoding.MIN_GAP - 1e-8
     code = encoding.encode(ZONE, layout, len(vector) // SLOT, ALL)
     assert code.shape == vector.shape and np.abs(code).max() <= 1.0
@@ -104,9 +106,12 @@ def test_every_vector_stands_for_a_layout_that_can_be_built(vector):
 
 
 def test_earthworks_that_do_not_fit_the_slope_are_absent():
+    ditches = DesignProblem("quick", 1, ("ditch",))
+    assert ditches.decode([0.0, 1.0, -1.0]) == ()  # deep and narrow on the steep part
+    assert len(ditches.decode([1.0, 0.0, 0.0])) == 1
     problem = DesignProblem("quick", 1, ("embankment",))
-    assert problem.decode([0.0, 0.5, 0.0]) == ()  # on the steep part
-    (dam,) = problem.decode([0.98, -0.6, -1.0])  # at the toe
+    assert problem.decode([1.0, 0.0, 0.0]) == ()  # the ground falls: it ends beyond the zone
+    (dam,) = problem.decode([0.95, -0.6, -1.0])  # at the toe
     assert dam.outline(problem.site.profile)[:, 0].max() <= problem.site.barrier_zone.end
 
 

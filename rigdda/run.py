@@ -36,7 +36,7 @@ EVENT = np.dtype(
         ("energy", "f8"),
     ]
 )
-"""One event. block: N + i for barrier i, a gravity wall that hits or breaks another barrier. target:
+"""One event. block: N + i for barrier i, a gravity wall that hits or breaks another one. target:
 index of the barrier or station. x, y: contact point of a hit or a failure, centroid at a crossing
 [m]. height: of that point above the highest ground there, above 0 where there is none [m]. speed:
 of the centroid [m/s]. energy: translational and rotational, just before a hit or a failure [J]."""

@@ -16,8 +16,8 @@ import numpy as np
 from agents.protocol import Entry
 from envs import Evaluation
 from envs.evaluation import student_interval
-from rigdda import Layout, Outcome, Site
-from rigdda.barriers import describe, to_tables
+from rigdda import Fence, GravityWall, Layout, Outcome, Site
+from rigdda.barriers import Earthwork, describe, to_tables
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
@@ -45,6 +45,9 @@ HIT = {
     "displacement": ("displacement", "m", 1.0),
 }
 """The same of a barrier."""
+
+ONLY = {"failed": Fence, "displacement": GravityWall}
+"""Kind of which alone a field of a barrier says anything."""
 
 
 class EvaluationsFile:
@@ -109,10 +112,15 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
         add(words, unit, factor, [getattr(outcome, name) for outcome in results])
     run_out = [outcome.run_out[1] for outcome in results]
     add("run-out of 95 % of the mass", "m", 1.0, run_out, -math.inf)
-    for i, wall in enumerate(layout):
+    for i, barrier in enumerate(layout):
         table.add_section()
-        table.add_row(describe(wall))
+        table.add_row(describe(barrier))
+        earthwork = isinstance(barrier, Earthwork)
         for name, (words, unit, factor) in HIT.items():
+            if earthwork and name not in ("overtopped", "caught"):
+                continue
+            if not isinstance(barrier, ONLY.get(name, object)):
+                continue
             add(f"  {words}", unit, factor, [getattr(o.barriers[i], name) for o in results])
     return table
 

@@ -147,6 +147,24 @@ def test_simulate_writes_what_it_says(toml: Path, tmp_path: Path) -> None:
         assert name in words
 
 
+def test_simulate_takes_every_kind(toml: Path, tmp_path: Path) -> None:
+    layout = (
+        rigdda.Fence(12.0, 2.0, 5e4),
+        rigdda.GravityWall(16.0, 1.0),
+        rigdda.Ditch(20.2, 0.5, 1.0),
+        rigdda.Embankment(21.3, 0.3, 0.2),
+    )
+    rigdda.save_layout(layout, tmp_path / "layout.json")
+    options = ("--releases", 1, "--layout", "layout.json", "--out", "o")
+    words = run("simulate", toml, *options, folder=tmp_path)
+    assert rigdda.Run.load(tmp_path / "o/run.npz").scene.barriers == layout
+    assert png_size(tmp_path / "o/profile.png")[0] > 900
+    for name in ("fence at 12.0 m", "gravity wall at", "ditch at", "embankment at", "failed"):
+        assert name in words
+    made = run("replay", toml, "--layout", "layout.json", "--out", "r", folder=tmp_path)
+    assert (tmp_path / made.strip()).is_file()
+
+
 def test_replay_makes_an_episode_and_says_where(toml: Path, tmp_path: Path) -> None:
     words = run("replay", toml, "--seed", 2, "--out", "o", folder=tmp_path)
     file = tmp_path / words.strip()

@@ -183,7 +183,7 @@ def _reach(
 ) -> NDArray[np.bool_]:
     """Return which centroids (x, y) a barrier holds at the end, as `Outcome` says."""
     scene, barrier = run.scene, run.scene.barriers[index]
-    if _state(run, index) in ("failed", "overturned"):
+    if state_of(run, index) in ("failed", "overturned"):
         return np.zeros(len(x), dtype=bool)
     rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
     corners = run.outline(index)
@@ -197,7 +197,7 @@ def _reach(
     return (x < face) & (y < top + rise * (face - x))
 
 
-def _state(run: Run, index: int) -> str:
+def state_of(run: Run, index: int) -> str:
     """Return the state of a barrier at the end."""
     barrier = run.scene.barriers[index]
     if math.isfinite(run.failure(index)):
@@ -230,6 +230,6 @@ def _barrier(run: Run, index: int, passed: NDArray[np.float64], caught: float) -
         overtopped=int((uphill & np.isfinite(passed) & (passed < failure)).sum()),
         failed=math.isfinite(failure),
         caught=caught,
-        state=_state(run, index),
+        state=state_of(run, index),
         displacement=_displacement(run, index),
     )

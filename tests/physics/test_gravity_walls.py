@@ -21,6 +21,7 @@ from rigdda import (
     Wall,
 )
 from rigdda.geometry import polygon_properties
+from rigdda.outcome import state_of
 
 CONCRETE = 2400.0
 
@@ -147,3 +148,15 @@ def test_runs_with_every_kind_are_stored(tmp_path):
     again = Run.load(tmp_path / "run.npz")
     assert again.scene.barriers == barriers
     np.testing.assert_array_equal(again.barrier_poses, run.barrier_poses)
+
+
+@pytest.mark.parametrize(
+    ("share", "at", "friction_deg", "state"),
+    [(0.9, 1.9, 60.0, "stands"), (1.3, 0.5, 20.0, "slid"), (1.5, 1.9, 60.0, "overturned")],
+)
+def test_the_state_at_the_end_is_told(share, at, friction_deg, state):
+    wall = GravityWall(0.5, 2.0, 1.0)
+    weight = CONCRETE * GRAVITY * 2.0
+    limit = weight * min(math.tan(math.radians(friction_deg)), 0.5 / at)
+    run = Simulation(pushed(share * limit, at, wall, friction_deg)).run(5.0)
+    assert state_of(run, 0) == state

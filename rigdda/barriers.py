@@ -162,11 +162,11 @@ class GravityWall(_Barrier, frozen=True, tag="gravity_wall"):
 class Fence(_Barrier, frozen=True, tag="fence"):
     """A flexible fence that absorbs energy up to its capacity, then fails.
 
-    Impacts on it are plastic whatever its surface. When the work that its contact forces take
-    from blocks would exceed what is left of the capacity, it fails: the block goes on with the
-    energy that is left, and the fence is gone. It stays upright until then; a pile that leans on
-    it does no work and does not break it. Forces that blocks exchange within one step, a block
-    that hits one at rest against the fence, are borne by these blocks.
+    Impacts on it are plastic whatever its surface. It takes the work of its contact forces, and
+    of a blow on a block at rest against it what that block passes on. When this would exceed what
+    is left of the capacity, it fails: the block goes on with the energy that is left, and the
+    fence is gone. It stays upright until then; the weight of a pile that leans on it does no work
+    and does not break it.
 
     Parameters
     ----------

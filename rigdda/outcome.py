@@ -41,7 +41,8 @@ class BarrierOutcome:
         Largest and summed energy of the hits, of translation and rotation just before the first
         touch [J].
     absorbed_energy : float
-        Work that contact forces of the barrier took from the blocks [J].
+        Work that contact forces of the barrier took from the blocks [J]; of a fence also what
+        blocks at rest against it passed on of blows on them.
     impact_heights : tuple of float
         Height of each hit above the ground at the barrier's uphill face at the start [m].
     overtopped : int

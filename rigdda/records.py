@@ -59,6 +59,7 @@ CONTACT = _record(
     us=float,
     friction=float,  # tan phi
     restitution=float,
+    passing=float,  # closing velocity if the fence it is with were not there [m/s]
     stiffness=float,  # of the contact at rest [N/m]
     kappa=float,  # in this step [N/m]
     bias=float,  # displacement at which the spring is free [m], see contact.law

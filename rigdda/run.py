@@ -57,7 +57,7 @@ class Run:
     events : (E,) structured array
         Hits and crossings in order of time, see `EVENT`.
     absorbed : (B,) array
-        Energy that each barrier took from the blocks by contact forces [J].
+        Energy that each barrier took from the blocks [J], as `BarrierOutcome` says.
     watch_energy : (N,) array
         Largest kinetic energy of each block while its centroid was in the watched interval [J].
     barrier_poses : (T, B, 3) array

@@ -97,6 +97,29 @@ def test_what_slept_against_a_fence_falls_when_it_fails():
     assert after.poses[-1, 0, 0] > 2.0
 
 
+@pytest.mark.parametrize(("share", "left"), [(1.5, 0.0), (3.0, 0.5), (10.0, 4.0)])
+def test_a_block_at_rest_against_the_fence_passes_blows_on(share, left):
+    """Two equal blocks go on together with half the energy of the blow, which the fence takes."""
+    speed = math.sqrt(2.0 * share * CAPACITY / 2600.0)
+    blocks = (box(-0.5, 0.5), box(-4.0, 0.5, velocity=(speed, 0.0, 0.0)))
+    scene = Scene(GROUND, blocks, rock(0.0), barriers=(Fence(0.0, 5.0, CAPACITY),))
+    run = Simulation(scene).run(1.0)
+    kept = 0.5 * 2600.0 * (run.velocities[-1, :, 0] ** 2).sum() / CAPACITY
+    assert kept == pytest.approx(left, abs=0.02 * share)
+    assert run.absorbed[0] / CAPACITY == pytest.approx(min(share / 2.0, 1.0), rel=0.07)
+
+
+def test_the_weight_of_a_pile_does_not_break_a_fence():
+    ramp = Terrain([(-40.0, 40.0), (40.0, -40.0)])
+    up = np.array([-1.0, 1.0]) / math.sqrt(2.0)
+    blocks = tuple(
+        box(*(up * (1.4 + 1.01 * i) + 0.5 / math.sqrt(2.0)), angle=-math.pi / 4) for i in range(6)
+    )
+    scene = Scene(ramp, blocks, rock(10.0), barriers=(Fence(0.0, 4.0, 2e3),))
+    run = Simulation(scene, Settings(sleeping=False)).run(20.0)
+    assert math.isinf(run.failure(0))
+
+
 def test_a_fence_can_be_overtopped():
     high = box(-3.0, 5.0, velocity=(20.0, 0.0, 0.0))
     scene = Scene(GROUND, (high,), rock(), barriers=(Fence(0.0, 2.0, CAPACITY),))

@@ -7,8 +7,9 @@ the contacts aim at the velocity -s u_c instead of 0. For impacts in proportion 
 
     W(s) = (1 - s^2) W(0).
 
-Blocks at rest against the fence pass blows on to it: see `passed_on`. The s for which W(s) is what is left is found from there by regula falsi in s^2, since friction and
-neighbours bend the law (Dowell and Jarratt 1971, BIT 11, 168-174).
+The s for which W(s) is what is left is found from there by regula falsi in s^2, since friction and
+neighbours bend the law (Dowell and Jarratt 1971, BIT 11, 168-174). Blocks at rest against the fence
+pass blows on to it: see `passed_on`.
 """
 
 from __future__ import annotations

@@ -152,6 +152,7 @@ def design(
     """
     from agents import job, tables
     from envs import DesignProblem
+    from rigdda.barriers import describe
 
     problem = DesignProblem(site)
     folder = folder_for(out, "design", problem.site.name)
@@ -161,7 +162,7 @@ def design(
         job.write(study, folder)
     show(tables.designs(study.cases))
     for wall in study.cases[-1][1].layout:
-        click.echo(tables.describe(wall))
+        click.echo(describe(wall))
     resumed = f", {store.resumed} taken from a former run" if store.resumed else ""
     click.echo(
         f"search: {study.result.simulations} releases; verification: {verify} unseen ones each "

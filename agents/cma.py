@@ -8,8 +8,8 @@ costs), and no barrier at all.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +19,7 @@ from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
 from agents.rule import rule
 from agents.store import Store
 from envs import DesignProblem
-from envs.encoding import MIN_HEIGHT, NUMBERS
+from envs.encoding import MIN_HEIGHT, slot_size
 from rigdda import Layout
 
 Floats = NDArray[np.float64]
@@ -52,9 +52,13 @@ def design(
 
 
 def _starts(problem: DesignProblem, ensemble: Ensemble) -> list[Layout]:
-    """Return the different layouts that an ensemble suggests."""
+    """Return the different layouts that an ensemble suggests, of walls if they may be built."""
+    if "wall" not in problem.kinds:
+        return [()]
     wall = rule(problem.site, ensemble)
-    lower = [tuple(replace(w, height=share * w.height) for w in wall) for share in LOWER]
+    lower = [
+        tuple(msgspec.structs.replace(w, height=share * w.height) for w in wall) for share in LOWER
+    ]
     return list(dict.fromkeys([*convex.candidates(problem, ensemble), wall, *lower, ()]))
 
 
@@ -87,13 +91,14 @@ def _propose(problem: DesignProblem, starts: list[Layout], rng: np.random.Genera
 
 
 def _centre(problem: DesignProblem, layout: Layout, rng: np.random.Generator) -> Floats:
-    """Return the vector of a layout, (3 max_barriers,), its empty slots on the verge of a wall.
+    """Return the vector of a layout, (size,), its empty slots on the verge of a barrier.
 
-    Their stations are drawn at random, so that every restart tries walls in other places.
+    Their stations and kinds are drawn at random, so that every restart tries others.
     """
     vector = problem.encode(layout)
-    empty = vector.reshape(-1, NUMBERS)[len(layout) :]
+    empty = vector.reshape(-1, slot_size(problem.kinds))[len(layout) :]
     verge = 2.0 * MIN_HEIGHT / problem.site.barrier_zone.max_height - 1.0
     empty[:, 0] = rng.uniform(-1.0, 1.0, len(empty))
-    empty[:, 1:] = max(-1.0, verge - 0.02), -1.0
+    empty[:, 1:3] = max(-1.0, verge - 0.02), -1.0
+    empty[:, 3:] = rng.uniform(-1.0, 1.0, empty[:, 3:].shape)
     return vector

@@ -30,7 +30,7 @@ from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
 from agents.store import Store
 from envs import DesignProblem
 from envs.encoding import MIN_GAP, MIN_HEIGHT
-from rigdda import Layout, Site, Wall
+from rigdda import Layout, Site, Wall, check
 
 LEVELS = 8
 """Heights between the least and the largest."""
@@ -77,8 +77,10 @@ def design(
     Raises
     ------
     BadInput, Diverged
-        If the budget is below 2 or the seed below 0; if a simulation diverges.
+        If the budget is below 2, the seed below 0 or walls are not among the kinds; if a
+        simulation diverges.
     """
+    check.one_of("kind of convex", "wall", problem.kinds)
     ledger = Ledger(problem, simulations, seed, progress, store)
     return search(ledger, _propose(candidates(problem, ensemble_for(ledger))))
 

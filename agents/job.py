@@ -14,10 +14,11 @@ from agents.names import DESIGNERS
 from agents.protocol import Designer, DesignResult, Entry
 from agents.rule import rule
 from agents.store import Store
-from agents.tables import EvaluationsFile, describe
+from agents.tables import EvaluationsFile
 from agents.verify import verify
 from envs import DesignProblem, Evaluation
 from rigdda import Layout, Outcome, Run, Site, check
+from rigdda.barriers import describe
 
 Tick = Callable[[int, str], None]
 """Called as a job goes on: releases done so far, and what is being done."""

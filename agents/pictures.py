@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ import numpy as np
 from agents.protocol import History
 from envs import Evaluation
 from envs.picture import BARRIER, ROAD, ROCK, draw
-from rigdda import Run, Site
+from rigdda import Ditch, Run, Site
+from rigdda.barriers import Standing
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
@@ -75,12 +77,14 @@ def _slope(axes: Axes, site: Site, panel: Panel) -> None:
     axes.plot(reach, ground, color=ZONE, linewidth=7, zorder=0.5, solid_capstyle="butt")
     for block in run.scene.blocks:
         axes.fill(*block.vertices.T, facecolor=START, edgecolor="white", linewidth=0.2)
-    for barrier in run.scene.barriers:
-        outline = barrier.outline(terrain)
-        axes.fill(*outline.T, facecolor=BARRIER, edgecolor=BARRIER, linewidth=2.5)
+    for i, barrier in enumerate(run.scene.barriers):
+        outline = run.outline(i)
+        if isinstance(barrier, Standing) and not math.isfinite(run.failure(i)):
+            axes.fill(*outline.T, facecolor=BARRIER, edgecolor=BARRIER, linewidth=2.5)
+        size = barrier.depth if isinstance(barrier, Ditch) else barrier.height
         axes.annotate(
-            f"{barrier.height:.1f} m",
-            outline[2],
+            f"{size:.1f} m",
+            outline[np.argmax(outline[:, 1])],
             xytext=(16, 26),
             textcoords="offset points",
             color=BARRIER,

@@ -14,7 +14,7 @@ from agents.crossings import Ensemble, ensemble_for
 from agents.protocol import DesignResult, Ledger, Progress
 from agents.store import Store
 from envs import DesignProblem
-from rigdda import Layout, Site, Wall
+from rigdda import Site, Wall, check
 
 QUANTILE = 0.95
 FREEBOARD = 0.5
@@ -35,14 +35,16 @@ def design(
     Raises
     ------
     BadInput, Diverged
-        If the budget is below 2 or the seed below 0; if a simulation diverges.
+        If the budget is below 2, the seed below 0 or walls are not among the kinds; if a
+        simulation diverges.
     """
+    check.one_of("the rule's kind", "wall", problem.kinds)
     ledger = Ledger(problem, simulations, seed, progress, store)
     layout = rule(problem.site, ensemble_for(ledger))
     return ledger.result(ledger.evaluate(layout, "final", min(32, ledger.left)))
 
 
-def rule(site: Site, ensemble: Ensemble) -> Layout:
+def rule(site: Site, ensemble: Ensemble) -> tuple[Wall, ...]:
     """Return one wall where the 95 % energy of the crossing blocks is least.
 
     Stations that would need a higher wall than the site allows are passed over; if all would, the

@@ -16,7 +16,8 @@ import numpy as np
 from agents.protocol import Entry
 from envs import Evaluation
 from envs.evaluation import student_interval
-from rigdda import Layout, Outcome, Site, Wall
+from rigdda import Fence, GravityWall, Layout, Outcome, Site
+from rigdda.barriers import Earthwork, describe, to_tables
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
@@ -39,14 +40,20 @@ HIT = {
     "total_energy": ("energy of all hits", "kJ", 1e-3),
     "absorbed_energy": ("energy absorbed", "kJ", 1e-3),
     "overtopped": ("blocks that passed", "-", 1.0),
+    "caught": ("mass at rest behind or in it", "%", 100.0),
+    "failed": ("failed", "-", 1.0),
+    "displacement": ("displacement", "m", 1.0),
 }
 """The same of a barrier."""
+
+ONLY = {"failed": Fence, "displacement": GravityWall}
+"""Kind of which alone a field of a barrier says anything."""
 
 
 class EvaluationsFile:
     """A CSV file with one row an evaluated layout, written as they come.
 
-    `barriers` is a JSON list of [x, height, thickness] in metres. Usable as a context manager.
+    `barriers` is a JSON list of tables as in a layout file. Usable as a context manager.
     """
 
     FIELDS = (
@@ -68,7 +75,7 @@ class EvaluationsFile:
     def add(self, entry: Entry) -> None:
         """Write one row and flush it."""
         e = entry.evaluation
-        barriers = json.dumps([[b.x, b.height, b.thickness] for b in e.layout])
+        barriers = json.dumps(to_tables(e.layout))
         numbers = (len(e.seeds), e.objective, *e.ci, e.debris, *e.debris_ci, e.cost)
         self._rows.writerow((entry.simulations, entry.stage, *numbers, barriers))
         self._file.flush()
@@ -110,10 +117,15 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
         add(words, unit, factor, [getattr(outcome, name) for outcome in results])
     run_out = [outcome.run_out[1] for outcome in results]
     add("run-out of 95 % of the mass", "m", 1.0, run_out, -math.inf)
-    for i, wall in enumerate(layout):
+    for i, barrier in enumerate(layout):
         table.add_section()
-        table.add_row(describe(wall))
+        table.add_row(describe(barrier))
+        earthwork = isinstance(barrier, Earthwork)
         for name, (words, unit, factor) in HIT.items():
+            if earthwork and name not in ("overtopped", "caught"):
+                continue
+            if not isinstance(barrier, ONLY.get(name, object)):
+                continue
             add(f"  {words}", unit, factor, [getattr(o.barriers[i], name) for o in results])
     return table
 
@@ -138,11 +150,6 @@ def sites(found: Iterable[Site]) -> Table:
         words = shorten(site.description, 120, placeholder=" ...")
         table.add_row(site.name, f"{max(heights) - min(heights):g}", blocks, road, words)
     return table
-
-
-def describe(wall: Wall) -> str:
-    """Return a barrier in words."""
-    return f"wall at {wall.x:.1f} m, {wall.height:.1f} m high, {wall.thickness:.1f} m thick"
 
 
 def empty_table(head: Sequence[str]) -> Table:

@@ -32,8 +32,9 @@ class BarrierDesign(gymnasium.Env[dict[str, Any], Action]):
     """Design all barriers of a site at once: an episode is one step.
 
     Action
-        Box(-1, 1, (3 max_barriers,), float32): station, height and thickness of each barrier, as
-        `DesignProblem.decode` reads them.
+        Box(-1, 1, (size,), float32): station, height, and thickness, capacity or width of each
+        barrier, then one score for each kind if there are several, as `DesignProblem.decode`
+        reads them; size is 3 max_barriers for one kind, else (3 + kinds) max_barriers.
     Observation
         Dict of 1-D float32 arrays, see `envs.observation`. It depends on the site and on what
         stands, not on the episode's releases.
@@ -43,7 +44,7 @@ class BarrierDesign(gymnasium.Env[dict[str, Any], Action]):
         After one step. Never truncated.
     Info
         At reset without barriers, at step with the layout: `objective` and `cost` (floats),
-        `layout` (tuple of Wall), `outcomes` (tuple of Outcome, one a release).
+        `layout` (tuple of Barrier), `outcomes` (tuple of Outcome, one a release).
     Randomness
         `reset` draws the seeds of the episode's releases; `reset(seed=...)` fixes all that follows.
 

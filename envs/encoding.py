@@ -1,33 +1,73 @@
 """Vectors in [-1, 1] that stand for layouts.
 
-Three numbers a slot, one slot a barrier: station across the zone, height, thickness. Every vector
-stands for a layout that can be built, so that an optimiser needs no constraints.
+One slot a barrier: station across the zone, height, size, and one score for each kind if there are
+several; the largest wins, the first of equals. Every vector stands for a layout, so that an
+optimiser needs no constraints.
+
+============  ===================================  =============================================
+kind          height                               size
+============  ===================================  =============================================
+wall          height, 0 to the greatest            thickness, least to greatest
+gravity_wall  height, 0 to the greatest            thickness, least to greatest
+fence         height, 0 to the greatest            capacity, least to greatest, logarithmic
+ditch         depth, 0 to the greatest             width, least to greatest
+embankment    height, 0 to the greatest            width of the crest, in the range of thickness
+============  ===================================  =============================================
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import isotonic_regression
 
-from rigdda import BadInput, Layout, Wall, check
+from rigdda import BadInput, Barrier, Layout, check
+from rigdda.barriers import KINDS
 from rigdda.site import BarrierZone
 
 Floats = NDArray[np.float64]
 
 NUMBERS = 3
-"""Numbers in a slot."""
+"""Numbers in a slot, without scores."""
 
 MIN_HEIGHT = 0.5
-"""A lower barrier is absent [m]."""
+"""A lower barrier, or a shallower ditch, is absent [m]."""
 
 MIN_GAP = 2.0
-"""Least distance between a barrier's downhill face and the next one's uphill face [m]."""
+"""Least distance between a barrier's downhill end and the next one's uphill face [m]."""
 
 TOLERANCE = 1e-9
-"""Rounding that is forgiven at the limits of the zone, so that decoding undoes encoding [m]."""
+"""Rounding that is forgiven at the limits of the zone, so that decoding undoes encoding: share of
+the limit, and of 1 [m or J]."""
+
+
+class Decision(NamedTuple):
+    """Which parameters of a kind are decided, and the fields of the zone that limit them."""
+
+    height: str
+    max_height: str
+    size: str
+    min_size: str
+    max_size: str
+    logarithmic: bool = False
+
+
+DECISIONS = {
+    "wall": Decision("height", "max_height", "thickness", "min_thickness", "max_thickness"),
+    "gravity_wall": Decision("height", "max_height", "thickness", "min_thickness", "max_thickness"),
+    "fence": Decision("height", "max_height", "capacity", "min_capacity", "max_capacity", True),
+    "ditch": Decision("depth", "max_depth", "width", "min_width", "max_width"),
+    "embankment": Decision("height", "max_height", "width", "min_thickness", "max_thickness"),
+}
+
+
+def slot_size(kinds: Sequence[str]) -> int:
+    """Return the numbers in a slot for a choice of kinds."""
+    return NUMBERS + (len(kinds) if len(kinds) > 1 else 0)
 
 
 def vector(field: str, value: ArrayLike, size: int) -> Floats:
@@ -50,33 +90,55 @@ def vector(field: str, value: ArrayLike, size: int) -> Floats:
     return np.clip(array, -1.0, 1.0)
 
 
-def decode(zone: BarrierZone, values: Floats) -> Layout:
+def decode(zone: BarrierZone, values: Floats, kinds: Sequence[str] = ("wall",)) -> Layout:
     """Return the layout that a vector stands for, sorted downhill.
 
     Parameters
     ----------
     zone : BarrierZone
-        Where barriers may stand; at least as long as they may be thick.
-    values : (3 n,) array
-        n slots in [-1, 1]. Station: the wall's uphill face, from the zone's start to where the
-        wall still stands inside the zone. Height: from 0 to the greatest; below `MIN_HEIGHT` the
-        barrier is absent. Thickness: from the least to the greatest.
+        Where barriers may stand; at least as long as the longest of them.
+    values : (slot_size n,) array
+        n slots in [-1, 1]. Station: the barrier's uphill face, from the zone's start to where it
+        still stands inside the zone. Height and size: see the module; below `MIN_HEIGHT` the
+        barrier is absent.
+    kinds : sequence of str
+        Kinds to choose from, in the order of their scores.
 
     Returns
     -------
-    tuple of Wall
+    tuple of Barrier
         At most n, `MIN_GAP` apart, whatever the order of the slots.
     """
-    station, height, thickness = 0.5 * (values.reshape(-1, NUMBERS).T + 1.0)
-    thickness = zone.min_thickness + thickness * (zone.max_thickness - zone.min_thickness)
-    x = zone.start + station * (zone.end - thickness - zone.start)
-    height = height * zone.max_height
-    present = height >= MIN_HEIGHT - TOLERANCE
-    walls = np.column_stack([x, np.maximum(height, MIN_HEIGHT), thickness])[present]
-    return tuple(Wall(*wall) for wall in _spread(zone, walls).tolist())
+    slots = values.reshape(-1, slot_size(kinds))
+    found = []
+    for slot in slots:
+        kind = kinds[int(np.argmax(slot[NUMBERS:]))] if len(kinds) > 1 else kinds[0]
+        station, height, size = (0.5 * (slot[:NUMBERS] + 1.0)).tolist()
+        barrier = _make(zone, kind, station, height, size)
+        if barrier is not None:
+            found.append(barrier)
+    return _spread(zone, found)
 
 
-def encode(zone: BarrierZone, layout: Sequence[Wall], slots: int) -> Floats:
+def _make(
+    zone: BarrierZone, kind: str, station: float, height: float, size: float
+) -> Barrier | None:
+    """Return the barrier of three shares from 0 to 1, None if it is absent."""
+    decision = DECISIONS[kind]
+    tall = height * getattr(zone, decision.max_height)
+    if tall < MIN_HEIGHT - TOLERANCE:
+        return None
+    low, high = getattr(zone, decision.min_size), getattr(zone, decision.max_size)
+    large = low * (high / low) ** size if decision.logarithmic else low + size * (high - low)
+    values = {decision.height: max(tall, MIN_HEIGHT), decision.size: large}
+    barrier = KINDS[kind](x=zone.start, **values)
+    x = zone.start + station * (zone.end - barrier.extent - zone.start)
+    return msgspec.structs.replace(barrier, x=x)
+
+
+def encode(
+    zone: BarrierZone, layout: Sequence[Barrier], slots: int, kinds: Sequence[str] = ("wall",)
+) -> Floats:
     """Return a vector that `decode` turns into `layout`, empty slots last.
 
     Raises
@@ -84,26 +146,44 @@ def encode(zone: BarrierZone, layout: Sequence[Wall], slots: int) -> Floats:
     BadInput
         If the layout is not one that `decode` can give.
     """
-    walls = sorted(check_layout(zone, layout), key=lambda wall: wall.x)
-    if len(walls) > slots:
-        raise BadInput("layout", f"{len(walls)} barriers", f"give at most {slots}")
-    for i, wall in enumerate(walls):
-        check.number(f"layout[{i}].height", wall.height, MIN_HEIGHT - TOLERANCE)
-        if i and wall.x - walls[i - 1].x - walls[i - 1].thickness < MIN_GAP - TOLERANCE:
+    barriers = sorted(check_layout(zone, layout), key=lambda barrier: barrier.x)
+    if len(barriers) > slots:
+        raise BadInput("layout", f"{len(barriers)} barriers", f"give at most {slots}")
+    out = np.tile([0.0, -1.0, 0.0] + [0.0] * (slot_size(kinds) - NUMBERS), (slots, 1))
+    for i, barrier in enumerate(barriers):
+        decision = DECISIONS[check.one_of(f"layout[{i}].kind", barrier.kind, kinds)]
+        tall, size = getattr(barrier, decision.height), getattr(barrier, decision.size)
+        check.number(f"layout[{i}].{decision.height}", tall, MIN_HEIGHT - TOLERANCE)
+        _check_rest(i, barrier, decision)
+        before = barriers[i - 1]
+        if i and barrier.x - before.x - before.extent < MIN_GAP - TOLERANCE:
             mend = f"put it {MIN_GAP:g} m downhill of the barrier before it"
-            raise BadInput(f"layout[{i}].x", wall.x, mend)
-    out = np.tile([0.0, -1.0, 0.0], slots)
-    for i, wall in enumerate(walls):
-        share = (
-            _share(wall.x, zone.start, zone.end - wall.thickness),
-            wall.height / zone.max_height,
-            _share(wall.thickness, zone.min_thickness, zone.max_thickness),
+            raise BadInput(f"layout[{i}].x", barrier.x, mend)
+        low, high = getattr(zone, decision.min_size), getattr(zone, decision.max_size)
+        if decision.logarithmic:
+            size, low, high = np.log(size), np.log(low), np.log(high)
+        shares = (
+            _share(barrier.x, zone.start, zone.end - barrier.extent),
+            tall / getattr(zone, decision.max_height),
+            _share(size, low, high),
         )
-        out[NUMBERS * i : NUMBERS * (i + 1)] = 2.0 * np.array(share) - 1.0
-    return np.clip(out, -1.0, 1.0)
+        out[i, :NUMBERS] = 2.0 * np.array(shares) - 1.0
+        if len(kinds) > 1:
+            out[i, NUMBERS:] = [1.0 if kind == barrier.kind else -1.0 for kind in kinds]
+    return np.clip(out.ravel(), -1.0, 1.0)
 
 
-def check_layout(zone: BarrierZone, layout: Sequence[Wall]) -> Layout:
+def _check_rest(i: int, barrier: Barrier, decision: Decision) -> None:
+    """Check that what is not decided has its default."""
+    for field in msgspec.structs.fields(barrier):
+        if field.name in ("x", decision.height, decision.size):
+            continue
+        value = getattr(barrier, field.name)
+        if value != field.default:
+            raise BadInput(f"layout[{i}].{field.name}", value, f"leave it at {field.default:g}")
+
+
+def check_layout(zone: BarrierZone, layout: Sequence[Barrier]) -> Layout:
     """Return `layout` as a tuple if each barrier is inside the zone and its limits.
 
     Raises
@@ -112,41 +192,58 @@ def check_layout(zone: BarrierZone, layout: Sequence[Wall]) -> Layout:
         If one is not.
     """
     try:
-        walls = tuple(layout)
+        barriers = tuple(layout)
     except TypeError:
-        raise BadInput("layout", layout, "give a sequence of rigdda.Wall") from None
-    for i, wall in enumerate(walls):
-        if not isinstance(wall, Wall):
-            raise BadInput(f"layout[{i}]", wall, "give a rigdda.Wall")
+        raise BadInput(
+            "layout", layout, "give a sequence of rigdda.Wall or other barriers"
+        ) from None
+    for i, barrier in enumerate(barriers):
+        if not isinstance(barrier, Barrier):
+            raise BadInput(f"layout[{i}]", barrier, "give a rigdda.Wall or another barrier")
+        decision = DECISIONS[barrier.kind]
         limits = {
-            "x": (zone.start, zone.end - wall.thickness),
-            "height": (0.0, zone.max_height),
-            "thickness": (zone.min_thickness, zone.max_thickness),
+            "x": (zone.start, zone.end - barrier.extent),
+            decision.height: (0.0, getattr(zone, decision.max_height)),
+            decision.size: (getattr(zone, decision.min_size), getattr(zone, decision.max_size)),
         }
         for name, (low, high) in limits.items():
-            field = f"layout[{i}].{name}"
-            check.number(field, getattr(wall, name), low - TOLERANCE, high + TOLERANCE)
-    return walls
+            low, high = low - TOLERANCE * max(1.0, low), high + TOLERANCE * max(1.0, high)
+            check.number(f"layout[{i}].{name}", getattr(barrier, name), low, high)
+    return barriers
+
+
+def longest(zone: BarrierZone, kinds: Sequence[str]) -> float:
+    """Return the greatest length along the slope of a barrier that a vector may stand for [m]."""
+    largest = [_make(zone, kind, 0.0, 1.0, 1.0) for kind in kinds]
+    return max(barrier.extent for barrier in largest if barrier is not None)
 
 
 def _share(value: float, low: float, high: float) -> float:
     return (value - low) / (high - low) if high > low else 0.5
 
 
-def _spread(zone: BarrierZone, walls: Floats) -> Floats:
-    """Return walls, (n, 3) x, height, thickness, sorted by x and at least `MIN_GAP` apart.
+def _spread(zone: BarrierZone, barriers: Sequence[Barrier]) -> Layout:
+    """Return barriers sorted by x and at least `MIN_GAP` apart.
 
     The lowest are dropped until the rest fits into the zone; the rest moves as little as possible,
     uphill and downhill alike (least squares, so continuous in x).
     """
     length = zone.end - zone.start
-    walls = walls[np.lexsort(walls.T[::-1])]
-    while walls[:, 2].sum() + MIN_GAP * (len(walls) - 1) > length + TOLERANCE:
-        walls = np.delete(walls, np.argmin(walls[:, 1]), axis=0)
-    taken = np.cumsum(walls[:, 2] + MIN_GAP)
-    before = np.concatenate([[0.0], taken[:-1]])[: len(walls)]
-    free = walls[:, 0] - before  # chainages once walls and gaps are taken out: must not fall
+    rest = sorted(barriers, key=lambda b: (b.x, _height(b), b.extent, b.kind))
+    while sum(b.extent for b in rest) + MIN_GAP * (len(rest) - 1) > length + TOLERANCE:
+        rest.remove(min(rest, key=_height))
+    if not rest:
+        return ()
+    taken = np.cumsum([b.extent + MIN_GAP for b in rest])
+    before = np.concatenate([[0.0], taken[:-1]])
+    free = np.array([b.x for b in rest]) - before  # barriers and gaps taken out: must not fall
     if (np.diff(free) < 0.0).any():
         last = zone.end - (taken[-1] - MIN_GAP)
-        walls[:, 0] = before + np.clip(isotonic_regression(free).x, zone.start, last)
-    return walls
+        x = before + np.clip(isotonic_regression(free).x, zone.start, last)
+        rest = [msgspec.structs.replace(b, x=at) for b, at in zip(rest, x.tolist(), strict=True)]
+    return tuple(rest)
+
+
+def _height(barrier: Barrier) -> float:
+    """Return the height of a barrier, or the depth of a ditch [m]."""
+    return float(getattr(barrier, DECISIONS[barrier.kind].height))

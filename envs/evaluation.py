@@ -23,7 +23,7 @@ class Evaluation:
 
     Parameters
     ----------
-    layout : tuple of Wall
+    layout : tuple of Barrier
         The barriers.
     seeds : tuple of int
         Seed of each release.

@@ -17,10 +17,12 @@ block      (1,)            0 to 1       root of the wanted mean area of the bloc
 damping    (2,)            0 to 5       coefficient [1/s]; 1 if it acts in contact only, else 0
 zone       (2,)            -10 to 0     first and last x for barriers [100 m]
 road       (1,)            0 to 1       width [100 m]
-limits     (3,)            0 to 1       greatest height, least and greatest thickness of a wall
-                                        [10 m]
-prices     (4,)            -10 to 10    base [cost limit], square [cost limit per m2], factor uphill
-                                        of the toe, x of the toe [100 m]
+limits     (8,)            0 to 1       greatest height, least and greatest thickness of a wall,
+                                        greatest depth, least and greatest width of a ditch [10 m];
+                                        log10 of the least and greatest capacity of a fence [10]
+prices     (8,)            -10 to 10    base [cost limit], square [cost limit per m2], factor uphill
+                                        of the toe, x of the toe [100 m]; prices of gravity walls,
+                                        fences, ditches, embankments [cost limit]
 weights    (2,)            0 to 10      risk weight, cost weight
 energy     (16,)           0 to 1       barrier-free 95 % energy at equal steps across the zone,
                                         log10(1 + E/J) / 10
@@ -28,7 +30,7 @@ bounce     (16,)           0 to 1       barrier-free 95 % height of the centroid
                                         at the same stations [100 m]
 deposit    (17,)           0 to 1       barrier-free share of the mass at the end in 16 equal parts
                                         of the profile and beyond it
-layout     (3 barriers,)   -1 to 1      what stands, encoded as an action; at reset nothing
+layout     (size,)         -1 to 1      what stands, encoded as an action; at reset nothing
 cost_left  (1,)            -10 to 1     1 - cost / cost limit
 =========  ==============  ===========  ===========================================================
 """
@@ -45,7 +47,7 @@ from numpy.typing import ArrayLike, NDArray
 from envs import encoding
 from envs.envelope import BINS, STATIONS, envelope
 from envs.problem import DesignProblem
-from rigdda import Site, Wall
+from rigdda import Barrier, Site
 
 Observation = dict[str, NDArray[np.float32]]
 
@@ -54,6 +56,11 @@ LENGTH = 100.0
 """Unit of positions and lengths [m]."""
 SIZE = 10.0
 """Unit of the sizes of blocks and walls [m]."""
+
+LENGTHS = (
+    "max_height", "min_thickness", "max_thickness", "max_depth", "min_width", "max_width",
+)  # fmt: skip
+PRICED = ("gravity_wall", "fence", "ditch", "embankment")
 
 FIELDS: dict[str, tuple[int, float, float]] = {
     "profile": (PROFILE_POINTS, -2.0, 5.0),
@@ -64,8 +71,8 @@ FIELDS: dict[str, tuple[int, float, float]] = {
     "damping": (2, 0.0, 5.0),
     "zone": (2, -10.0, 0.0),
     "road": (1, 0.0, 1.0),
-    "limits": (3, 0.0, 1.0),
-    "prices": (4, -10.0, 10.0),
+    "limits": (8, 0.0, 1.0),
+    "prices": (8, -10.0, 10.0),
     "weights": (2, 0.0, 10.0),
     "energy": (STATIONS, 0.0, 1.0),
     "bounce": (STATIONS, 0.0, 1.0),
@@ -73,21 +80,22 @@ FIELDS: dict[str, tuple[int, float, float]] = {
     "layout": (encoding.NUMBERS, -1.0, 1.0),
     "cost_left": (1, -10.0, 1.0),
 }
-"""Size, lower and upper bound of every array; the size of `layout` is that of one slot."""
+"""Size, lower and upper bound of every array; the size of `layout` is that of a problem's vector,
+here that of one slot for one kind."""
 
 
 def space(problem: DesignProblem) -> spaces.Dict:
     """Return the space of a problem's observations."""
-    slots = {"layout": problem.max_barriers}
+    sizes = {"layout": problem.size}
     return spaces.Dict(
         {
-            name: spaces.Box(low, high, (size * slots.get(name, 1),), np.float32)
+            name: spaces.Box(low, high, (sizes.get(name, size),), np.float32)
             for name, (size, low, high) in FIELDS.items()
         }
     )
 
 
-def observe(problem: DesignProblem, layout: Sequence[Wall]) -> Observation:
+def observe(problem: DesignProblem, layout: Sequence[Barrier]) -> Observation:
     """Return the observation of a problem with a layout in place, in arrays of its own.
 
     The first observation of a site in a process simulates its envelope.
@@ -152,7 +160,17 @@ def _barriers(problem: DesignProblem) -> dict[str, ArrayLike]:
     toe = (site.slope.toe - edge) / LENGTH
     return {
         "zone": [(zone.start - edge) / LENGTH, (zone.end - edge) / LENGTH],
-        "limits": np.array([zone.max_height, zone.min_thickness, zone.max_thickness]) / SIZE,
-        "prices": [costs.base / limit, costs.square / limit, costs.off_toe, toe],
+        "limits": [
+            *(getattr(zone, name) / SIZE for name in LENGTHS),
+            math.log10(zone.min_capacity) / 10.0,
+            math.log10(zone.max_capacity) / 10.0,
+        ],
+        "prices": [
+            costs.base / limit,
+            costs.square / limit,
+            costs.off_toe,
+            toe,
+            *(getattr(costs, kind) / limit for kind in PRICED),
+        ],
         "weights": [problem.risk_weight, problem.cost_weight],
     }

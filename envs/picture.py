@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import Run
+from rigdda import Ditch, Run
+from rigdda.barriers import Earthwork
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 SIZE = (8.0, 4.5)
 """Width and height of a picture [inch], 100 pixels each."""
 GROUND, ROCK, BARRIER, ROAD = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04"
+BROKEN = "#b0b6bc"
 
 
 def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> None:
@@ -31,11 +33,18 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
     frame : int
         Index of the frame, the last by default.
     """
-    terrain = run.scene.terrain
+    terrain = run.scene.ground
     assert terrain is not None
     x, y = terrain.points.T
-    for barrier in run.scene.barriers:
-        axes.fill(*barrier.outline(terrain).T, color=BARRIER, linewidth=0)
+    for i, barrier in enumerate(run.scene.barriers):
+        colour = BARRIER if run.times[frame] < run.failure(i) else BROKEN
+        axes.fill(
+            *run.outline(i, frame).T,
+            facecolor="none" if isinstance(barrier, Ditch) else colour,
+            edgecolor=colour,
+            linewidth=1.0 if isinstance(barrier, Ditch) else 0.0,
+            zorder=3.0 if isinstance(barrier, Earthwork) else 1.0,
+        )
     axes.fill_between(x, y, y.min() - 0.05 * np.ptp(y), color=GROUND, linewidth=0)
     inner = x[(x > road[0]) & (x < road[1])]
     lane = [road[0], *inner, road[1]]

@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 import rigdda
 from envs import baseline, encoding
 from envs.evaluation import Evaluation, student_interval
-from rigdda import BadInput, Layout, Outcome, Site, Wall, check
+from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
+from rigdda.barriers import KINDS as ALL_KINDS
+from rigdda.barriers import Earthwork
 
 Floats = NDArray[np.float64]
 
 KINDS = ("wall",)
-"""Kinds of barrier that can be designed."""
+"""Kinds of barrier that are designed if none are named."""
 
 OVERRUN = 10.0
 """How many times the cost above the limit is charged. Soft, so that a search sees a way back."""
@@ -38,7 +40,7 @@ class DesignProblem:
     max_barriers : int
         Slots for barriers; each may be empty.
     kinds : sequence of str
-        Kinds of barrier.
+        Kinds of barrier to choose from: "wall", "gravity_wall", "fence", "ditch", "embankment".
     risk_weight, cost_weight : float
         Weights in the objective [-].
     cost_limit : float, optional
@@ -66,12 +68,13 @@ class DesignProblem:
         cost_weight: float = 0.2,
         cost_limit: float | None = None,
     ):
-        where = _site(site)
+        where, names = _site(site), _kinds(kinds)
+        _room(where, names)
         limit = where.costs.limit if cost_limit is None else cost_limit
         values = {
             "site": where,
             "max_barriers": check.integer("max_barriers", max_barriers, 1),
-            "kinds": _kinds(kinds),
+            "kinds": names,
             "risk_weight": check.number("risk_weight", risk_weight, 0.0),
             "cost_weight": check.number("cost_weight", cost_weight, 0.0),
             "cost_limit": check.number("cost_limit", limit, 0.0, open_low=True),
@@ -81,18 +84,19 @@ class DesignProblem:
 
     @property
     def size(self) -> int:
-        """Numbers in a vector, 3 max_barriers."""
-        return encoding.NUMBERS * self.max_barriers
+        """Numbers in a vector: 3 max_barriers, and a score for each kind if there are several."""
+        return encoding.slot_size(self.kinds) * self.max_barriers
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
-        """Lowest and highest vector, -1 and 1, each (3 max_barriers,)."""
+        """Lowest and highest vector, -1 and 1, each (size,)."""
         return np.full(self.size, -1.0), np.full(self.size, 1.0)
 
     def decode(self, vector: ArrayLike) -> Layout:
-        """Return the layout that a (3 max_barriers,) vector stands for, see `encoding.decode`.
+        """Return the layout that a (size,) vector stands for, see `encoding.decode`.
 
-        Every vector has one: entries beyond [-1, 1] are clipped.
+        Every vector has one: entries beyond [-1, 1] are clipped; ditches and embankments that do
+        not fit the slope, or reach beyond the zone, are absent.
 
         Raises
         ------
@@ -100,17 +104,33 @@ class DesignProblem:
             If the shape is wrong or an entry is not a number.
         """
         values = encoding.vector("vector", vector, self.size)
-        return encoding.decode(self.site.barrier_zone, values)
+        return self._fitting(encoding.decode(self.site.barrier_zone, values, self.kinds))
 
-    def encode(self, layout: Sequence[Wall]) -> Floats:
-        """Return a (3 max_barriers,) vector that `decode` turns into `layout`.
+    def _fitting(self, layout: Layout) -> Layout:
+        """Return the barriers of a layout that fit the slope, sorted downhill."""
+        ground, kept = self.site.profile, []
+        for barrier in layout:
+            if isinstance(barrier, Earthwork):
+                try:
+                    reach = barrier.outline(ground)[:, 0].max()
+                    changed = barrier.build(ground, self.site.slope.surface)
+                except BadInput:
+                    continue
+                if reach > self.site.barrier_zone.end + encoding.TOLERANCE:
+                    continue
+                ground = changed
+            kept.append(barrier)
+        return tuple(kept)
+
+    def encode(self, layout: Sequence[Barrier]) -> Floats:
+        """Return a (size,) vector that `decode` turns into `layout`.
 
         Raises
         ------
         BadInput
             If the layout is not one that `decode` can give.
         """
-        return encoding.encode(self.site.barrier_zone, layout, self.max_barriers)
+        return encoding.encode(self.site.barrier_zone, layout, self.max_barriers, self.kinds)
 
     def penalised(self, cost: float) -> float:
         """Return the cost that is charged: as it is up to the limit, tenfold above it."""
@@ -122,14 +142,14 @@ class DesignProblem:
         return self.risk_weight * debris + self.cost_weight * charged
 
     def evaluate(
-        self, layout: Sequence[Wall], seeds: Sequence[int], executor: Executor | None = None
+        self, layout: Sequence[Barrier], seeds: Sequence[int], executor: Executor | None = None
     ) -> Evaluation:
         """Simulate a layout in one release for each seed.
 
         Parameters
         ----------
-        layout : sequence of Wall
-            Barriers inside the zone and its limits; too dear a layout is simulated all the same.
+        layout : sequence of Barrier
+            Of any kind, inside the zone and its limits; too dear a layout is simulated too.
         seeds : sequence of int
             At least one whole number of at least 0.
         executor : Executor, optional
@@ -139,7 +159,7 @@ class DesignProblem:
         Raises
         ------
         BadInput
-            If the layout is not inside the zone or the seeds are unsound.
+            If the layout is not inside the zone or does not fit, or the seeds are unsound.
         Diverged
             If a simulation diverges.
         """
@@ -184,14 +204,20 @@ def _site(site: object) -> Site:
         site = Site.load(site)
     if not isinstance(site, Site):
         raise BadInput("site", site, "give a name, a TOML file or a rigdda.Site")
-    zone = site.barrier_zone
-    if zone.end - zone.start < zone.max_thickness:
-        mend = f"put it at least max_thickness {zone.max_thickness:g} beyond the zone's start"
-        raise BadInput("barrier_zone.end", zone.end, mend)
     if not {"concrete", "rock"} & site.surfaces.keys():
         mend = "define concrete, of which barriers are, or rock instead"
         raise BadInput("surfaces", sorted(site.surfaces), mend)
     return site
+
+
+def _room(site: Site, kinds: tuple[str, ...]) -> None:
+    """Check that every barrier has room in the zone."""
+    zone = site.barrier_zone
+    longest = encoding.longest(zone, kinds)
+    if zone.end - zone.start < longest:
+        what = "max_thickness" if longest == zone.max_thickness else "the length of a barrier"
+        mend = f"put it at least {what} {longest:g} beyond the zone's start"
+        raise BadInput("barrier_zone.end", zone.end, mend)
 
 
 def _seeds(seeds: Sequence[int]) -> tuple[int, ...]:
@@ -205,7 +231,7 @@ def _seeds(seeds: Sequence[int]) -> tuple[int, ...]:
 
 
 def _kinds(kinds: Sequence[str]) -> tuple[str, ...]:
-    names = tuple(check.one_of("kinds", kind, KINDS) for kind in kinds)
+    names = tuple(check.one_of("kinds", kind, ALL_KINDS) for kind in kinds)
     if not names or len(set(names)) < len(names):
         raise BadInput("kinds", kinds, "name each kind once")
     return names

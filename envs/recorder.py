@@ -9,6 +9,7 @@ from pathlib import Path
 
 from envs.evaluation import Evaluation
 from rigdda import BadInput, Run, Site
+from rigdda.barriers import describe
 
 Trigger = Callable[[int], bool]
 
@@ -68,13 +69,10 @@ class Recorder:
         """
         from rigdda.replay import Marks
 
-        walls = [
-            f"{wall.height:.2f} m high, {wall.thickness:.2f} m thick at x = {wall.x:.2f} m"
-            for wall in evaluation.layout
-        ]
+        barriers = [describe(barrier, 2) for barrier in evaluation.layout]
         notes = {
             "seed": f"{evaluation.typical}, the nearest to the mean of {len(evaluation.seeds)}",
-            "layout": "; ".join(walls) or "no barrier",
+            "layout": "; ".join(barriers) or "no barrier",
             "reward": f"{reward:+.4f}",
             "objective": f"{evaluation.objective:.4f}",
             "debris": f"{evaluation.debris:.4f}",

@@ -1,28 +1,35 @@
 """Rigid-block discontinuous deformation analysis for the design of rockfall protection."""
 
 from rigdda import sites
+from rigdda.barriers import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Wall
 from rigdda.errors import BadInput, Diverged, Error
 from rigdda.loads import BodyForce, LineLoad, PointLoad
 from rigdda.outcome import BarrierOutcome, Outcome
 from rigdda.release import release, release_many
 from rigdda.run import Run
-from rigdda.scene import Block, Layout, Scene, Surface, Terrain, Wall
+from rigdda.scene import Block, Scene, Surface
 from rigdda.settings import Settings
 from rigdda.simulation import Simulation, simulate_many
 from rigdda.site import Site, load_layout, save_layout
 from rigdda.supports import Bolt, FixedPoint
+from rigdda.terrain import Terrain
 
 __version__ = "0.1.0"
 
 __all__ = [
     "BadInput",
+    "Barrier",
     "BarrierOutcome",
     "Block",
     "BodyForce",
     "Bolt",
+    "Ditch",
     "Diverged",
+    "Embankment",
     "Error",
+    "Fence",
     "FixedPoint",
+    "GravityWall",
     "Layout",
     "LineLoad",
     "Outcome",

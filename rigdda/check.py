@@ -31,6 +31,8 @@ def number(
         out = float(value)
     except (TypeError, ValueError):
         raise BadInput(field, value, "give a number") from None
+    if isinstance(value, str | bytes):
+        raise BadInput(field, value, "give a number, not a text")
     if not math.isfinite(out):
         raise BadInput(field, value, "give a finite number")
     if out < low or out > high or (open_low and out == low):

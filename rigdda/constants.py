@@ -105,6 +105,12 @@ SMALL_ISLAND = 2
 ENERGY_HALVINGS = 4
 """Times restitution is halved when an eccentric impact would gain energy; then it is plastic."""
 
+BREAK_TOLERANCE = 1e-4
+"""Share of its capacity by which a failing fence may miss it [-]."""
+
+BREAK_SOLVES = 8
+"""Most solutions for the speed with which blocks pass a failing fence; a centred hit takes one."""
+
 SAME_NORMAL = 0.7
 """Least cosine between the normals of one vertex's contact in two steps that share memory [-]."""
 

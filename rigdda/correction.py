@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, SHOCK, STEADY_RATE
+from rigdda.gauges import barrier_contact
 from rigdda.kernel import kernel
 from rigdda.open_close import assemble_blocks, load_moment
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
@@ -147,17 +148,22 @@ def account(
         i = work.slot[c[k].a]
         dn = along(normal_row(c, k, True), m.d[i])
         ds = along(shear_row(c, k, True), m.d[i])
+        block, barrier = barrier_contact(gauges, c[k].a, c[k].b)
+        if barrier >= 0 and block == c[k].a:
+            gauges.absorbed[barrier] -= c[k].normal * dn + c[k].shear * ds
         if c[k].pair >= 0:
             j = work.slot[c[k].b]
-            dn += along(normal_row(c, k, False), m.d[j])
-            ds += along(shear_row(c, k, False), m.d[j])
+            en = along(normal_row(c, k, False), m.d[j])
+            es = along(shear_row(c, k, False), m.d[j])
+            if barrier >= 0 and block != c[k].a:
+                gauges.absorbed[barrier] -= c[k].normal * en + c[k].shear * es
+            dn += en
+            ds += es
         if c[k].kind == BOLT or c[k].kind == PIN:
             ledger[4] += c[k].normal * dn + c[k].shear * ds
             continue
         ledger[0] += c[k].shear * ds
         ledger[1] += c[k].normal * dn
-        if c[k].b >= p.blocks:
-            gauges.absorbed[c[k].b - p.blocks] -= c[k].normal * dn + c[k].shear * ds
 
 
 @kernel

@@ -7,10 +7,11 @@ import math
 from rigdda.constants import NEW_HIT_TIME, OPEN
 from rigdda.kernel import kernel
 from rigdda.motion import kinetic_energy
-from rigdda.records import Bodies, Contacts, Gauges, Parameters, Work
+from rigdda.records import Bodies, Contacts, Gauges, Work
 
-HIT, CROSSING = 0, 1
-"""Kinds of event: a block touches a barrier; a block's centroid first passes a station."""
+HIT, CROSSING, FAILED = 0, 1, 2
+"""Kinds of event: a block touches a barrier; a block's centroid first passes a station; a block
+breaks a barrier."""
 
 
 @kernel
@@ -20,7 +21,9 @@ def write_event(
 ) -> int:  # fmt: skip
     """Write event n of body i; returns the new number of events."""
     event = gauges.event[n]
-    event.time, event.kind, event.block, event.target = time, kind, i, target
+    rocks = len(gauges.next_station)
+    event.time, event.kind, event.target = time, kind, target
+    event.block = i if i < rocks else rocks + gauges.barrier[i]
     event.x, event.y, event.height = x, y, height
     event.speed = math.hypot(bodies[i].vx, bodies[i].vy)
     event.energy = kinetic_energy(bodies, i)
@@ -28,17 +31,30 @@ def write_event(
 
 
 @kernel
+def barrier_contact(gauges: Gauges, a: int, b: int) -> tuple[int, int]:
+    """Return what strikes and what barrier it strikes in a contact of a and b, -1 for no barrier.
+
+    A gravity wall that is carried along strikes other barriers.
+    """
+    rocks = len(gauges.next_station)
+    if b >= rocks:
+        return a, gauges.barrier[b]
+    if a >= rocks and b >= 0:
+        return b, gauges.barrier[a]
+    return a, -1
+
+
+@kernel
 def note_hits(
     bodies: Bodies, c: Contacts, work: Work, low: int, high: int, gauges: Gauges, events: int,
-    time: float, p: Parameters,
+    time: float,
 ) -> int:  # fmt: skip
     """Write a hit for each barrier that a block touches anew; velocities still those before."""
     for item in range(low, high):
         k = work.contact_item[item]
-        barrier = c[k].b - p.blocks
+        i, barrier = barrier_contact(gauges, c[k].a, c[k].b)
         if barrier < 0 or c[k].state == OPEN:
             continue
-        i = c[k].a
         if time - gauges.last_touch[i, barrier] > NEW_HIT_TIME:
             height = c[k].y - gauges.barrier_ground[barrier]
             events = write_event(
@@ -49,10 +65,10 @@ def note_hits(
 
 
 @kernel
-def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float, p: Parameters) -> int:
+def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> int:
     """Write a crossing for each station that a centroid first passes; watch energies."""
     stations = len(gauges.station)
-    for i in range(p.blocks):
+    for i in range(len(gauges.next_station)):
         x = bodies[i].x
         if gauges.watch[0] <= x <= gauges.watch[1]:
             gauges.watch_energy[i] = max(gauges.watch_energy[i], kinetic_energy(bodies, i))

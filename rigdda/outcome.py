@@ -9,18 +9,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.barriers import Barrier, Ditch, Embankment, GravityWall
 from rigdda.geometry import polygon_properties
 from rigdda.run import Run
-from rigdda.scene import Wall
 from rigdda.site import Site
 
 GRAIN = 2.0**40
 """Fractions are whole multiples of 1/GRAIN, so that they add up to 1 exactly in any order."""
 
 
+SLID = 0.1
+"""Displacement beyond which a gravity wall has slid [m]: what its contacts give under load is a
+hundredth of it."""
+
+AT_REST = 0.1
+"""Speed below which a caught block is at rest [m/s], as in replays."""
+
+
 @dataclass(frozen=True, slots=True)
 class BarrierOutcome:
     """What one barrier took in a release.
+
+    Ditches and embankments are ground: what happens on them counts as no hit, and they absorb
+    nothing here.
 
     Parameters
     ----------
@@ -30,13 +41,23 @@ class BarrierOutcome:
         Largest and summed energy of the hits, of translation and rotation just before the first
         touch [J].
     absorbed_energy : float
-        Work that contact forces of the barrier took from the blocks [J].
+        Work that contact forces of the barrier took from the blocks [J]; of a fence also what
+        blocks at rest against it passed on of blows on them.
     impact_heights : tuple of float
-        Height of each hit above the ground at the barrier's face [m].
+        Height of each hit above the ground at the barrier's uphill face at the start [m].
     overtopped : int
-        Blocks that started uphill of the barrier and were downhill of it at some time.
+        Blocks that started uphill of the barrier and first passed it while it stood: beyond its
+        downhill face, the downhill edge of a ditch or of an embankment's crest. A gravity wall
+        counts as where it stood at the start.
     failed : bool
-        Whether it failed; a rigid wall never does.
+        Whether it failed; only fences do.
+    caught : float
+        Share of the released mass at rest at the end that it holds, or that is in the ditch.
+    state : {"stands", "failed", "slid", "overturned"}
+        At the end. A gravity wall has slid if it is more than 0.1 m away from its place,
+        and is overturned if it is turned beyond the angle of its diagonal.
+    displacement : float
+        Distance of its centroid at the end from where it was at the start [m].
     """
 
     hits: int
@@ -46,6 +67,9 @@ class BarrierOutcome:
     impact_heights: tuple[float, ...]
     overtopped: int
     failed: bool
+    caught: float
+    state: str
+    displacement: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +92,9 @@ class Outcome:
     slope_fraction, held_fraction, road_fraction, beyond_fraction : float
         Where the mass is at the end, by centroid; they add up to 1 exactly. Held: uphill of a
         barrier that stands and below the line that rises uphill from its top at the angle of
-        friction, the steepest surface of a deposit that leans on it.
+        friction, the steepest surface of a deposit that leans on it. Not of one that failed or
+        was overturned; what a ditch holds is between its edges, below that line from its
+        downhill edge.
     barriers : tuple of BarrierOutcome
         One for each barrier of the layout.
     """
@@ -85,9 +111,9 @@ class Outcome:
     barriers: tuple[BarrierOutcome, ...]
 
 
-def stations(site: Site, layout: Sequence[Wall]) -> tuple[float, ...]:
+def stations(site: Site, layout: Sequence[Barrier]) -> tuple[float, ...]:
     """Return the ascending chainages at which a release must be watched for its outcome [m]."""
-    return tuple(sorted({site.road.start, *(b.x + b.thickness for b in layout)}))
+    return tuple(sorted({site.road.start, *(b.end for b in layout)}))
 
 
 def watch(site: Site) -> tuple[float, float]:
@@ -100,21 +126,20 @@ def measure(site: Site, run: Run) -> Outcome:
     scene = run.scene
     area, weight, mass = _masses(run)
     lines = stations(site, scene.barriers)
-    passed = {
-        line: np.isin(np.arange(len(area)), run.crossings(i)["block"])
-        for i, line in enumerate(lines)
-    }
+    passed = {line: _first_passed(run, i) for i, line in enumerate(lines)}
     x, y = run.poses[-1, :, 0], run.poses[-1, :, 1]
     beyond = x > site.road.end
     road = (x >= site.road.start) & ~beyond
-    held = _held(run, x, y) & ~road & ~beyond
+    reach = [_reach(run, i, x, y) for i in range(len(scene.barriers))]
+    held = np.any([np.zeros(len(x), dtype=bool), *reach], axis=0) & ~road & ~beyond
+    resting = np.hypot(*run.velocities[-1, :, :2].T) < AT_REST
 
     def share(where: NDArray[np.bool_]) -> float:
         return float(weight[where].sum() / GRAIN)
 
     return Outcome(
         released_mass=mass,
-        debris_fraction=share(passed[site.road.start]),
+        debris_fraction=share(np.isfinite(passed[site.road.start])),
         debris_on_road=float(area[road].sum()),
         max_energy_on_road=float(run.watch_energy.max()),
         run_out=_run_out(x, weight),
@@ -123,7 +148,8 @@ def measure(site: Site, run: Run) -> Outcome:
         road_fraction=share(road),
         beyond_fraction=share(beyond),
         barriers=tuple(
-            _barrier(run, i, passed[b.x + b.thickness]) for i, b in enumerate(scene.barriers)
+            _barrier(run, i, passed[b.end], share(reach[i] & resting))
+            for i, b in enumerate(scene.barriers)
         ),
     )
 
@@ -145,26 +171,66 @@ def _run_out(x: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float
     return float(at[0]), float(at[1]), float(at[2])
 
 
-def _held(run: Run, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
-    scene = run.scene
-    held = np.zeros(len(x), dtype=bool)
+def _first_passed(run: Run, station: int) -> NDArray[np.float64]:
+    """Return the time at which each block first passed a station, inf if it did not, (N,) [s]."""
+    time = np.full(run.poses.shape[1], np.inf)
+    crossings = run.crossings(station)
+    time[crossings["block"]] = crossings["time"]
+    return time
+
+
+def _reach(
+    run: Run, index: int, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return which centroids (x, y) a barrier holds at the end, as `Outcome` says."""
+    scene, barrier = run.scene, run.scene.barriers[index]
+    if state_of(run, index) in ("failed", "overturned"):
+        return np.zeros(len(x), dtype=bool)
     rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
-    for barrier in scene.barriers:
-        assert scene.terrain is not None
-        top = barrier.outline(scene.terrain)[:, 1].max()
-        held |= (x < barrier.x) & (y < top + rise * (barrier.x - x))
-    return held
+    corners = run.outline(index)
+    if isinstance(barrier, Ditch):
+        assert scene.ground is not None
+        edge, top = barrier.end, scene.ground.height(barrier.end)
+        return (x >= barrier.x) & (x < edge) & (y < top + rise * (edge - x))
+    face, top = corners[:, 0].min(), corners[:, 1].max()
+    if isinstance(barrier, Embankment):  # its uphill side belongs to it
+        face += barrier.side_slope * barrier.height
+    return (x < face) & (y < top + rise * (face - x))
 
 
-def _barrier(run: Run, index: int, passed: NDArray[np.bool_]) -> BarrierOutcome:
+def state_of(run: Run, index: int) -> str:
+    """Return the state of a barrier at the end."""
+    barrier = run.scene.barriers[index]
+    if math.isfinite(run.failure(index)):
+        return "failed"
+    if isinstance(barrier, GravityWall):
+        diagonal = math.atan2(barrier.thickness, barrier.height)
+        if abs(run.barrier_poses[-1, index, 2]) > diagonal:
+            return "overturned"
+        if _displacement(run, index) > SLID:
+            return "slid"
+    return "stands"
+
+
+def _displacement(run: Run, index: int) -> float:
+    """Return the distance of a barrier's centroid from where it was at the start [m]."""
+    moved = run.barrier_poses[-1, index, :2] - run.barrier_poses[0, index, :2]
+    return float(np.hypot(*moved))
+
+
+def _barrier(run: Run, index: int, passed: NDArray[np.float64], caught: float) -> BarrierOutcome:
     hits = run.hits(index)
     uphill = run.poses[0, :, 0] < run.scene.barriers[index].x
+    failure = run.failure(index)
     return BarrierOutcome(
         hits=len(hits),
         max_energy=float(hits["energy"].max(initial=0.0)),
         total_energy=math.fsum(hits["energy"]),
         absorbed_energy=float(run.absorbed[index]),
         impact_heights=tuple(float(h) for h in hits["height"]),
-        overtopped=int((passed & uphill).sum()),
-        failed=False,
+        overtopped=int((uphill & np.isfinite(passed) & (passed < failure)).sum()),
+        failed=math.isfinite(failure),
+        caught=caught,
+        state=state_of(run, index),
+        displacement=_displacement(run, index),
     )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.barriers import Fence, GravityWall
 from rigdda.constants import (
     AWAKE,
     BOLT,
@@ -83,9 +84,9 @@ def pack(
     watch : (float, float)
         Interval of x in which energies are watched [m].
     """
-    blocks, barriers = len(scene.blocks), len(scene.barriers)
     names = list(scene.surfaces)
     bodies, outlines = pack_bodies(scene, names)
+    blocks = free_bodies(scene)
     room = 16 * blocks + 64
     return Arrays(
         bodies,
@@ -96,28 +97,38 @@ def pack(
         empty_contacts(room),
         empty_contacts(room),
         empty_matrix(blocks, room),
-        empty_work(blocks + barriers, room),
+        empty_work(len(bodies), room),
         pack_gauges(scene, stations, watch),
         pack_parameters(scene, settings, bodies, names),
     )
 
 
+def free_bodies(scene: Scene) -> int:
+    """Return how many bodies are not barriers that are fixed: these come first."""
+    return len(scene.blocks) + sum(isinstance(b, GravityWall) for b in scene.barriers)
+
+
 def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
-    """Return the blocks, then the barriers, as bodies at the start, and their outlines."""
-    terrain = scene.terrain
-    walls = [b.outline(terrain) for b in scene.barriers] if terrain is not None else []
-    polygons = [b.vertices for b in scene.blocks] + walls
+    """Return the blocks, then the barriers, as bodies at the start, and their outlines.
+
+    The surface of fences comes after the named ones.
+    """
+    polygons = [b.vertices for b in scene.blocks] + [scene.outline(i) for i in scene.bodies]
     bodies = np.zeros(len(polygons), dtype=BODY).view(np.recarray)
     outlines = pack_outlines(polygons, bodies)
     for i, polygon in enumerate(polygons):
         area, centre, second = polygon_properties(polygon)
         block = scene.blocks[i] if i < len(scene.blocks) else None
-        density = block.density if block else 1.0
+        barrier = None if block else scene.barriers[scene.bodies[i - len(scene.blocks)]]
+        heavy = block or (barrier if isinstance(barrier, GravityWall) else None)
+        density = heavy.density if heavy else 1.0
         bodies["x"][i], bodies["y"][i] = centre
         bodies["radius"][i] = np.hypot(*(polygon - centre).T).max()
         bodies["mass"][i], bodies["inertia"][i] = density * area, density * second
         bodies["surface"][i] = names.index(block.surface if block else scene.barrier_surface)
-        bodies["status"][i] = AWAKE if block and not block.fixed else FIXED
+        if isinstance(barrier, Fence):
+            bodies["surface"][i] = len(names)
+        bodies["status"][i] = FIXED if (block.fixed if block else not heavy) else AWAKE
         if block and not block.fixed:
             bodies["vx"][i], bodies["vy"][i], bodies["omega"][i] = block.velocity
         place_corners(bodies, outlines, i)
@@ -207,11 +218,11 @@ def pack_outlines(polygons: list[NDArray[np.float64]], bodies: Bodies) -> Outlin
 
 def pack_ground(scene: Scene, names: list[str]) -> Ground:
     """Return the terrain segments and the bins that find them by x."""
-    if scene.terrain is None:
+    if scene.ground is None:
         none, start = np.zeros(0), np.zeros(1, dtype=np.int64)
         whole = np.zeros(0, dtype=np.int64)
         return Ground(none, none, none, none, none, none, whole, start, whole, 0.0, 1.0)
-    points = scene.terrain.points
+    points = scene.ground.points
     step = np.diff(points, axis=0)
     length = np.hypot(step[:, 0], step[:, 1])
     tangent = step / length[:, None]
@@ -238,7 +249,7 @@ def pack_ground(scene: Scene, names: list[str]) -> Ground:
         np.ascontiguousarray(tangent[:, 0]),
         length,
         turn,
-        np.array([names.index(s) for s in scene.terrain.surfaces], dtype=np.int64),
+        np.array([names.index(s) for s in scene.ground.surfaces], dtype=np.int64),
         np.cumsum([0, *(len(i) for i in items)]).astype(np.int64),
         np.array([s for cell in items for s in cell], dtype=np.int64),
         float(origin),
@@ -307,13 +318,17 @@ def pack_gauges(scene: Scene, stations: NDArray[np.float64], watch: tuple[float,
     """Return the gauges, with no station passed that a block starts beyond."""
     blocks, barriers = len(scene.blocks), len(scene.barriers)
     start = [polygon_properties(b.vertices)[1][0] for b in scene.blocks]
-    terrain = scene.terrain
+    ground = scene.ground
+    fences = [isinstance(b, Fence) for b in scene.barriers]
     return Gauges(
         stations,
-        np.array([_ground(terrain, x) for x in stations]),
+        np.array([_ground(ground, x) for x in stations]),
         np.searchsorted(stations, start, side="right").astype(np.int64),
-        np.array([terrain.height(b.x) for b in scene.barriers] if terrain else []),
-        np.full((blocks, barriers), -np.inf),
+        np.array([-1] * blocks + list(scene.bodies), dtype=np.int64),
+        np.array([b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]),
+        sum(fences),
+        np.array([_ground(ground, b.x) for b in scene.barriers]),
+        np.full((free_bodies(scene), barriers), -np.inf),
         np.zeros(barriers),
         np.array(watch, dtype=np.float64),
         np.zeros(blocks),
@@ -329,7 +344,7 @@ def _ground(terrain: Terrain | None, x: float) -> float:
 
 def event_room(blocks: int, stations: int, barriers: int) -> int:
     """Return the size of an event buffer that holds any two steps."""
-    return 2 * blocks * (stations + barriers) + 1
+    return 2 * (blocks + 1) * (stations + barriers) + 1
 
 
 def pack_parameters(
@@ -345,12 +360,20 @@ def pack_parameters(
     static = settings.mode == "static"
     weight = np.mean(bodies["mass"][free]) * (gravity or 9.81)
     pairs = [[scene.interface(a, b) for b in names] for a in names]
+    friction = np.array([[s.friction_deg for s in row] for row in pairs])
+    restitution = np.array(
+        [[PLAIN_CONTACT if s.restitution is None else s.restitution for s in row] for row in pairs]
+    )
+    if any(isinstance(b, Fence) for b in scene.barriers):
+        # fences are of the surface of barriers, but plastic
+        same = [*range(len(names)), names.index(scene.barrier_surface)]
+        friction, restitution = friction[same][:, same], np.pad(restitution, ((0, 1), (0, 1)))
     if scene.terrain is None or gx != 0.0 or gy >= 0.0:
         floor = -np.inf
     else:
         floor = scene.terrain.points[:, 1].min() - FALL_BELOW
     return Parameters(
-        len(scene.blocks),
+        free_bodies(scene),
         settings.dt,
         gx,
         gy,
@@ -369,11 +392,6 @@ def pack_parameters(
         settings.relaxation,
         settings.sleeping and not (static or shaken or scene.supports),
         float(floor),
-        np.tan(np.radians([[s.friction_deg for s in row] for row in pairs])),
-        np.array(
-            [
-                [PLAIN_CONTACT if s.restitution is None else s.restitution for s in row]
-                for row in pairs
-            ]
-        ),
+        np.tan(np.radians(friction)),
+        restitution,
     )

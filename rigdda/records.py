@@ -1,8 +1,8 @@
 """Arrays that the kernels work on: structured arrays, named tuples of arrays. `pack` fills them.
 
-M bodies: the N blocks of the scene, then its B barriers. R: polygons, the M outlines of the bodies,
-then the convex parts of those that are not convex. P: most corners of a polygon. S: terrain
-segments. C: room for contacts.
+M bodies: the N blocks of the scene, its gravity walls, then its walls and fences. B: barriers. R:
+polygons, the M outlines of the bodies, then the convex parts of those that are not convex. P: most
+corners of a polygon. S: terrain segments. C: room for contacts.
 """
 
 from __future__ import annotations
@@ -68,6 +68,7 @@ CONTACT = _record(
     restitution=float,
     cohesion=float,  # shear force that an unbroken joint bears without normal force [N]
     tension=float,  # tension that it, or a bolt before it yields, bears [N]
+    passing=float,  # closing velocity if the fence it is with were not there [m/s]
     stiffness=float,  # of the contact at rest [N/m]
     kappa=float,  # in this step [N/m]
     bias=float,  # displacement at which the spring is free [m], see contact.law
@@ -158,7 +159,7 @@ class Ground(NamedTuple):
 class Matrix(NamedTuple):
     """Block-sparse symmetric system of one island: n blocks, 3x3 each."""
 
-    diagonal: Floats  # (N, 3, 3)
+    diagonal: Floats  # (N, 3, 3), N with the gravity walls
     off: Floats  # (pairs, 3, 3) row block pair_i, column block pair_j
     pair_i: Ints
     pair_j: Ints
@@ -202,8 +203,11 @@ class Gauges(NamedTuple):
     station: Floats  # (K,) ascending chainages [m]
     station_ground: Floats  # (K,) elevation of the highest ground there [m]
     next_station: Ints  # (N,) first station a block has not passed
+    barrier: Ints  # (M,) barrier that a body is, -1: rock
+    capacity: Floats  # (B,) energy that a barrier absorbs before it fails [J], inf: it does not
+    fences: int  # barriers that can fail
     barrier_ground: Floats  # (B,) elevation from which impact heights count [m]
-    last_touch: Floats  # (N, B) time of the last touch [s]
+    last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
     absorbed: Floats  # (B,) [J]
     watch: Floats  # (2,) interval of x
     watch_energy: Floats  # (N,) largest energy in it [J]
@@ -223,7 +227,7 @@ class Shaking(NamedTuple):
 class Parameters(NamedTuple):
     """Numbers of the scene and the settings."""
 
-    blocks: int
+    blocks: int  # bodies that may move: the blocks of the scene and its gravity walls
     dt: float
     gravity_x: float  # [m/s2]
     gravity_y: float

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
+from rigdda.barriers import Barrier
 from rigdda.outcome import Outcome, measure, stations, watch
 from rigdda.run import Run
-from rigdda.scene import Wall
 from rigdda.simulation import Simulation
 from rigdda.site import Site
 
 
 def release(
-    site: Site, layout: Sequence[Wall] = (), seed: int = 0, progress: bool = False
+    site: Site, layout: Sequence[Barrier] = (), seed: int = 0, progress: bool = False
 ) -> tuple[Run, Outcome]:
     """Simulate one release of the source with a layout in place.
 
@@ -37,7 +37,7 @@ def release(
     return run, measure(site, run)
 
 
-def release_many(jobs: Sequence[tuple[Site, Sequence[Wall], int]]) -> list[Outcome]:
+def release_many(jobs: Sequence[tuple[Site, Sequence[Barrier], int]]) -> list[Outcome]:
     """Return the outcomes of many releases (site, layout, seed), over all cores in threads.
 
     Each outcome is the one that `release` gives. Raises as `release` does.

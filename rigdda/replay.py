@@ -25,6 +25,7 @@ import shapely
 from numpy.typing import NDArray
 
 from rigdda import check
+from rigdda.barriers import Ditch, GravityWall
 from rigdda.errors import BadInput, Error
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
@@ -46,6 +47,7 @@ EDGE = 0.01
 SKY: Colour = (233, 240, 246)
 GROUND: Colour = (201, 188, 165)
 BARRIER: Colour = (28, 90, 160)
+BROKEN: Colour = (176, 182, 188)
 ROAD: Colour = (232, 93, 4)
 ROCK: tuple[Colour, ...] = ((104, 88, 74), (128, 108, 90), (88, 80, 76), (146, 122, 98))
 INK: Colour = (40, 34, 30)
@@ -168,6 +170,8 @@ def _log_run(rec: rr.RecordingStream, run: Run, marks: Marks, root: str = "") ->
     """Log a whole run below the entity `root`."""
     _log_setting(rec, f"{root}/world", run.scene, marks)
     time = rr.TimeColumn(TIMELINE, duration=run.times)
+    for i in range(len(run.scene.barriers)):
+        _log_barrier(rec, f"{root}/world/barriers/{i}", time, run, i)
     for i in range(len(run.scene.blocks)):
         _log_block(rec, f"{root}/world/blocks/{i}", time, run, i)
     for name, values in _scalars(run, marks).items():
@@ -181,7 +185,7 @@ def _log_run(rec: rr.RecordingStream, run: Run, marks: Marks, root: str = "") ->
 
 
 def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks) -> None:
-    """Log what does not move: the camera, the terrain, the barriers and the road."""
+    """Log what never changes: the camera, the ground and the road."""
     left, bottom, right, top = _frame(scene)
     rec.log(world, rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
     eye = rr.Transform3D(translation=[(left + right) / 2, (bottom + top) / 2, CAMERA])
@@ -193,14 +197,11 @@ def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks
         image_plane_distance=CAMERA,
     )
     rec.log(f"{world}/camera", eye, lens, static=True)
-    if scene.terrain is None:
+    if scene.ground is None:
         return
-    chain = scene.terrain.points
+    chain = scene.ground.points
     surface = shapely.LineString(chain)
     _log_shape(rec, f"{world}/terrain", _ground(chain, bottom), LAYER["terrain"], GROUND, surface)
-    for i, barrier in enumerate(scene.barriers):
-        shape = shapely.Polygon(barrier.outline(scene.terrain))
-        _log_shape(rec, f"{world}/barriers/{i}", shape, LAYER["barriers"], BARRIER)
     if marks.road is not None:
         start, end = marks.road
         road = shapely.clip_by_rect(surface, start, bottom, end, top)
@@ -209,19 +210,50 @@ def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks
         rec.log(f"{world}/road", line, static=True)
 
 
-def _log_block(rec: rr.RecordingStream, entity: str, time: rr.TimeColumn, run: Run, i: int) -> None:
-    """Log block `i`: its polygon about its centroid once, and where that is in every frame."""
-    block = run.scene.blocks[i]
-    x, y, theta = run.poses[:, i].T
+def _log_barrier(
+    rec: rr.RecordingStream, entity: str, time: rr.TimeColumn, run: Run, i: int
+) -> None:
+    """Log barrier `i`: a gravity wall moves, a failed fence turns pale, a ditch is a line."""
+    barrier, z = run.scene.barriers[i], LAYER["barriers"]
+    outline = run.scene.outline(i)
+    if isinstance(barrier, Ditch):
+        edge = np.insert(np.concatenate([outline, outline[:1]]), 2, z + EDGE, axis=1)
+        line = rr.LineStrips3D([edge], colors=BARRIER, radii=rr.Radius.ui_points(1.5))
+        rec.log(entity, line, static=True)
+        return
+    if isinstance(barrier, GravityWall):
+        body = shapely.Polygon(outline - polygon_properties(outline)[1])
+        _log_shape(rec, entity, body, 0.0, BARRIER)
+        _log_motion(rec, entity, time, run.barrier_poses[:, i], z)
+        return
+    failure = run.failure(i)
+    whole = shapely.Polygon(outline)
+    _log_shape(rec, entity, whole, z, BARRIER if np.isinf(failure) else None)
+    if np.isfinite(failure):
+        when = rr.TimeColumn(TIMELINE, duration=[run.times[0], failure])
+        rec.send_columns(entity, [when], rr.Mesh3D.columns(albedo_factor=[BARRIER, BROKEN]))
+
+
+def _log_motion(
+    rec: rr.RecordingStream, entity: str, time: rr.TimeColumn, poses: Floats, z: float
+) -> None:
+    """Log where a body is in every frame, from its poses, (T, 3)."""
+    x, y, theta = poses.T
     still = np.zeros_like(theta)
-    body = block.vertices - polygon_properties(block.vertices)[1]
-    colour = GROUND if block.fixed else ROCK[i % len(ROCK)]
-    _log_shape(rec, entity, shapely.Polygon(body), 0.0, colour)
     columns = rr.Transform3D.columns(
-        translation=np.column_stack([x, y, still + LAYER["blocks"]]),
+        translation=np.column_stack([x, y, still + z]),
         quaternion=np.column_stack([still, still, np.sin(theta / 2), np.cos(theta / 2)]),
     )
     rec.send_columns(entity, [time], columns)
+
+
+def _log_block(rec: rr.RecordingStream, entity: str, time: rr.TimeColumn, run: Run, i: int) -> None:
+    """Log block `i`: its polygon about its centroid once, and where that is in every frame."""
+    block = run.scene.blocks[i]
+    body = block.vertices - polygon_properties(block.vertices)[1]
+    colour = GROUND if block.fixed else ROCK[i % len(ROCK)]
+    _log_shape(rec, entity, shapely.Polygon(body), 0.0, colour)
+    _log_motion(rec, entity, time, run.poses[:, i], LAYER["blocks"])
 
 
 def _log_shape(
@@ -229,11 +261,15 @@ def _log_shape(
     entity: str,
     shape: shapely.Geometry,
     z: float,
-    colour: Colour,
+    colour: Colour | None,
     outline: shapely.Geometry | None = None,
 ) -> None:
-    """Log `shape` filled with `colour`, and in ink its `outline` (by default, all of it)."""
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+    """Log `shape` filled with `colour`, and in ink its `outline` (by default, all of it).
+
+    Without a colour it is left to be logged over time.
+    """
+    valid = shapely.make_valid(shape)  # parts of an earthwork may be joined without width
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(valid))
     corners = [_lift(triangle, z)[:3] for triangle in triangles]  # the fourth closes the ring
     edge = _lift(outline or shape, z + EDGE)
     fill = rr.Mesh3D(vertex_positions=np.concatenate(corners), albedo_factor=colour)
@@ -256,8 +292,8 @@ def _ground(chain: Floats, bottom: float) -> shapely.Geometry:
 def _frame(scene: Scene) -> tuple[float, float, float, float]:
     """Return left, bottom, right, top of a view on the whole scene at its start [m]."""
     parts = [block.vertices for block in scene.blocks]
-    if scene.terrain is not None:
-        parts += [scene.terrain.points, *(b.outline(scene.terrain) for b in scene.barriers)]
+    if scene.ground is not None:
+        parts += [scene.ground.points, *(scene.outline(i) for i in range(len(scene.barriers)))]
     points = np.concatenate(parts)
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.04 * float((high - low).max())

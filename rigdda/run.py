@@ -13,12 +13,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.barriers import from_table, to_tables
 from rigdda.errors import BadInput
 from rigdda.files import atomic
-from rigdda.gauges import CROSSING, HIT
+from rigdda.gauges import CROSSING, FAILED, HIT
 from rigdda.loads import BodyForce, LineLoad, PointLoad
-from rigdda.scene import Block, Scene, Surface, Terrain, Wall
+from rigdda.scene import Block, Scene, Surface
 from rigdda.supports import Bolt, FixedPoint
+from rigdda.terrain import Terrain
 
 if TYPE_CHECKING:
     from rigdda.replay import Marks
@@ -39,10 +41,10 @@ EVENT = np.dtype(
         ("energy", "f8"),
     ]
 )
-"""One event. target: index of the barrier or station. x, y: contact point of a hit, centroid at a
-crossing [m]. height: of that point above the highest ground
-there, above 0 where there is none [m]. speed: of the centroid [m/s]. energy:
-translational and rotational, just before a hit [J]."""
+"""One event. block: N + i for barrier i, a gravity wall that hits or breaks another one. target:
+index of the barrier or station. x, y: contact point of a hit or a failure, centroid at a crossing
+[m]. height: of that point above the highest ground there, above 0 where there is none [m]. speed:
+of the centroid [m/s]. energy: translational and rotational, just before a hit or a failure [J]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,9 +62,11 @@ class Run:
     events : (E,) structured array
         Hits and crossings in order of time, see `EVENT`.
     absorbed : (B,) array
-        Energy that each barrier took from the blocks by contact forces [J].
+        Energy that each barrier took from the blocks [J], as `BarrierOutcome` says.
     watch_energy : (N,) array
         Largest kinetic energy of each block while its centroid was in the watched interval [J].
+    barrier_poses : (T, B, 3) array
+        x, y, theta of the centroid of each barrier's outline; only gravity walls move.
     """
 
     scene: Scene
@@ -72,10 +76,23 @@ class Run:
     events: NDArray[np.void]
     absorbed: NDArray[np.float64]
     watch_energy: NDArray[np.float64]
+    barrier_poses: NDArray[np.float64]
 
     def hits(self, barrier: int) -> NDArray[np.void]:
         """Return the events in which a block hits `barrier`."""
         return self._of(HIT, barrier)
+
+    def failure(self, barrier: int) -> float:
+        """Return the time at which `barrier` failed, inf if it did not [s]."""
+        failed = self._of(FAILED, barrier)
+        return float(failed["time"][0]) if len(failed) else np.inf
+
+    def outline(self, barrier: int, frame: int = -1) -> NDArray[np.float64]:
+        """Return the (n, 2) corners of a barrier in a frame, see `Scene.outline` [m]."""
+        corners = self.scene.outline(barrier)
+        start, (x, y, theta) = self.barrier_poses[0, barrier], self.barrier_poses[frame, barrier]
+        cos, sin = np.cos(theta), np.sin(theta)
+        return (corners - start[:2]) @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
 
     def crossings(self, station: int) -> NDArray[np.void]:
         """Return the events in which a block first passes `station`."""
@@ -96,6 +113,7 @@ class Run:
                 events=self.events,
                 absorbed=self.absorbed,
                 watch_energy=self.watch_energy,
+                barrier_poses=self.barrier_poses,
             )
 
     @classmethod
@@ -155,7 +173,7 @@ def scene_to_json(scene: Scene) -> bytes:
                 for b in scene.blocks
             ],
             "surfaces": scene.surfaces,
-            "barriers": scene.barriers,
+            "barriers": to_tables(scene.barriers),
             "interfaces": [[*pair, surface] for pair, surface in scene.interfaces.items()],
             "loads": [[type(load).__name__, load] for load in scene.loads],
             "supports": [[type(support).__name__, support] for support in scene.supports],
@@ -181,7 +199,9 @@ def scene_from_json(text: bytes) -> Scene:
         terrain=terrain and Terrain(**terrain),
         blocks=tuple(Block(**b) for b in data.pop("blocks")),
         surfaces={name: Surface(**s) for name, s in data.pop("surfaces").items()},
-        barriers=tuple(Wall(**b) for b in data.pop("barriers")),
+        barriers=tuple(
+            from_table(f"barriers[{i}]", table) for i, table in enumerate(data.pop("barriers"))
+        ),
         interfaces={(a, b): Surface(**s) for a, b, s in data.pop("interfaces")},
         loads=tuple(LOADS[name](**load) for name, load in data.pop("loads")),
         supports=tuple(SUPPORTS[name](**support) for name, support in data.pop("supports")),

@@ -12,10 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.validation import explain_validity
 
 from rigdda import check
+from rigdda.barriers import Barrier, Earthwork, GravityWall, Layout, Wall, earthworks
 from rigdda.errors import BadInput
 from rigdda.geometry import is_convex
 from rigdda.loads import Load, vector
 from rigdda.supports import FixedPoint, Support
+from rigdda.terrain import Terrain
+
+__all__ = ["Barrier", "Block", "Layout", "Scene", "Surface", "Terrain", "Wall", "simple_polygon"]
 
 RIGHT_ANGLE_DEG = 90.0
 
@@ -104,139 +108,21 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Terrain:
-    """The ground, a chain of segments walked with the ground on its right.
-
-    A slope that is walked from left to right has the ground below. Overhangs are allowed, the
-    chain must not cross itself.
-
-    Parameters
-    ----------
-    points : (m, 2) array_like
-        Corners of the chain [m].
-    surfaces : sequence of str, optional
-        Surface name of each of the m - 1 segments; "rock" by default.
-
-    Raises
-    ------
-    BadInput
-        If the chain crosses itself, a segment has no length or the number of names is wrong.
-    """
-
-    points: NDArray[np.float64]
-    surfaces: tuple[str, ...]
-
-    def __init__(self, points: ArrayLike, surfaces: Sequence[str] | None = None):
-        chain = check.points("terrain points", points, 2)
-        short = np.flatnonzero(np.hypot(*np.diff(chain, axis=0).T) < 1e-9)
-        if short.size:
-            raise BadInput(
-                f"terrain points[{short[0] + 1}]",
-                chain[short[0] + 1].tolist(),
-                "remove it: it repeats the point before it",
-            )
-        if not shapely.LineString(chain).is_simple:
-            raise BadInput("terrain points", "chain", "untangle it: the chain crosses itself")
-        names = ("rock",) * (len(chain) - 1) if surfaces is None else tuple(surfaces)
-        if len(names) != len(chain) - 1:
-            raise BadInput(
-                "terrain surfaces",
-                f"{len(names)} names",
-                f"give one name for each of the {len(chain) - 1} segments",
-            )
-        object.__setattr__(self, "points", chain)
-        object.__setattr__(self, "surfaces", names)
-
-    def height(self, x: float) -> float:
-        """Return the elevation of the highest ground at chainage `x` [m].
-
-        Raises
-        ------
-        BadInput
-            If the terrain does not reach `x`.
-        """
-        p, q = self.points[:-1], self.points[1:]
-        low, high = np.minimum(p[:, 0], q[:, 0]), np.maximum(p[:, 0], q[:, 0])
-        over = (low <= x) & (x <= high)
-        if not over.any():
-            raise BadInput("x", x, f"stay on the terrain, {low.min():g} to {high.max():g} m")
-        p, q = p[over], q[over]
-        run = q[:, 0] - p[:, 0]
-        share = np.where(run == 0.0, 1.0, (x - p[:, 0]) / np.where(run == 0.0, 1.0, run))
-        return float(
-            np.where(
-                run == 0.0,
-                np.maximum(p[:, 1], q[:, 1]),
-                p[:, 1] + share * (q[:, 1] - p[:, 1]),
-            ).max()
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Wall:
-    """A rigid retaining wall that stands on the terrain and cannot be moved.
-
-    Parameters
-    ----------
-    x : float
-        Chainage of its uphill face [m].
-    height : float
-        Height above the highest ground under it [m].
-    thickness : float
-        Extent downhill of `x` [m].
-
-    Raises
-    ------
-    BadInput
-        If a value is not finite or not above zero.
-    """
-
-    x: float
-    height: float
-    thickness: float = 1.0
-
-    def __post_init__(self) -> None:
-        check.number("wall x", self.x)
-        check.number("wall height", self.height, 0.0, open_low=True)
-        check.number("wall thickness", self.thickness, 0.0, open_low=True)
-
-    def outline(self, terrain: Terrain) -> NDArray[np.float64]:
-        """Return the (4, 2) corners of the wall on `terrain`, its foot in the ground.
-
-        Raises
-        ------
-        BadInput
-            If the wall does not stand on the terrain.
-        """
-        left, right = self.x, self.x + self.thickness
-        inner = [x for x in terrain.points[:, 0] if left < x < right]
-        try:
-            ground = [terrain.height(x) for x in (left, *inner, right)]
-        except BadInput as bad:
-            raise BadInput("wall x", self.x, bad.mend) from None
-        foot, top = min(ground) - 1.0, max(ground) + self.height
-        return np.array([[left, foot], [right, foot], [right, top], [left, top]])
-
-
-Barrier = Wall
-Layout = tuple[Barrier, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """A mechanical problem in two dimensions, per metre of slope width.
 
     Parameters
     ----------
     terrain : Terrain or None
-        The fixed ground; None: free space.
+        The natural ground; None: free space.
     blocks : sequence of Block
-        The blocks, at least one of them free to move.
+        The rock, at least one block of it free to move. Gravity walls are not among them.
     surfaces : mapping of str to Surface
         Every surface that a block or the terrain names. Two surfaces that meet take the smaller
         of each property.
-    barriers : sequence of Wall
-        Fixed walls; their surface is "concrete" where the scene defines it, else "rock".
+    barriers : sequence of Wall, GravityWall, Fence, Ditch or Embankment
+        Protective structures; their surface is "concrete" where the scene defines it, else "rock".
+        That of embankments is "soil" where the scene defines it.
     interfaces : mapping of (str, str) to Surface
         Properties for pairs of surfaces, instead of the smaller of each.
     loads : sequence of PointLoad, LineLoad or BodyForce
@@ -276,6 +162,8 @@ class Scene:
     damping: float = 0.0
     damping_when: str = "always"
     base_motion: NDArray[np.float64] | None = None
+    ground: Terrain | None = field(init=False, repr=False)
+    _moved: Mapping[Barrier, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("blocks", "barriers", "loads", "supports"):
@@ -300,12 +188,47 @@ class Scene:
         for pair in self.interfaces:
             for name in pair:
                 self._known(f"interfaces {pair}", name)
+        object.__setattr__(self, "ground", self.terrain)
+        object.__setattr__(self, "_moved", {})
         if self.barriers:
-            if self.terrain is None:
-                raise BadInput("barriers", self.barriers, "give the scene a terrain to stand on")
-            self._known("barrier surface", self.barrier_surface)
-            for barrier in self.barriers:
-                barrier.outline(self.terrain)
+            self._build()
+
+    def _build(self) -> None:
+        """Set the ground with its earthworks and check that every barrier stands on it."""
+        if self.terrain is None:
+            raise BadInput("barriers", self.barriers, "give the scene a terrain to stand on")
+        self._known("barrier surface", self.barrier_surface)
+        fill = "soil" if "soil" in self.surfaces else self.barrier_surface
+        ground, moved = earthworks(self.terrain, self.barriers, fill)
+        object.__setattr__(self, "ground", ground)
+        object.__setattr__(self, "_moved", moved)
+        for i in range(len(self.barriers)):
+            self.outline(i)
+
+    def outline(self, barrier: int) -> NDArray[np.float64]:
+        """Return the (n, 2) corners of a barrier at the start [m].
+
+        Those of a ditch or an embankment enclose what is dug out or filled in.
+
+        Raises
+        ------
+        BadInput
+            If the barrier does not stand on the ground.
+        """
+        what = self.barriers[barrier]
+        if isinstance(what, Earthwork):
+            return self._moved[what]
+        assert self.ground is not None
+        return what.outline(self.ground)
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """Barriers that are bodies, in the order in which they follow the blocks.
+
+        Gravity walls first, which are free to move, then walls and fences.
+        """
+        upright = [i for i, b in enumerate(self.barriers) if not isinstance(b, Earthwork)]
+        return tuple(sorted(upright, key=lambda i: not isinstance(self.barriers[i], GravityWall)))
 
     def _check_loads(self) -> None:
         for i, load in enumerate(self.loads):

@@ -11,9 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check
-from rigdda.constants import BAD_STATE, BOLT, CONTACTS_FULL, EVENTS_FULL, OPEN, PIN, PLAIN
+from rigdda.constants import (
+    BAD_STATE,
+    BOLT,
+    CONTACTS_FULL,
+    EVENTS_FULL,
+    FIXED,
+    OPEN,
+    PIN,
+    PLAIN,
+)
 from rigdda.contact.links import anchor
 from rigdda.errors import BadInput, Diverged
+from rigdda.geometry import polygon_properties
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
 from rigdda.records import COUNTERS, LEDGER
 from rigdda.run import EVENT, Run
@@ -36,14 +46,15 @@ CONTACT = np.dtype(
         ("penetration", "f8"),
     ]
 )
-"""One contact. block_b: -1 terrain, N + i barrier i. The normal points from b to a; shear is
-positive along the normal turned by +90 degrees. Forces act on a [N]; penetration [m]."""
+"""One contact. block_b: -1 terrain, N + i barrier i; block_a may be one, a gravity wall. The
+normal points from b to a; shear is positive along the normal turned by +90 degrees. Forces act on a
+[N]; penetration [m]."""
 
 STATES = np.array(["open", "stick", "slip"])
 
 
 class Energy(NamedTuple):
-    """Energies of all blocks now, and work done on them so far [J].
+    """Energies of all blocks and gravity walls now, and work done on them so far [J].
 
     `elastic` is stored in bolts and plain contacts. `friction`, `damping` and `impact` are what
     shear forces, damping and the normal forces of contacts did, less what springs store: negative
@@ -117,6 +128,8 @@ class Simulation:
         self._ledger = np.zeros(len(LEDGER))
         self._deepest = np.zeros(1)
         self._elastic_at_start = self._elastic()
+        centres = [polygon_properties(scene.outline(i))[1] for i in range(len(scene.barriers))]
+        self._barrier_start = np.array([[*centre, 0.0] for centre in centres]).reshape(-1, 3)
         self._events: list[NDArray[np.void]] = []
 
     @property
@@ -129,6 +142,17 @@ class Simulation:
         """Copy of x, y, theta of the centroids, (N, 3) [m, m, rad]."""
         b, n = self._arrays.bodies, len(self.scene.blocks)
         return np.stack([b["x"][:n], b["y"][:n], b["theta"][:n]], axis=1)
+
+    @property
+    def barrier_poses(self) -> NDArray[np.float64]:
+        """Copy of x, y, theta of the centroids of the barriers' outlines, (B, 3) [m, m, rad].
+
+        Only gravity walls move.
+        """
+        out = self._barrier_start.copy()
+        b, n = self._arrays.bodies, len(self.scene.blocks)
+        out[list(self.scene.bodies)] = np.stack([b["x"][n:], b["y"][n:], b["theta"][n:]], axis=1)
+        return out
 
     @property
     def velocities(self) -> NDArray[np.float64]:
@@ -148,7 +172,9 @@ class Simulation:
         c = c[:n]
         c = c[(c["kind"] != BOLT) & (c["kind"] != PIN)]
         out = np.zeros(len(c), dtype=CONTACT)
-        out["block_a"], out["block_b"] = c["a"], c["b"]
+        blocks = len(self.scene.blocks)
+        number = np.array([*range(blocks), *(blocks + i for i in self.scene.bodies), -1])
+        out["block_a"], out["block_b"] = number[c["a"]], number[c["b"]]
         for name in ("x", "y", "nx", "ny"):
             out[name] = c[name]
         closed = c["state"] != OPEN
@@ -187,9 +213,9 @@ class Simulation:
         return float(total + 0.5 * (c["stiffness"] * np.minimum(c["gap"], 0.0) ** 2).sum())
 
     def energy(self) -> Energy:
-        """Return the energies of the free blocks now and the work done on them so far."""
-        b, n = self._arrays.bodies, len(self.scene.blocks)
-        free = np.array([not block.fixed for block in self.scene.blocks])
+        """Return the energies of what is free to move now and the work done on it so far."""
+        b, n = self._arrays.bodies, self._arrays.parameters.blocks
+        free = b["status"][:n] != FIXED
         speed = b["vx"][:n] ** 2 + b["vy"][:n] ** 2
         kinetic = 0.5 * (b["mass"][:n] * speed + b["inertia"][:n] * b["omega"][:n] ** 2)
         gx, gy = self.scene.gravity_vector
@@ -256,9 +282,10 @@ class Simulation:
             elif reason == CONTACTS_FULL:
                 self._grow()
             elif reason == BAD_STATE:
+                body = self._arrays.bodies[block]
                 raise Diverged(
                     f"step {self._counters[0]} ({self.time:g} s): block {block} moves at "
-                    f"{self.velocities[block].tolist()}; use a smaller dt"
+                    f"{[float(body[v]) for v in ('vx', 'vy', 'omega')]}; use a smaller dt"
                 )
 
     def run(self, duration: float, every: float = 0.05, progress: bool = False) -> Run:
@@ -283,7 +310,7 @@ class Simulation:
         stride = max(1, round(every / self.settings.dt))
         steps = max(1, round(duration / self.settings.dt))
         marks = [*range(stride, steps, stride), steps]
-        frames = [(self.time, self.poses, self.velocities)]
+        frames = [self._frame()]
         done = 0
         for mark in _track(marks, progress):
             try:
@@ -292,12 +319,15 @@ class Simulation:
                 error.run = self._record(frames)
                 raise
             done = mark
-            frames.append((self.time, self.poses, self.velocities))
+            frames.append(self._frame())
         return self._record(frames)
 
-    def _record(self, frames: list[tuple[float, NDArray, NDArray]]) -> Run:
+    def _frame(self) -> tuple[float, NDArray, NDArray, NDArray]:
+        return self.time, self.poses, self.velocities, self.barrier_poses
+
+    def _record(self, frames: list[tuple[float, NDArray, NDArray, NDArray]]) -> Run:
         self._drain_events()
-        times, poses, velocities = (np.array(column) for column in zip(*frames, strict=True))
+        times, poses, velocities, barrier_poses = map(np.array, zip(*frames, strict=True))
         events = np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
         gauges = self._arrays.gauges
         return Run(
@@ -308,6 +338,7 @@ class Simulation:
             events,
             gauges.absorbed.copy(),
             gauges.watch_energy.copy(),
+            barrier_poses,
         )
 
     def _drain_events(self) -> None:
@@ -323,7 +354,7 @@ class Simulation:
         self._now, self._before = grown, empty_contacts(room)
         order = self._arrays.work.sorted
         self._arrays = self._arrays._replace(
-            matrix=empty_matrix(len(self.scene.blocks), room),
+            matrix=empty_matrix(self._arrays.parameters.blocks, room),
             work=empty_work(len(bodies), room)._replace(sorted=order),
         )
 

@@ -9,6 +9,18 @@ from rigdda.records import Bodies, Parameters, Work
 
 
 @kernel
+def wake_island(bodies: Bodies, island: int, blocks: int) -> int:
+    """Wake the bodies that fell asleep in an island; returns how many."""
+    woken = 0
+    for k in range(blocks):
+        if bodies[k].status == ASLEEP and bodies[k].island == island:
+            bodies[k].status = AWAKE
+            bodies[k].quiet = 0.0
+            woken += 1
+    return woken
+
+
+@kernel
 def wake_neighbours(bodies: Bodies, work: Work, pairs: int, blocks: int) -> int:
     """Wake the islands of sleeping bodies paired with a moving one; returns how many bodies."""
     woken = 0
@@ -16,12 +28,7 @@ def wake_neighbours(bodies: Bodies, work: Work, pairs: int, blocks: int) -> int:
         i, j = work.pairs[2 * q], work.pairs[2 * q + 1]
         if bodies[j].status != ASLEEP or top_speed(bodies, i) < WAKE_SPEED:
             continue
-        island = bodies[j].island
-        for k in range(blocks):
-            if bodies[k].status == ASLEEP and bodies[k].island == island:
-                bodies[k].status = AWAKE
-                bodies[k].quiet = 0.0
-                woken += 1
+        woken += wake_island(bodies, bodies[j].island, blocks)
     return woken
 
 

@@ -31,7 +31,8 @@ from rigdda.correction import (
     move_corners,
     place_corners,
 )
-from rigdda.gauges import note_hits, note_passage
+from rigdda.fence import limit_fences, wake_behind
+from rigdda.gauges import barrier_contact, note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel
 from rigdda.motion import top_speed
@@ -85,8 +86,9 @@ def keep_asleep(
         if count < len(c) and (b == TERRAIN or bodies[b].status != AWAKE):
             copy_contact(c, count, old, m)
             count += 1
-            if b >= p.blocks:
-                gauges.last_touch[a, b - p.blocks] = time
+            block, barrier = barrier_contact(gauges, a, b)
+            if barrier >= 0:
+                gauges.last_touch[block, barrier] = time
     return count
 
 
@@ -138,7 +140,8 @@ def solve_and_move(
         c0, c1 = work.contact_start[s], work.contact_start[s + 1]
         if c1 > c0:
             open_close(bodies, c, m, work, s, p, counters)
-            counters[6] = note_hits(bodies, c, work, c0, c1, gauges, counters[6], time, p)
+            limit_fences(bodies, c, m, work, s, gauges, time, p, counters)
+            counters[6] = note_hits(bodies, c, work, c0, c1, gauges, counters[6], time)
         struck = is_struck(c, work, c0, c1)
         for item in range(c0, c1):
             keep_memory(c, work.contact_item[item], struck)
@@ -163,6 +166,7 @@ def solve_and_move(
                 bodies[c[k].b].touching = 1
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
+        wake_behind(bodies, c, count, gauges, p)
     return bad
 
 
@@ -198,7 +202,7 @@ def advance(
     swapped = False
     for _ in range(steps):
         room = len(gauges.event) - counters[6]
-        if room < p.blocks * (len(gauges.station) + len(gauges.absorbed)):
+        if room < (p.blocks + 1) * (len(gauges.station) + len(gauges.absorbed)):
             return EVENTS_FULL, -1, swapped
         time = (counters[0] + 1) * p.dt
         if p.static:
@@ -219,7 +223,7 @@ def advance(
             bodies, outlines, now, count, m, work, gauges, time, p, counters, ledger
         )
         yield_bolts(bodies, links)
-        counters[6] = note_passage(bodies, gauges, counters[6], time, p)
+        counters[6] = note_passage(bodies, gauges, counters[6], time)
         counters[0] += 1
         if bad >= 0:
             return BAD_STATE, bad, swapped

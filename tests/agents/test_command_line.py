@@ -18,6 +18,7 @@ from rerun.chunk import RrdReader
 import rigdda
 from agents import DESIGNERS
 from rigdda import Site
+from rigdda.barriers import to_tables
 
 TINY = ("--simulations", "24", "--verify", "4")
 COMMANDS = ("sites", "simulate", "design", "validate", "replay")
@@ -85,12 +86,10 @@ def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -
         kept = line["evaluation"]
         assert float(row["objective"]) == kept["objective"]
         assert int(row["releases"]) == len(kept["seeds"])
-        assert json.loads(row["barriers"]) == [
-            [b["x"], b["height"], b["thickness"]] for b in kept["layout"]
-        ]
+        assert json.loads(row["barriers"]) == kept["layout"]
     assert {row["stage"] for row in table} == {"search", "final", "verification"}
     assert [row["stage"] for row in table[-3:]] == 3 * ["verification"]
-    assert json.loads(table[-1]["barriers"]) == [[b.x, b.height, b.thickness] for b in layout]
+    assert json.loads(table[-1]["barriers"]) == to_tables(layout)
     assert int(table[-1]["simulations"]) <= 24
     for name in ("profile.png", "search.png"):
         width, height = png_size(folder / name)
@@ -146,6 +145,24 @@ def test_simulate_writes_what_it_says(toml: Path, tmp_path: Path) -> None:
     assert png_size(tmp_path / "o/profile.png")[0] > 900
     for name in ("debris past the road's edge [%]", "95 % interval", "wall at 15.0 m"):
         assert name in words
+
+
+def test_simulate_takes_every_kind(toml: Path, tmp_path: Path) -> None:
+    layout = (
+        rigdda.Fence(12.0, 2.0, 5e4),
+        rigdda.GravityWall(16.0, 1.0),
+        rigdda.Ditch(20.2, 0.5, 1.0),
+        rigdda.Embankment(21.3, 0.3, 0.2),
+    )
+    rigdda.save_layout(layout, tmp_path / "layout.json")
+    options = ("--releases", 1, "--layout", "layout.json", "--out", "o")
+    words = run("simulate", toml, *options, folder=tmp_path)
+    assert rigdda.Run.load(tmp_path / "o/run.npz").scene.barriers == layout
+    assert png_size(tmp_path / "o/profile.png")[0] > 900
+    for name in ("fence at 12.0 m", "gravity wall at", "ditch at", "embankment at", "failed"):
+        assert name in words
+    made = run("replay", toml, "--layout", "layout.json", "--out", "r", folder=tmp_path)
+    assert (tmp_path / made.strip()).is_file()
 
 
 def test_replay_makes_an_episode_and_says_where(toml: Path, tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from agents.protocol import DesignResult, Ledger, Plan, search
 from agents.seeds import STREAMS, release_seeds
 from agents.verify import verify
 from envs import DesignProblem
-from rigdda import BadInput, Wall
+from rigdda import BadInput, Site, Wall
+from rigdda.barriers import KINDS
 
 
 def design(name: str, problem: DesignProblem, simulations: int, seed: int = 0) -> DesignResult:
@@ -49,6 +50,22 @@ def test_the_same_seed_gives_the_same_result(name: str, problem: DesignProblem) 
     assert first == second
     other = design(name, problem, 40, seed=4)
     assert other.evaluation.seeds != first.evaluation.seeds
+
+
+@pytest.mark.parametrize("name", ["cma", "random"])
+@pytest.mark.parametrize("kinds", [("fence",), ("gravity_wall", "ditch"), tuple(KINDS)])
+def test_a_search_designs_with_any_kinds(name: str, kinds: tuple[str, ...], site: Site) -> None:
+    problem = DesignProblem(site, 2, kinds)
+    result = design(name, problem, 40)
+    assert result == design(name, problem, 40)
+    tried = {b.kind for e in result.history.entries for b in e.evaluation.layout}
+    assert tried <= set(kinds) and (tried or name == "cma")
+
+
+@pytest.mark.parametrize("name", ["convex", "rule"])
+def test_what_designs_walls_refuses_problems_without_them(name: str, site: Site) -> None:
+    with pytest.raises(BadInput, match="= 'wall': choose one of fence"):
+        design(name, DesignProblem(site, 2, ("fence",)), 40)
 
 
 @pytest.mark.parametrize("name", ["cma", "convex", "rule"])

@@ -10,19 +10,21 @@ import pytest
 import agents
 from agents.store import Store
 from envs import DesignProblem
-from rigdda import Site, Wall
+from rigdda import Ditch, Fence, GravityWall, Layout, Site, Wall
 
 WALLS = (Wall(20.0, 2.0, 0.7),)
+MIXED = (Fence(12.0, 2.0, 2e5), GravityWall(15.0, 1.0), Ditch(18.0, 0.5, 2.5))
 
 
 @pytest.mark.parametrize("seeds", [(4,), (4, 5, 6)])
+@pytest.mark.parametrize("layout", [WALLS, MIXED])
 def test_an_evaluation_survives_the_file_to_the_bit(
-    seeds: tuple[int, ...], problem: DesignProblem, tmp_path: Path
+    layout: Layout, seeds: tuple[int, ...], problem: DesignProblem, tmp_path: Path
 ) -> None:
     file = tmp_path / "store.jsonl"
-    written = Store(file).evaluate(problem, WALLS, seeds)
+    written = Store(file).evaluate(problem, layout, seeds)
     store = Store(file)
-    assert store.evaluate(problem, WALLS, seeds) == written == problem.evaluate(WALLS, seeds)
+    assert store.evaluate(problem, layout, seeds) == written == problem.evaluate(layout, seeds)
     assert (store.simulated, store.resumed) == (0, len(seeds))
 
 

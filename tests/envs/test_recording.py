@@ -13,6 +13,7 @@ import rigdda
 from envs import DesignProblem
 from envs.design import BarrierDesign
 from rigdda import Site
+from rigdda.barriers import describe
 
 ACTION = np.array([0.2, -0.4, -0.3], dtype=np.float32)
 
@@ -49,7 +50,7 @@ def test_an_episode_is_recorded(ramp: Site, tmp_path: Path) -> None:
     (wall,) = info["layout"]
     ((notes,),) = rows(path, "/notes", "TextDocument:text", static=True)
     assert f"**seed**: {env.seeds[nearest]}, the nearest to the mean of 3" in notes
-    assert f"**layout**: {wall.height:.2f} m high, {wall.thickness:.2f} m thick" in notes
+    assert f"**layout**: {describe(wall, 2)}" in notes
     assert f"**reward**: {reward:+.4f}" in notes
     assert f"**objective**: {info['objective']:.4f}" in notes
 

@@ -1,0 +1,122 @@
+"""Cutting into the ground and filling it up, along a line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.errors import BadInput
+from rigdda.terrain import Terrain
+
+Floats = NDArray[np.float64]
+
+NEAR = 1e-6
+"""Distance within which two corners are one [m]."""
+
+
+def span(field: str, ground: Terrain, start: float, end: float) -> Floats:
+    """Return the corners of the ground from chainage `start` to `end`, both included, (n, 2).
+
+    Raises
+    ------
+    BadInput
+        If the ground does not reach that far, or has a vertical face or an overhang there.
+    """
+    first, last = _segments(field, ground, start, end)
+    piece = ground.points[first : last + 2]
+    x = np.array([start, *piece[(piece[:, 0] > start) & (piece[:, 0] < end), 0], end])
+    return np.column_stack([x, np.interp(x, *piece.T)])
+
+
+def regrade(
+    field: str, ground: Terrain, line: Floats, pick: Any, surface: str | None
+) -> tuple[Floats, Terrain]:
+    """Return what is moved, and the ground cut down to a line or filled up to it.
+
+    Parameters
+    ----------
+    field : str
+        Named if it cannot be done.
+    line : (k, 2) array
+        Corners of the line, x ascending [m].
+    pick : ufunc
+        np.minimum cuts, np.maximum fills.
+    surface : str or None
+        Of the new ground; None: that of the ground above it.
+
+    Returns
+    -------
+    outline : (n, 2) array
+        What is cut or filled, a polygon whose parts are joined by pieces without width [m].
+    ground : Terrain
+        The new ground.
+
+    Raises
+    ------
+    BadInput
+        If nothing changes, or the ground there is no single line.
+    """
+    start, end = line[0, 0], line[-1, 0]
+    old = span(field, ground, start, end)
+    x = _corners(old, line)
+    before, new = np.interp(x, *old.T), pick(np.interp(x, *old.T), np.interp(x, *line.T))
+    moved = 0.5 * (np.abs(new - before)[1:] + np.abs(new - before)[:-1])
+    if moved @ np.diff(x) < NEAR:
+        raise BadInput(field, float(start), "move it or make it larger: it changes nothing here")
+    outline = np.concatenate([np.column_stack([x, new]), np.column_stack([x, before])[-2:0:-1]])
+    first, last = _segments(field, ground, start, end)
+    middle = 0.5 * (x[1:] + x[:-1])
+    own = first + np.searchsorted(ground.points[first + 1 : last + 1, 0], middle)
+    names = [
+        surface if surface is not None and change > NEAR else ground.surfaces[s]
+        for s, change in zip(own, moved, strict=True)
+    ]
+    return outline, _insert(ground, first, last, np.column_stack([x, new]), names)
+
+
+def _segments(field: str, ground: Terrain, start: float, end: float) -> tuple[int, int]:
+    """Return the first and the last segment between two chainages."""
+    x = ground.points[:, 0]
+    if start < x.min() or end > x.max():
+        raise BadInput(field, start, f"stay on the terrain, {x.min():g} to {x.max():g} m")
+    low, high = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
+    over = np.flatnonzero((low < end) & (high > start))
+    if (np.diff(x)[over] <= 0.0).any() or (np.diff(over) != 1).any():
+        raise BadInput(field, start, "put it where the ground has no vertical face or overhang")
+    return int(over[0]), int(over[-1])
+
+
+def _corners(old: Floats, line: Floats) -> Floats:
+    """Return the chainages of all corners of two lines and of where they cross."""
+    x = np.union1d(old[:, 0], line[:, 0])
+    over = np.interp(x, *line.T) - np.interp(x, *old.T)
+    k = np.flatnonzero(over[:-1] * over[1:] < 0.0)
+    crossing = x[k] + (x[k + 1] - x[k]) * over[k] / (over[k] - over[k + 1])
+    x = np.union1d(x, crossing)
+    inner = x[1:-1][(np.diff(x)[:-1] > NEAR) & (x[-1] - x[1:-1] > NEAR)]
+    return np.array([x[0], *inner, x[-1]])
+
+
+def _insert(ground: Terrain, first: int, last: int, piece: Floats, names: list[str]) -> Terrain:
+    """Return the ground with a piece of it, within segments first to last, replaced."""
+    kept = [0]  # a corner in the middle of one straight segment is left out
+    for k in range(1, len(piece) - 1):
+        (ax, ay), (bx, by), (cx, cy) = piece[kept[-1]], piece[k], piece[k + 1]
+        bend = abs((bx - ax) * (cy - by) - (by - ay) * (cx - bx))
+        if names[k] != names[k - 1] or bend > NEAR * NEAR * (1.0 + (cx - ax) ** 2):
+            kept.append(k)
+    kept.append(len(piece) - 1)
+    points = [*ground.points[: first + 1], *piece[kept], *ground.points[last + 1 :]]
+    surfaces = [
+        *ground.surfaces[: first + 1],
+        *(names[k] for k in kept[:-1]),
+        *ground.surfaces[last:],
+    ]
+    at = first + len(kept)  # place of the piece's last corner
+    for joint, segment in ((at, at), (first, first)):
+        if np.hypot(*(points[joint + 1] - points[joint])) < NEAR:
+            # the piece begins or ends at a corner of the ground
+            del points[joint + 1 if joint == at else joint], surfaces[segment]
+    return Terrain(np.array(points), surfaces)

@@ -1,0 +1,204 @@
+"""Fences: they fail when the energy that they took would exceed their capacity.
+
+An impact on a fence is plastic. If the work of its contact forces in a step would be more than
+what is left of its capacity, the blocks pass through it with a share s of their closing velocities:
+the contacts aim at the velocity -s u_c instead of 0. For impacts in proportion the impulse is then
+1 - s and the mean velocity 1 + s times that of the plastic impact, so that
+
+    W(s) = (1 - s^2) W(0).
+
+The s for which W(s) is what is left is found from there by regula falsi in s^2, since friction and
+neighbours bend the law (Dowell and Jarratt 1971, BIT 11, 168-174). Blocks at rest against the fence
+pass blows on to it: see `passed_on`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import NDArray
+
+from rigdda.assembly.springs import along, normal_row, shear_row
+from rigdda.constants import (
+    ASLEEP,
+    BREAK_SOLVES,
+    BREAK_TOLERANCE,
+    IMPACT,
+    OPEN,
+    RETIRED,
+    SHOCK,
+    SPEED_LIMIT,
+    STICK,
+)
+from rigdda.gauges import FAILED, write_event
+from rigdda.kernel import kernel
+from rigdda.open_close import open_close
+from rigdda.records import Bodies, Contacts, Gauges, Matrix, Parameters, Work
+from rigdda.sleep import wake_island
+
+
+@kernel
+def work_taken(c: Contacts, m: Matrix, work: Work, low: int, high: int, fence: int) -> float:
+    """Return the work that body `fence` takes from the blocks of an island in this step [J]."""
+    total = 0.0
+    for item in range(low, high):
+        k = work.contact_item[item]
+        if c[k].b == fence and c[k].state != OPEN:
+            d = m.d[work.slot[c[k].a]]
+            total -= c[k].normal * along(normal_row(c, k, True), d)
+            total -= c[k].shear * along(shear_row(c, k, True), d)
+    return total
+
+
+@kernel
+def let_pass(c: Contacts, work: Work, low: int, high: int, fence: int, s: float, dt: float) -> None:
+    """Make the contacts with a fence impacts after which a share s of c.passing is left."""
+    for item in range(low, high):
+        k = work.contact_item[item]
+        if c[k].b == fence:
+            c[k].kind, c[k].state, c[k].flips = IMPACT, STICK, 0
+            c[k].memory_normal = c[k].memory_shear = c[k].steady = 0.0
+            c[k].bias = -dt * s * c[k].passing
+
+
+@kernel
+def let_go(c: Contacts, work: Work, low: int, high: int, fence: int, dt: float) -> None:
+    """Keep the contacts with a fence from closing in this step, whatever comes."""
+    for item in range(low, high):
+        k = work.contact_item[item]
+        if c[k].b == fence:
+            c[k].kind, c[k].state = IMPACT, OPEN
+            c[k].memory_normal = c[k].memory_shear = c[k].steady = 0.0
+            c[k].bias = -dt * SPEED_LIMIT
+
+
+@kernel
+def passed_on(c: Contacts, work: Work, low: int, high: int, fence: int, dt: float) -> float:
+    """Return the energy of blows that blocks at rest against a fence pass on to it [J].
+
+    Blow and support act within one step, so that the block does not move and the fence does no
+    work. One after the other, the block would come at the fence with c.passing instead of -u_0,
+    and the impulse would take half their product.
+    """
+    total = 0.0
+    for item in range(low, high):
+        k = work.contact_item[item]
+        if c[k].b == fence and c[k].state != OPEN:
+            total += 0.5 * dt * c[k].normal * max(c[k].passing + min(c[k].un, 0.0), 0.0)
+    return total
+
+
+@kernel
+def set_passing(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, fence: int, p: Parameters,
+    counters: NDArray,
+) -> None:  # fmt: skip
+    """Set c.passing at a fence: the closing velocities as if the fence were not there.
+
+    Where blocks of the island hit each other it is settled without the fence first.
+    """
+    low, high = work.contact_start[island], work.contact_start[island + 1]
+    struck = False
+    for item in range(low, high):
+        k = work.contact_item[item]
+        blow = c[k].kind == IMPACT or c[k].kind == SHOCK
+        struck = struck or (blow and 0 <= c[k].b < p.blocks and c[k].normal > 0.0)
+        c[k].passing = max(-c[k].un, 0.0)
+    if not struck:
+        return
+    let_go(c, work, low, high, fence, p.dt)
+    open_close(bodies, c, m, work, island, p, counters)
+    for item in range(low, high):
+        k = work.contact_item[item]
+        if c[k].b == fence:
+            dn = along(normal_row(c, k, True), m.d[work.slot[c[k].a]])
+            c[k].passing = max(c[k].un - 2.0 * dn / p.dt, 0.0)
+    let_pass(c, work, low, high, fence, 0.0, p.dt)
+    open_close(bodies, c, m, work, island, p, counters)
+
+
+@kernel
+def break_through(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, fence: int, left: float,
+    taken: float, tolerance: float, p: Parameters, counters: NDArray,
+) -> None:  # fmt: skip
+    """Settle an island so that a fence takes what is left of its capacity, where it took more.
+
+    If no share s does, it takes less or nothing: never more than is left and `tolerance` [J].
+    """
+    low, high = work.contact_start[island], work.contact_start[island + 1]
+    # squares of shares with which it takes too much and too little, and by how much
+    small, over = 0.0, taken - left
+    large, under = 1.0, -left
+    side = 0
+    square = 1.0 if left <= 0.0 else 1.0 - left / taken
+    for _ in range(BREAK_SOLVES):
+        let_pass(c, work, low, high, fence, math.sqrt(square), p.dt)
+        open_close(bodies, c, m, work, island, p, counters)
+        off = work_taken(c, m, work, low, high, fence) - left
+        off += passed_on(c, work, low, high, fence, p.dt)
+        if abs(off) <= tolerance:
+            return
+        # regula falsi after Illinois: an end that stays counts half from its second time on
+        if off > 0.0:
+            small, over = square, off
+            under *= 0.5 if side > 0 else 1.0
+            side = 1
+        else:
+            large, under = square, off
+            over *= 0.5 if side < 0 else 1.0
+            side = -1
+        square = small + (large - small) * over / (over - under)
+    if off > 0.0:
+        let_go(c, work, low, high, fence, p.dt)
+        open_close(bodies, c, m, work, island, p, counters)
+
+
+@kernel
+def touches(c: Contacts, work: Work, low: int, high: int, fence: int) -> int:
+    """Return a closed contact of an island with a fence, -1 if there is none."""
+    for item in range(low, high):
+        k = work.contact_item[item]
+        if c[k].b == fence and c[k].state != OPEN:
+            return k
+    return -1
+
+
+@kernel
+def limit_fences(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, gauges: Gauges, time: float,
+    p: Parameters, counters: NDArray,
+) -> None:  # fmt: skip
+    """Let an island that was settled break the fences that would take more than they can."""
+    if gauges.fences == 0:
+        return
+    low, high = work.contact_start[island], work.contact_start[island + 1]
+    for fence in range(p.blocks, len(bodies)):
+        barrier = gauges.barrier[fence]
+        capacity = gauges.capacity[barrier]
+        k = touches(c, work, low, high, fence) if capacity < math.inf else -1
+        if k < 0:
+            continue
+        set_passing(bodies, c, m, work, island, fence, p, counters)
+        left, tolerance = capacity - gauges.absorbed[barrier], BREAK_TOLERANCE * capacity
+        taken = work_taken(c, m, work, low, high, fence)
+        taken += passed_on(c, work, low, high, fence, p.dt)
+        if taken > left + tolerance:
+            if bodies[fence].status != RETIRED:
+                bodies[fence].status = RETIRED
+                height = c[k].y - gauges.barrier_ground[barrier]
+                counters[6] = write_event(
+                    gauges, counters[6], time, FAILED, bodies, c[k].a, barrier, c[k].x, c[k].y,
+                    height,
+                )  # fmt: skip
+            break_through(bodies, c, m, work, island, fence, left, taken, tolerance, p, counters)
+        gauges.absorbed[barrier] += passed_on(c, work, low, high, fence, p.dt)
+
+
+@kernel
+def wake_behind(bodies: Bodies, c: Contacts, count: int, gauges: Gauges, p: Parameters) -> None:
+    """Wake what sleeps against a fence that failed in this step."""
+    for k in range(count if gauges.fences > 0 else 0):
+        b, a = c[k].b, c[k].a
+        if b >= p.blocks and bodies[b].status == RETIRED and bodies[a].status == ASLEEP:
+            wake_island(bodies, bodies[a].island, p.blocks)

@@ -1,0 +1,173 @@
+"""Layout files, prices, outcomes and replays of every kind of barrier."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+import rigdda
+from rigdda import (
+    BadInput,
+    Ditch,
+    Embankment,
+    Fence,
+    GravityWall,
+    Site,
+    Wall,
+    load_layout,
+    save_layout,
+)
+from rigdda.barriers import KINDS, describe, earthworks, section
+from rigdda.outcome import stations
+from rigdda.replay import Marks
+
+QUICK = Site.load("quick")
+LAYOUT = (
+    Wall(12.0, 1.0, 0.5),
+    GravityWall(17.0, 1.5, 1.0, 2300.0),
+    Fence(22.0, 2.0, 3e4),
+    Ditch(29.8, 0.8, 2.0, 0.3),
+    Embankment(31.9, 0.6, 0.3, 0.4),
+)
+
+
+@pytest.mark.parametrize("name", ["layout.toml", "layout.json"])
+def test_layout_files_give_back_every_kind(name, tmp_path):
+    save_layout(LAYOUT, tmp_path / name)
+    assert load_layout(tmp_path / name) == LAYOUT
+
+
+def test_a_table_without_kind_is_a_wall(tmp_path):
+    (tmp_path / "layout.toml").write_text("[[barriers]]\nx = 1\nheight = 2.0")
+    assert load_layout(tmp_path / "layout.toml") == (Wall(1.0, 2.0),)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('kind = "moat"\nx = 1.0\nheight = 1.0', ["barriers[0].kind", "moat", "gravity_wall"]),
+        ("x = 1.0\nheight = 1.0\ncapacity = 3.0", ["barriers[0]", "capacity"]),
+        ('kind = "fence"\nx = 1.0\nheight = 1.0', ["barriers[0]", "capacity"]),
+        ('kind = "fence"\nx = 1.0\nheight = 1.0\ncapacity = -1.0', ["fence capacity", "above 0"]),
+        ('kind = "ditch"\nx = 1.0\ndepth = "1.0"\nwidth = 3.0', ["barriers[0]", "depth"]),
+        ('x = "1.0"\nheight = 1.0', ["barriers[0]", "$.x"]),
+        ('kind = "gravity_wall"\nx = 1.0\nheight = 1.0\ndensity = nan', ["gravity wall density"]),
+        ('kind = "ditch"\nx = 1.0\ndepth = 1.0\nwidth = 3.0\nside_slope = 9.0', ["side_slope"]),
+        ("x = 1.0\nheight = 1.0\nheigth = 1.0", ["heigth"]),
+    ],
+)
+def test_bad_tables_are_named(text, words, tmp_path):
+    (tmp_path / "layout.toml").write_text(f"[[barriers]]\n{text}\n")
+    with pytest.raises(BadInput) as caught:
+        load_layout(tmp_path / "layout.toml")
+    line = str(caught.value)
+    assert all(word in line for word in words), line
+    assert "\n" not in line
+
+
+def test_numbers_are_not_read_from_text():
+    with pytest.raises(BadInput, match="wall height = '2': give a number"):
+        Wall(1.0, "2")  # type: ignore[arg-type]
+
+
+def test_prices():
+    costs = msgspec.structs.replace(QUICK.costs, gravity_wall=2.0, fence=3.0, ditch=4.0)
+    site = msgspec.structs.replace(QUICK, costs=costs)
+    expected = {
+        Wall(30.0, 2.0, 0.5): (1 + 4.0) * 1.5 / 2,
+        GravityWall(30.0, 2.0, 0.5): 1 + 2.0 * 1.0,
+        Fence(30.0, 2.0, 1e6): 1 + 3.0 * 2.0,
+        Fence(30.0, 2.0, 4e6): 1 + 3.0 * 2.0 * 4**0.45,
+    }
+    for barrier, cost in expected.items():
+        assert site.cost((barrier,)) == pytest.approx(cost)
+        uphill = msgspec.structs.replace(barrier, x=20.0)
+        assert site.cost((uphill,)) == pytest.approx(1.5 * cost)
+    for barrier, price in ((Ditch(30.0, 1.0, 3.0), 4.0), (Embankment(30.0, 1.0, 0.5), 0.3)):
+        area = section(earthworks(site.profile, (barrier,), "rock")[1][barrier])
+        assert site.cost((barrier,)) == pytest.approx(1.0 + price * area)
+        level = 1.0 * (3.0 - 0.25) if isinstance(barrier, Ditch) else 1.0 * (0.5 + 0.5)
+        assert area == pytest.approx(level, rel=0.15)
+
+
+@pytest.fixture(scope="module")
+def released():
+    return rigdda.release(QUICK, LAYOUT, 3)
+
+
+def test_every_kind_reports(released):
+    _, outcome = released
+    wall, heavy, fence, ditch, dam = outcome.barriers
+    assert wall.state == "stands" and wall.displacement == 0.0
+    assert heavy.state in ("slid", "overturned") and heavy.displacement > 0.1
+    assert fence.failed and fence.state == "failed" and fence.caught == 0.0
+    assert fence.absorbed_energy <= 1.01 * LAYOUT[2].capacity
+    assert fence.max_energy > 0.0
+    for earthwork in (ditch, dam):
+        assert (earthwork.hits, earthwork.absorbed_energy) == (0, 0.0)
+        assert earthwork.state == "stands"
+    assert ditch.caught > 0.0
+    shares = ("slope_fraction", "held_fraction", "road_fraction", "beyond_fraction")
+    assert sum(getattr(outcome, name) for name in shares) == 1.0
+    assert outcome.held_fraction >= ditch.caught
+    assert outcome.released_mass == rigdda.release(QUICK, (), 3)[1].released_mass
+
+
+def test_what_passes_a_failed_fence_did_not_overtop_it(released):
+    run, outcome = released
+    line = stations(QUICK, LAYOUT).index(LAYOUT[2].end)
+    passed = run.crossings(line)["time"]
+    assert outcome.barriers[2].overtopped == (passed < run.failure(2)).sum() < len(passed)
+
+
+def test_every_kind_is_described_and_known():
+    assert [barrier.kind for barrier in LAYOUT] == list(KINDS)
+    words = [describe(barrier) for barrier in LAYOUT]
+    assert words[2] == "fence at 22.0 m, 2.0 m high, 30 kJ"
+    assert len(set(words)) == 5
+
+
+def test_replays_show_every_kind(released, tmp_path):
+    run, _ = released
+    path = tmp_path / "episode.rrd"
+    run.to_rerun(path, Marks())
+    chunks = list(RrdReader(path).stream().to_chunks())
+    for i in range(5):
+        assert any(chunk.entity_path == f"/world/barriers/{i}" for chunk in chunks)
+
+    def moving(entity, component):
+        stream = RrdReader(path).stream().filter(content=entity, is_static=False)
+        (chunk,) = stream.to_chunks()
+        batch = chunk.to_record_batch()
+        return batch.column("sim_time").cast("int64").to_numpy() * 1e-9, batch.column(
+            component
+        ).to_pylist()
+
+    times, places = moving("/world/barriers/1", "Transform3D:translation")
+    assert len(times) == len(run.times)
+    assert places[-1][0][:2] == pytest.approx(run.barrier_poses[-1, 1, :2], rel=1e-5)
+    times, colours = moving("/world/barriers/2", "Mesh3D:albedo_factor")
+    assert times[1] == pytest.approx(run.failure(2), abs=1e-6)
+    assert colours[0] != colours[1]
+
+
+def test_pictures_show_every_kind(released):
+    from envs.picture import picture
+
+    run, _ = released
+    image = picture(run, (QUICK.road.start, QUICK.road.end), "all")
+    bare = picture(rigdda.release(QUICK, (), 3)[0], (QUICK.road.start, QUICK.road.end), "all")
+    assert image.shape == bare.shape and np.abs(image.astype(int) - bare).sum() > 0
+
+
+def test_a_fence_that_stands_holds_what_a_failed_one_does_not():
+    weak, strong = (
+        rigdda.release(QUICK, (Fence(20.0, 4.0, capacity),), 1)[1] for capacity in (1e3, 1e9)
+    )
+    assert weak.barriers[0].failed and not strong.barriers[0].failed
+    assert math.isclose(weak.held_fraction, 0.0) and strong.held_fraction > 0.1
+    assert strong.debris_fraction < weak.debris_fraction

@@ -207,7 +207,8 @@ def keep_memory(c: Contacts, k: int, struck: bool) -> None:
     if c[k].kind == MOVING:
         rise = c[k].normal - c[k].memory_normal
         c[k].memory_normal += rise if rise < 0.0 else STEADY_RATE * rise
-        c[k].memory_shear = c[k].shear * c[k].memory_normal / c[k].normal
+        lasting = c[k].memory_normal / c[k].normal if c[k].normal > 0.0 else 1.0
+        c[k].memory_shear = lasting * c[k].shear
     elif not struck:
         c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
     c[k].start_normal, c[k].start_shear = c[k].normal, c[k].shear

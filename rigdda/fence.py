@@ -57,7 +57,8 @@ def let_pass(c: Contacts, work: Work, low: int, high: int, fence: int, s: float,
         k = work.contact_item[item]
         if c[k].b == fence:
             c[k].kind, c[k].state, c[k].flips = IMPACT, STICK, 0
-            c[k].memory_normal = c[k].memory_shear = c[k].steady = 0.0
+            c[k].memory_normal = c[k].memory_shear = 0.0
+            c[k].start_normal = c[k].start_shear = 0.0
             c[k].bias = -dt * s * c[k].passing
 
 
@@ -68,7 +69,8 @@ def let_go(c: Contacts, work: Work, low: int, high: int, fence: int, dt: float) 
         k = work.contact_item[item]
         if c[k].b == fence:
             c[k].kind, c[k].state = IMPACT, OPEN
-            c[k].memory_normal = c[k].memory_shear = c[k].steady = 0.0
+            c[k].memory_normal = c[k].memory_shear = 0.0
+            c[k].start_normal = c[k].start_shear = 0.0
             c[k].bias = -dt * SPEED_LIMIT
 
 

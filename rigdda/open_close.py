@@ -38,6 +38,7 @@ from rigdda.constants import (
     STICK,
     WAIT_STEPS,
 )
+from rigdda.contact.joint import break_joint
 from rigdda.contact.law import set_shock
 from rigdda.islands import pair_blocks
 from rigdda.kernel import kernel
@@ -186,6 +187,14 @@ def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) 
             return LOCKED
         c[k].state = STICK
         return MOVED
+    if c[k].bond > 0.0:
+        strength = c[k].cohesion + c[k].friction * max(normal, 0.0)
+        if normal >= -c[k].tension and abs(shear) <= strength:
+            c[k].normal, c[k].shear = normal, shear
+            return NONE
+        break_joint(c, k)
+        if normal >= tension:
+            return MOVED
     if normal < tension:
         c[k].state = OPEN
         c[k].flips += 1
@@ -314,7 +323,13 @@ def relax(
     counters[8] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt, speed)
     for item in range(c0, c1):
         k = work.contact_item[item]
-        within = c[k].friction * c[k].normal > abs(c[k].shear)
+        limit = c[k].cohesion + c[k].friction * max(c[k].normal, 0.0)
+        within = limit > abs(c[k].shear)
+        if c[k].bond > 0.0:
+            if within and c[k].normal > -c[k].tension:
+                c[k].state, c[k].kind = STICK, MOVING
+                continue
+            break_joint(c, k)
         kind = c[k].kind
         if kind == BOLT or kind == PIN:
             c[k].state = SLIP if c[k].normal == -c[k].tension else STICK

@@ -360,7 +360,10 @@ def pack_parameters(
     static = settings.mode == "static"
     weight = np.mean(bodies["mass"][free]) * (gravity or 9.81)
     pairs = [[scene.interface(a, b) for b in names] for a in names]
-    friction = np.array([[s.friction_deg for s in row] for row in pairs])
+    friction, cohesion, tension = (
+        np.array([[getattr(s, name) for s in row] for row in pairs])
+        for name in ("friction_deg", "cohesion", "tension")
+    )
     restitution = np.array(
         [[PLAIN_CONTACT if s.restitution is None else s.restitution for s in row] for row in pairs]
     )
@@ -368,6 +371,7 @@ def pack_parameters(
         # fences are of the surface of barriers, but plastic
         same = [*range(len(names)), names.index(scene.barrier_surface)]
         friction, restitution = friction[same][:, same], np.pad(restitution, ((0, 1), (0, 1)))
+        cohesion, tension = (np.pad(s, ((0, 1), (0, 1))) for s in (cohesion, tension))
     if scene.terrain is None or gx != 0.0 or gy >= 0.0:
         floor = -np.inf
     else:
@@ -393,5 +397,8 @@ def pack_parameters(
         settings.sleeping and not (static or shaken or scene.supports),
         float(floor),
         np.tan(np.radians(friction)),
+        bool((cohesion + tension).any()),
+        cohesion,
+        tension,
         restitution,
     )

@@ -66,7 +66,8 @@ CONTACT = _record(
     us=float,
     friction=float,  # tan phi
     restitution=float,
-    cohesion=float,  # shear force that an unbroken joint bears without normal force [N]
+    bond=float,  # length of joint that the contact stands for and that is not broken [m]
+    cohesion=float,  # shear force that it bears without normal force [N]
     tension=float,  # tension that it, or a bolt before it yields, bears [N]
     passing=float,  # closing velocity if the fence it is with were not there [m/s]
     stiffness=float,  # of the contact at rest [N/m]
@@ -247,6 +248,9 @@ class Parameters(NamedTuple):
     sleeping: bool
     floor: float  # a centroid below it is retired [m]
     friction: Floats  # (surfaces, surfaces) tan phi
+    bonded: bool  # whether a surface has cohesion or tension
+    cohesion: Floats  # [Pa]
+    tension: Floats
     restitution: Floats  # PLAIN_CONTACT: the paper's penalty contact
 
 

@@ -17,6 +17,7 @@ from rigdda.constants import (
     TERRAIN,
 )
 from rigdda.contact.broad_phase import overlapping_pairs, sort_by_low, sweep_boxes
+from rigdda.contact.joint import bond_joints
 from rigdda.contact.law import prepare, strike_at_once
 from rigdda.contact.links import add_link, yield_bolts
 from rigdda.contact.narrow_phase import collide_pair
@@ -115,6 +116,8 @@ def detect(
                 q += 1
             if count >= 0:
                 recall(c, first, count, old, work.first, p.slack)
+                if p.bonded and time <= 1.5 * p.dt:
+                    bond_joints(c, first, count, p)
             for k in range(first, count):
                 prepare(bodies, c, k, work, time <= 1.5 * p.dt, p)
             strike_at_once(bodies, c, first, count, p)

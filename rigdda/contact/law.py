@@ -166,7 +166,7 @@ def set_rest(c: Contacts, k: int, weight: float, most: float, p: Parameters) -> 
     c[k].kind = REST
     c[k].kappa = c[k].stiffness
     elastic = c[k].memory_normal / c[k].stiffness
-    if c[k].gap > p.penetration:
+    if c[k].gap > p.penetration and c[k].bond == 0.0:
         c[k].memory_normal = c[k].start_normal = 0.0
         c[k].bias = -c[k].gap
     else:
@@ -252,7 +252,8 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
     c[k].friction = p.friction[surface, c[k].other]
     c[k].restitution = p.restitution[surface, c[k].other]
     c[k].flips = 0
-    c[k].cohesion = c[k].tension = 0.0
+    c[k].cohesion = c[k].bond * p.cohesion[surface, c[k].other]
+    c[k].tension = c[k].bond * p.tension[surface, c[k].other]
     strike(bodies, c, k, 0.5 * p.dt, pull, p)
     if c[k].restitution == PLAIN_CONTACT:
         set_plain(c, k, p)

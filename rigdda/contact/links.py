@@ -47,7 +47,7 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contacts, k: int, p: Param
     c[k].other, c[k].gap, c[k].flips = 0, 0.0, 0
     c[k].x, c[k].y, c[k].share, c[k].state = ax, ay, 0.5, STICK
     c[k].memory_normal = c[k].memory_shear = c[k].start_normal = c[k].start_shear = 0.0
-    c[k].friction = c[k].restitution = 0.0
+    c[k].friction = c[k].restitution = c[k].passing = c[k].bond = c[k].cohesion = 0.0
     c[k].ra_x, c[k].ra_y = arm(bodies, a, links[q].ax, links[q].ay, 0.5 * p.dt)
     if b >= 0:
         c[k].rb_x, c[k].rb_y = arm(bodies, b, links[q].bx, links[q].by, 0.5 * p.dt)

@@ -38,7 +38,7 @@ def recall_from(
         c[k].memory_normal = old[m].memory_normal
         c[k].memory_shear = old[m].memory_shear
         c[k].start_normal, c[k].start_shear = old[m].start_normal, old[m].start_shear
-        c[k].stiffness = old[m].stiffness
+        c[k].stiffness, c[k].bond = old[m].stiffness, old[m].bond
         return True
     return False
 
@@ -55,7 +55,7 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray, slac
     for k in range(low, high):
         c[k].state, c[k].kind = OPEN, NEW
         c[k].memory_normal = c[k].memory_shear = c[k].stiffness = 0.0
-        c[k].start_normal = c[k].start_shear = 0.0
+        c[k].start_normal = c[k].start_shear = c[k].bond = 0.0
         if c[k].gap > slack:
             continue
         a, b = c[k].a, c[k].b
@@ -79,3 +79,4 @@ def copy_contact(c: Contacts, k: int, old: Contacts, m: int) -> None:
     c[k].memory_normal, c[k].memory_shear = old[m].memory_normal, old[m].memory_shear
     c[k].start_normal, c[k].start_shear = old[m].start_normal, old[m].start_shear
     c[k].stiffness, c[k].normal, c[k].shear = old[m].stiffness, old[m].normal, old[m].shear
+    c[k].bond = old[m].bond

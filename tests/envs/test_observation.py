@@ -20,7 +20,10 @@ from rigdda.site import Motion, Scatter
 def test_the_site_is_told(ramp: Site) -> None:
     site = msgspec.structs.replace(
         ramp,
-        surfaces={"rock": Surface(25.0, 0.1), "concrete": Surface(45.0, 0.3)},
+        surfaces={
+            "rock": Surface(25.0, restitution=0.1),
+            "concrete": Surface(45.0, restitution=0.3),
+        },
         motion=Motion(0.3, "contact", 1.0, 0.01),
         scatter=Scatter(2.0),
     )

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from rigdda.linear.direct import solve_block
 from rigdda.linear.pcg import multiply, solve_pcg
+from rigdda.linear.skyline import profile, solve_skyline
+from rigdda.linear.sor import solve_sor
 from rigdda.pack import empty_matrix
 from rigdda.records import Matrix
 
@@ -50,13 +52,13 @@ def test_multiply(seed, n):
     assert np.abs(y.ravel() - exact).max() < 1e-12 * np.abs(dense).max()
 
 
-@given(seeds, st.integers(1, 30), st.booleans())
-def test_pcg(seed, n, warm):
+@given(seeds, st.integers(1, 30), st.booleans(), st.booleans())
+def test_pcg(seed, n, warm, by_block):
     m, dense, pairs = system(seed, n)
     exact = np.linalg.solve(dense, m.rhs.ravel())
     if warm:
         m.d[:] = exact.reshape(n, 3) * 1.01
-    iterations = solve_pcg(m, n, pairs, 1e-12)
+    iterations = solve_pcg(m, n, pairs, 1e-12, by_block)
     assert 0 < iterations < 30 * n + 30
     assert np.abs(m.d.ravel() - exact).max() < 1e-8 * np.abs(exact).max()
 
@@ -64,13 +66,13 @@ def test_pcg(seed, n, warm):
 def test_pcg_starts_from_the_given_value():
     m, dense, pairs = system(3, 20)
     m.d[:] = np.linalg.solve(dense, m.rhs.ravel()).reshape(20, 3)
-    assert solve_pcg(m, 20, pairs, 1e-8) == 0
+    assert solve_pcg(m, 20, pairs, 1e-8, False) == 0
 
 
 def test_pcg_without_load():
     m, _, pairs = system(4, 5)
     m.rhs[:] = 0.0
-    assert solve_pcg(m, 5, pairs, 1e-9) == 0
+    assert solve_pcg(m, 5, pairs, 1e-9, False) == 0
     assert (m.d == 0.0).all()
 
 
@@ -83,3 +85,22 @@ def test_solve_block(symmetric, seed):
     solve_block(k, f, d)
     exact = np.linalg.solve(k, f)
     assert np.abs(d - exact).max() < 1e-12 * np.linalg.cond(k) * np.abs(exact).max()
+
+
+@given(seeds, st.integers(1, 30))
+def test_skyline(seed, n):
+    m, dense, pairs = system(seed, n)
+    count = profile(m, n, pairs)
+    assert count <= min(len(m.factor), (3 * n + 1) * 3 * n // 2)
+    solve_skyline(m, n, pairs, count)
+    exact = np.linalg.solve(dense, m.rhs.ravel())
+    assert np.abs(m.d.ravel() - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+@given(seeds, st.integers(1, 12), st.sampled_from([1.0, 1.5]))
+def test_sor(seed, n, factor):
+    m, dense, pairs = system(seed, n, spread=0.3)
+    sweeps = solve_sor(m, n, pairs, 1e-12, factor)
+    assert sweeps < 100 * n + 300
+    exact = np.linalg.solve(dense, m.rhs.ravel())
+    assert np.abs(m.d.ravel() - exact).max() < 1e-6 * np.abs(exact).max()

@@ -1,0 +1,221 @@
+"""Loads, supports, joints, ground motion and static mode against statics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from physics.helpers import box, rock
+from rigdda import (
+    BadInput,
+    Block,
+    BodyForce,
+    Bolt,
+    FixedPoint,
+    LineLoad,
+    PointLoad,
+    Run,
+    Scene,
+    Settings,
+    Simulation,
+    Surface,
+    Terrain,
+)
+
+FLAT = Terrain([(-50.0, 0.0), (50.0, 0.0)])
+WEIGHT = 2600.0 * 9.81
+"""Weight of a square of 1 m2 [N]."""
+
+
+def square(**how) -> Block:
+    return box(0.0, 0.5, **how)
+
+
+LOADS = {
+    "point": PointLoad(0, (0.0, 0.5), (3.0e4, 1.0e4)),
+    "line": LineLoad(0, (-0.5, 0.2), (0.5, 0.8), (3.0e4 / math.hypot(1, 0.6), 0.0)),
+    "body": BodyForce(0, (3.0e4, 0.0)),
+}
+
+
+@pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
+def test_a_load_through_the_centroid_accelerates(load):
+    sim = Simulation(Scene(None, (square(),), loads=(load,), gravity=0.0))
+    sim.step(200)
+    vx, vy, omega = sim.velocities[0]
+    assert vx == pytest.approx(3.0e4 / 2600.0)
+    assert vy == pytest.approx(1.0e4 / 2600.0 if load is LOADS["point"] else 0.0)
+    assert abs(omega) < 1e-12
+    energy = sim.energy()
+    assert energy.external == pytest.approx(energy.kinetic, rel=1e-12)
+
+
+def test_a_dead_load_turns_with_its_point():
+    """A physical pendulum in the field of a load: energy is kept, period as small swings say."""
+    load = PointLoad(0, (0.5, 0.5), (0.0, -1e4))
+    sim = Simulation(Scene(None, (square(),), loads=(load,), gravity=0.0))
+    start = sum(sim.energy()[:3])
+    for _ in range(400):
+        sim.step()
+        energy = sim.energy()
+        assert sum(energy[:3]) - start == pytest.approx(energy.external, abs=1e-6)
+
+
+def test_a_pin_carries_the_weight_and_lets_turn():
+    sim = Simulation(Scene(None, (square(),), supports=(FixedPoint(0, (0.5, 0.5)),)))
+    sim.step()
+    # angular acceleration m g r / (I + m r^2), I = m / 6, r = 1/2
+    assert sim.velocities[0, 2] == pytest.approx(9.81 * 0.5 / (1 / 6 + 0.25) * 5e-3, rel=1e-3)
+    force = sim.supports()[0, 1]
+    assert force == pytest.approx(WEIGHT * (1 - 0.25 / (1 / 6 + 0.25)), rel=1e-2)
+    start = sum(sim.energy()[:3])
+    for _ in range(400):
+        sim.step()
+        pinned = sim.poses[0, :2] + 0.5 * np.array(
+            [math.cos(sim.poses[0, 2]), math.sin(sim.poses[0, 2])]
+        )
+        assert np.hypot(*(pinned - (0.5, 0.5))) < 1e-3
+    assert sum(sim.energy()[:3]) == pytest.approx(start, abs=0.01 * WEIGHT)
+
+
+def test_a_bolt_hangs_a_block():
+    bolt = Bolt(0, (0.0, 1.0), None, (0.0, 3.0), 1e6)
+    sim = Simulation(Scene(None, (square(),), supports=(bolt,), damping=3.0))
+    sim.step(4000)
+    assert sim.poses[0, 1] == pytest.approx(0.5 - WEIGHT / 1e6, abs=1e-6)
+    assert sim.supports()[0] == pytest.approx([0.0, WEIGHT], abs=1.0)
+    assert sim.energy().elastic == pytest.approx(0.5 * WEIGHT**2 / 1e6, rel=1e-3)
+
+
+def test_a_bolt_yields():
+    bolt = Bolt(0, (0.0, 1.0), None, (0.0, 3.0), 1e7, yield_force=0.5 * WEIGHT)
+    sim = Simulation(Scene(None, (square(),), supports=(bolt,)))
+    sim.step(10)
+    before = sim.velocities[0, 1]
+    sim.step(100)
+    assert (sim.velocities[0, 1] - before) / 0.5 == pytest.approx(-0.5 * 9.81, rel=1e-3)
+
+
+def test_a_prestressed_bolt_between_blocks_holds_them_together():
+    lower, upper = box(0.0, 0.5), box(0.0, 1.5)
+    pull = PointLoad(1, (0.0, 1.5), (0.0, 1.8 * WEIGHT))
+    for prestress, stands in ((2.0 * WEIGHT, True), (0.0, False)):
+        bolt = Bolt(0, (0.0, 0.2), 1, (0.0, 1.8), 1e4, prestress)
+        scene = Scene(FLAT, (lower, upper), rock(30.0), loads=(pull,), supports=(bolt,))
+        sim = Simulation(scene)
+        sim.step(60)
+        assert (sim.poses[1, 1] < 1.501) == stands
+
+
+@pytest.mark.parametrize(
+    ("load", "stands"), [(0.97, True), (1.03, False)], ids=["below strength", "above strength"]
+)
+@pytest.mark.parametrize("way", ["tension", "shear"])
+def test_a_joint_breaks_at_its_strength(way, load, stands):
+    surface = {"rock": Surface(30.0, cohesion=4e4, tension=3e4)}
+    if way == "tension":
+        force = (0.0, WEIGHT + load * 3e4)
+    else:
+        force = (load * (4e4 + WEIGHT * math.tan(math.radians(30.0))), 0.0)
+    block = box(0.0, 0.5, 2.0, 1.0) if way == "shear" else square()
+    if way == "shear":
+        surface = {"rock": Surface(30.0, cohesion=2e4, tension=3e4)}
+        force = (load * (4e4 + 2 * WEIGHT * math.tan(math.radians(30.0))), 0.0)
+    # at the height of the base, so that the block is not turned
+    point = (0.0, 0.0) if way == "shear" else (0.0, 0.5)
+    scene = Scene(FLAT, (block,), surface, loads=(PointLoad(0, point, force),))
+    sim = Simulation(scene)
+    start = sim.poses[0, :2]
+    sim.step(200)
+    assert (np.hypot(*(sim.poses[0, :2] - start)) < 1e-4) == stands
+
+
+def test_a_broken_joint_does_not_heal():
+    surface = {"rock": Surface(10.0, cohesion=1e5, tension=1e5)}
+    block = square(velocity=(0.0, 8.0, 0.0))
+    sim = Simulation(Scene(FLAT, (block,), surface, loads=(PointLoad(0, (0, 0), (8e3, 0.0)),)))
+    sim.step(600)
+    assert sim.poses[0, 1] < 0.51  # back on the ground
+    assert sim.velocities[0, 0] > 1.0  # and slides
+
+
+def test_static_mode_settles_at_once_and_stays():
+    blocks = [box(1e-4 * i, 0.5 + i) for i in range(5)]
+    sim = Simulation(Scene(FLAT, blocks, rock(30.0)), Settings(mode="static"))
+    sim.step(50)
+    forces = sim.contacts()
+    base = forces[forces["block_b"] == -1]
+    assert base["normal_force"].sum() == pytest.approx(5 * WEIGHT, rel=1e-6)
+    assert np.abs(sim.velocities).max() < 1e-6
+
+
+@pytest.mark.parametrize("solver", ["pcg", "block-pcg", "sor", "direct"])
+def test_every_solver_carries_a_stack(solver):
+    blocks = [box(1e-4 * i, 0.5 + i) for i in range(6)]
+    sim = Simulation(Scene(FLAT, blocks, rock(30.0)), Settings(solver=solver))
+    sim.step(200)
+    assert np.abs(sim.velocities).max() < 1e-4
+
+
+def test_one_system_for_all_gives_what_islands_give():
+    blocks = [box(3.0 * i, 0.5 + 0.2 * i) for i in range(3)]
+    ends = []
+    for islands in (True, False):
+        settings = Settings(islands=islands, sleeping=False)
+        sim = Simulation(Scene(FLAT, blocks, rock(30.0)), settings)
+        sim.step(100)
+        ends.append(sim.poses)
+    np.testing.assert_allclose(ends[0], ends[1], atol=3e-4)  # falling blocks are relaxed
+
+
+def test_plain_contact_sinks_by_its_spring():
+    settings = Settings(penetration=1e-3)
+    scene = Scene(FLAT, (square(),), {"rock": Surface(30.0, restitution=None)}, damping=20.0)
+    sim = Simulation(scene, settings)
+    sim.step(2000)
+    # two corners share the weight, each of stiffness weight / penetration
+    assert 0.5 - sim.poses[0, 1] == pytest.approx(0.5e-3, rel=1e-3)
+
+
+def test_a_scene_with_all_of_it_survives_a_file(tmp_path):
+    scene = Scene(
+        FLAT,
+        (square(), box(3.0, 0.5)),
+        {"rock": Surface(30.0, 1e3, 2e3, None)},
+        loads=(*LOADS.values(),),
+        supports=(FixedPoint(1, (3.0, 0.5)), Bolt(0, (0, 0), 1, (3, 0), 1e5, 10.0, 1e4)),
+        gravity=(0.1, -9.8),
+        base_motion=[(0.0, 0.0, 0.0), (0.1, 1.0, 0.0), (0.2, 0.0, 0.0)],
+    )
+    run = Simulation(scene).run(0.1)
+    run.save(tmp_path / "run.npz")
+    again = Simulation(Run.load(tmp_path / "run.npz").scene).run(0.1)
+    assert np.array_equal(run.poses, again.poses)
+
+
+BAD = {
+    "block": (lambda: Scene(FLAT, (square(),), loads=(PointLoad(1, (0, 0), (1, 0)),)), "loads[0]"),
+    "support": (
+        lambda: Scene(FLAT, (square(),), supports=(Bolt(0, (0, 0), 3, (1, 1), 1e5),)),
+        "supports[0]",
+    ),
+    "stiffness": (lambda: Bolt(0, (0, 0), None, (1, 1), 0.0), "bolt: stiffness"),
+    "no length": (lambda: Bolt(0, (0, 0), None, (0, 0), 1e5), "bolt: point_b"),
+    "yield": (lambda: Bolt(0, (0, 0), None, (1, 0), 1e5, 10.0, 5.0), "bolt: yield_force"),
+    "NaN": (lambda: PointLoad(0, (0, math.nan), (1, 0)), "point load: point"),
+    "motion": (lambda: Scene(FLAT, (square(),), base_motion=[(1, 0, 0), (0, 0, 0)]), "base_motion"),
+    "shape": (lambda: Scene(FLAT, (square(),), base_motion=[1.0, 2.0]), "base_motion"),
+    "mode": (lambda: Settings(mode="quick"), "mode"),
+    "solver": (lambda: Settings(solver="magic"), "solver"),
+    "cohesion": (lambda: Surface(30.0, cohesion=-1.0), "cohesion"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input(case):
+    wrong, field = BAD[case]
+    with pytest.raises(BadInput) as caught:
+        wrong()
+    assert caught.value.field.startswith(field)

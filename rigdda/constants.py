@@ -64,7 +64,7 @@ its state. Nearly every step that does not converge has one such contact."""
 RELAXATION_SWEEPS = 25
 """Most sweeps over the forces of an island in motion in a step."""
 
-RELAXATION_SPEED = 0.02
+RELAXATION_SPEED = 0.05
 """Greatest change of a contact's velocity in a sweep at which sweeps stop [m/s]; in an island
 slower than QUIET_SPEED less in proportion, so that it comes to rest."""
 

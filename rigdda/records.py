@@ -165,11 +165,11 @@ class Matrix(NamedTuple):
     pair_i: Ints
     pair_j: Ints
     rhs: Floats  # (N, 3)
-    d: Floats  # (N, 3) displacements: u0, v0 [m], r0 [rad]
+    d: Floats  # (N + 1, 3) displacements u0, v0 [m], r0 [rad]; the last of what cannot move
     residual: Floats  # (N, 3) and the vectors of conjugate gradients
     direction: Floats
     product: Floats
-    scaled: Floats
+    scaled: Floats  # (N + 1, 3)
     first: Ints  # (N,) leftmost block of a row, or head of its chain of neighbours
     row: Ints  # (3 N,) place in `factor` of column 0 of a scalar row
     factor: Floats  # Cholesky factor within the profile
@@ -193,7 +193,7 @@ class Work(NamedTuple):
     contact_item: Ints
     first: Ints  # (M + 1,) contacts of the last step by body a
     row: Floats  # (C, columns) contacts of one island, see linear.psor
-    row_i: Ints  # (C,) slots of their bodies, -1: no unknowns
+    row_i: Ints  # (C,) slots of their bodies
     row_j: Ints
     field: Floats  # (2,) acceleration of free blocks in this step [m/s2]
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from rigdda.assembly.springs import normal_row, shear_row
 from rigdda.constants import (
     BOLT,
@@ -36,29 +38,28 @@ COLUMNS = 23
 
 
 @kernel
-def flexibility(m: Matrix, i: int, e: tuple[float, float, float]) -> float:
+def flexibility(inverse: Floats, i: int, e: tuple[float, float, float]) -> float:
     """Return the displacement along e of slot i per force along e [m/N]."""
-    if i < 0:
-        return 0.0
-    diagonal = m.diagonal[i]
-    translation = (e[0] * e[0] + e[1] * e[1]) / diagonal[0, 0]
-    return translation + e[2] * e[2] / diagonal[2, 2]
+    return (e[0] * e[0] + e[1] * e[1]) * inverse[i, 0] + e[2] * e[2] * inverse[i, 2]
 
 
 @kernel
-def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, dt: float) -> None:
-    """Write contact k as row `place` and add its starting force to the displacements."""
+def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, dt: float) -> None:
+    """Write contact k as row `place` and add its starting force to the displacements.
+
+    Slot n stands for bodies without unknowns.
+    """
     row, old = work.row, c[k]
     i = work.slot[old.a]
-    j = work.slot[old.b] if old.pair >= 0 else -1
+    j = work.slot[old.b] if old.pair >= 0 else n
     work.row_i[place], work.row_j[place] = i, j
     en, es = normal_row(c, k, True), shear_row(c, k, True)
     fn, fs = normal_row(c, k, False), shear_row(c, k, False)
     for q in range(3):
         row[place, NORMAL_A + q], row[place, SHEAR_A + q] = en[q], es[q]
         row[place, NORMAL_B + q], row[place, SHEAR_B + q] = fn[q], fs[q]
-    soft_n = flexibility(m, i, en) + flexibility(m, j, fn)
-    soft_s = flexibility(m, i, es) + flexibility(m, j, fs)
+    soft_n = flexibility(m.scaled, i, en) + flexibility(m.scaled, j, fn)
+    soft_s = flexibility(m.scaled, i, es) + flexibility(m.scaled, j, fs)
     own = old.kind == PLAIN or old.kind == BOLT or old.kind == PIN
     # stiff against the inertia of the blocks
     kappa = old.kappa if own else RELAXATION_STIFFNESS / soft_n
@@ -81,54 +82,56 @@ def push(
     row: Floats, place: int, column: int, i: int, j: int, d: Floats, inverse: Floats, force: float
 ) -> None:
     """Move the blocks of a row by what a force along its direction displaces each alone."""
-    light, turn = force * inverse[i, 0], force * inverse[i, 2]
-    d[i, 0] += light * row[place, column]
-    d[i, 1] += light * row[place, column + 1]
-    d[i, 2] += turn * row[place, column + 2]
-    if j >= 0:
-        light, turn = force * inverse[j, 0], force * inverse[j, 2]
-        d[j, 0] += light * row[place, column + 3]
-        d[j, 1] += light * row[place, column + 4]
-        d[j, 2] += turn * row[place, column + 5]
-
-
-@kernel
-def relative(row: Floats, place: int, column: int, i: int, j: int, d: Floats) -> float:
-    """Return the relative displacement of a row along its direction [m]."""
-    total = row[place, column] * d[i, 0] + row[place, column + 1] * d[i, 1]
-    total += row[place, column + 2] * d[i, 2]
-    if j >= 0:
-        total += row[place, column + 3] * d[j, 0] + row[place, column + 4] * d[j, 1]
-        total += row[place, column + 5] * d[j, 2]
-    return total
+    for q in range(3):
+        d[i, q] += force * inverse[i, q] * row[place, column + q]
+        d[j, q] += force * inverse[j, q] * row[place, column + 3 + q]
 
 
 @kernel
 def sweep(
     row: Floats, row_i: Ints, row_j: Ints, d: Floats, inverse: Floats, count: int, backwards: bool
 ) -> float:
-    """Visit every contact once; returns the greatest displacement that a visit changed [m]."""
+    """Visit every contact once; returns the greatest displacement that a visit changed [m].
+
+    A body without unknowns has a slot of its own that nothing moves. Displacements of a visit are
+    held in local variables, and unsigned indices spare numba's test for negative ones.
+    """
     worst = 0.0
     for visit in range(count):
-        place = count - 1 - visit if backwards else visit
-        i, j = row_i[place], row_j[place]
-        force = row[place, FORCE]
-        off = row[place, FREE] - 2.0 * relative(row, place, NORMAL_A, i, j, d)
-        normal = force + row[place, GAIN] * (off - force * row[place, SOFT])
-        normal = max(normal, -row[place, TENSION])
-        if normal != force:
-            push(row, place, NORMAL_A, i, j, d, inverse, normal - force)
-            row[place, FORCE] = normal
-            worst = max(worst, abs(normal - force) * row[place, SOFT])
-        force = row[place, FORCE + 1]
-        limit = row[place, COHESION] + row[place, FRICTION] * max(normal, 0.0)
-        if limit == 0.0 and force == 0.0:
+        place = np.uintp(count - 1 - visit if backwards else visit)
+        i, j = np.uintp(row_i[place]), np.uintp(row_j[place])
+        r = row[place]
+        u, v, w, light, turn = d[i, 0], d[i, 1], d[i, 2], inverse[i, 0], inverse[i, 2]
+        u2, v2, w2, light2, turn2 = d[j, 0], d[j, 1], d[j, 2], inverse[j, 0], inverse[j, 2]
+        moved = r[NORMAL_A] * u + r[NORMAL_A + 1] * v + r[NORMAL_A + 2] * w
+        moved += r[NORMAL_B] * u2 + r[NORMAL_B + 1] * v2 + r[NORMAL_B + 2] * w2
+        force = r[FORCE]
+        normal = force + r[GAIN] * (r[FREE] - 2.0 * moved - force * r[SOFT])
+        normal = max(normal, -r[TENSION])
+        push = normal - force
+        limit = r[COHESION] + r[FRICTION] * max(normal, 0.0)
+        before = r[FORCE + 1]
+        if push == 0.0 and limit == 0.0 and before == 0.0:
             continue
-        off = row[place, FREE + 1] - 2.0 * relative(row, place, SHEAR_A, i, j, d)
-        shear = force + row[place, GAIN + 1] * (off - force * row[place, SOFT + 1])
+        worst = max(worst, abs(push) * r[SOFT])
+        u += push * light * r[NORMAL_A]
+        v += push * light * r[NORMAL_A + 1]
+        w += push * turn * r[NORMAL_A + 2]
+        u2 += push * light2 * r[NORMAL_B]
+        v2 += push * light2 * r[NORMAL_B + 1]
+        w2 += push * turn2 * r[NORMAL_B + 2]
+        moved = r[SHEAR_A] * u + r[SHEAR_A + 1] * v + r[SHEAR_A + 2] * w
+        moved += r[SHEAR_B] * u2 + r[SHEAR_B + 1] * v2 + r[SHEAR_B + 2] * w2
+        shear = before + r[GAIN + 1] * (r[FREE + 1] - 2.0 * moved - before * r[SOFT + 1])
         shear = min(max(shear, -limit), limit)
-        push(row, place, SHEAR_A, i, j, d, inverse, shear - force)
-        row[place, FORCE + 1] = shear
+        push = shear - before
+        d[i, 0] = u + push * light * r[SHEAR_A]
+        d[i, 1] = v + push * light * r[SHEAR_A + 1]
+        d[i, 2] = w + push * turn * r[SHEAR_A + 2]
+        d[j, 0] = u2 + push * light2 * r[SHEAR_B]
+        d[j, 1] = v2 + push * light2 * r[SHEAR_B + 1]
+        d[j, 2] = w2 + push * turn2 * r[SHEAR_B + 2]
+        r[FORCE], r[FORCE + 1] = normal, shear
     return worst
 
 
@@ -163,10 +166,12 @@ def relax_forces(
         for q in range(3):
             m.scaled[s, q] = 1.0 / m.diagonal[s, q, q]
             m.d[s, q] = m.rhs[s, q] * m.scaled[s, q]
+    for q in range(3):
+        m.scaled[n, q] = m.d[n, q] = 0.0
     count = high - low
     sort_by_height(c, work.contact_item, low, high)
     for place in range(count):
-        pack_row(c, work.contact_item[low + place], m, work, place, dt)
+        pack_row(c, work.contact_item[low + place], m, work, place, n, dt)
     scale = dt / (2.0 * RELAXATION_STIFFNESS)
     share = min(max(speed / QUIET_SPEED, LEAST_QUIET), 1.0)
     limit, far = share * RELAXATION_SPEED * scale, FAR_SPEED * scale

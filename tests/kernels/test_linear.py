@@ -57,15 +57,15 @@ def test_pcg(seed, n, warm, by_block):
     m, dense, pairs = system(seed, n)
     exact = np.linalg.solve(dense, m.rhs.ravel())
     if warm:
-        m.d[:] = exact.reshape(n, 3) * 1.01
+        m.d[:n] = exact.reshape(n, 3) * 1.01
     iterations = solve_pcg(m, n, pairs, 1e-12, by_block)
     assert 0 < iterations < 30 * n + 30
-    assert np.abs(m.d.ravel() - exact).max() < 1e-8 * np.abs(exact).max()
+    assert np.abs(m.d[:n].ravel() - exact).max() < 1e-8 * np.abs(exact).max()
 
 
 def test_pcg_starts_from_the_given_value():
     m, dense, pairs = system(3, 20)
-    m.d[:] = np.linalg.solve(dense, m.rhs.ravel()).reshape(20, 3)
+    m.d[:20] = np.linalg.solve(dense, m.rhs.ravel()).reshape(20, 3)
     assert solve_pcg(m, 20, pairs, 1e-8, False) == 0
 
 
@@ -94,7 +94,7 @@ def test_skyline(seed, n):
     assert count <= min(len(m.factor), (3 * n + 1) * 3 * n // 2)
     solve_skyline(m, n, pairs, count)
     exact = np.linalg.solve(dense, m.rhs.ravel())
-    assert np.abs(m.d.ravel() - exact).max() < 1e-9 * np.abs(exact).max()
+    assert np.abs(m.d[:n].ravel() - exact).max() < 1e-9 * np.abs(exact).max()
 
 
 @given(seeds, st.integers(1, 12), st.sampled_from([1.0, 1.5]))
@@ -103,4 +103,4 @@ def test_sor(seed, n, factor):
     sweeps = solve_sor(m, n, pairs, 1e-12, factor)
     assert sweeps < 100 * n + 300
     exact = np.linalg.solve(dense, m.rhs.ravel())
-    assert np.abs(m.d.ravel() - exact).max() < 1e-6 * np.abs(exact).max()
+    assert np.abs(m.d[:n].ravel() - exact).max() < 1e-6 * np.abs(exact).max()

@@ -150,8 +150,11 @@ SPEED_LIMIT = 1e4
 WAIT_STEPS = 40
 """Steps for which an island that did not settle as a whole is relaxed before it is tried again."""
 
+CUTS = 5
+"""Most halvings of the step of an island whose corners would move too far."""
+
 # status of a body
-AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3
+AWAKE, ASLEEP, FIXED, RETIRED, HELD = 0, 1, 2, 3, 4
 # state of a contact
 OPEN, STICK, SLIP = 0, 1, 2
 # kind of a contact in one step

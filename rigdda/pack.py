@@ -12,6 +12,7 @@ from rigdda.barriers import Fence, GravityWall
 from rigdda.constants import (
     AWAKE,
     BOLT,
+    CUTS,
     FIXED,
     PENETRATION_RATIO,
     PIN,
@@ -66,7 +67,7 @@ class Arrays(NamedTuple):
     matrix: Matrix
     work: Work
     gauges: Gauges
-    parameters: Parameters
+    parameters: tuple[Parameters, ...]  # of the step, then of its halves, quarters, ...
 
 
 def pack(
@@ -88,6 +89,7 @@ def pack(
     bodies, outlines = pack_bodies(scene, names)
     blocks = free_bodies(scene)
     room = 16 * blocks + 64
+    parameters = pack_parameters(scene, settings, bodies, names)
     return Arrays(
         bodies,
         outlines,
@@ -99,7 +101,7 @@ def pack(
         empty_matrix(blocks, room),
         empty_work(len(bodies), room),
         pack_gauges(scene, stations, watch),
-        pack_parameters(scene, settings, bodies, names),
+        tuple(parameters._replace(dt=settings.dt / 2**level) for level in range(CUTS + 1)),
     )
 
 
@@ -379,6 +381,7 @@ def pack_parameters(
     return Parameters(
         free_bodies(scene),
         settings.dt,
+        settings.displacement_limit * size,
         gx,
         gy,
         gravity,

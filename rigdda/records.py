@@ -36,7 +36,8 @@ BODY = _record(
     part=int,  # first polygon of its convex parts: itself where it is convex
     parts=int,  # number of them
     surface=int,  # index of the surface
-    status=int,  # AWAKE, ASLEEP, FIXED, RETIRED
+    status=int,  # AWAKE, ASLEEP, FIXED, RETIRED, HELD while other islands are cut back
+    cut=int,  # 1 if its island is to be cut back in this step
     island=int,  # island in which a sleeping body fell asleep
     touching=int,  # 1 if a contact was closed in the last step
     wait=int,  # steps until its island is solved as a whole again
@@ -230,6 +231,7 @@ class Parameters(NamedTuple):
 
     blocks: int  # bodies that may move: the blocks of the scene and its gravity walls
     dt: float
+    displacement_limit: float  # of a corner in a step, beyond it an island is cut back [m]
     gravity_x: float  # [m/s2]
     gravity_y: float
     gravity: float  # its magnitude
@@ -267,5 +269,6 @@ COUNTERS = (
     "events",
     "contact_total",
     "sweeps",
+    "cut_backs",
 )
 """Entries of the counter array."""

@@ -75,11 +75,13 @@ class Diagnostics(NamedTuple):
     """What the computation took so far.
 
     `penetration` is the greatest depth of a vertex inside another polygon or the terrain [m];
-    `relaxed` counts islands whose open-close iteration did not settle and that were relaxed.
+    `relaxed` counts islands whose contact forces were relaxed, since they move or their open-close
+    iteration did not settle; `cut_backs` counts islands that took shorter steps.
     """
 
     steps: int
     open_close_iterations: int
+    cut_backs: int
     relaxed: int
     sweeps: int
     solves: int
@@ -214,7 +216,7 @@ class Simulation:
 
     def energy(self) -> Energy:
         """Return the energies of what is free to move now and the work done on it so far."""
-        b, n = self._arrays.bodies, self._arrays.parameters.blocks
+        b, n = self._arrays.bodies, self._arrays.parameters[0].blocks
         free = b["status"][:n] != FIXED
         speed = b["vx"][:n] ** 2 + b["vy"][:n] ** 2
         kinetic = 0.5 * (b["mass"][:n] * speed + b["inertia"][:n] * b["omega"][:n] ** 2)
@@ -239,6 +241,7 @@ class Simulation:
         return Diagnostics(
             count["steps"],
             count["open_close_iterations"],
+            count["cut_backs"],
             count["relaxed_islands"],
             count["sweeps"],
             count["solves"],
@@ -282,11 +285,21 @@ class Simulation:
             elif reason == CONTACTS_FULL:
                 self._grow()
             elif reason == BAD_STATE:
-                body = self._arrays.bodies[block]
-                raise Diverged(
-                    f"step {self._counters[0]} ({self.time:g} s): block {block} moves at "
-                    f"{[float(body[v]) for v in ('vx', 'vy', 'omega')]}; use a smaller dt"
-                )
+                raise Diverged(self._divergence(block))
+
+    def _divergence(self, block: int) -> str:
+        """Return what is known of a block that moves too fast, and of the contact that did it."""
+        body = self._arrays.bodies[block]
+        speed = ", ".join(f"{body[name]:g}" for name in ("vx", "vy", "omega"))
+        told = f"step {self._counters[0]} ({self.time:g} s): block {block} moves at ({speed})"
+        contacts = self.contacts()
+        touching = contacts[(contacts["block_a"] == block) | (contacts["block_b"] == block)]
+        if len(touching):
+            c = touching[np.argmax(np.abs(touching["normal_force"]))]
+            other = c["block_b"] if c["block_a"] == block else c["block_a"]
+            told += f", pressed with {c['normal_force']:g} N at ({c['x']:g}, {c['y']:g})"
+            told += f" by {'the terrain' if other < 0 else f'block {other}'}"
+        return f"{told}; use a smaller dt"
 
     def run(self, duration: float, every: float = 0.05, progress: bool = False) -> Run:
         """Simulate `duration` seconds and record a frame `every` so often, the start included.
@@ -354,7 +367,7 @@ class Simulation:
         self._now, self._before = grown, empty_contacts(room)
         order = self._arrays.work.sorted
         self._arrays = self._arrays._replace(
-            matrix=empty_matrix(self._arrays.parameters.blocks, room),
+            matrix=empty_matrix(self._arrays.parameters[0].blocks, room),
             work=empty_work(len(bodies), room)._replace(sorted=order),
         )
 

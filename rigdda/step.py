@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from numpy.typing import NDArray
 
 from rigdda.constants import (
@@ -9,8 +11,10 @@ from rigdda.constants import (
     AWAKE,
     BAD_STATE,
     CONTACTS_FULL,
+    CUTS,
     DONE,
     EVENTS_FULL,
+    HELD,
     OPEN,
     RETIRED,
     SPEED_LIMIT,
@@ -94,6 +98,16 @@ def keep_asleep(
 
 
 @kernel
+def keep_held(c: Contacts, count: int, old: Contacts, work: Work, a: int) -> int:
+    """Keep the contacts of block a, which has taken its step; returns the new number."""
+    for k in range(work.first[a], work.first[a + 1]):
+        if count < len(c):
+            c[count] = old[k]
+            count += 1
+    return count
+
+
+@kernel
 def detect(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, c: Contacts, old: Contacts,
     old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters,
@@ -108,6 +122,8 @@ def detect(
     for a in range(p.blocks):
         if bodies[a].status == ASLEEP:
             count = keep_asleep(bodies, c, count, old, work, a, gauges, time, p)
+        elif bodies[a].status == HELD:
+            count = keep_held(c, count, old, work, a)
         elif bodies[a].status == AWAKE:
             first = count
             count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
@@ -134,15 +150,33 @@ def detect(
 @kernel
 def solve_and_move(
     bodies: Bodies, outlines: Outlines, c: Contacts, count: int, m: Matrix, work: Work,
-    gauges: Gauges, time: float, p: Parameters, counters: NDArray, ledger: NDArray,
-) -> int:  # fmt: skip
-    """Settle every island, note hits, then move its blocks; returns a bad block or -1."""
+    gauges: Gauges, time: float, p: Parameters, limit: float, counters: NDArray,
+    ledger: NDArray,
+) -> tuple[int, float]:  # fmt: skip
+    """Settle every island, note hits, then move its blocks.
+
+    An island of which a corner would move by more than `limit` [m] is left where it is, and marked.
+
+    Returns
+    -------
+    bad : int
+        A block that went bad, or -1.
+    excess : float
+        Greatest displacement of the islands left, over the limit; 0 if there is none.
+    """
     islands = find_islands(bodies, c, count, work, p.blocks, p.islands)
-    bad = -1
+    bad, excess = -1, 0.0
     for s in range(islands):
         c0, c1 = work.contact_start[s], work.contact_start[s + 1]
         if c1 > c0:
             open_close(bodies, c, m, work, s, p, counters)
+            far = greatest_displacement(bodies, m, work, s) / limit
+            if far > 1.0:
+                excess = max(excess, far)
+                counters[9] += 1
+                for place in range(work.block_start[s], work.block_start[s + 1]):
+                    bodies[work.block_item[place]].cut = 1
+                continue
             limit_fences(bodies, c, m, work, s, gauges, time, p, counters)
             counters[6] = note_hits(bodies, c, work, c0, c1, gauges, counters[6], time)
         struck = is_struck(c, work, c0, c1)
@@ -170,26 +204,107 @@ def solve_and_move(
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
         wake_behind(bodies, c, count, gauges, p)
-    return bad
+    return bad, excess
+
+
+@kernel
+def greatest_displacement(bodies: Bodies, m: Matrix, work: Work, island: int) -> float:
+    """Return a bound on the displacement of any corner of an island in this step [m]."""
+    most, low = 0.0, work.block_start[island]
+    for place in range(low, work.block_start[island + 1]):
+        d, radius = m.d[place - low], bodies[work.block_item[place]].radius
+        most = max(most, math.hypot(d[0], d[1]) + abs(d[2]) * radius)
+    return most
 
 
 @kernel
 def rest_all(bodies: Bodies) -> None:
     """Take the velocity from every block: static mode."""
     for i in range(len(bodies)):
-        bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
+        if bodies[i].status != HELD:
+            bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
+
+
+@kernel
+def take_step(
+    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
+    c: Contacts, old: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters, start: int,
+    limit: float, counters: NDArray, ledger: NDArray, deepest: NDArray,
+) -> tuple[int, int, float]:  # fmt: skip
+    """Take a step from the time `start` p.dt, with its contacts in c.
+
+    Returns
+    -------
+    reason : int
+        DONE, CONTACTS_FULL before anything has moved, or BAD_STATE.
+    block : int
+        The block that went bad, else -1.
+    excess : float
+        As `solve_and_move` gives it.
+    """
+    time = (start + 1) * p.dt
+    if p.static:
+        rest_all(bodies)
+    set_field(work, shaking, start * p.dt, time, p)
+    count = detect(bodies, outlines, ground, links, c, old, counters[5], work, gauges, time, p)
+    if count < 0 or (limit < math.inf and 4 * count > 3 * len(c)):  # room to spare for a cut-back
+        return CONTACTS_FULL, -1, 0.0
+    counters[5] = count
+    counters[7] += count
+    for k in range(count):
+        deepest[0] = max(deepest[0], -c[k].gap)
+    bad, excess = solve_and_move(
+        bodies, outlines, c, count, m, work, gauges, time, p, limit, counters, ledger
+    )
+    yield_bolts(bodies, links)
+    return DONE if bad < 0 else BAD_STATE, bad, excess
+
+
+@kernel
+def cut_back(
+    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
+    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters,
+    parts: int, counters: NDArray, ledger: NDArray, deepest: NDArray,
+) -> tuple[int, int]:  # fmt: skip
+    """Take the step in `parts` shorter ones, of p.dt, for the islands that would go too far.
+
+    All others have taken it and are held. `parts` is even, so that in the end `now` holds the
+    contacts, as it does at the start. Returns reason and block as `take_step` does.
+    """
+    for k in range(counters[5]):
+        if bodies[now[k].a].cut == 1:
+            recall(now, k, k + 1, before, work.first, p.slack)
+    for i in range(p.blocks):
+        if bodies[i].status == AWAKE and bodies[i].cut == 0:
+            bodies[i].status = HELD
+        bodies[i].cut = 0
+    reason, block = DONE, -1
+    for part in range(counters[0] * parts, (counters[0] + 1) * parts):
+        now, before = before, now
+        if reason == DONE:
+            reason, block, _ = take_step(
+                bodies, outlines, ground, links, shaking, now, before, m, work, gauges, p, part,
+                math.inf, counters, ledger, deepest,
+            )  # fmt: skip
+    for i in range(p.blocks):
+        if bodies[i].status == HELD:
+            bodies[i].status = AWAKE
+    return reason, block
 
 
 @entry_kernel
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
-    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters,
-    counters: NDArray, ledger: NDArray, deepest: NDArray, steps: int,
+    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges,
+    levels: tuple[Parameters, ...], counters: NDArray, ledger: NDArray, deepest: NDArray,
+    steps: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Take up to `steps` steps.
 
     Parameters
     ----------
+    levels : tuple of Parameters
+        Of the step, then of its halves, quarters, ..., which are for islands that are cut back.
     counters, ledger, deepest : arrays
         See `records.COUNTERS`, `records.LEDGER`; deepest[0] is the greatest penetration [m].
 
@@ -202,32 +317,29 @@ def advance(
     swapped : bool
         Whether `now` and `before` have changed roles.
     """
-    swapped = False
+    swapped, p = False, levels[0]
     for _ in range(steps):
         room = len(gauges.event) - counters[6]
         if room < (p.blocks + 1) * (len(gauges.station) + len(gauges.absorbed)):
             return EVENTS_FULL, -1, swapped
-        time = (counters[0] + 1) * p.dt
-        if p.static:
-            rest_all(bodies)
-        set_field(work, shaking, counters[0] * p.dt, time, p)
-        count = detect(
-            bodies, outlines, ground, links, before, now, counters[5], work, gauges, time, p
-        )
-        if count < 0:
-            return CONTACTS_FULL, -1, swapped
+        reason, block, excess = take_step(
+            bodies, outlines, ground, links, shaking, before, now, m, work, gauges, p,
+            counters[0], p.displacement_limit, counters, ledger, deepest,
+        )  # fmt: skip
+        if reason == CONTACTS_FULL:
+            return reason, -1, swapped
         now, before = before, now
         swapped = not swapped
-        counters[5] = count
-        counters[7] += count
-        for k in range(count):
-            deepest[0] = max(deepest[0], -now[k].gap)
-        bad = solve_and_move(
-            bodies, outlines, now, count, m, work, gauges, time, p, counters, ledger
-        )
-        yield_bolts(bodies, links)
-        counters[6] = note_passage(bodies, gauges, counters[6], time)
+        if excess > 0.0 and reason == DONE:
+            level = 1
+            while excess > 2.0**level and level < CUTS:
+                level += 1
+            reason, block = cut_back(
+                bodies, outlines, ground, links, shaking, now, before, m, work, gauges,
+                levels[level], 2**level, counters, ledger, deepest,
+            )  # fmt: skip
         counters[0] += 1
-        if bad >= 0:
-            return BAD_STATE, bad, swapped
+        counters[6] = note_passage(bodies, gauges, counters[6], counters[0] * p.dt)
+        if reason != DONE:
+            return BAD_STATE, block, swapped
     return DONE, -1, swapped

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigdda.constants import AWAKE, RETIRED
+from rigdda.constants import AWAKE, HELD, RETIRED
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Outlines, Parameters, Work
 
@@ -59,14 +59,16 @@ def overlapping_pairs(bodies: Bodies, work: Work) -> int:
     for k in range(len(order)):
         i = order[k]
         status_i = bodies[i].status
-        if status_i == RETIRED:
+        if status_i == RETIRED or status_i == HELD:
             continue
         for m in range(k + 1, len(order)):
             j = order[m]
             if work.low_x[j] > work.high_x[i]:
                 break
             status_j = bodies[j].status
-            if status_j == RETIRED or (status_i != AWAKE and status_j != AWAKE):
+            if status_j == RETIRED or status_j == HELD:
+                continue
+            if status_i != AWAKE and status_j != AWAKE:
                 continue
             if work.low_y[j] > work.high_y[i] or work.low_y[i] > work.high_y[j]:
                 continue

@@ -43,7 +43,7 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contacts, k: int, p: Param
     a, b = links[q].a, links[q].b
     ax, ay = anchor(bodies, a, links[q].ax, links[q].ay)
     bx, by = anchor(bodies, b, links[q].bx, links[q].by)
-    c[k].a, c[k].b, c[k].key, c[k].owner, c[k].kind = a, b, q, 1, links[q].kind
+    c[k].a, c[k].b, c[k].key, c[k].owner, c[k].kind = a, b, -1 - q, 1, links[q].kind
     c[k].other, c[k].gap, c[k].flips = 0, 0.0, 0
     c[k].x, c[k].y, c[k].share, c[k].state = ax, ay, 0.5, STICK
     c[k].memory_normal = c[k].memory_shear = c[k].start_normal = c[k].start_shear = 0.0

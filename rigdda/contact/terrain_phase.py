@@ -27,10 +27,10 @@ def over_segment(ground: Ground, s: int, x: float, y: float, depth: float) -> bo
     tx, ty = ground.normal_y[s], -ground.normal_x[s]
     along = tx * (x - ground.x[s]) + ty * (y - ground.y[s])
     # in a concave corner: what is deeper under this segment than beyond it, or under both
-    if along < 0.0 and ground.turn[s] > 0.0 and depth > 0.0:
+    if along < 0.0 and ground.turn[s] > 0.0:
         near = -along <= depth * math.tan(0.5 * ground.turn[s])
         return near or below_segment(ground, s - 1, x, y) <= 0.0
-    if along > ground.length[s] and ground.turn[s + 1] > 0.0 and depth > 0.0:
+    if along > ground.length[s] and ground.turn[s + 1] > 0.0:
         near = along - ground.length[s] <= depth * math.tan(0.5 * ground.turn[s + 1])
         return near or below_segment(ground, s + 1, x, y) <= 0.0
     return -1e-9 <= along <= ground.length[s] + 1e-9
@@ -85,15 +85,37 @@ def beneath_roof(
 
 
 @kernel
-def place_of_hit(
-    bodies: Bodies, a: int, x: float, y: float, nx: float, ny: float, gap: float, dt: float
+def along_neighbour(
+    ground: Ground, s: int, x: float, y: float, dx: float, dy: float
 ) -> tuple[float, float]:
-    """Return where in the step a corner of block a meets a line, or (x, y) if it never does."""
+    """Return the displacement of a point less what would take it into segment s, if it is over it.
+
+    It slides along that segment.
+    """
+    gap = below_segment(ground, s, x, y)
+    sunk = min(gap, 0.0) - gap - (ground.normal_x[s] * dx + ground.normal_y[s] * dy)
+    if sunk <= 0.0 or not over_segment(ground, s, x, y, max(-gap, 0.0)):
+        return dx, dy
+    return dx + sunk * ground.normal_x[s], dy + sunk * ground.normal_y[s]
+
+
+@kernel
+def place_of_hit(
+    bodies: Bodies, ground: Ground, s: int, a: int, x: float, y: float, gap: float, p: Parameters
+) -> tuple[float, float]:
+    """Return where in the step a corner of block a meets the line of segment s.
+
+    Or (x, y) if it never does. It may slide there along a neighbour, into a concave corner.
+    """
     if gap <= 0.0:
         return x, y
-    dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
-    dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
-    approach = -(nx * dx + ny * dy)
+    dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * p.dt
+    dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * p.dt
+    if ground.turn[s] > 0.0:
+        dx, dy = along_neighbour(ground, s - 1, x, y, dx, dy)
+    if ground.turn[s + 1] > 0.0:
+        dx, dy = along_neighbour(ground, s + 1, x, y, dx, dy)
+    approach = -(ground.normal_x[s] * dx + ground.normal_y[s] * dy)
     time = min(gap / approach, 1.0) if approach > 0.0 else 0.0
     return x + time * dx, y + time * dy
 
@@ -128,7 +150,7 @@ def corners_on_segment(
             continue
         if concave and outlines.corner[a, vertex].reentrant:
             continue
-        hit_x, hit_y = place_of_hit(bodies, a, x, y, nx, ny, gap, dt)
+        hit_x, hit_y = place_of_hit(bodies, ground, s, a, x, y, gap, p)
         if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0)):
             continue
         if shadowed(ground, s, hit_x, hit_y, gap):

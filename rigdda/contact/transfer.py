@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from rigdda.constants import NEW, OPEN, SAME_NORMAL, TERRAIN
+from rigdda.constants import NEW, OPEN, SAME_FACE, SAME_NORMAL, TERRAIN
 from rigdda.kernel import kernel
 from rigdda.records import Contacts
 
@@ -25,14 +25,32 @@ def index_by_body(c: Contacts, count: int, first: NDArray, bodies: int) -> None:
 
 
 @kernel
-def recall_from(
-    c: Contacts, k: int, old: Contacts, low: int, high: int, b: int, sign: float
+def fits_another(
+    c: Contacts, k: int, new_low: int, new_high: int, old: Contacts, m: int, cosine: float
 ) -> bool:
+    """Return whether another of the new contacts of the corner of k has the normal of old[m]."""
+    for j in range(new_low, new_high):
+        if j == k or c[j].key != c[k].key or c[j].b != c[k].b:
+            continue
+        if abs(c[j].nx * old[m].nx + c[j].ny * old[m].ny) > cosine:
+            return True
+    return False
+
+
+@kernel
+def recall_from(
+    c: Contacts, k: int, new_low: int, new_high: int, old: Contacts, low: int, high: int, b: int,
+    sign: float,
+) -> bool:  # fmt: skip
     """Give contact k the memory of the same closed contact among old[low:high], if there is one."""
     for m in range(low, high):
         if old[m].b != b or old[m].key != c[k].key or old[m].state == OPEN:
             continue
-        if sign * (c[k].nx * old[m].nx + c[k].ny * old[m].ny) < SAME_NORMAL:
+        cosine = sign * (c[k].nx * old[m].nx + c[k].ny * old[m].ny)
+        if cosine < SAME_NORMAL:
+            continue
+        # where a corner slides into a concave corner, the face ahead is not the one it comes from
+        if cosine < SAME_FACE and fits_another(c, k, new_low, new_high, old, m, cosine):
             continue
         c[k].state, c[k].kind = old[m].state, old[m].kind
         c[k].memory_normal = old[m].memory_normal
@@ -59,9 +77,9 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray, slac
         if c[k].gap > slack:
             continue
         a, b = c[k].a, c[k].b
-        found = recall_from(c, k, old, first[a], first[a + 1], b, 1.0)
+        found = recall_from(c, k, low, high, old, first[a], first[a + 1], b, 1.0)
         if not found and b != TERRAIN:
-            recall_from(c, k, old, first[b], first[b + 1], a, -1.0)
+            recall_from(c, k, low, high, old, first[b], first[b + 1], a, -1.0)
 
 
 @kernel

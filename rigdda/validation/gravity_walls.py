@@ -102,7 +102,7 @@ OVERTURNS = (
 
 CASES = (
     Case(
-        "gravity-wall-slides",
+        "wall-slides",
         (
             Check("limit load", "W tan phi", "N", 2e-2, "relative"),
             Check("turn at 1.02", "none: it slides", "rad", 1e-3, "bound"),
@@ -110,7 +110,7 @@ CASES = (
         lambda lab: (limit_loads(lab, SLIDES), Measured(np.abs(turns(lab, SLIDES)))),
     ),
     Case(
-        "gravity-wall-overturns",
+        "wall-overturns",
         (
             Check("limit load", "W b/(2 h)", "N", 2e-2, "relative"),
             Check("overturns at 1.02", "yes: W b/(2 h)", "-", 0.0, "absolute"),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from agents.tables import empty_table, write_rows
 from rigdda import BadInput
-from rigdda.validation import Case, Convergence, Result, converge, evaluate, ready
+from rigdda.validation import CASES, Case, Convergence, Result, converge, evaluate
 from rigdda.validation.convergence import STEPS
 from rigdda.validation.flight import CASES as FLIGHT
 
@@ -33,14 +33,13 @@ def choose(only: Sequence[str], slow: bool) -> tuple[Case, ...]:
     BadInput
         If no name begins so.
     """
-    cases = ready()
     for start in only:
-        if not any(case.name.startswith(start) for case in cases):
-            names = ", ".join(case.name for case in cases)
+        if not any(case.name.startswith(start) for case in CASES):
+            names = ", ".join(case.name for case in CASES)
             raise BadInput("--only", start, f"use the beginning of one of {names}")
     if only:
-        return tuple(case for case in cases if case.name.startswith(tuple(only)))
-    return tuple(case for case in cases if slow or not case.slow)
+        return tuple(case for case in CASES if case.name.startswith(tuple(only)))
+    return tuple(case for case in CASES if slow or not case.slow)
 
 
 def runs(cases: Sequence[Case]) -> int:

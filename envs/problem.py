@@ -112,11 +112,10 @@ class DesignProblem:
         for barrier in layout:
             if isinstance(barrier, Earthwork):
                 try:
-                    reach = barrier.outline(ground)[:, 0].max()
-                    changed = barrier.build(ground, self.site.slope.surface)
+                    moved, changed = barrier.build(ground, self.site.slope.surface)
                 except BadInput:
                     continue
-                if reach > self.site.barrier_zone.end + encoding.TOLERANCE:
+                if moved[:, 0].max() > self.site.barrier_zone.end + encoding.TOLERANCE:
                     continue
                 ground = changed
             kept.append(barrier)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,33 @@ def integer(field: str, value: Any, low: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
         raise BadInput(field, value, f"give a whole number of at least {low}")
     return int(value)
+
+
+def vector(field: str, value: Sequence[float]) -> tuple[float, float]:
+    """Return `value` as two finite numbers.
+
+    Raises
+    ------
+    BadInput
+        If it is not two finite numbers.
+    """
+    try:
+        x, y = value
+    except (TypeError, ValueError):
+        raise BadInput(field, value, "give two numbers (x, y)") from None
+    return number(field, x), number(field, y)
+
+
+def set_vectors(what: str, record: object, *names: str) -> None:
+    """Set fields of a frozen dataclass, each to its value as two finite numbers.
+
+    Raises
+    ------
+    BadInput
+        If one is not two finite numbers.
+    """
+    for name in names:
+        object.__setattr__(record, name, vector(f"{what}: {name}", getattr(record, name)))
 
 
 def points(field: str, value: ArrayLike, least: int) -> NDArray[np.float64]:

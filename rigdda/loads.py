@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check
-from rigdda.errors import BadInput
 
 Floats = NDArray[np.float64]
-
-
-def vector(where: str, value: Sequence[float]) -> tuple[float, float]:
-    """Return `value` as two finite numbers.
-
-    Raises
-    ------
-    BadInput
-        If it is not two finite numbers.
-    """
-    try:
-        x, y = value
-    except (TypeError, ValueError):
-        raise BadInput(where, value, "give two numbers (x, y)") from None
-    return check.number(where, x), check.number(where, y)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +37,7 @@ class PointLoad:
 
     def __post_init__(self) -> None:
         check.integer("point load: block", self.block, 0)
-        object.__setattr__(self, "point", vector("point load: point", self.point))
-        object.__setattr__(self, "force", vector("point load: force", self.force))
+        check.set_vectors("point load", self, "point", "force")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
@@ -88,8 +70,7 @@ class LineLoad:
 
     def __post_init__(self) -> None:
         check.integer("line load: block", self.block, 0)
-        for name in ("start", "end", "force_per_length"):
-            object.__setattr__(self, name, vector(f"line load: {name}", getattr(self, name)))
+        check.set_vectors("line load", self, "start", "end", "force_per_length")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
@@ -120,9 +101,7 @@ class BodyForce:
 
     def __post_init__(self) -> None:
         check.integer("body force: block", self.block, 0)
-        object.__setattr__(
-            self, "force_per_area", vector("body force: force_per_area", self.force_per_area)
-        )
+        check.set_vectors("body force", self, "force_per_area")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""

@@ -158,8 +158,8 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
         return point[0] - bodies["x"][block], point[1] - bodies["y"][block]
 
     links = np.zeros(len(scene.supports), dtype=LINK).view(np.recarray)
-    for link, support in zip(links, scene.supports, strict=True):
-        link["yielding"] = math.inf
+    for number, (link, support) in enumerate(zip(links, scene.supports, strict=True)):
+        link["number"], link["yielding"] = number, math.inf
         if isinstance(support, FixedPoint):
             link["kind"], link["a"], link["b"] = PIN, support.block, TERRAIN
             link["ax"], link["ay"] = anchor(support.block, support.point)

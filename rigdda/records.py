@@ -93,6 +93,7 @@ LINK = _record(
     a=int,  # block
     b=int,  # block or TERRAIN
     kind=int,  # BOLT or PIN
+    number=int,  # index of the support in the scene
     ax=float,  # anchors in body coordinates, in the ground where b is TERRAIN [m]
     ay=float,
     bx=float,

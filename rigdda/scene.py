@@ -15,7 +15,7 @@ from rigdda import check
 from rigdda.barriers import Barrier, Earthwork, GravityWall, Layout, Wall, earthworks
 from rigdda.errors import BadInput
 from rigdda.geometry import is_convex
-from rigdda.loads import Load, vector
+from rigdda.loads import Load
 from rigdda.supports import FixedPoint, Support
 from rigdda.terrain import Terrain
 
@@ -171,7 +171,7 @@ class Scene:
         object.__setattr__(self, "surfaces", dict(self.surfaces))
         object.__setattr__(self, "interfaces", dict(self.interfaces))
         if isinstance(self.gravity, Sequence):
-            object.__setattr__(self, "gravity", vector("gravity", self.gravity))
+            object.__setattr__(self, "gravity", check.vector("gravity", self.gravity))
         else:
             check.number("gravity", self.gravity, 0.0)
         check.number("damping", self.damping, 0.0)

@@ -21,7 +21,7 @@ from rigdda.constants import (
     PIN,
     PLAIN,
 )
-from rigdda.contact.links import anchor
+from rigdda.contact.links import anchor, tension
 from rigdda.errors import BadInput, Diverged
 from rigdda.geometry import polygon_properties
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
@@ -30,7 +30,6 @@ from rigdda.run import EVENT, Run
 from rigdda.scene import Scene
 from rigdda.settings import Settings
 from rigdda.step import advance
-from rigdda.supports import FixedPoint, Support
 
 CONTACT = np.dtype(
     [
@@ -191,25 +190,20 @@ class Simulation:
         c = self._now[: self._counters[5]]
         c = c[(c["kind"] == BOLT) | (c["kind"] == PIN)]
         out = np.zeros((len(self.scene.supports), 2))
-        order = np.argsort([_first_block(s) for s in self.scene.supports], kind="stable")
         fx = c["normal"] * c["nx"] - c["shear"] * c["ny"]
         fy = c["normal"] * c["ny"] + c["shear"] * c["nx"]
-        out[order[c["key"]]] = np.stack([fx, fy], axis=1)
+        out[self._arrays.links["number"][c["key"]]] = np.stack([fx, fy], axis=1)
         return out
 
     def _elastic(self) -> float:
         """Return the energy stored in bolts and plain contacts now [J]."""
         b, links = self._arrays.bodies, self._arrays.links
         total = 0.0
-        for link in links[links["kind"] == BOLT]:
-            ends = [
-                np.array(anchor(b, int(link[i]), float(link[x]), float(link[y])))
-                for i, x, y in (("a", "ax", "ay"), ("b", "bx", "by"))
-            ]
-            force = link["prestress"] + link["stiffness"] * (
-                np.hypot(*(ends[0] - ends[1])) - link["length"]
-            )
-            total += 0.5 * force**2 / link["stiffness"]
+        for q in np.flatnonzero(links["kind"] == BOLT):
+            bolt = links[q]
+            start = anchor(b, bolt["a"], bolt["ax"], bolt["ay"])
+            end = anchor(b, bolt["b"], bolt["bx"], bolt["by"])
+            total += 0.5 * tension(links, q, math.dist(start, end)) ** 2 / bolt["stiffness"]
         c = self._now[: self._counters[5]]
         c = c[(c["kind"] == PLAIN) & (c["state"] != OPEN)]
         return float(total + 0.5 * (c["stiffness"] * np.minimum(c["gap"], 0.0) ** 2).sum())
@@ -370,10 +364,6 @@ class Simulation:
             matrix=empty_matrix(self._arrays.parameters[0].blocks, room),
             work=empty_work(len(bodies), room)._replace(sorted=order),
         )
-
-
-def _first_block(support: Support) -> int:
-    return support.block if isinstance(support, FixedPoint) else support.block_a
 
 
 def simulate_many(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from rigdda import check
 from rigdda.errors import BadInput
-from rigdda.loads import vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +31,7 @@ class FixedPoint:
 
     def __post_init__(self) -> None:
         check.integer("fixed point: block", self.block, 0)
-        object.__setattr__(self, "point", vector("fixed point: point", self.point))
+        check.set_vectors("fixed point", self, "point")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +71,7 @@ class Bolt:
             check.integer("bolt: block_b", self.block_b, 0)
             if self.block_b == self.block_a:
                 raise BadInput("bolt: block_b", self.block_b, "give another block than block_a")
-        object.__setattr__(self, "point_a", vector("bolt: point_a", self.point_a))
-        object.__setattr__(self, "point_b", vector("bolt: point_b", self.point_b))
+        check.set_vectors("bolt", self, "point_a", "point_b")
         if math.dist(self.point_a, self.point_b) < 1e-6:
             raise BadInput("bolt: point_b", self.point_b, "put it apart from point_a")
         check.number("bolt: stiffness", self.stiffness, 0.0, open_low=True)

@@ -6,11 +6,10 @@ them; `rigdda validate` prints them and the tests run them.
 
 from rigdda.validation.case import Case, Check, Lab, Measured, Result, evaluate
 from rigdda.validation.convergence import Convergence, converge
-from rigdda.validation.suite import CASES, PENDING, ready
+from rigdda.validation.suite import CASES
 
 __all__ = [
     "CASES",
-    "PENDING",
     "Case",
     "Check",
     "Convergence",
@@ -19,5 +18,4 @@ __all__ = [
     "Result",
     "converge",
     "evaluate",
-    "ready",
 ]

@@ -63,10 +63,9 @@ CASES = (
         ),
         measure_spin,
     ),
-)
-
-LINEAR = Case(
-    "spin-linear",
-    (Check("growth in a turn", "(1 + dr^2)^(2 pi/atan dr) - 1", "-", 5e-2, "relative"),),
-    measure_growth,
+    Case(
+        "spin-linear",
+        (Check("growth in a turn", "(1 + dr^2)^(2 pi/atan dr) - 1", "-", 5e-2, "relative"),),
+        measure_growth,
+    ),
 )

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-import rigdda
+from rigdda.loads import PointLoad
 from rigdda.scene import Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured, Metered
 from rigdda.validation.scenes import FLAT, GRAVITY, box, incline, masses, rock, shifts
@@ -69,26 +68,24 @@ def measure_hold(lab: Lab, friction_deg: float) -> tuple[Measured, Measured]:
 
 def measure_pressed(lab: Lab) -> tuple[Measured, Measured]:
     """Watch a block that ten times its weight presses into a slope of 30 degrees."""
-    new: Any = rigdda
     plain, down = incline(30.0, 35.0)
     weight = GRAVITY * masses(plain)[0][0]
     force = 10.0 * weight * np.array([down[1], -down[0]])  # into the slope
     centre = plain.blocks[0].vertices.mean(axis=0)
-    scene = new.Scene(
+    scene = Scene(
         plain.terrain,
         plain.blocks,
         plain.surfaces,
-        loads=(new.PointLoad(0, tuple(centre), tuple(force)),),
+        loads=(PointLoad(0, tuple(centre), tuple(force)),),
     )
     return measure_creep(lab, lab.simulate(scene, sleeping=False))
 
 
 def measure_newmark(lab: Lab) -> tuple[Measured]:
     """Shake level ground under a block by one rectangular pulse; it slides to rest."""
-    new: Any = rigdda
     push = PULSE * GRAVITY
     history = [(0.0, push, 0.0), (PULSE_TIME, push, 0.0), (PULSE_TIME, 0.0, 0.0)]
-    scene: Scene = new.Scene(
+    scene = Scene(
         Terrain(FLAT),
         (box(0.0, 0.25, 1.0, 0.5),),
         rock(math.degrees(math.atan(YIELD))),
@@ -125,13 +122,11 @@ CASES = (
     slide_case("slide-35-34-10s", 35.0, 34.0, 1.0, 10.0, 1e-4),
     Case("hold-30-30.5", HOLDS, lambda lab: measure_hold(lab, 30.5)),
     Case("hold-30-35", HOLDS, lambda lab: measure_hold(lab, 35.0)),
-)
-
-PRESSED = Case("hold-pressed", HOLDS, measure_pressed)
-
-NEWMARK = Case(
-    "newmark",
-    (Check("way", "V^2/(2 g N) (1 - N/A), V = A g T (Newmark 1965)", "m", 1e-3, "relative"),),
-    measure_newmark,
-    smooth=True,
+    Case("hold-pressed", HOLDS, measure_pressed),
+    Case(
+        "newmark",
+        (Check("way", "V^2/(2 g N) (1 - N/A), V = A g T (Newmark 1965)", "m", 1e-3, "relative"),),
+        measure_newmark,
+        smooth=True,
+    ),
 )

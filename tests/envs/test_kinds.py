@@ -112,7 +112,8 @@ def test_earthworks_that_do_not_fit_the_slope_are_absent():
     problem = DesignProblem("quick", 1, ("embankment",))
     assert problem.decode([1.0, 0.0, 0.0]) == ()  # the ground falls: it ends beyond the zone
     (dam,) = problem.decode([0.95, -0.6, -1.0])  # at the toe
-    assert dam.outline(problem.site.profile)[:, 0].max() <= problem.site.barrier_zone.end
+    moved, _ = dam.build(problem.site.profile, "rock")
+    assert moved[:, 0].max() <= problem.site.barrier_zone.end
 
 
 def test_the_observation_holds_every_kind_in_bounds(ramp: Site) -> None:

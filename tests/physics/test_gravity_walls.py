@@ -1,4 +1,4 @@
-"""Gravity walls slide and overturn at the loads of statics."""
+"""Gravity walls as bodies of a scene; the accuracy suite has their limit loads."""
 
 from __future__ import annotations
 
@@ -8,77 +8,10 @@ import numpy as np
 import pytest
 
 from physics.helpers import FLAT, GRAVITY, box, rock
-from rigdda import (
-    Block,
-    Fence,
-    GravityWall,
-    Run,
-    Scene,
-    Settings,
-    Simulation,
-    Surface,
-    Terrain,
-    Wall,
-)
-from rigdda.geometry import polygon_properties
+from rigdda import Fence, GravityWall, Run, Scene, Simulation, Terrain, Wall
 from rigdda.outcome import state_of
-
-CONCRETE = 2400.0
-
-
-def pushed(force: float, at: float, wall: GravityWall, friction_deg: float) -> Scene:
-    """Return a wall at the foot of a ramp of ice, on which a smooth rock leans on the wall.
-
-    The rock touches the vertical face with its nose at height `at` [m]. Without friction it rests
-    on the ramp under the horizontal force W tan(30 deg), from which its density follows.
-    """
-    rise = math.tan(math.radians(30.0))
-    corners = [(-6.0, 6.0), (-0.6, 0.6), (0.5, 0.0), (-0.6, 0.6), (-6.0, 6.0)]
-    above = [0.0, 0.0, at, 3.0, 3.0]
-    rock_corners = [(x, rise * y + up) for (x, y), up in zip(corners, above, strict=True)]
-    area = abs(polygon_properties(np.array(rock_corners))[0])
-    density = force / (GRAVITY * rise * area)
-    terrain = Terrain([(-40.0, 40.0 * rise), (0.0, 0.0), (60.0, 0.0)], ["ice", "rock"])
-    surfaces = {
-        "rock": Surface(friction_deg),
-        "concrete": Surface(friction_deg),
-        "ice": Surface(0.0),
-    }
-    block = Block(rock_corners, density, surface="ice")
-    return Scene(terrain, (block,), surfaces, barriers=(wall,))
-
-
-def displacement(scene: Scene, seconds: float) -> np.ndarray:
-    """Return how far and how much a scene's first barrier moves and turns [m, m, rad]."""
-    sim = Simulation(scene, Settings(sleeping=False))
-    start = sim.barrier_poses
-    sim.step(round(seconds / 5e-3))
-    return (sim.barrier_poses - start)[0]
-
-
-@pytest.mark.parametrize("thickness, friction_deg, at", [(1.0, 20.0, 1.0), (2.0, 30.0, 1.2)])
-def test_slides_when_the_force_exceeds_friction(thickness, friction_deg, at):
-    wall = GravityWall(0.5, 2.0, thickness)
-    weight = CONCRETE * GRAVITY * thickness * 2.0
-    limit = weight * math.tan(math.radians(friction_deg))
-    assert limit * at < weight * thickness / 2.0  # it slides first
-    below, above = (
-        displacement(pushed(share * limit, at, wall, friction_deg), 2.0) for share in (0.98, 1.02)
-    )
-    assert np.hypot(*below[:2]) < 1e-3
-    assert above[0] > 0.05
-    assert abs(above[2]) < 1e-3
-
-
-@pytest.mark.parametrize("at", [1.5, 1.9])
-def test_overturns_when_the_moment_exceeds_that_of_the_weight(at):
-    wall = GravityWall(0.5, 2.0, 1.0)
-    limit = CONCRETE * GRAVITY * 2.0 * 0.5 / at
-    below, above = (
-        displacement(pushed(share * limit, at, wall, 60.0), 2.0) for share in (0.98, 1.02)
-    )
-    assert abs(below[2]) < 1e-3
-    assert above[2] < -0.05  # downhill
+from rigdda.validation.case import Lab
+from rigdda.validation.gravity_walls import DURATION, FACE, Push, displacement
 
 
 @pytest.mark.parametrize("slope_deg", [20.0, 30.0])
@@ -90,10 +23,10 @@ def test_slides_on_a_slope_steeper_than_friction(slope_deg):
     for share, slides in ((0.98, True), (1.02, False)):
         friction_deg = math.degrees(math.atan(share * limit))
         scene = Scene(terrain, (far,), rock(friction_deg), barriers=(GravityWall(0.0, 1.0, 2.0),))
-        x, y, turn = displacement(scene, 1.0)
+        x, y, turn = displacement(Lab(5e-3), scene)
         assert turn == pytest.approx(0.0, abs=1e-3)
         if slides:  # s = 1/2 g (sin - cos tan phi) t^2
-            way = 0.5 * GRAVITY * math.sin(math.radians(slope_deg)) * (1.0 - share)
+            way = 0.5 * GRAVITY * math.sin(math.radians(slope_deg)) * (1.0 - share) * DURATION**2
             assert math.hypot(x, y) == pytest.approx(way, rel=0.01)
         else:
             assert math.hypot(x, y) < 1e-4
@@ -155,8 +88,6 @@ def test_runs_with_every_kind_are_stored(tmp_path):
     [(0.9, 1.9, 60.0, "stands"), (1.3, 0.5, 20.0, "slid"), (1.5, 1.9, 60.0, "overturned")],
 )
 def test_the_state_at_the_end_is_told(share, at, friction_deg, state):
-    wall = GravityWall(0.5, 2.0, 1.0)
-    weight = CONCRETE * GRAVITY * 2.0
-    limit = weight * min(math.tan(math.radians(friction_deg)), 0.5 / at)
-    run = Simulation(pushed(share * limit, at, wall, friction_deg)).run(5.0)
+    push = Push(GravityWall(FACE, 2.0, 1.0), friction_deg, at)
+    run = Simulation(push.scene(share * push.limit())).run(5.0)
     assert state_of(run, 0) == state

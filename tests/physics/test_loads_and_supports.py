@@ -89,6 +89,14 @@ def test_a_bolt_hangs_a_block():
     assert sim.energy().elastic == pytest.approx(0.5 * WEIGHT**2 / 1e6, rel=1e-3)
 
 
+def test_forces_of_supports_are_in_the_order_of_the_scene():
+    blocks = (box(0.0, 0.5), box(3.0, 0.5, density=5200.0))
+    bolts = (Bolt(1, (3.0, 1.0), None, (3.0, 3.0), 1e6), Bolt(0, (0.0, 1.0), None, (0.0, 3.0), 1e6))
+    sim = Simulation(Scene(None, blocks, supports=bolts, damping=3.0))
+    sim.step(4000)
+    assert sim.supports()[:, 1] == pytest.approx([2.0 * WEIGHT, WEIGHT], rel=1e-4)
+
+
 def test_a_bolt_yields():
     bolt = Bolt(0, (0.0, 1.0), None, (0.0, 3.0), 1e7, yield_force=0.5 * WEIGHT)
     sim = Simulation(Scene(None, (square(),), supports=(bolt,)))

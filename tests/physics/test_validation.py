@@ -6,16 +6,17 @@ import math
 
 import pytest
 
-from rigdda.validation import Case, Check, Measured, evaluate, ready, rocking, rotation, slides
+from rigdda.validation import CASES, Case, Check, Measured, evaluate, rocking, rotation, slides
 from rigdda.validation.convergence import Convergence
 
-CASES = [
-    pytest.param(case, id=case.name, marks=pytest.mark.slow if case.slow else ())
-    for case in ready()
-]
 
-
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.name, marks=pytest.mark.slow if case.slow else ())
+        for case in CASES
+    ],
+)
 def test_case(case):
     missed = [str(result) for result in evaluate(case) if not result.passed]
     assert not missed, "\n".join(missed)

@@ -1,0 +1,36 @@
+"""Protective structures: what a layout is made of.
+
+Walls, gravity walls and fences stand on the ground; ditches and embankments change it. The x of
+each is the chainage where it begins for a block that comes down the slope.
+"""
+
+from rigdda.barriers.earthworks import Ditch, Earthwork, Embankment
+from rigdda.barriers.layout import (
+    KINDS,
+    Barrier,
+    Layout,
+    describe,
+    earthworks,
+    from_table,
+    section,
+    to_tables,
+)
+from rigdda.barriers.standing import Fence, GravityWall, Standing, Wall
+
+__all__ = [
+    "KINDS",
+    "Barrier",
+    "Ditch",
+    "Earthwork",
+    "Embankment",
+    "Fence",
+    "GravityWall",
+    "Layout",
+    "Standing",
+    "Wall",
+    "describe",
+    "earthworks",
+    "from_table",
+    "section",
+    "to_tables",
+]

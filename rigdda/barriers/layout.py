@@ -1,0 +1,107 @@
+"""Layouts of barriers: the ground that they leave, their tables in files, their words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import msgspec
+
+from rigdda import check
+from rigdda.barriers.base import Floats
+from rigdda.barriers.earthworks import Ditch, Earthwork, Embankment
+from rigdda.barriers.standing import Fence, GravityWall, Wall
+from rigdda.errors import BadInput
+from rigdda.geometry import polygon_properties
+from rigdda.terrain import Terrain
+
+Barrier = Wall | GravityWall | Fence | Ditch | Embankment
+Layout = tuple[Barrier, ...]
+
+KINDS: dict[str, type[Barrier]] = {
+    "wall": Wall,
+    "gravity_wall": GravityWall,
+    "fence": Fence,
+    "ditch": Ditch,
+    "embankment": Embankment,
+}
+"""Class of every kind, by its name in layout files."""
+
+
+def earthworks(
+    terrain: Terrain, layout: Iterable[Barrier], surface: str
+) -> tuple[Terrain, dict[Barrier, Floats]]:
+    """Return the ground with the ditches and embankments of a layout, and what each moved.
+
+    They are built from the crest down, each on the ground that those above it left.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        The natural ground.
+    surface : str
+        Surface of embankments.
+
+    Returns
+    -------
+    ground : Terrain
+        The ground with them.
+    outlines : dict of barrier to (n, 2) array
+        Corners of what each digs out or fills in [m].
+
+    Raises
+    ------
+    BadInput
+        If one does not fit.
+    """
+    outlines: dict[Barrier, Floats] = {}
+    for barrier in sorted((b for b in layout if isinstance(b, Earthwork)), key=lambda b: b.x):
+        outlines[barrier], terrain = barrier.build(terrain, surface)
+    return terrain, outlines
+
+
+def section(outline: Floats) -> float:
+    """Return the area of an outline [m2], in whichever direction it is walked."""
+    return abs(polygon_properties(outline)[0])
+
+
+def from_table(where: str, table: Any) -> Barrier:
+    """Return the barrier of a table of a layout file, by default a wall.
+
+    Raises
+    ------
+    BadInput
+        If the kind is unknown, a field is unknown, missing or not a number, or a value is outside
+        its range; the message names it.
+    """
+    if not isinstance(table, dict):
+        raise BadInput(where, table, "give a table")
+    kind = check.one_of(f"{where}.kind", table.get("kind", "wall"), KINDS)
+    try:
+        return msgspec.convert({**table, "kind": kind}, KINDS[kind])
+    except msgspec.ValidationError as error:
+        if isinstance(error.__cause__, BadInput):
+            raise error.__cause__ from None
+        raise BadInput(where, table, f"mend it: {error}") from None
+
+
+def to_tables(layout: Sequence[Barrier]) -> list[dict[str, Any]]:
+    """Return the tables of a layout file; `from_table` gives each barrier back."""
+    return [msgspec.to_builtins(barrier) for barrier in layout]
+
+
+def describe(barrier: Barrier, digits: int = 1) -> str:
+    """Return a barrier in words, lengths with so many digits after the point."""
+
+    def metres(value: float) -> str:
+        return f"{value:.{digits}f} m"
+
+    head = f"{barrier.words} at {metres(barrier.x)}"
+    match barrier:
+        case Ditch():
+            return f"{head}, {metres(barrier.depth)} deep, {metres(barrier.width)} wide"
+        case Embankment():
+            return f"{head}, {metres(barrier.height)} high, crest {metres(barrier.width)} wide"
+        case Fence():
+            return f"{head}, {metres(barrier.height)} high, {barrier.capacity / 1e3:.0f} kJ"
+    return f"{head}, {metres(barrier.height)} high, {metres(barrier.thickness)} thick"

@@ -1,0 +1,78 @@
+"""A fence takes its capacity from the blocks that hit it and leaves them the rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import accumulate
+
+from rigdda.barriers import Fence
+from rigdda.gauges import FAILED
+from rigdda.scene import Scene, Terrain
+from rigdda.validation.case import Case, Check, Lab, Measured
+from rigdda.validation.scenes import FLAT, box, kinetic_energy, masses, rock
+
+FENCE = Fence(x=0.0, height=20.0, capacity=1e5)
+
+SIDE = 1.4
+"""Side of the squares [m]."""
+
+DURATION = 4.0
+"""Time in which three squares arrive and fly on [s]."""
+
+PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
+"""Parts of a step by which a volley is late: it hits elsewhere in a step."""
+
+
+def volley(shares: Sequence[float], late: float = 0.0) -> Scene:
+    """Return squares that hit the fence flat, one after the other, without gravity.
+
+    `shares` are their energies over its capacity, `late` is a time [s].
+    """
+    mass = masses(Scene(None, (box(width=SIDE, height=SIDE),)))[0][0]
+    blocks = []
+    for i, share in enumerate(shares):
+        speed = math.sqrt(2.0 * share * FENCE.capacity / mass)
+        x, y = -3.0 - 5.0 * i - speed * late, 2.0 + 3.0 * i
+        blocks.append(box(x, y, SIDE, SIDE, velocity=(speed, 0.0, 0.0)))
+    return Scene(Terrain(FLAT), tuple(blocks), rock(30.0, 0.5), barriers=(FENCE,), gravity=0.0)
+
+
+def outcome(shares: Sequence[float]) -> tuple[int, float]:
+    """Return which hit breaks the fence, 0 if none does, and the energy kept over capacity."""
+    taken = list(accumulate(shares))
+    breaking = next((hit for hit, total in enumerate(taken, 1) if total > 1.0), 0)
+    return breaking, max(taken[-1] - 1.0, 0.0)
+
+
+def fly(lab: Lab, scene: Scene) -> tuple[int, float]:
+    """Return what `outcome` foretells, as it is computed."""
+    sim = lab.simulate(scene)
+    events = sim.run(DURATION).events
+    broken = events[events["kind"] == FAILED]
+    kept = kinetic_energy(sim.velocities, *masses(scene)) / FENCE.capacity
+    return int(broken["block"][0]) + 1 if len(broken) else 0, kept
+
+
+def measure(lab: Lab, shares: Sequence[float]) -> tuple[Measured, Measured]:
+    """Throw one volley, at all phases."""
+    found = (fly(lab, volley(shares, phase * lab.dt)) for phase in PHASES)
+    breaking, kept = zip(*found, strict=True)
+    exact = outcome(shares)
+    return Measured(breaking, exact[0]), Measured(kept, exact[1])
+
+
+def case(name: str, *shares: float) -> Case:
+    """Return the case of one volley."""
+    checks = (
+        Check("hit that breaks it", "the first beyond the capacity", "-", 0.0, "absolute"),
+        Check("energy kept", "sum of hits - capacity E, or none", "E", 0.01, "absolute"),
+    )
+    return Case(name, checks, lambda lab: measure(lab, shares))
+
+
+CASES = (
+    case("fence-0.9", 0.9),
+    case("fence-1.1", 1.1),
+    case("fence-3x0.45", 0.45, 0.45, 0.45),
+)

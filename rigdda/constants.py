@@ -4,6 +4,10 @@ PENETRATION_RATIO = 1e-4
 """Wanted penetration over block size [-]. Smaller: stiffer contacts, taller stacks stand, more
 solver iterations."""
 
+SOFT = 5e-3
+"""Compression of a contact at rest over block size, above which a run warns [-]. A stack of 20
+buckles there: at 1.96/n^2 of the size of its blocks."""
+
 IMPACT_STIFFNESS = 1e4
 """Stiffness of an impact and of a new contact, times effective mass / dt^2 [-]. The velocity after
 an impact misses its target by half the inverse of this, 5e-5 of the change."""

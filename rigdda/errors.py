@@ -43,3 +43,7 @@ class Diverged(Error, RuntimeError):
     def __init__(self, message: str, run: Any = None):
         super().__init__(message)
         self.run = run
+
+
+class SoftContacts(UserWarning):
+    """A result leans on contacts whose penalty stiffness is too small for the load they carry."""

@@ -372,7 +372,7 @@ def pack_parameters(
     if any(isinstance(b, Fence) for b in scene.barriers):
         # fences are of the surface of barriers, but plastic
         same = [*range(len(names)), names.index(scene.barrier_surface)]
-        friction, restitution = friction[same][:, same], np.pad(restitution, ((0, 1), (0, 1)))
+        friction, restitution = friction[np.ix_(same, same)], np.pad(restitution, ((0, 1), (0, 1)))
         cohesion, tension = (np.pad(s, ((0, 1), (0, 1))) for s in (cohesion, tension))
     if scene.terrain is None or gx != 0.0 or gy >= 0.0:
         floor = -np.inf

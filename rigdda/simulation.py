@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
@@ -20,9 +21,12 @@ from rigdda.constants import (
     OPEN,
     PIN,
     PLAIN,
+    REST,
+    SLACK_RATIO,
+    SOFT,
 )
 from rigdda.contact.links import anchor, tension
-from rigdda.errors import BadInput, Diverged
+from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.geometry import polygon_properties
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
 from rigdda.records import COUNTERS, LEDGER
@@ -75,7 +79,8 @@ class Diagnostics(NamedTuple):
 
     `penetration` is the greatest depth of a vertex inside another polygon or the terrain [m];
     `relaxed` counts islands whose contact forces were relaxed, since they move or their open-close
-    iteration did not settle; `cut_backs` counts islands that took shorter steps.
+    iteration did not settle; `cut_backs` counts islands that took shorter steps. `compression` is
+    the greatest one of the springs of contacts at rest now, over the mean block size [-].
     """
 
     steps: int
@@ -87,6 +92,7 @@ class Diagnostics(NamedTuple):
     solver_iterations: int
     contacts: int
     penetration: float
+    compression: float
 
 
 class Simulation:
@@ -192,7 +198,7 @@ class Simulation:
         out = np.zeros((len(self.scene.supports), 2))
         fx = c["normal"] * c["nx"] - c["shear"] * c["ny"]
         fy = c["normal"] * c["ny"] + c["shear"] * c["nx"]
-        out[self._arrays.links["number"][c["key"]]] = np.stack([fx, fy], axis=1)
+        out[self._arrays.links["number"][-1 - c["key"]]] = np.stack([fx, fy], axis=1)
         return out
 
     def _elastic(self) -> float:
@@ -242,7 +248,15 @@ class Simulation:
             count["solver_iterations"],
             count["contact_total"],
             float(self._deepest[0]),
+            self._compression(),
         )
+
+    def _compression(self) -> float:
+        """Return the greatest compression of a contact at rest now, over the mean block size."""
+        c = self._now[: self._counters[5]]
+        c = c[((c["kind"] == REST) | (c["kind"] == PLAIN)) & (c["state"] != OPEN)]
+        size = self._arrays.parameters[0].slack / SLACK_RATIO
+        return float((c["normal"] / c["stiffness"]).max(initial=0.0) / size)
 
     def step(self, n: int = 1) -> None:
         """Take `n` steps.
@@ -311,6 +325,11 @@ class Simulation:
             If a time is not positive.
         Diverged
             If the simulation diverges; its `run` keeps the frames up to then.
+
+        Warns
+        -----
+        SoftContacts
+            If contacts at rest in the end are too soft for their load.
         """
         check.number("duration", duration, 0.0, open_low=True)
         check.number("every", every, 0.0, open_low=True)
@@ -327,6 +346,13 @@ class Simulation:
                 raise
             done = mark
             frames.append(self._frame())
+        if self._compression() > SOFT:
+            warnings.warn(
+                f"contacts at rest give way by {self._compression():.2g} of a block: what stands "
+                "or falls may hang on it; give Settings a smaller penetration",
+                SoftContacts,
+                stacklevel=2,
+            )
         return self._record(frames)
 
     def _frame(self) -> tuple[float, NDArray, NDArray, NDArray]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from physics.helpers import FLAT, box, rock
 
-from rigdda import Diverged, Error, Scene, Simulation, Terrain
+from rigdda import Diverged, Error, Scene, Settings, Simulation, SoftContacts, Terrain
 
 FAST = (1e6, 0.0, 0.0)
 
@@ -35,3 +35,16 @@ def test_frames_before_it_goes_bad():
 def test_step():
     with pytest.raises(Diverged):
         Simulation(Scene(None, (box(velocity=FAST),), rock())).step(10)
+
+
+def test_the_error_names_the_contact_that_did_it():
+    scene = Scene(None, (box(), box(2.0, velocity=(-2e4, 0.0, 0.0))), rock(), gravity=0.0)
+    with pytest.raises(Diverged, match=r"pressed with .* N at .* by block [01]; use"):
+        Simulation(scene).run(1.0)
+
+
+def test_contacts_too_soft_for_their_load_are_told():
+    scene = Scene(Terrain(FLAT), tuple(box(0.0, 0.5 + i) for i in range(5)), rock())
+    with pytest.warns(SoftContacts, match="smaller penetration"):
+        Simulation(scene, Settings(penetration=0.02)).run(2.0)
+    Simulation(scene).run(2.0)  # no warning by default

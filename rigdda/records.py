@@ -232,7 +232,7 @@ class Parameters(NamedTuple):
 
     blocks: int  # bodies that may move: the blocks of the scene and its gravity walls
     dt: float
-    displacement_limit: float  # of a corner in a step, beyond it an island is cut back [m]
+    displacement_limit: float  # of a corner off its straight path, before a cut-back [m]
     gravity_x: float  # [m/s2]
     gravity_y: float
     gravity: float  # its magnitude

@@ -155,14 +155,15 @@ def solve_and_move(
 ) -> tuple[int, float]:  # fmt: skip
     """Settle every island, note hits, then move its blocks.
 
-    An island of which a corner would move by more than `limit` [m] is left where it is, and marked.
+    An island of which a corner would end farther than `limit` [m] from its straight path is left
+    where it is, and marked.
 
     Returns
     -------
     bad : int
         A block that went bad, or -1.
     excess : float
-        Greatest displacement of the islands left, over the limit; 0 if there is none.
+        Greatest departure from a straight path in the islands left, over the limit; else 0.
     """
     islands = find_islands(bodies, c, count, work, p.blocks, p.islands)
     bad, excess = -1, 0.0
@@ -170,7 +171,7 @@ def solve_and_move(
         c0, c1 = work.contact_start[s], work.contact_start[s + 1]
         if c1 > c0:
             open_close(bodies, c, m, work, s, p, counters)
-            far = greatest_displacement(bodies, m, work, s) / limit
+            far = greatest_departure(bodies, m, work, s, p.dt) / limit
             if far > 1.0:
                 excess = max(excess, far)
                 counters[9] += 1
@@ -208,12 +209,14 @@ def solve_and_move(
 
 
 @kernel
-def greatest_displacement(bodies: Bodies, m: Matrix, work: Work, island: int) -> float:
-    """Return a bound on the displacement of any corner of an island in this step [m]."""
+def greatest_departure(bodies: Bodies, m: Matrix, work: Work, island: int, dt: float) -> float:
+    """Return a bound on how far from its straight path any corner of an island ends a step [m]."""
     most, low = 0.0, work.block_start[island]
     for place in range(low, work.block_start[island + 1]):
-        d, radius = m.d[place - low], bodies[work.block_item[place]].radius
-        most = max(most, math.hypot(d[0], d[1]) + abs(d[2]) * radius)
+        d, i = m.d[place - low], work.block_item[place]
+        turn = abs(d[2]) * bodies[i].radius
+        dx, dy = d[0] - dt * bodies[i].vx, d[1] - dt * bodies[i].vy
+        most = max(most, math.hypot(dx, dy) + turn)
     return most
 
 

@@ -70,7 +70,8 @@ def beneath_roof(
     foot_x, foot_y = x - gap * ground.normal_x[s], y - gap * ground.normal_y[s]
     between = False
     for other in range(len(ground.length)):
-        between = between or crosses_segment(ground, other, x, y, foot_x, foot_y)
+        if other != s:
+            between = between or crosses_segment(ground, other, x, y, foot_x, foot_y)
     if not between:
         return False
     for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):

@@ -17,7 +17,7 @@ LONG = 0.1
 
 def test_only_the_island_that_goes_too_far_is_cut_back():
     still = tuple(box(-10.0, 0.5 + i) for i in range(3))
-    thrown = box(5.0, 0.52, velocity=(30.0, -1.0, 0.0))
+    thrown = box(5.0, 3.0, velocity=(30.0, -20.0, 3.0))
     sim = Simulation(Scene(Terrain(FLAT), (*still, thrown), rock()), Settings(dt=LONG))
     alone = Simulation(Scene(Terrain(FLAT), still, rock()), Settings(dt=LONG))
     sim.step(10)
@@ -33,7 +33,6 @@ def test_a_slide_at_a_long_step_stays_exact():
     thrown = box(0.0, 0.5, velocity=(12.0, 0.0, 0.0))
     sim = Simulation(Scene(Terrain(FLAT), (thrown,), rock(30.0)), Settings(dt=LONG))
     sim.step(10)
-    assert sim.diagnostics.cut_backs > 0
     way = 12.0 - 0.5 * 9.81 * math.tan(math.radians(30.0))
     assert sim.poses[0, 0] == pytest.approx(way, rel=1e-5)
 

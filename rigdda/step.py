@@ -229,70 +229,37 @@ def rest_all(bodies: Bodies) -> None:
 
 
 @kernel
-def take_step(
-    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
-    c: Contacts, old: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters, start: int,
-    limit: float, counters: NDArray, ledger: NDArray, deepest: NDArray,
-) -> tuple[int, int, float]:  # fmt: skip
-    """Take a step from the time `start` p.dt, with its contacts in c.
+def hold_others(bodies: Bodies, now: Contacts, count: int, before: Contacts, work: Work,
+    p: Parameters,
+) -> None:  # fmt: skip
+    """Begin a cut-back: all blocks but those of the islands left have taken the step and are held.
 
-    Returns
-    -------
-    reason : int
-        DONE, CONTACTS_FULL before anything has moved, or BAD_STATE.
-    block : int
-        The block that went bad, else -1.
-    excess : float
-        As `solve_and_move` gives it.
+    The contacts of the islands left are as they were before the step.
     """
-    time = (start + 1) * p.dt
-    if p.static:
-        rest_all(bodies)
-    set_field(work, shaking, start * p.dt, time, p)
-    count = detect(bodies, outlines, ground, links, c, old, counters[5], work, gauges, time, p)
-    if count < 0 or (limit < math.inf and 4 * count > 3 * len(c)):  # room to spare for a cut-back
-        return CONTACTS_FULL, -1, 0.0
-    counters[5] = count
-    counters[7] += count
     for k in range(count):
-        deepest[0] = max(deepest[0], -c[k].gap)
-    bad, excess = solve_and_move(
-        bodies, outlines, c, count, m, work, gauges, time, p, limit, counters, ledger
-    )
-    yield_bolts(bodies, links)
-    return DONE if bad < 0 else BAD_STATE, bad, excess
-
-
-@kernel
-def cut_back(
-    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
-    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters,
-    parts: int, counters: NDArray, ledger: NDArray, deepest: NDArray,
-) -> tuple[int, int]:  # fmt: skip
-    """Take the step in `parts` shorter ones, of p.dt, for the islands that would go too far.
-
-    All others have taken it and are held. `parts` is even, so that in the end `now` holds the
-    contacts, as it does at the start. Returns reason and block as `take_step` does.
-    """
-    for k in range(counters[5]):
         if bodies[now[k].a].cut == 1:
             recall(now, k, k + 1, before, work.first, p.slack)
     for i in range(p.blocks):
         if bodies[i].status == AWAKE and bodies[i].cut == 0:
             bodies[i].status = HELD
         bodies[i].cut = 0
-    reason, block = DONE, -1
-    for part in range(counters[0] * parts, (counters[0] + 1) * parts):
-        now, before = before, now
-        if reason == DONE:
-            reason, block, _ = take_step(
-                bodies, outlines, ground, links, shaking, now, before, m, work, gauges, p, part,
-                math.inf, counters, ledger, deepest,
-            )  # fmt: skip
-    for i in range(p.blocks):
+
+
+@kernel
+def release_all(bodies: Bodies) -> None:
+    """End a cut-back."""
+    for i in range(len(bodies)):
         if bodies[i].status == HELD:
             bodies[i].status = AWAKE
-    return reason, block
+
+
+@kernel
+def level_for(excess: float) -> int:
+    """Return how often to halve a step that went too far by this factor."""
+    level = 1
+    while excess > 2.0**level and level < CUTS:
+        level += 1
+    return level
 
 
 @entry_kernel
@@ -320,29 +287,44 @@ def advance(
     swapped : bool
         Whether `now` and `before` have changed roles.
     """
-    swapped, p = False, levels[0]
-    for _ in range(steps):
+    swapped, level, part = False, 0, 0
+    while steps > 0:
+        p, parts = levels[level], 2**level
         room = len(gauges.event) - counters[6]
-        if room < (p.blocks + 1) * (len(gauges.station) + len(gauges.absorbed)):
+        if level == 0 and room < (p.blocks + 1) * (len(gauges.station) + len(gauges.absorbed)):
             return EVENTS_FULL, -1, swapped
-        reason, block, excess = take_step(
-            bodies, outlines, ground, links, shaking, before, now, m, work, gauges, p,
-            counters[0], p.displacement_limit, counters, ledger, deepest,
-        )  # fmt: skip
-        if reason == CONTACTS_FULL:
-            return reason, -1, swapped
+        start = counters[0] * parts + part
+        time = (start + 1) * p.dt
+        if p.static:
+            rest_all(bodies)
+        set_field(work, shaking, start * p.dt, time, p)
+        count = detect(
+            bodies, outlines, ground, links, before, now, counters[5], work, gauges, time, p
+        )
+        # a cut-back, which cannot be left, has room to spare
+        if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
+            return CONTACTS_FULL, -1, swapped
         now, before = before, now
         swapped = not swapped
-        if excess > 0.0 and reason == DONE:
-            level = 1
-            while excess > 2.0**level and level < CUTS:
-                level += 1
-            reason, block = cut_back(
-                bodies, outlines, ground, links, shaking, now, before, m, work, gauges,
-                levels[level], 2**level, counters, ledger, deepest,
-            )  # fmt: skip
-        counters[0] += 1
-        counters[6] = note_passage(bodies, gauges, counters[6], counters[0] * p.dt)
-        if reason != DONE:
-            return BAD_STATE, block, swapped
+        counters[5] = count
+        counters[7] += count
+        for k in range(count):
+            deepest[0] = max(deepest[0], -now[k].gap)
+        limit = p.displacement_limit if level == 0 else math.inf
+        bad, excess = solve_and_move(
+            bodies, outlines, now, count, m, work, gauges, time, p, limit, counters, ledger
+        )
+        yield_bolts(bodies, links)
+        part += 1
+        if bad < 0 and excess > 0.0:
+            hold_others(bodies, now, count, before, work, p)
+            level, part = level_for(excess), 0
+        elif bad >= 0 or part == parts:
+            release_all(bodies)
+            level, part = 0, 0
+            counters[0] += 1
+            counters[6] = note_passage(bodies, gauges, counters[6], counters[0] * levels[0].dt)
+            steps -= 1
+        if bad >= 0:
+            return BAD_STATE, bad, swapped
     return DONE, -1, swapped

@@ -179,9 +179,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             rock = shapely.Polygon(piece)
             left, _, right, _ = rock.bounds
             if left < chain[0, 0]:
-                raise BadInput(
-                    where, piece, f"put it beyond the crest at {chain[0, 0]:g}"
-                )
+                raise BadInput(where, piece, f"put it beyond the crest at {chain[0, 0]:g}")
             if right >= self.road.start:
                 raise BadInput(where, piece, f"put it uphill of the road at {self.road.start:g}")
             sunk = shapely.intersection(rock, ground).area

@@ -14,6 +14,7 @@ from rigdda.validation import (
     flight,
     impacts,
     invariance,
+    ritchie,
     rocking,
     rolling,
     rotation,
@@ -37,6 +38,7 @@ CASES: tuple[Case, ...] = (
     *energy.CASES,
     *stacks.CASES,
     *arches.CASES,
+    *ritchie.CASES,
 )
 """Cases that can be computed."""
 

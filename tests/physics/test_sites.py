@@ -100,7 +100,8 @@ def test_toppling_site_falls_below_the_limiting_friction(friction_deg, stands):
     start = sim.poses
     sim.step(1000)
     moved = np.hypot(*(sim.poses - start)[:, :2].T).max()
-    assert moved < 0.01 if stands else moved > 0.1, moved
+    # columns settle by centimetres against one another, then stand for good
+    assert moved < 0.1 if stands else moved > 1.0
 
 
 def columns(**change):

@@ -28,6 +28,7 @@ from rigdda.barriers import (
 )
 from rigdda.errors import BadInput
 from rigdda.files import atomic
+from rigdda.geometry import overlap
 from rigdda.scene import Block, Scene, Surface
 from rigdda.settings import Settings
 from rigdda.source import NEAR, Point, Source
@@ -182,7 +183,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise BadInput(where, piece, f"put it beyond the crest at {chain[0, 0]:g}")
             if right >= self.road.start:
                 raise BadInput(where, piece, f"put it uphill of the road at {self.road.start:g}")
-            sunk = shapely.intersection(rock, ground).area
+            sunk = overlap(rock, ground)
             if sunk > NEAR * rock.length:
                 corners = shapely.points(piece)
                 depth = shapely.distance(ground.exterior, corners) * ground.contains(corners)

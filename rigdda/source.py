@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.errors import BadInput
+from rigdda.geometry import overlap
 from rigdda.joints import JointSet, cut
 from rigdda.scene import convex_polygon, simple_polygon
 
@@ -66,8 +67,8 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             )
         rocks = [shapely.Polygon(simple_polygon(where, b)) for where, b in self.pieces()]
         for i, j in shapely.STRtree(rocks).query(rocks, predicate="intersects").T:
-            common = shapely.intersection(rocks[i], rocks[j]).area
-            if i < j and common > NEAR * rocks[j].length:
+            common = overlap(rocks[i], rocks[j]) if i < j else 0.0
+            if common > NEAR * rocks[j].length:
                 raise BadInput(
                     f"source.blocks[{j}]",
                     self.blocks[j],

@@ -153,7 +153,9 @@ def capacity(site: Site, wall: Wall) -> float:
     top = float(wall.outline(terrain)[:, 1].max())
     rise = math.tan(math.radians(min(s.friction_deg for s in site.surfaces.values())))
     x = np.linspace(wall.x, float(terrain.points[0, 0]), 1000)
-    depth = top + rise * (wall.x - x) - np.interp(x, *terrain.points.T)
+    chainage, ground = terrain.points.T
+    over = np.interp(x, np.maximum.accumulate(chainage), ground)  # overhangs are filled
+    depth = top + rise * (wall.x - x) - over
     full = np.minimum.accumulate(depth) > 0.0
     area = float(np.sum(depth[full]) * abs(x[1] - x[0]))
     return FILL * site.source.density * area

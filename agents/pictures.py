@@ -60,7 +60,7 @@ def profile(path: str | os.PathLike[str], site: Site, panels: Sequence[Panel]) -
 
 def _window(site: Site) -> tuple[float, float, float, float]:
     """Return left, right, bottom, top of what matters: from the source to beyond the road [m]."""
-    source = np.array(site.source.polygon)
+    source = site.source.outline
     x, y = np.array(site.slope.points).T
     reach = site.road.end - source[:, 0].min()
     left = max(source[:, 0].min() - 0.05 * reach, x[0])

@@ -138,8 +138,7 @@ def _slope(site: Site) -> dict[str, ArrayLike]:
 def _rock(site: Site) -> dict[str, ArrayLike]:
     """Return the source and the mechanics of its blocks."""
     source, motion = site.source, site.motion
-    x, y = np.array(source.polygon).T - [[site.road.start], [site.profile.height(site.road.start)]]
-    area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    x, y = source.outline.T - [[site.road.start], [site.profile.height(site.road.start)]]
     barrier = "concrete" if "concrete" in site.surfaces else "rock"
     names = (site.slope.surface, source.surface, barrier)
     met = [site.surfaces[name] for name in names]
@@ -147,8 +146,8 @@ def _rock(site: Site) -> dict[str, ArrayLike]:
     extent = np.array([x.min(), x.max(), y.min(), y.max()]) / LENGTH
     return {
         "surfaces": [*pairs, site.scatter.friction_deg / 10.0],
-        "source": [*extent, area / LENGTH],
-        "block": [math.sqrt(source.block_area) / SIZE],
+        "source": [*extent, source.area / LENGTH],
+        "block": [math.sqrt(source.mean_block_area) / SIZE],
         "damping": [motion.damping, motion.damping_when == "contact"],
     }
 

@@ -28,35 +28,22 @@ from rigdda.barriers import (
 )
 from rigdda.errors import BadInput
 from rigdda.files import atomic
-from rigdda.joints import JointSet, cut
-from rigdda.scene import Block, Scene, Surface, convex_polygon
+from rigdda.geometry import overlap
+from rigdda.scene import Block, Scene, Surface
 from rigdda.settings import Settings
+from rigdda.source import NEAR, Point, Source
 from rigdda.terrain import Terrain
-
-Point = tuple[float, float]
 
 
 class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The ground: corners from the crest down to beyond the road, x growing downhill [m].
 
+    It may have overhangs, as the base of a toppling slope has; earthworks need ground without.
     `surface` names the surface of every segment, `toe` is the chainage where the slope ends [m].
     """
 
     points: tuple[Point, ...]
     toe: float
-    surface: str = "rock"
-
-
-class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The jointed rock mass that comes down: a convex polygon cut by joint sets.
-
-    `block_area` is the wanted mean area of its blocks [m2], `density` in kg/m3.
-    """
-
-    polygon: tuple[Point, ...]
-    joints: tuple[JointSet, ...]
-    block_area: float = 2.0
-    density: float = 2600.0
     surface: str = "rock"
 
 
@@ -168,11 +155,15 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def _check_slope(self) -> None:
         points = check.points("slope.points", self.slope.points, 2)
-        if (np.diff(points[:, 0]) < 0.0).any() or points[0, 1] <= points[-1, 1]:
+        x, (low, high) = points[:, 0], points[[0, -1], 0]
+        if not (low < high and (low <= x).all() and (x <= high).all()) or (
+            points[0, 1] <= points[-1, 1]
+        ):
             raise BadInput(
-                "slope.points", f"{len(points)} points", "list them downhill, x never falling"
+                "slope.points",
+                f"{len(points)} points",
+                "list them downhill, the one of least x first, the one of greatest x last",
             )
-        low, high = points[0, 0], points[-1, 0]
         check.number("slope.toe", self.slope.toe, low, high)
         check.number("road.start", self.road.start, low, high)
         check.number("road.end", self.road.end, low, high)
@@ -182,22 +173,25 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             check.one_of(f"{where}.surface", name, self.surfaces)
 
     def _check_source(self) -> None:
-        corners = convex_polygon("source.polygon", self.source.polygon)
-        check.number("source.block_area", self.source.block_area, 0.0, open_low=True)
-        check.number("source.density", self.source.density, 0.0, open_low=True)
-        if len({j.dip_deg for j in self.source.joints}) < 2:
-            raise BadInput(
-                "source.joints", self.source.joints, "give at least two sets of different dip"
-            )
-        if corners[:, 0].max() >= self.road.start:
-            raise BadInput("source.polygon", corners.tolist(), "put it uphill of the road")
-        for i, (x, y) in enumerate(corners):
-            ground = self.profile.height(float(x))
-            if y < ground - 1e-6:
+        chain = self.profile.points
+        deep = chain[:, 1].min() - 1.0
+        ground = shapely.Polygon([*chain, (chain[-1, 0], deep), (chain[0, 0], deep)])
+        for where, piece in self.source.pieces():
+            rock = shapely.Polygon(piece)
+            left, _, right, _ = rock.bounds
+            if left < chain[0, 0]:
+                raise BadInput(where, piece, f"put it beyond the crest at {chain[0, 0]:g}")
+            if right >= self.road.start:
+                raise BadInput(where, piece, f"put it uphill of the road at {self.road.start:g}")
+            sunk = overlap(rock, ground)
+            if sunk > NEAR * rock.length:
+                corners = shapely.points(piece)
+                depth = shapely.distance(ground.exterior, corners) * ground.contains(corners)
+                corner = int(depth.argmax())
                 raise BadInput(
-                    f"source.polygon[{i}]",
-                    [float(x), float(y)],
-                    f"raise it out of the ground, which is at {ground:g} there",
+                    f"{where}[{corner}]",
+                    piece[corner],
+                    f"raise it out of the ground, in which {sunk:g} m2 of the rock are",
                 )
 
     def _check_zone(self) -> None:
@@ -264,12 +258,11 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """
         rng = np.random.default_rng(check.integer("seed", seed, 0))
         shift = self.scatter.friction_deg * rng.standard_normal()
-        polygon = shapely.Polygon(self.source.polygon)
-        blocks = cut(polygon, self.source.joints, self.source.block_area, rng)
         return Scene(
             terrain=self.profile,
             blocks=tuple(
-                Block(b, density=self.source.density, surface=self.source.surface) for b in blocks
+                Block(b, density=self.source.density, surface=self.source.surface)
+                for b in self.source.draw(rng)
             ),
             surfaces={
                 name: Surface(

@@ -11,6 +11,7 @@ from rigdda.validation import (
     gravity_walls,
     impacts,
     invariance,
+    ritchie,
     rocking,
     rolling,
     rotation,
@@ -37,4 +38,5 @@ CASES: tuple[Case, ...] = (
     *stacks.CASES,
     *arches.CASES,
     *toppling.CASES,
+    *ritchie.CASES,
 )

@@ -1,0 +1,137 @@
+"""The built-in sites: their blocks start clear of all else, come down and are accounted for."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+import shapely
+
+from rigdda import BadInput, Simulation, Site, Surface, sites
+from rigdda.geometry import overlap
+from rigdda.outcome import measure, stations, watch
+from rigdda.site import Scatter
+from rigdda.validation import toppling
+
+NAMES = sites.names()
+RITCHIE = [name for name in NAMES if name.startswith("ritchie-")]
+
+
+def test_promised_sites_are_there():
+    promised = {"quick", "ritchie-35", "ritchie-60", "ritchie-80", "shu-hwa", "toppling"}
+    assert promised <= set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_name_is_that_of_the_file(name):
+    assert Site.load(name).name == name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_saved_site_is_the_same(name, tmp_path):
+    site = Site.load(name)
+    site.save(tmp_path / "site.toml")
+    assert Site.load(tmp_path / "site.toml") == site
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", range(3))
+def test_blocks_start_clear_of_the_ground_and_of_each_other(name, seed):
+    site = Site.load(name)
+    scene = site.realise(seed=seed)
+    chain = scene.terrain.points
+    ground = shapely.Polygon([*chain, (chain[-1, 0], -999.0), (chain[0, 0], -999.0)])
+    rocks = [shapely.Polygon(b.vertices) for b in scene.blocks]
+    scale = site.source.mean_block_area
+    assert max(overlap(rock, ground) for rock in rocks) < 1e-6 * scale
+    first, second = shapely.STRtree(rocks).query(rocks, predicate="intersects")
+    pairs = [(rocks[i], rocks[j]) for i, j in zip(first, second, strict=True) if i < j]
+    assert max(overlap(a, b) for a, b in pairs) < 1e-6 * scale
+    assert shapely.area(rocks).sum() == pytest.approx(site.source.area, rel=1e-9)
+    assert shapely.union_all(rocks).within(shapely.Polygon(site.source.outline).buffer(1e-6))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rock_comes_down_and_is_accounted_for(name):
+    site = Site.load(name)
+    sim = Simulation(site.realise(seed=1), site.settings(), stations(site, ()), watch(site))
+    run = sim.run(4.0)
+    assert sim.diagnostics.penetration < 0.1
+    fell = run.poses[0, :, 1] - run.poses[-1, :, 1]
+    assert (fell > 1.0).mean() > 0.4  # below a joint that dips into the slope some blocks stay
+    outcome = measure(site, run)
+    assert outcome.slope_fraction + outcome.road_fraction + outcome.beyond_fraction == 1.0
+
+
+@pytest.mark.parametrize("name", RITCHIE)
+def test_slopes_of_ritchie_have_the_angle_of_their_name(name):
+    points = np.array(Site.load(name).slope.points)
+    run, rise = np.diff(points, axis=0)[1]
+    assert np.degrees(np.arctan2(-rise, run)) == pytest.approx(float(name[-2:]), abs=0.05)
+
+
+def test_sites_of_ritchie_differ_in_their_angle_only():
+    first, *others = map(Site.load, RITCHIE)
+    for other in others:
+        for part in ("source", "surfaces", "motion", "costs"):
+            assert getattr(other, part) == getattr(first, part)
+        assert other.road.start - other.slope.toe == pytest.approx(
+            first.road.start - first.slope.toe
+        )
+
+
+def test_toppling_site_is_the_slope_of_goodman_and_bray():
+    """Mirrored, so that it falls to the right, with the heel of the toe column at (140, 10)."""
+    _, exact = toppling.slope()
+    blocks = Site.load("toppling").realise().blocks
+    assert len(blocks) == len(exact) == 16
+    for block, column in zip(blocks, exact, strict=True):
+        mirrored = shapely.Polygon([140.0, 10.0] + column.vertices * [-1.0, 1.0])
+        assert shapely.Polygon(block.vertices).symmetric_difference(mirrored).area < 1e-4
+        assert block.density == pytest.approx(column.density, rel=1e-5)
+
+
+@pytest.mark.parametrize(("friction_deg", "stands"), [(38.5, True), (37.0, False)])
+def test_toppling_site_falls_below_the_limiting_friction(friction_deg, stands):
+    """38.151 deg (Goodman and Bray 1976)."""
+    site = msgspec.structs.replace(
+        Site.load("toppling"), surfaces={"rock": Surface(friction_deg)}, scatter=Scatter()
+    )
+    sim = Simulation(site.realise(), site.settings())
+    start = sim.poses
+    sim.step(1000)
+    moved = np.hypot(*(sim.poses - start)[:, :2].T).max()
+    # columns settle by centimetres against one another, then stand for good
+    assert moved < 0.1 if stands else moved > 1.0
+
+
+def columns(**change):
+    """Return the source of the toppling site with other fields."""
+    return msgspec.structs.replace(Site.load("toppling").source, **change)
+
+
+def test_a_source_is_a_jointed_mass_or_blocks():
+    jointed = Site.load("quick").source
+    with pytest.raises(BadInput) as caught:
+        columns(polygon=jointed.polygon)
+    assert caught.value.field == "source.blocks"
+    with pytest.raises(BadInput) as caught:
+        columns(blocks=())
+    assert caught.value.field == "source.polygon"
+
+
+def test_blocks_of_a_source_do_not_overlap():
+    blocks = Site.load("toppling").source.blocks
+    shifted = tuple((x + 0.1, y) for x, y in blocks[3])
+    with pytest.raises(BadInput) as caught:
+        columns(blocks=(*blocks[:3], shifted, *blocks[4:]))
+    assert caught.value.field == "source.blocks[3]"
+    assert "in block 2" in caught.value.mend
+
+
+def test_blocks_of_a_source_are_out_of_the_ground():
+    site = Site.load("toppling")
+    sunk = tuple((x, y - 0.1) for x, y in site.source.blocks[0])
+    with pytest.raises(BadInput) as caught:
+        msgspec.structs.replace(site, source=columns(blocks=(sunk,)))
+    assert caught.value.field.startswith("source.blocks[0]")

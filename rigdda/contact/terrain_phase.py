@@ -184,8 +184,8 @@ def edge_on_ridge(
 ) -> int:
     """Add the contact of a convex terrain corner with an edge of a part of block a, if it has one.
 
-    The edge is the last to separate the corner from the block; its normal must lie between those
-    of the two segments, or a corner of the block is in contact instead.
+    The edge is the last to separate the corner from the block, or about as deep; its normal must
+    lie between those of the two segments, or a corner of the block is in contact instead.
     """
     x, y = ground.x[corner], ground.y[corner]
     dt, n = p.dt, outlines.polygon[part].count
@@ -196,6 +196,7 @@ def edge_on_ridge(
         return k
     left, right, concave = corner - 1, corner, part != a
     best, best_time, best_gap = -1, -1.0, -1e300
+    last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
         nx, ny = outlines.normal_x[part, edge], outlines.normal_y[part, edge]
         gap = nx * (x - outlines.world_x[part, edge]) + ny * (y - outlines.world_y[part, edge])
@@ -212,11 +213,13 @@ def edge_on_ridge(
         after_left = ground.normal_x[left] * -ny - ground.normal_y[left] * -nx <= 1e-9
         before_right = -nx * ground.normal_y[right] + ny * ground.normal_x[right] <= 1e-9
         fits = after_left and before_right and not inner
-        if not fits:
-            gap -= 0.1 * p.slack  # near a tie prefer an edge that fits
-        if time > best_time or (time == best_time and gap > best_gap):
-            best, best_time, best_gap = (edge if fits else -1), time, gap
-    if best < 0:
+        if fits and (time > best_time or (time == best_time and gap > best_gap)):
+            best, best_time, best_gap = edge, time, gap
+        if time > last or (time == last and gap > depth):
+            last, depth = time, gap
+    # beside a corner that slides over the ridge another edge is soon the nearest one: as long as
+    # the depths are alike, what fits counts
+    if best < 0 or best_time < last or best_gap < 2.0 * min(depth, 0.0) - p.slack:
         return k
     nx, ny = outlines.normal_x[part, best], outlines.normal_y[part, best]
     gap = nx * (x - outlines.world_x[part, best]) + ny * (y - outlines.world_y[part, best])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-
 from physics.helpers import FLAT, box, rock
+
 from rigdda import Fence, PointLoad, Scene, Settings, Simulation, Terrain
 from rigdda.step import advance
 

@@ -23,6 +23,11 @@ IMPACT_STEPS = 3.0
 """Least closing speed of an impact in units of g dt [-]: what gravity alone gives a resting block
 in a few steps is no impact."""
 
+BLOW_SPEED = 1.0
+"""Least closing speed with which a contact that was closed already begins an impact [m/s]: it was
+foreseen, and closed from afar in the step before. Lower, and contacts of a pressed pile that close
+slowly are never pushed out."""
+
 SHOCK_SPEED = 0.1
 """Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
 for what hits the block from the other side, and it is treated as a plastic impact."""

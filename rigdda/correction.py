@@ -7,7 +7,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
-from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, SHOCK, STEADY_RATE
+from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, SHOCK, SHOCK_SPEED, STEADY_RATE
 from rigdda.gauges import barrier_contact
 from rigdda.kernel import kernel
 from rigdda.open_close import assemble_blocks, load_moment
@@ -90,6 +90,35 @@ def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> Non
 
 
 @kernel
+def pass_on_shares(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, dt: float
+) -> None:
+    """Let the time of an impact be that of the blows it sends through an island.
+
+    Blocks that are struck through others would else move on for a while, into those that stopped.
+    """
+    low, high = work.contact_start[island], work.contact_start[island + 1]
+    spreading = False
+    for s in range(work.block_start[island + 1] - work.block_start[island]):
+        spreading = spreading or m.direction[s, 0] > 0.0
+    while spreading:
+        spreading = False
+        for item in range(low, high):
+            k = work.contact_item[item]
+            if c[k].pair < 0 or c[k].state == OPEN:
+                continue
+            i, j = work.slot[c[k].a], work.slot[c[k].b]
+            early, late = (
+                max(m.direction[i, 0], m.direction[j, 0]),
+                min(m.direction[i, 0], m.direction[j, 0]),
+            )
+            lighter = min(bodies[c[k].a].mass, bodies[c[k].b].mass)
+            if early > late and c[k].normal * dt > SHOCK_SPEED * lighter:
+                m.direction[i, 0] = m.direction[j, 0] = early
+                spreading = True
+
+
+@kernel
 def apply_forces(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters
 ) -> None:
@@ -110,6 +139,7 @@ def apply_forces(
         add_contact_force(c, k, m, work.slot[c[k].a], True)
         if c[k].pair >= 0:
             add_contact_force(c, k, m, work.slot[c[k].b], False)
+    pass_on_shares(bodies, c, m, work, island, p.dt)
     for s in range(b1 - b0):
         i = work.block_item[b0 + s]
         share = m.direction[s, 0]

@@ -108,6 +108,35 @@ def keep_held(c: Contacts, count: int, old: Contacts, work: Work, a: int) -> int
 
 
 @kernel
+def collide_block(
+    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, count: int, old: Contacts,
+    work: Work, a: int, low: int, high: int, start: bool, p: Parameters,
+) -> int:  # fmt: skip
+    """Write the contacts of awake block a with the terrain and with the pairs low:high.
+
+    Returns
+    -------
+    int
+        The new number of contacts; -1 if they do not fit.
+    """
+    first, room = count, len(c) - outlines.world_x.shape[1] - 4
+    count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
+    for q in range(low, high):
+        if count < 0 or count > room:
+            return -1
+        count = collide_pair(bodies, outlines, c, count, a, work.pairs[2 * q + 1], p)
+    if count < 0 or count > room:
+        return -1
+    recall(c, first, count, old, work.first, p.slack)
+    if p.bonded and start:
+        bond_joints(c, first, count, p)
+    for k in range(first, count):
+        prepare(bodies, c, k, work, start, p)
+    strike_at_once(bodies, c, first, count, p)
+    return count
+
+
+@kernel
 def detect(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, c: Contacts, old: Contacts,
     old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters,
@@ -117,34 +146,57 @@ def detect(
     pairs = candidate_pairs(bodies, outlines, work, p)
     if pairs < 0:
         return -1
-    room = len(c) - outlines.world_x.shape[1] - 4
-    count = q = link = 0
+    start = time <= 1.5 * p.dt
+    count = pair = link = 0
     for a in range(p.blocks):
-        if bodies[a].status == ASLEEP:
+        low = pair
+        while pair < pairs and work.pairs[2 * pair] == a:
+            pair += 1
+        low_link = link
+        while link < len(links) and links[link].a == a:
+            link += 1
+        if bodies[a].status == AWAKE:
+            count = collide_block(
+                bodies, outlines, ground, c, count, old, work, a, low, pair, start, p
+            )
+            if count < 0 or count + link - low_link > len(c):
+                return -1
+            for q in range(low_link, link):
+                add_link(bodies, links, q, c, count, p)
+                count += 1
+        elif bodies[a].status == ASLEEP:
             count = keep_asleep(bodies, c, count, old, work, a, gauges, time, p)
         elif bodies[a].status == HELD:
             count = keep_held(c, count, old, work, a)
-        elif bodies[a].status == AWAKE:
-            first = count
-            count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
-            while q < pairs and work.pairs[2 * q] == a and 0 <= count <= room:
-                count = collide_pair(bodies, outlines, c, count, a, work.pairs[2 * q + 1], p)
-                q += 1
-            if count >= 0:
-                recall(c, first, count, old, work.first, p.slack)
-                if p.bonded and time <= 1.5 * p.dt:
-                    bond_joints(c, first, count, p)
-            for k in range(first, count):
-                prepare(bodies, c, k, work, time <= 1.5 * p.dt, p)
-            strike_at_once(bodies, c, first, count, p)
-            while link < len(links) and links[link].a == a and count <= room:
-                add_link(bodies, links, link, c, count, p)
-                count, link = count + 1, link + 1
-        if count < 0 or count > room:
-            return -1
-        while link < len(links) and links[link].a <= a:
-            link += 1
     return count
+
+
+@kernel
+def move_island(
+    bodies: Bodies, outlines: Outlines, c: Contacts, m: Matrix, work: Work, island: int,
+    gauges: Gauges, p: Parameters, ledger: NDArray,
+) -> int:  # fmt: skip
+    """Move the blocks of an island whose forces are known; returns one that went bad, or -1."""
+    c0, c1 = work.contact_start[island], work.contact_start[island + 1]
+    low, bad = work.block_start[island], -1
+    struck = is_struck(c, work, c0, c1)
+    for item in range(c0, c1):
+        keep_memory(c, work.contact_item[item], struck)
+    apply_forces(bodies, c, m, work, island, p)
+    account(bodies, c, m, work, island, p, ledger, gauges)
+    for place in range(low, work.block_start[island + 1]):
+        i = work.block_item[place]
+        bodies[i].touching = 0
+        move_block(bodies, i, m, place - low, p.dt)
+        if not top_speed(bodies, i) < SPEED_LIMIT:
+            bad = i
+        elif bodies[i].y < p.floor:
+            bodies[i].status = RETIRED
+        if p.post_correction:
+            place_corners(bodies, outlines, i)
+        else:
+            move_corners(bodies, outlines, i, m, place - low)
+    return bad
 
 
 @kernel
@@ -175,28 +227,11 @@ def solve_and_move(
             if far > 1.0:
                 excess = max(excess, far)
                 counters[9] += 1
-                for place in range(work.block_start[s], work.block_start[s + 1]):
-                    bodies[work.block_item[place]].cut = 1
+                mark_cut(bodies, work, s)
                 continue
             limit_fences(bodies, c, m, work, s, gauges, time, p, counters)
             counters[6] = note_hits(bodies, c, work, c0, c1, gauges, counters[6], time)
-        struck = is_struck(c, work, c0, c1)
-        for item in range(c0, c1):
-            keep_memory(c, work.contact_item[item], struck)
-        apply_forces(bodies, c, m, work, s, p)
-        account(bodies, c, m, work, s, p, ledger, gauges)
-        for place in range(work.block_start[s], work.block_start[s + 1]):
-            i = work.block_item[place]
-            bodies[i].touching = 0
-            move_block(bodies, i, m, place - work.block_start[s], p.dt)
-            if not top_speed(bodies, i) < SPEED_LIMIT:
-                bad = i
-            elif bodies[i].y < p.floor:
-                bodies[i].status = RETIRED
-            if p.post_correction:
-                place_corners(bodies, outlines, i)
-            else:
-                move_corners(bodies, outlines, i, m, place - work.block_start[s])
+        bad = max(bad, move_island(bodies, outlines, c, m, work, s, gauges, p, ledger))
     for k in range(count):
         if c[k].state != OPEN:
             bodies[c[k].a].touching = 1
@@ -206,6 +241,13 @@ def solve_and_move(
         watch_quiet(bodies, work, islands, p)
         wake_behind(bodies, c, count, gauges, p)
     return bad, excess
+
+
+@kernel
+def mark_cut(bodies: Bodies, work: Work, island: int) -> None:
+    """Mark the blocks of an island that is to be cut back."""
+    for place in range(work.block_start[island], work.block_start[island + 1]):
+        bodies[work.block_item[place]].cut = 1
 
 
 @kernel

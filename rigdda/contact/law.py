@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from rigdda.constants import (
     AWAKE,
+    BLOW_SPEED,
     GREATEST_LOAD,
     IMPACT,
     IMPACT_SPEED,
@@ -261,7 +262,9 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
     threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
     gap = max(c[k].gap, 0.0)
     mean = -c[k].un + 0.5 * pull * p.dt
-    if c[k].state == OPEN and mean > threshold and gap < mean * p.dt:
+    # what was foreseen may still come fast when it is closed already
+    least = threshold if c[k].state == OPEN else max(threshold, BLOW_SPEED)
+    if mean > least and gap < mean * p.dt:
         closing = strike(bodies, c, k, gap / mean, pull, p)
         if closing > threshold:
             set_impact(c, k, closing, effective_mass(bodies, c, k), p)

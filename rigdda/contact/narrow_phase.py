@@ -10,6 +10,8 @@ leads through a neighbouring part, and that one has the contact.
 
 from __future__ import annotations
 
+import math
+
 from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
@@ -186,22 +188,27 @@ def collide_pair(
         dy += bodies[b].vy * dt
         spin += abs(bodies[b].omega) * bodies[b].radius * dt
         fall = 0.0
+    together = 0.0
+    if bodies[b].status == AWAKE:
+        together = dt * min(math.hypot(ax, ay), math.hypot(bodies[b].vx, bodies[b].vy))
     spread = spin + fall + p.slack
     if bodies[a].parts == 1 and bodies[b].parts == 1:
-        return collide_parts(bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0)
+        return collide_parts(
+            bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0, together
+        )
     first = k
     k = collide_all_parts(
-        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack
+        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack, together
     )
     if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
-        k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300)
+        k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0)
     return k
 
 
 @kernel
 def collide_all_parts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, dx: float,
-    dy: float, spread: float, slack: float, sunk: float,
+    dy: float, spread: float, slack: float, sunk: float, together: float,
 ) -> int:  # fmt: skip
     """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
     first = k
@@ -209,7 +216,9 @@ def collide_all_parts(
         for j in range(bodies[b].part, bodies[b].part + bodies[b].parts):
             if k + 2 > len(c):
                 return -1
-            found = collide_parts(bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk)
+            found = collide_parts(
+                bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk, together
+            )
             for new in range(k, found):
                 k = keep_nearest(c, first, k, new)
     return k
@@ -239,11 +248,12 @@ def keep_nearest(c: Contacts, first: int, k: int, new: int) -> int:
 @kernel
 def collide_parts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, j: int,
-    dx: float, dy: float, spread: float, slack: float, sunk: float,
+    dx: float, dy: float, spread: float, slack: float, sunk: float, together: float,
 ) -> int:  # fmt: skip
     """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
 
-    (dx, dy) is the displacement of b relative to a over the step; see `face_of_contact`.
+    (dx, dy) is the displacement of b relative to a over the step; see `face_of_contact`. Both move
+    by `together`: when something stops one of two that touch, the other turns about it.
     """
     ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
     possible, time_i, gap_i, edge_i = face_of_contact(
@@ -260,6 +270,8 @@ def collide_parts(
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
     reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(gap_i, gap_j) <= slack
+    if touching:
+        reach += together
     # corner beside corner, the better face may miss the other body where the second one does not
     for _ in range(2):
         face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigdda.scene import Block, Scene, Terrain, Wall
+from rigdda.settings import LARGEST_DT
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, polygon, rock, rough
 
@@ -48,15 +49,14 @@ def measure(lab: Lab) -> tuple[Measured, Measured, Measured]:
     return Measured(sum(arrived), SHOTS), Measured(sum(passed)), Measured(deepest)
 
 
+CHECKS = (
+    Check("arrive", "all", "-", 0.0, "absolute"),
+    Check("centroids pass", "none: rigid", "-", 0.0, "bound"),
+    # deeper, a corner would show on the far side
+    Check("corner depth", "none: rigid", "m", WALL.thickness, "bound"),
+)
+
 CASES = (
-    Case(
-        "thin-wall",
-        (
-            Check("arrive", "all", "-", 0.0, "absolute"),
-            Check("centroids pass", "none: rigid", "-", 0.0, "bound"),
-            # deeper, a corner would show on the far side
-            Check("corner depth", "none: rigid", "m", WALL.thickness, "bound"),
-        ),
-        measure,
-    ),
+    Case("thin-wall", CHECKS, measure),
+    Case("thin-wall-100ms", CHECKS, measure, dt=LARGEST_DT),
 )

@@ -93,6 +93,9 @@ LAST_SWEEPS = 200
 RELAXATION_STIFFNESS = 30.0
 """Stiffness of a contact in relaxation times its flexibility [-]; stiffer converges more slowly."""
 
+LAYERS = 64
+"""Layers in which the contacts of an island are ordered by height for relaxation."""
+
 STEADY_RATE = 0.25
 """Share of a rise of the force that counts as lasting load after one step of motion [-]; the rest
 may be an impulse."""

@@ -97,24 +97,26 @@ def pass_on_shares(
 
     Blocks that are struck through others would else move on for a while, into those that stopped.
     """
-    low, high = work.contact_start[island], work.contact_start[island + 1]
-    spreading = False
+    spreading, blows = False, 0
     for s in range(work.block_start[island + 1] - work.block_start[island]):
         spreading = spreading or m.direction[s, 0] > 0.0
+    if not spreading:
+        return
+    for item in range(work.contact_start[island], work.contact_start[island + 1]):
+        k = work.contact_item[item]
+        if c[k].pair >= 0 and c[k].state != OPEN:
+            lighter = min(bodies[c[k].a].mass, bodies[c[k].b].mass)
+            if c[k].normal * dt > SHOCK_SPEED * lighter:
+                work.picked[blows] = k
+                blows += 1
     while spreading:
         spreading = False
-        for item in range(low, high):
-            k = work.contact_item[item]
-            if c[k].pair < 0 or c[k].state == OPEN:
-                continue
+        for blow in range(blows):
+            k = work.picked[blow]
             i, j = work.slot[c[k].a], work.slot[c[k].b]
-            early, late = (
-                max(m.direction[i, 0], m.direction[j, 0]),
-                min(m.direction[i, 0], m.direction[j, 0]),
-            )
-            lighter = min(bodies[c[k].a].mass, bodies[c[k].b].mass)
-            if early > late and c[k].normal * dt > SHOCK_SPEED * lighter:
-                m.direction[i, 0] = m.direction[j, 0] = early
+            first = max(m.direction[i, 0], m.direction[j, 0])
+            if min(m.direction[i, 0], m.direction[j, 0]) < first:
+                m.direction[i, 0] = m.direction[j, 0] = first
                 spreading = True
 
 

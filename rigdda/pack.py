@@ -14,6 +14,7 @@ from rigdda.constants import (
     BOLT,
     CUTS,
     FIXED,
+    LAYERS,
     PENETRATION_RATIO,
     PIN,
     PLAIN_CONTACT,
@@ -312,6 +313,8 @@ def empty_work(bodies: int, room: int) -> Work:
         np.zeros((room, COLUMNS)),
         whole(room),
         whole(room),
+        whole(room),
+        whole(LAYERS + 1),
         np.zeros(2),
     )
 

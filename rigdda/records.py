@@ -197,6 +197,8 @@ class Work(NamedTuple):
     row: Floats  # (C, columns) contacts of one island, see linear.psor
     row_i: Ints  # (C,) slots of their bodies
     row_j: Ints
+    picked: Ints  # (C,) some contacts of an island, or all in another order
+    layer: Ints  # (LAYERS + 1,) contacts of an island below a height
     field: Floats  # (2,) acceleration of free blocks in this step [m/s2]
 
 

@@ -136,21 +136,29 @@ def sweep(
 
 
 @kernel
-def sort_by_height(c: Contacts, item: Ints, low: int, high: int) -> None:
-    """Shell sort of the contacts low:high, lowest first, so that a sweep carries loads through."""
-    gap = 1
-    while 3 * gap + 1 < high - low:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for i in range(low + gap, high):
-            k = item[i]
-            y = c[k].y
-            j = i - gap
-            while j >= low and (c[item[j]].y > y or (c[item[j]].y == y and item[j] > k)):
-                item[j + gap] = item[j]
-                j -= gap
-            item[j + gap] = k
-        gap //= 3
+def sort_by_height(c: Contacts, work: Work, low: int, high: int) -> None:
+    """Order the contacts low:high by height, lowest first, so that a sweep carries loads through.
+
+    A counting sort in as many layers as there is room for: within one the order does not matter.
+    """
+    item, layers = work.contact_item, min(len(work.layer) - 1, high - low)
+    least, most = math.inf, -math.inf
+    for place in range(low, high):
+        y = c[item[place]].y
+        least, most = min(least, y), max(most, y)
+    scale = layers / (most - least) * (1.0 - 1e-9) if most > least else 0.0
+    for s in range(layers + 1):
+        work.layer[s] = 0
+    for place in range(low, high):
+        work.layer[int(scale * (c[item[place]].y - least)) + 1] += 1
+    for s in range(layers):
+        work.layer[s + 1] += work.layer[s]
+    for place in range(low, high):
+        s = int(scale * (c[item[place]].y - least))
+        work.picked[work.layer[s]] = item[place]
+        work.layer[s] += 1
+    for place in range(low, high):
+        item[place] = work.picked[place - low]
 
 
 @kernel
@@ -169,7 +177,7 @@ def relax_forces(
     for q in range(3):
         m.scaled[n, q] = m.d[n, q] = 0.0
     count = high - low
-    sort_by_height(c, work.contact_item, low, high)
+    sort_by_height(c, work, low, high)
     for place in range(count):
         pack_row(c, work.contact_item[low + place], m, work, place, n, dt)
     scale = dt / (2.0 * RELAXATION_STIFFNESS)

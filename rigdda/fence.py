@@ -33,7 +33,7 @@ from rigdda.constants import (
 from rigdda.gauges import FAILED, write_event
 from rigdda.kernel import kernel
 from rigdda.open_close import open_close
-from rigdda.records import Bodies, Contacts, Gauges, Matrix, Parameters, Work
+from rigdda.records import EVENTS, Bodies, Contacts, Gauges, Matrix, Parameters, Work
 from rigdda.sleep import wake_island
 
 
@@ -189,8 +189,8 @@ def limit_fences(
             if bodies[fence].status != RETIRED:
                 bodies[fence].status = RETIRED
                 height = c[k].y - gauges.barrier_ground[barrier]
-                counters[6] = write_event(
-                    gauges, counters[6], time, FAILED, bodies, c[k].a, barrier, c[k].x, c[k].y,
+                counters[EVENTS] = write_event(
+                    gauges, counters[EVENTS], time, FAILED, bodies, c[k].a, barrier, c[k].x, c[k].y,
                     height,
                 )  # fmt: skip
             break_through(bodies, c, m, work, island, fence, left, taken, tolerance, p, counters)

@@ -48,7 +48,18 @@ from rigdda.linear.psor import relax_forces
 from rigdda.linear.skyline import profile, solve_skyline
 from rigdda.linear.sor import solve_sor
 from rigdda.motion import top_speed
-from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
+from rigdda.records import (
+    ITERATIONS,
+    RELAXED,
+    SOLVER_ITERATIONS,
+    SOLVES,
+    SWEEPS,
+    Bodies,
+    Contacts,
+    Matrix,
+    Parameters,
+    Work,
+)
 
 NONE, MOVED, LOCKED = 0, 1, 2
 
@@ -270,12 +281,12 @@ def solve_states(
     few = 2 + (c1 - c0) // FEW_MOVING
     for iteration in range(PATIENCE * p.iterations):
         assemble_island(bodies, c, m, work, island, pairs, p)
-        counters[1] += 1
+        counters[ITERATIONS] += 1
         if n == 1:
             solve_block(m.diagonal[0], m.rhs[0], m.d[0])
         else:
-            counters[3] += 1
-            counters[4] += solve_island(m, n, pairs, p)
+            counters[SOLVES] += 1
+            counters[SOLVER_ITERATIONS] += solve_island(m, n, pairs, p)
         moved, locked = update_states(bodies, c, m, work, c0, c1, p)
         if moved == 0:
             return locked == 0
@@ -319,8 +330,8 @@ def relax(
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
-    counters[2] += 1
-    counters[8] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt, speed)
+    counters[RELAXED] += 1
+    counters[SWEEPS] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt, speed)
     for item in range(c0, c1):
         k = work.contact_item[item]
         limit = c[k].cohesion + c[k].friction * max(c[k].normal, 0.0)

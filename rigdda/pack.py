@@ -401,6 +401,7 @@ def pack_parameters(
         SOLVERS.index(settings.solver),
         settings.relaxation,
         settings.sleeping and not (static or shaken or scene.supports),
+        settings.timing,
         float(floor),
         np.tan(np.radians(friction)),
         bool((cohesion + tension).any()),

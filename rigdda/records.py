@@ -251,6 +251,7 @@ class Parameters(NamedTuple):
     solver: int  # AUTO, PCG, BLOCK_PCG, SOR, DIRECT
     relaxation: float
     sleeping: bool
+    timing: bool
     floor: float  # a centroid below it is retired [m]
     friction: Floats  # (surfaces, surfaces) tan phi
     bonded: bool  # whether a surface has cohesion or tension
@@ -262,16 +263,13 @@ class Parameters(NamedTuple):
 LEDGER = ("friction", "impact", "damping", "external", "links")
 """Work done on the blocks so far [J]: entries of the ledger array."""
 
-COUNTERS = (
-    "steps",
-    "open_close_iterations",
-    "relaxed_islands",
-    "solves",
-    "solver_iterations",
-    "contacts",
-    "events",
-    "contact_total",
-    "sweeps",
-    "cut_backs",
-)
-"""Entries of the counter array."""
+COUNTERS = 14
+"""Length of the counter array. Its entries:"""
+
+STEPS, ITERATIONS, RELAXED, SOLVES, SOLVER_ITERATIONS = 0, 1, 2, 3, 4
+CONTACTS, EVENTS, CONTACT_TOTAL, SWEEPS, CUT_BACKS = 5, 6, 7, 8, 9
+"""Steps; open-close iterations; islands relaxed; systems solved and iterations of their solver;
+contacts now; events not yet read; contacts, sweeps of relaxation and cut-backs so far."""
+
+BROAD_PHASE, NARROW_PHASE, OPEN_CLOSE, MOTION = 10, 11, 12, 13
+"""Processor cycles by phase of the step, if they are timed."""

@@ -54,6 +54,8 @@ class Settings:
         Solve each cluster of blocks that touch on its own. False: all blocks in one system.
     sleeping : bool
         Let blocks at rest sleep until they are disturbed. They cost nothing then.
+    timing : bool
+        Time the phases of a step, see `Diagnostics`; costs a few reads of the cycle counter.
 
     Raises
     ------
@@ -72,6 +74,7 @@ class Settings:
     post_correction: bool = True
     islands: bool = True
     sleeping: bool = True
+    timing: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.dt, int | float) and LARGEST_DT < self.dt < math.inf:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 import warnings
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -29,7 +30,21 @@ from rigdda.contact.links import anchor, tension
 from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.geometry import polygon_properties
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
-from rigdda.records import COUNTERS, LEDGER
+from rigdda.records import (
+    BROAD_PHASE,
+    CONTACT_TOTAL,
+    CONTACTS,
+    COUNTERS,
+    CUT_BACKS,
+    EVENTS,
+    ITERATIONS,
+    LEDGER,
+    RELAXED,
+    SOLVER_ITERATIONS,
+    SOLVES,
+    STEPS,
+    SWEEPS,
+)
 from rigdda.run import EVENT, Run
 from rigdda.scene import Scene
 from rigdda.settings import Settings
@@ -52,6 +67,10 @@ CONTACT = np.dtype(
 """One contact. block_b: -1 terrain, N + i barrier i; block_a may be one, a gravity wall. The
 normal points from b to a; shear is positive along the normal turned by +90 degrees. Forces act on a
 [N]; penetration [m]."""
+
+PHASES = ("broad phase", "narrow phase", "open-close", "motion")
+"""Phases of a step: pairs of bodies that may touch; their contacts and the law of each; open-close
+iteration, solution and relaxation; islands, movement and gauges."""
 
 STATES = np.array(["open", "stick", "slip"])
 
@@ -81,6 +100,7 @@ class Diagnostics(NamedTuple):
     `relaxed` counts islands whose contact forces were relaxed, since they move or their open-close
     iteration did not settle; `cut_backs` counts islands that took shorter steps. `compression` is
     the greatest one of the springs of contacts at rest now, over the mean block size [-].
+    `seconds` is the processor time by phase [s], nothing without `Settings.timing`.
     """
 
     steps: int
@@ -93,6 +113,7 @@ class Diagnostics(NamedTuple):
     contacts: int
     penetration: float
     compression: float
+    seconds: dict[str, float]
 
 
 class Simulation:
@@ -131,9 +152,10 @@ class Simulation:
         self.settings = settings or Settings()
         self._arrays = pack(scene, self.settings, lines, watch or (math.inf, -math.inf))
         self._now, self._before = self._arrays.now, self._arrays.before
-        self._counters = np.zeros(len(COUNTERS), dtype=np.int64)
+        self._counters = np.zeros(COUNTERS, dtype=np.int64)
         self._ledger = np.zeros(len(LEDGER))
         self._deepest = np.zeros(1)
+        self._seconds = 0.0
         self._elastic_at_start = self._elastic()
         centres = [polygon_properties(scene.outline(i))[1] for i in range(len(scene.barriers))]
         self._barrier_start = np.array([[*centre, 0.0] for centre in centres]).reshape(-1, 3)
@@ -142,7 +164,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated time [s], counted in whole steps."""
-        return float(self._counters[0] * self.settings.dt)
+        return float(self._counters[STEPS] * self.settings.dt)
 
     @property
     def poses(self) -> NDArray[np.float64]:
@@ -175,7 +197,7 @@ class Simulation:
 
     def contacts(self) -> NDArray[np.void]:
         """Return the contacts of the last step as a structured array, see `CONTACT`."""
-        c, n = self._now, self._counters[5]
+        c, n = self._now, self._counters[CONTACTS]
         c = c[:n]
         c = c[(c["kind"] != BOLT) & (c["kind"] != PIN)]
         out = np.zeros(len(c), dtype=CONTACT)
@@ -193,7 +215,7 @@ class Simulation:
 
     def supports(self) -> NDArray[np.float64]:
         """Return the force of each support on its (first) block in the last step, (S, 2) [N]."""
-        c = self._now[: self._counters[5]]
+        c = self._now[: self._counters[CONTACTS]]
         c = c[(c["kind"] == BOLT) | (c["kind"] == PIN)]
         out = np.zeros((len(self.scene.supports), 2))
         fx = c["normal"] * c["nx"] - c["shear"] * c["ny"]
@@ -210,7 +232,7 @@ class Simulation:
             start = anchor(b, bolt["a"], bolt["ax"], bolt["ay"])
             end = anchor(b, bolt["b"], bolt["bx"], bolt["by"])
             total += 0.5 * tension(links, q, math.dist(start, end)) ** 2 / bolt["stiffness"]
-        c = self._now[: self._counters[5]]
+        c = self._now[: self._counters[CONTACTS]]
         c = c[(c["kind"] == PLAIN) & (c["state"] != OPEN)]
         return float(total + 0.5 * (c["stiffness"] * np.minimum(c["gap"], 0.0) ** 2).sum())
 
@@ -237,23 +259,31 @@ class Simulation:
     @property
     def diagnostics(self) -> Diagnostics:
         """What the computation took so far."""
-        count = dict(zip(COUNTERS, self._counters.tolist(), strict=True))
+        count = self._counters
         return Diagnostics(
-            count["steps"],
-            count["open_close_iterations"],
-            count["cut_backs"],
-            count["relaxed_islands"],
-            count["sweeps"],
-            count["solves"],
-            count["solver_iterations"],
-            count["contact_total"],
+            int(count[STEPS]),
+            int(count[ITERATIONS]),
+            int(count[CUT_BACKS]),
+            int(count[RELAXED]),
+            int(count[SWEEPS]),
+            int(count[SOLVES]),
+            int(count[SOLVER_ITERATIONS]),
+            int(count[CONTACT_TOTAL]),
             float(self._deepest[0]),
             self._compression(),
+            self._seconds_by_phase(),
         )
+
+    def _seconds_by_phase(self) -> dict[str, float]:
+        """Return the time spent in each phase [s], in proportion to its cycles."""
+        cycles = self._counters[BROAD_PHASE:].astype(float)
+        total = cycles.sum()
+        share = cycles / total if total > 0.0 else cycles
+        return dict(zip(PHASES, (self._seconds * share).tolist(), strict=True))
 
     def _compression(self) -> float:
         """Return the greatest compression of a contact at rest now, over the mean block size."""
-        c = self._now[: self._counters[5]]
+        c = self._now[: self._counters[CONTACTS]]
         c = c[((c["kind"] == REST) | (c["kind"] == PLAIN)) & (c["state"] != OPEN)]
         size = self._arrays.parameters[0].slack / SLACK_RATIO
         return float((c["normal"] / c["stiffness"]).max(initial=0.0) / size)
@@ -266,9 +296,9 @@ class Simulation:
         Diverged
             If a block's velocity is no longer finite or beyond any rockfall.
         """
-        target = self._counters[0] + check.integer("n", n, 0)
-        while self._counters[0] < target:
-            a = self._arrays
+        target = self._counters[STEPS] + check.integer("n", n, 0)
+        while self._counters[STEPS] < target:
+            a, before = self._arrays, time.thread_time()
             reason, block, swapped = advance(
                 a.bodies,
                 a.outlines,
@@ -284,8 +314,9 @@ class Simulation:
                 self._counters,
                 self._ledger,
                 self._deepest,
-                target - self._counters[0],
+                target - self._counters[STEPS],
             )
+            self._seconds += time.thread_time() - before
             if swapped:
                 self._now, self._before = self._before, self._now
             if reason == EVENTS_FULL:
@@ -299,7 +330,7 @@ class Simulation:
         """Return what is known of a block that moves too fast, and of the contact that did it."""
         body = self._arrays.bodies[block]
         speed = ", ".join(f"{body[name]:g}" for name in ("vx", "vy", "omega"))
-        told = f"step {self._counters[0]} ({self.time:g} s): block {block} moves at ({speed})"
+        told = f"step {self._counters[STEPS]} ({self.time:g} s): block {block} moves at ({speed})"
         contacts = self.contacts()
         touching = contacts[(contacts["block_a"] == block) | (contacts["block_b"] == block)]
         if len(touching):
@@ -375,9 +406,9 @@ class Simulation:
         )
 
     def _drain_events(self) -> None:
-        n = self._counters[6]
+        n = self._counters[EVENTS]
         self._events.append(self._arrays.gauges.event[:n].copy())
-        self._counters[6] = 0
+        self._counters[EVENTS] = 0
 
     def _grow(self) -> None:
         room = 2 * len(self._now)

@@ -6,6 +6,7 @@ import math
 
 from numpy.typing import NDArray
 
+from rigdda.clock import lap
 from rigdda.constants import (
     ASLEEP,
     AWAKE,
@@ -43,6 +44,15 @@ from rigdda.kernel import entry_kernel, kernel
 from rigdda.motion import top_speed
 from rigdda.open_close import open_close
 from rigdda.records import (
+    BROAD_PHASE,
+    CONTACT_TOTAL,
+    CONTACTS,
+    CUT_BACKS,
+    EVENTS,
+    MOTION,
+    NARROW_PHASE,
+    OPEN_CLOSE,
+    STEPS,
     Bodies,
     Contacts,
     Gauges,
@@ -139,11 +149,13 @@ def collide_block(
 @kernel
 def detect(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, c: Contacts, old: Contacts,
-    old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters,
+    old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters, counters: NDArray,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
+    since = lap(counters, BROAD_PHASE, 0, p.timing)
     index_by_body(old, old_count, work.first, p.blocks)
     pairs = candidate_pairs(bodies, outlines, work, p)
+    since = lap(counters, BROAD_PHASE, since, p.timing)
     if pairs < 0:
         return -1
     start = time <= 1.5 * p.dt
@@ -168,6 +180,7 @@ def detect(
             count = keep_asleep(bodies, c, count, old, work, a, gauges, time, p)
         elif bodies[a].status == HELD:
             count = keep_held(c, count, old, work, a)
+    lap(counters, NARROW_PHASE, since, p.timing)
     return count
 
 
@@ -217,20 +230,23 @@ def solve_and_move(
     excess : float
         Greatest departure from a straight path in the islands left, over the limit; else 0.
     """
+    since = lap(counters, MOTION, 0, p.timing)
     islands = find_islands(bodies, c, count, work, p.blocks, p.islands)
     bad, excess = -1, 0.0
     for s in range(islands):
         c0, c1 = work.contact_start[s], work.contact_start[s + 1]
         if c1 > c0:
+            since = lap(counters, MOTION, since, p.timing)
             open_close(bodies, c, m, work, s, p, counters)
+            since = lap(counters, OPEN_CLOSE, since, p.timing)
             far = greatest_departure(bodies, m, work, s, p.dt) / limit
             if far > 1.0:
                 excess = max(excess, far)
-                counters[9] += 1
+                counters[CUT_BACKS] += 1
                 mark_cut(bodies, work, s)
                 continue
             limit_fences(bodies, c, m, work, s, gauges, time, p, counters)
-            counters[6] = note_hits(bodies, c, work, c0, c1, gauges, counters[6], time)
+            counters[EVENTS] = note_hits(bodies, c, work, c0, c1, gauges, counters[EVENTS], time)
         bad = max(bad, move_island(bodies, outlines, c, m, work, s, gauges, p, ledger))
     for k in range(count):
         if c[k].state != OPEN:
@@ -240,6 +256,7 @@ def solve_and_move(
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
         wake_behind(bodies, c, count, gauges, p)
+    lap(counters, MOTION, since, p.timing)
     return bad, excess
 
 
@@ -332,24 +349,25 @@ def advance(
     swapped, level, part = False, 0, 0
     while steps > 0:
         p, parts = levels[level], 2**level
-        room = len(gauges.event) - counters[6]
+        room = len(gauges.event) - counters[EVENTS]
         if level == 0 and room < (p.blocks + 1) * (len(gauges.station) + len(gauges.absorbed)):
             return EVENTS_FULL, -1, swapped
-        start = counters[0] * parts + part
+        start = counters[STEPS] * parts + part
         time = (start + 1) * p.dt
         if p.static:
             rest_all(bodies)
         set_field(work, shaking, start * p.dt, time, p)
         count = detect(
-            bodies, outlines, ground, links, before, now, counters[5], work, gauges, time, p
-        )
+            bodies, outlines, ground, links, before, now, counters[CONTACTS], work, gauges, time,
+            p, counters,
+        )  # fmt: skip
         # a cut-back, which cannot be left, has room to spare
         if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
             return CONTACTS_FULL, -1, swapped
         now, before = before, now
         swapped = not swapped
-        counters[5] = count
-        counters[7] += count
+        counters[CONTACTS] = count
+        counters[CONTACT_TOTAL] += count
         for k in range(count):
             deepest[0] = max(deepest[0], -now[k].gap)
         limit = p.displacement_limit if level == 0 else math.inf
@@ -364,8 +382,10 @@ def advance(
         elif bad >= 0 or part == parts:
             release_all(bodies)
             level, part = 0, 0
-            counters[0] += 1
-            counters[6] = note_passage(bodies, gauges, counters[6], counters[0] * levels[0].dt)
+            counters[STEPS] += 1
+            counters[EVENTS] = note_passage(
+                bodies, gauges, counters[EVENTS], counters[STEPS] * levels[0].dt
+            )
             steps -= 1
         if bad >= 0:
             return BAD_STATE, bad, swapped

@@ -1,0 +1,30 @@
+"""What a simulation tells of its computation."""
+
+from __future__ import annotations
+
+import pytest
+
+from physics.helpers import FLAT, box, rock
+from rigdda import Scene, Settings, Simulation, Terrain
+
+STACK = Scene(Terrain(FLAT), tuple(box(0.0, 0.5 + i) for i in range(5)), rock())
+
+
+def test_phases_of_a_step_are_timed_on_demand():
+    sim = Simulation(STACK, Settings(timing=True, sleeping=False))
+    sim.step(2000)
+    seconds = sim.diagnostics.seconds
+    assert set(seconds) == {"broad phase", "narrow phase", "open-close", "motion"}
+    assert all(value > 0.0 for value in seconds.values())
+    assert seconds["open-close"] > seconds["broad phase"]
+    plain = Simulation(STACK, Settings(sleeping=False))
+    plain.step(2000)
+    assert sum(plain.diagnostics.seconds.values()) == 0.0
+    assert (plain.poses == sim.poses).all()
+
+
+def test_compression_is_that_of_the_lowest_contact():
+    """The stiffness of a contact is chosen for the wanted penetration under its load."""
+    sim = Simulation(STACK, Settings(penetration=2e-4))
+    sim.step(400)
+    assert sim.diagnostics.compression == pytest.approx(2e-4, rel=0.05)

@@ -1,1 +1,1 @@
-"""This core and other engines of rigid bodies side by side: error against processor time."""
+"""The core of `rigdda` and other engines of rigid bodies side by side: error against processor time."""

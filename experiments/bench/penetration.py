@@ -1,4 +1,4 @@
-"""How deep bodies are inside one another, by geometry from their poses: the same for all engines."""
+"""How deep bodies are inside one another, from their poses: the same for all engines."""
 
 from __future__ import annotations
 
@@ -35,9 +35,7 @@ def centroids(scene: Scene) -> Floats:
 
 def shapes(scene: Scene) -> Shapes:
     """Return the shapes of a scene."""
-    outlines = [
-        b.vertices - c for b, c in zip(scene.blocks, centroids(scene), strict=True)
-    ]
+    outlines = [b.vertices - c for b, c in zip(scene.blocks, centroids(scene), strict=True)]
     corners = np.zeros((len(outlines), max(map(len, outlines)), 2))
     for row, outline in zip(corners, outlines, strict=True):
         row[: len(outline)] = outline

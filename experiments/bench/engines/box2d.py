@@ -13,10 +13,10 @@ from rigdda import Scene
 NAME = "box2d"
 
 OPTIONS = (
-    {"substeps": 1, "hertz": 120.0},
     {"substeps": 2, "hertz": 120.0},
-    {"substeps": 4, "hertz": 30.0},
     {"substeps": 4, "hertz": 120.0},
+    {"substeps": 4, "hertz": 30.0},
+    {"substeps": 1, "hertz": 120.0},
     {"substeps": 8, "hertz": 240.0},
 )
 """What is swept beside the step; 4 sub-steps and 30 Hz are the defaults."""

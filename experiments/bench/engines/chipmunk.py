@@ -14,9 +14,9 @@ from rigdda.geometry import polygon_properties
 NAME = "pymunk"
 
 OPTIONS = (
-    {"iterations": 3, "slop": 1e-3},
     {"iterations": 10, "slop": 1e-2},
     {"iterations": 10, "slop": 1e-3},
+    {"iterations": 3, "slop": 1e-3},
     {"iterations": 30, "slop": 1e-4},
 )
 """What is swept beside the step; 10 iterations are the default."""

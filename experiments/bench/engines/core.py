@@ -1,4 +1,4 @@
-"""This core."""
+"""The core of `rigdda`: many steps a call."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -14,16 +15,15 @@ from rigdda.geometry import polygon_properties
 NAME = "mujoco"
 
 OPTIONS = (
-    {"softness": 2.0, "integrator": "EULER"},
-    {"softness": 4.0, "integrator": "EULER"},
-    {"softness": 10.0, "integrator": "EULER"},
-    {"softness": 4.0, "integrator": "RK4"},
+    {"softness": 2.0, "impedance": 0.99, "integrator": "EULER"},
+    {"softness": 2.0, "impedance": 0.95, "integrator": "EULER"},
+    {"softness": 4.0, "impedance": 0.95, "integrator": "EULER"},
+    {"softness": 2.0, "impedance": 0.99, "integrator": "RK4"},
 )
 """What is swept beside the step."""
 
-IMPEDANCE = 0.95
-"""Share of a contact's acceleration that its constraint prescribes, `solimp` [-]. 0.999 throws
-blocks out of a pile at any step tried."""
+FRICTION_STIFFNESS = 10.0
+"""Of friction over the normal contact, `impratio` [-]: blocks that hold creep less."""
 
 GROUND = 10.0
 """Thickness of the boxes that make the terrain [m]."""
@@ -45,16 +45,27 @@ class Engine:
         Whether blocks at rest may sleep.
     softness : float
         Time constant of contacts over the step, at least 2 [-].
+    impedance : float
+        Share of a contact's acceleration that its constraint prescribes, `solimp` [-].
     integrator : {"EULER", "RK4"}
         Of time.
     """
 
-    def __init__(self, scene: Scene, dt: float, sleeping: bool, softness: float, integrator: str):
+    def __init__(
+        self,
+        scene: Scene,
+        dt: float,
+        sleeping: bool,
+        softness: float,
+        impedance: float,
+        integrator: str,
+    ):
         spec = mujoco.MjSpec()
         spec.option.timestep = dt
         spec.option.gravity = [scene.gravity_vector[0], 0.0, scene.gravity_vector[1]]
         spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        spec.option.impratio = FRICTION_STIFFNESS
         if sleeping:
             spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
         mu = math.tan(math.radians(scene.surfaces["rock"].friction_deg))
@@ -62,7 +73,7 @@ class Engine:
             "friction": [mu, 0.0, 0.0],
             "condim": 3,
             "solref": [softness * dt, 1.0],
-            "solimp": [IMPEDANCE, IMPEDANCE, 1e-3, 0.5, 2.0],
+            "solimp": [impedance, impedance, 1e-3, 0.5, 2.0],
         }
         if scene.terrain is not None:
             self._add_terrain(spec, np.array(scene.terrain.points))
@@ -75,7 +86,7 @@ class Engine:
 
     def _add_terrain(self, spec, points: np.ndarray) -> None:
         """Add a plane for a terrain of one segment, else a box below each."""
-        for a, b in zip(points[:-1], points[1:], strict=True):
+        for a, b in pairwise(points):
             along = b - a
             length = math.hypot(*along)
             down = np.array([along[1], -along[0]]) / length
@@ -100,6 +111,7 @@ class Engine:
             pos=[centre[0], 0.0, centre[1]],
             mass=mass,
             inertia=[inertia, inertia, inertia],
+            ipos=[0.0, 0.0, 0.0],
             explicitinertial=True,
         )
         for kind, axis, c in (

@@ -1,1 +1,1 @@
-"""The core of `rigdda` and other engines of rigid bodies side by side: error against processor time."""
+"""The core of `rigdda` and other rigid-body engines side by side: error against processor time."""

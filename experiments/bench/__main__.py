@@ -46,7 +46,7 @@ def compare(console: Console, out: Path, quick: bool, say: Callable[[str], None]
 def alone(console: Console, out: Path, quick: bool, say: Callable[[str], None]) -> None:
     """Measure what concerns this core alone: growth of cost, start-up and memory."""
     sizes = growth.SIZES[:5] if quick else growth.SIZES
-    piles = growth.measure(sizes, 1 if quick else 3, say)
+    piles = growth.measure(sizes, 1 if quick else 2, say)
     tables.write(out / "growth.csv", piles)
     pictures.growth(out / "growth.png", piles)
     tables.show_rows(console, f"Growth: blocks^{growth.exponent(piles):.2f}", piles)

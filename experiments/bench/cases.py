@@ -224,7 +224,7 @@ def quick_cases() -> tuple[Case, ...]:
     """Return all cases but the largest, with one scene, fewer steps and fewer options each."""
     return tuple(
         replace(
-            c, scenes=c.scenes[:1], parts=tuple(p for p in c.parts if p in QUICK_PARTS), options=3
+            c, scenes=c.scenes[:1], parts=tuple(p for p in c.parts if p in QUICK_PARTS), options=2
         )
         for c in all_cases()[:-1]
     )

@@ -25,14 +25,21 @@ WORKERS = 2
 
 @dataclass(frozen=True)
 class Throughput:
-    """Episodes a second of wall time, median of the rounds, with what each ran."""
+    """Episodes a second of wall time, median and best of the rounds, with what each ran.
+
+    `busy_cores`: processor time over wall time of this core's rounds; below `cores`, others were at
+    work on the machine, or threads waited for one another.
+    """
 
     cores: int
     episodes: int
     rigdda_setting: str
     rigdda_per_second: float
+    rigdda_best: float
+    busy_cores: float
     peer_setting: str
     peer_per_second: float
+    peer_best: float
     ratio: float
 
 
@@ -71,11 +78,13 @@ def core_rate(scenes: list[Scene], duration: float, dt: float) -> float:
 def measure(case: Case, core: Setting, peer: Setting, episodes: int, rounds: int) -> Throughput:
     """Measure both in turn, each at its cheapest setting that is accurate enough."""
     scenes = [case.scenes[i % len(case.scenes)] for i in range(episodes)]
-    ours, theirs = [], []
+    ours, theirs, busy = [], [], []
     with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
         peer_rate(pool, scenes[: 2 * WORKERS], case.duration, peer)
         for _ in range(rounds):
+            before = time.perf_counter(), time.process_time()
             ours.append(core_rate(scenes, case.duration, core.dt))
+            busy.append((time.process_time() - before[1]) / (time.perf_counter() - before[0]))
             theirs.append(peer_rate(pool, scenes, case.duration, peer))
     mine, other = float(np.median(ours)), float(np.median(theirs))
     return Throughput(
@@ -83,7 +92,10 @@ def measure(case: Case, core: Setting, peer: Setting, episodes: int, rounds: int
         episodes,
         f"1/{1.0 / core.dt:.0f} s",
         mine,
+        max(ours),
+        float(np.median(busy)),
         f"{peer.engine.NAME} 1/{1.0 / peer.dt:.0f} s {peer.options}",
         other,
+        max(theirs),
         mine / other,
     )

@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from experiments.bench.cases import LONGEST, Case
-from experiments.bench.levels import Row
+from experiments.bench.levels import CORE, Row
 from rigdda import Scene
 from rigdda.errors import Diverged
 
-TIE = 1.2
-"""A setting is timed again if none of its engine has less error at 1/1.2 of its first time."""
+TIE = 1.3
+"""A setting is timed again if its first time is at most so many times that of the cheapest at a
+level: it may be the cheapest."""
+
+ENOUGH = 0.25
+"""Share of the finest level of error, and of patience, after which no finer step is tried."""
 
 LEAST = 0.01
 """Processor time that a measurement lasts at least [s]; shorter runs are repeated back to back."""
@@ -31,7 +35,7 @@ class Effort:
     """How much is spent on a case.
 
     Processor time [s] after which no finer step is tried with the same options, and of all repeated
-    runs together; most and fewest runs of a setting on a front.
+    runs together; most and fewest runs of a setting that may decide a level.
     """
 
     patience: float
@@ -40,8 +44,8 @@ class Effort:
     fewest: int
 
 
-FULL = Effort(patience=10.0, repeats=25.0, most=15, fewest=3)
-QUICK = Effort(patience=1.0, repeats=1.0, most=5, fewest=2)
+FULL = Effort(patience=8.0, repeats=30.0, most=15, fewest=5)
+QUICK = Effort(patience=1.0, repeats=1.0, most=5, fewest=3)
 
 
 @dataclass
@@ -123,7 +127,7 @@ def stepping(setting: Setting, case: Case) -> float:
 def sweep(
     case: Case, engines: list[ModuleType], effort: Effort, say: Callable[[str], None]
 ) -> list[Setting]:
-    """Measure a case: errors first, then times in rounds that go through all engines' fronts.
+    """Measure a case: errors first, then times in rounds through what may decide a level.
 
     The machine is shared: interleaved, engines meet the same disturbances, and medians count.
     """
@@ -132,7 +136,7 @@ def sweep(
         say(f"{case.name}: {engine.NAME}")
         for options in engine.OPTIONS[: case.options]:
             settings.extend(_refine(case, engine, options, effort))
-    good = [s for e in engines for s in _on_front([s for s in settings if s.engine is e])]
+    good = contenders(settings, case.levels)
     say(f"{case.name}: {len(good)} of {len(settings)} settings again")
     spent = 0.0
     for n in range(1, effort.most):
@@ -147,20 +151,23 @@ def sweep(
 def _refine(
     case: Case, engine: ModuleType, options: dict[str, Any], effort: Effort
 ) -> Iterator[Setting]:
-    """Yield ever finer steps until they take too long."""
+    """Yield ever finer steps until they take too long, sooner if they are accurate enough."""
     for part in case.parts:
         setting = Setting(engine, LONGEST / part, options)
         first_run(setting, case)
         yield setting
-        if setting.cpu[0] > effort.patience:
+        enough = setting.error < ENOUGH * min(case.levels)
+        if setting.cpu[0] > effort.patience * (ENOUGH if enough else 1.0):
             return
 
 
-def _on_front(settings: list[Setting]) -> list[Setting]:
-    """Return the settings that may be on the front of their engine, judged by one run each."""
-    return [
-        s
-        for s in settings
-        if np.isfinite(s.error)
-        and not any(o.error < s.error and TIE * o.cpu[0] < s.cpu[0] for o in settings)
-    ]
+def contenders(settings: list[Setting], levels: tuple[float, ...]) -> list[Setting]:
+    """Return the settings that may be the cheapest of the core or of the peers at a level."""
+    chosen = []
+    for core in (True, False):
+        side = [s for s in settings if (s.engine.NAME == CORE) is core]
+        for error in levels:
+            good = [s for s in side if s.error <= error]
+            least = min((s.cpu[0] for s in good), default=0.0)
+            chosen += [s for s in good if s.cpu[0] <= TIE * least and s not in chosen]
+    return chosen

@@ -29,6 +29,11 @@ class Row:
     cpu_max: float
     runs: int
 
+    @property
+    def label(self) -> str:
+        """Engine, step and options."""
+        return f"{self.engine} 1/{1.0 / self.dt:.0f} s {self.options}".rstrip()
+
 
 @dataclass(frozen=True)
 class Level:
@@ -64,13 +69,6 @@ def cheapest(rows: Iterable[Row], error: float) -> Row | None:
     return min(good, key=lambda r: r.cpu_us_per_simulated_s, default=None)
 
 
-def setting(row: Row | None) -> str:
-    """Return what a row ran with, or a dash."""
-    if row is None:
-        return "-"
-    return " ".join(filter(None, (row.engine, f"1/{1.0 / row.dt:.0f} s", row.options)))
-
-
 def level(case: Case, error: float, rows: Sequence[Row]) -> Level:
     """Compare at one error of a case."""
     here = [r for r in rows if r.case == case.name]
@@ -82,9 +80,9 @@ def level(case: Case, error: float, rows: Sequence[Row]) -> Level:
     return Level(
         case.name,
         error,
-        setting(peer),
+        peer.label if peer else "-",
         peer_cpu,
-        setting(core),
+        core.label if core else "-",
         core_cpu,
         ratio,
         alone or ratio <= case.must,

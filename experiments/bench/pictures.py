@@ -9,6 +9,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from experiments.bench.cases import Case
 from experiments.bench.growth import FITTED, Growth, exponent
@@ -43,9 +44,10 @@ def fronts(path: Path, cases: Sequence[Case], rows: Sequence[Row]) -> None:
             ax.axhline(error, color="0.8", linewidth=0.8, zorder=0)
         ax.set(xscale="log", yscale="log", title=case.name, ylabel=case.quantity)
         ax.set_xlabel("CPU us per simulated s")
+        ax.xaxis.set_minor_formatter(NullFormatter())
     for ax in axes[len(cases) :]:
         ax.axis("off")
-    axes[0].legend()
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     _save(figure, path)
 
 

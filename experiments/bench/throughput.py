@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
@@ -20,82 +19,81 @@ FRAME = 0.05
 """Interval of recorded frames [s]."""
 
 WORKERS = 2
-"""Processes and threads."""
+"""Processes of the peer."""
 
 
 @dataclass(frozen=True)
 class Throughput:
-    """Episodes a second of wall time, median and best of the rounds, with what each ran.
+    """Episodes a second of wall time and processor time of an episode, medians of the rounds.
 
-    `busy_cores`: processor time over wall time of this core's rounds; below `cores`, others were at
-    work on the machine, or threads waited for one another.
+    An episode is loaded, stepped and recorded. Where the machine's cores are shared, compare the
+    processor times: `cpu_ratio` is that of this core over the peer's.
     """
 
-    cores: int
     episodes: int
     rigdda_setting: str
     rigdda_per_second: float
-    rigdda_best: float
-    busy_cores: float
+    rigdda_cpu_s_per_episode: float
     peer_setting: str
     peer_per_second: float
-    peer_best: float
+    peer_cpu_s_per_episode: float
     ratio: float
+    cpu_ratio: float
 
 
 def episode(
     module: str, scene: Scene, duration: float, dt: float, options: dict[str, Any]
-) -> np.ndarray:
-    """Run one episode in a peer and return its frames (T, N, 3)."""
+) -> tuple[np.ndarray, float]:
+    """Run one episode in a peer; return its frames (T, N, 3) and its processor time [s]."""
+    start = time.process_time()
     engine = adapter(module).Engine(scene, dt, True, **options)
     stride = max(1, round(FRAME / dt))
     poses = [engine.poses()]
     for _ in range(round(duration / dt) // stride):
         engine.advance(stride)
         poses.append(engine.poses())
-    return np.array(poses)
+    return np.array(poses), time.process_time() - start
 
 
-def peer_rate(pool: Executor, scenes: list[Scene], duration: float, peer: Setting) -> float:
-    """Return the episodes a second of a peer in a pool of processes that has started."""
+def peer_rate(
+    pool: Executor, scenes: list[Scene], duration: float, peer: Setting
+) -> tuple[float, float]:
+    """Return episodes a second and processor time of one, in processes that have started."""
     module = peer.engine.__name__.rpartition(".")[2]
     before = time.perf_counter()
     jobs = [
         pool.submit(episode, module, scene, duration, peer.dt, peer.options) for scene in scenes
     ]
-    for job in jobs:
-        job.result()
-    return len(scenes) / (time.perf_counter() - before)
+    cpu = sum(job.result()[1] for job in jobs)
+    return len(scenes) / (time.perf_counter() - before), cpu / len(scenes)
 
 
-def core_rate(scenes: list[Scene], duration: float, dt: float) -> float:
-    """Return the episodes a second of this core in threads."""
-    before = time.perf_counter()
+def core_rate(scenes: list[Scene], duration: float, dt: float) -> tuple[float, float]:
+    """Return episodes a second of this core in threads and the processor time of one."""
+    wall, cpu = time.perf_counter(), time.process_time()
     simulate_many(scenes, Settings(dt=dt), duration, FRAME)
-    return len(scenes) / (time.perf_counter() - before)
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return len(scenes) / wall, cpu / len(scenes)
 
 
 def measure(case: Case, core: Setting, peer: Setting, episodes: int, rounds: int) -> Throughput:
     """Measure both in turn, each at its cheapest setting that is accurate enough."""
     scenes = [case.scenes[i % len(case.scenes)] for i in range(episodes)]
-    ours, theirs, busy = [], [], []
+    ours, theirs = [], []
     with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
         peer_rate(pool, scenes[: 2 * WORKERS], case.duration, peer)
         for _ in range(rounds):
-            before = time.perf_counter(), time.process_time()
             ours.append(core_rate(scenes, case.duration, core.dt))
-            busy.append((time.process_time() - before[1]) / (time.perf_counter() - before[0]))
             theirs.append(peer_rate(pool, scenes, case.duration, peer))
-    mine, other = float(np.median(ours)), float(np.median(theirs))
+    (mine, my_cpu), (other, other_cpu) = (np.median(r, axis=0).tolist() for r in (ours, theirs))
     return Throughput(
-        os.cpu_count() or 1,
         episodes,
-        f"1/{1.0 / core.dt:.0f} s",
+        core.row(case).label,
         mine,
-        max(ours),
-        float(np.median(busy)),
-        f"{peer.engine.NAME} 1/{1.0 / peer.dt:.0f} s {peer.options}",
+        my_cpu,
+        peer.row(case).label,
         other,
-        max(theirs),
+        other_cpu,
         mine / other,
+        my_cpu / other_cpu,
     )

@@ -44,7 +44,7 @@ class Effort:
     fewest: int
 
 
-FULL = Effort(patience=8.0, repeats=30.0, most=15, fewest=5)
+FULL = Effort(patience=5.0, repeats=20.0, most=15, fewest=5)
 QUICK = Effort(patience=1.0, repeats=1.0, most=5, fewest=3)
 
 

@@ -1,0 +1,45 @@
+"""One adapter an engine: the same scene, loaded into it.
+
+Each module has a `NAME`, the `OPTIONS` that are swept beside the step and an `Engine`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
+PEERS = {"chipmunk": "pymunk", "box2d": "pyb2d3", "mjc": "mujoco"}
+"""Module of each peer and the package it needs."""
+
+HINT = 'pip install -c constraints.txt -e ".[bench]"'
+
+
+class PeerMissing(ImportError):
+    """A peer is not installed; the message says how to install all of them."""
+
+
+def load() -> list[ModuleType]:
+    """Return the adapters, this core's first.
+
+    Raises
+    ------
+    PeerMissing
+        If a peer is not installed.
+    """
+    return [adapter("core"), *map(adapter, PEERS)]
+
+
+def adapter(name: str) -> ModuleType:
+    """Return the adapter of a module name.
+
+    Raises
+    ------
+    PeerMissing
+        If its engine is not installed.
+    """
+    try:
+        return importlib.import_module(f"{__name__}.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != PEERS.get(name):
+            raise
+        raise PeerMissing(f"{error.name} is not installed; get the peers by: {HINT}") from None

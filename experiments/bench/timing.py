@@ -1,0 +1,173 @@
+"""Error and processor time of every setting of every engine on a case."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from experiments.bench.cases import LONGEST, Case
+from experiments.bench.levels import CORE, Row
+from rigdda import Scene
+from rigdda.errors import Diverged
+
+TIE = 1.3
+"""A setting is timed again if its first time is at most so many times that of the cheapest at a
+level: it may be the cheapest."""
+
+ENOUGH = 0.25
+"""Share of the finest level of error, and of patience, after which no finer step is tried."""
+
+LEAST = 0.01
+"""Processor time that a measurement lasts at least [s]; shorter runs are repeated back to back."""
+
+LONG = 0.5
+"""Processor time from which the run that gives the error is timed too, not another one [s]."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is spent on a case.
+
+    Processor time [s] after which no finer step is tried with the same options, and of all repeated
+    runs together; most and fewest runs of a setting that may decide a level.
+    """
+
+    patience: float
+    repeats: float
+    most: int
+    fewest: int
+
+
+FULL = Effort(patience=5.0, repeats=20.0, most=15, fewest=5)
+QUICK = Effort(patience=1.0, repeats=1.0, most=5, fewest=3)
+
+
+@dataclass
+class Setting:
+    """An engine with its options and a step; what it erred and took so far."""
+
+    engine: ModuleType
+    dt: float
+    options: dict[str, Any]
+    error: float = np.inf
+    cpu: list[float] = field(default_factory=list)
+
+    @property
+    def median(self) -> float:
+        """Median processor time [s]."""
+        return float(np.median(self.cpu))
+
+    def load(self, scene: Scene, sleeping: bool) -> Any:
+        """Return the engine with a scene in it."""
+        return self.engine.Engine(scene, self.dt, sleeping, **self.options)
+
+    def row(self, case: Case) -> Row:
+        """Return what was measured; times per simulated second, of one scene."""
+        simulated = 1e-6 * case.duration * len(case.scenes)
+        return Row(
+            case.name,
+            self.engine.NAME,
+            self.dt,
+            " ".join(f"{k}={v}" for k, v in self.options.items()),
+            self.error,
+            self.median / simulated,
+            min(self.cpu) / simulated,
+            max(self.cpu) / simulated,
+            len(self.cpu),
+        )
+
+
+def first_run(setting: Setting, case: Case) -> None:
+    """Set the error of a setting, infinite where a scene diverges, and its first time."""
+    stride = 1 if case.every is None else round(case.every / setting.dt)
+    frames = round(case.duration / setting.dt) // stride
+    errors, cpu = [], 0.0
+    for scene in case.scenes:
+        engine = setting.load(scene, case.sleeping)
+        poses = [engine.poses()]
+        try:
+            for _ in range(frames):
+                before = time.process_time()
+                engine.advance(stride)
+                cpu += time.process_time() - before
+                poses.append(engine.poses())
+        except Diverged:
+            poses[-1] = np.full_like(poses[0], np.nan)
+        times = np.arange(len(poses)) * stride * setting.dt
+        finite = np.isfinite(poses).all()
+        errors.append(case.error(scene, times, np.array(poses)) if finite else np.inf)
+    setting.error = case.total(errors)
+    setting.cpu.append(cpu if cpu > LONG else stepping(setting, case))
+
+
+def stepping(setting: Setting, case: Case) -> float:
+    """Return the processor time of the steps of all scenes of a case [s].
+
+    Loading is left out, and nothing is read in between: this core and MuJoCo take all steps in one
+    call; pymunk and Box2D need a call a step, which is part of using them from Python.
+    """
+    total, rounds = 0.0, 0
+    while total < LEAST:
+        rounds += 1
+        for scene in case.scenes:
+            engine = setting.load(scene, case.sleeping)
+            before = time.process_time()
+            with contextlib.suppress(Diverged):
+                engine.advance(round(case.duration / setting.dt))
+            total += time.process_time() - before
+    return total / rounds
+
+
+def sweep(
+    case: Case, engines: list[ModuleType], effort: Effort, say: Callable[[str], None]
+) -> list[Setting]:
+    """Measure a case: errors first, then times in rounds through what may decide a level.
+
+    The machine is shared: interleaved, engines meet the same disturbances, and medians count.
+    """
+    settings: list[Setting] = []
+    for engine in engines:
+        say(f"{case.name}: {engine.NAME}")
+        for options in engine.OPTIONS[: case.options]:
+            settings.extend(_refine(case, engine, options, effort))
+    good = contenders(settings, case.levels)
+    say(f"{case.name}: {len(good)} of {len(settings)} settings again")
+    spent = 0.0
+    for n in range(1, effort.most):
+        if n >= effort.fewest and spent > effort.repeats:
+            break
+        for setting in good:
+            setting.cpu.append(stepping(setting, case))
+            spent += setting.cpu[-1]
+    return settings
+
+
+def _refine(
+    case: Case, engine: ModuleType, options: dict[str, Any], effort: Effort
+) -> Iterator[Setting]:
+    """Yield ever finer steps until they take too long, sooner if they are accurate enough."""
+    for part in case.parts:
+        setting = Setting(engine, LONGEST / part, options)
+        first_run(setting, case)
+        yield setting
+        enough = setting.error < ENOUGH * min(case.levels)
+        if setting.cpu[0] > effort.patience * (ENOUGH if enough else 1.0):
+            return
+
+
+def contenders(settings: list[Setting], levels: tuple[float, ...]) -> list[Setting]:
+    """Return the settings that may be the cheapest of the core or of the peers at a level."""
+    chosen = []
+    for core in (True, False):
+        side = [s for s in settings if (s.engine.NAME == CORE) is core]
+        for error in levels:
+            good = [s for s in side if s.error <= error]
+            least = min((s.cpu[0] for s in good), default=0.0)
+            chosen += [s for s in good if s.cpu[0] <= TIE * least and s not in chosen]
+    return chosen

@@ -187,6 +187,8 @@ class Work(NamedTuple):
     high_y: Floats
     sorted: Ints  # (M,) bodies by low_x, kept over steps
     pairs: Ints  # (2 C,) candidate pairs of bodies
+    partner_start: Ints  # (M + 1,) second bodies of the pairs by their first one
+    partner: Ints  # (C,)
     parent: Ints  # (M,) union-find
     slot: Ints  # (M,) place of a body in its island's matrix
     block_start: Ints  # (M + 1,) blocks of each island
@@ -197,6 +199,7 @@ class Work(NamedTuple):
     row: Floats  # (C, columns) contacts of one island, see linear.psor
     row_i: Ints  # (C,) slots of their bodies
     row_j: Ints
+    moved_in: Ints  # (M + 1,) last sweep in which a slot moved
     picked: Ints  # (C,) some contacts of an island, or all in another order
     layer: Ints  # (LAYERS + 1,) contacts of an island below a height
     field: Floats  # (2,) acceleration of free blocks in this step [m/s2]

@@ -21,7 +21,7 @@ from rigdda.constants import (
     SPEED_LIMIT,
     TERRAIN,
 )
-from rigdda.contact.broad_phase import overlapping_pairs, sort_by_low, sweep_boxes
+from rigdda.contact.broad_phase import partners_of_bodies, sweep_and_prune
 from rigdda.contact.joint import bond_joints
 from rigdda.contact.law import prepare, strike_at_once
 from rigdda.contact.links import add_link, yield_bolts
@@ -69,25 +69,15 @@ from rigdda.sleep import wake_neighbours, watch_quiet
 
 
 @kernel
-def candidate_pairs(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -> int:
-    """Return the number of pairs in work.pairs, sorted by their first body; -1 if too many."""
-    sweep_boxes(bodies, outlines, work, p)
-    sort_by_low(work)
-    pairs = overlapping_pairs(bodies, work)
+def candidate_pairs(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -> bool:
+    """List the bodies that each awake one may touch in this step; returns whether they fit."""
+    pairs = sweep_and_prune(bodies, outlines, work, p)
     if pairs > 0 and p.sleeping and wake_neighbours(bodies, work, pairs, p.blocks) > 0:
-        sweep_boxes(bodies, outlines, work, p)
-        sort_by_low(work)
-        pairs = overlapping_pairs(bodies, work)
-    for q in range(1, pairs):
-        a, b = work.pairs[2 * q], work.pairs[2 * q + 1]
-        j = q - 1
-        while j >= 0 and (
-            work.pairs[2 * j] > a or (work.pairs[2 * j] == a and work.pairs[2 * j + 1] > b)
-        ):
-            work.pairs[2 * j + 2], work.pairs[2 * j + 3] = work.pairs[2 * j], work.pairs[2 * j + 1]
-            j -= 1
-        work.pairs[2 * j + 2], work.pairs[2 * j + 3] = a, b
-    return pairs
+        pairs = sweep_and_prune(bodies, outlines, work, p)
+    if pairs < 0:
+        return False
+    partners_of_bodies(work, pairs)
+    return True
 
 
 @kernel
@@ -120,9 +110,9 @@ def keep_held(c: Contacts, count: int, old: Contacts, work: Work, a: int) -> int
 @kernel
 def collide_block(
     bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, count: int, old: Contacts,
-    work: Work, a: int, low: int, high: int, start: bool, p: Parameters,
+    work: Work, a: int, start: bool, p: Parameters,
 ) -> int:  # fmt: skip
-    """Write the contacts of awake block a with the terrain and with the pairs low:high.
+    """Write the contacts of awake block a with the terrain and with its partners.
 
     Returns
     -------
@@ -131,10 +121,10 @@ def collide_block(
     """
     first, room = count, len(c) - outlines.world_x.shape[1] - 4
     count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
-    for q in range(low, high):
+    for q in range(work.partner_start[a], work.partner_start[a + 1]):
         if count < 0 or count > room:
             return -1
-        count = collide_pair(bodies, outlines, c, count, a, work.pairs[2 * q + 1], p)
+        count = collide_pair(bodies, outlines, c, count, a, work.partner[q], p)
     if count < 0 or count > room:
         return -1
     recall(c, first, count, old, work.first, p.slack)
@@ -154,23 +144,17 @@ def detect(
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
     since = lap(counters, BROAD_PHASE, 0, p.timing)
     index_by_body(old, old_count, work.first, p.blocks)
-    pairs = candidate_pairs(bodies, outlines, work, p)
-    since = lap(counters, BROAD_PHASE, since, p.timing)
-    if pairs < 0:
+    if not candidate_pairs(bodies, outlines, work, p):
         return -1
+    since = lap(counters, BROAD_PHASE, since, p.timing)
     start = time <= 1.5 * p.dt
-    count = pair = link = 0
+    count = link = 0
     for a in range(p.blocks):
-        low = pair
-        while pair < pairs and work.pairs[2 * pair] == a:
-            pair += 1
         low_link = link
         while link < len(links) and links[link].a == a:
             link += 1
         if bodies[a].status == AWAKE:
-            count = collide_block(
-                bodies, outlines, ground, c, count, old, work, a, low, pair, start, p
-            )
+            count = collide_block(bodies, outlines, ground, c, count, old, work, a, start, p)
             if count < 0 or count + link - low_link > len(c):
                 return -1
             for q in range(low_link, link):

@@ -80,3 +80,38 @@ def overlapping_pairs(bodies: Bodies, work: Work) -> int:
             work.pairs[2 * count + 1] = i + j - first
             count += 1
     return count
+
+
+@kernel
+def sweep_and_prune(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -> int:
+    """Write the pairs of bodies that may touch in this step; returns how many, -1: too many."""
+    sweep_boxes(bodies, outlines, work, p)
+    sort_by_low(work)
+    return overlapping_pairs(bodies, work)
+
+
+@kernel
+def partners_of_bodies(work: Work, pairs: int) -> None:
+    """Gather the second bodies of the pairs by their first one, in ascending order."""
+    start = work.partner_start
+    for a in range(len(start)):
+        start[a] = 0
+    for q in range(pairs):
+        start[work.pairs[2 * q] + 1] += 1
+    for a in range(1, len(start)):
+        start[a] += start[a - 1]
+    for q in range(pairs):
+        a, b = work.pairs[2 * q], work.pairs[2 * q + 1]
+        place = start[a]
+        start[a] += 1
+        work.partner[place] = b
+    for a in range(len(start) - 1, 0, -1):
+        start[a] = start[a - 1]
+    start[0] = 0
+    for a in range(len(start) - 1):
+        for q in range(start[a] + 1, start[a + 1]):
+            b, place = work.partner[q], q - 1
+            while place >= start[a] and work.partner[place] > b:
+                work.partner[place + 1] = work.partner[place]
+                place -= 1
+            work.partner[place + 1] = b

@@ -20,6 +20,7 @@ from rigdda.constants import (
     LEAST_QUIET,
     PIN,
     PLAIN,
+    QUIET_SHARE,
     QUIET_SPEED,
     QUIET_SWEEPS,
     RELAXATION_SPEED,
@@ -89,17 +90,23 @@ def push(
 
 @kernel
 def sweep(
-    row: Floats, row_i: Ints, row_j: Ints, d: Floats, inverse: Floats, count: int, backwards: bool
-) -> float:
+    row: Floats, row_i: Ints, row_j: Ints, d: Floats, inverse: Floats, count: int, number: int,
+    moved_in: Ints, quiet: float,
+) -> float:  # fmt: skip
     """Visit every contact once; returns the greatest displacement that a visit changed [m].
+
+    But not where neither body has moved by more than `quiet` [m] in this or the last sweep:
+    moved_in[s] is the number of the last sweep in which slot s did.
 
     A body without unknowns has a slot of its own that nothing moves. Displacements of a visit are
     held in local variables, and unsigned indices spare numba's test for negative ones.
     """
     worst = 0.0
     for visit in range(count):
-        place = np.uintp(count - 1 - visit if backwards else visit)
+        place = np.uintp(count - 1 - visit if number % 2 == 1 else visit)
         i, j = np.uintp(row_i[place]), np.uintp(row_j[place])
+        if moved_in[i] < number - 1 and moved_in[j] < number - 1:
+            continue
         r = row[place]
         u, v, w, light, turn = d[i, 0], d[i, 1], d[i, 2], inverse[i, 0], inverse[i, 2]
         u2, v2, w2, light2, turn2 = d[j, 0], d[j, 1], d[j, 2], inverse[j, 0], inverse[j, 2]
@@ -113,7 +120,8 @@ def sweep(
         before = r[FORCE + 1]
         if push == 0.0 and limit == 0.0 and before == 0.0:
             continue
-        worst = max(worst, abs(push) * r[SOFT])
+        change = abs(push) * r[SOFT]
+        worst = max(worst, change)
         u += push * light * r[NORMAL_A]
         v += push * light * r[NORMAL_A + 1]
         w += push * turn * r[NORMAL_A + 2]
@@ -125,6 +133,10 @@ def sweep(
         shear = before + r[GAIN + 1] * (r[FREE + 1] - 2.0 * moved - before * r[SOFT + 1])
         shear = min(max(shear, -limit), limit)
         push = shear - before
+        if change + abs(push) * r[SOFT + 1] > quiet:
+            moved_in[i] = number
+            if light2 > 0.0:
+                moved_in[j] = number
         d[i, 0] = u + push * light * r[SHEAR_A]
         d[i, 1] = v + push * light * r[SHEAR_A + 1]
         d[i, 2] = w + push * turn * r[SHEAR_A + 2]
@@ -176,6 +188,8 @@ def relax_forces(
             m.d[s, q] = m.rhs[s, q] * m.scaled[s, q]
     for q in range(3):
         m.scaled[n, q] = m.d[n, q] = 0.0
+    for s in range(n + 1):
+        work.moved_in[s] = 0
     count = high - low
     sort_by_height(c, work, low, high)
     for place in range(count):
@@ -183,10 +197,13 @@ def relax_forces(
     scale = dt / (2.0 * RELAXATION_STIFFNESS)
     share = min(max(speed / QUIET_SPEED, LEAST_QUIET), 1.0)
     limit, far = share * RELAXATION_SPEED * scale, FAR_SPEED * scale
+    quiet = QUIET_SHARE * limit
     most = QUIET_SWEEPS if share < 1.0 else RELAXATION_SWEEPS
     sweeps, worst = 0, 1e300
     while (sweeps < most and worst > limit) or (sweeps < LAST_SWEEPS and worst > far):
-        worst = sweep(work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps % 2 == 1)
+        worst = sweep(
+            work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps, work.moved_in, quiet
+        )
         sweeps += 1
     for place in range(count):
         k = work.contact_item[low + place]

@@ -49,11 +49,15 @@ BODY = _record(
 """State of a body. Angle and body coordinates are the state, so area is kept."""
 
 CONTACT = _record(
-    a=int,  # block
-    b=int,  # body or TERRAIN; the normal points to a
-    key=int,  # vertex and its owner, the same over steps; -1 - q for support q
-    owner=int,  # 1: the vertex belongs to a, 0: to b
-    other=int,  # surface of b
+    a=np.int32,  # block
+    b=np.int32,  # body or TERRAIN; the normal points to a
+    key=np.int32,  # vertex and its owner, the same over steps; -1 - q for support q
+    owner=np.int32,  # 1: the vertex belongs to a, 0: to b
+    other=np.int32,  # surface of b
+    state=np.int32,  # OPEN, STICK, SLIP
+    kind=np.int32,  # REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN
+    flips=np.int32,
+    pair=np.int32,  # off-diagonal block of the pair of bodies, -1: no coupling
     x=float,  # the vertex [m]
     y=float,
     nx=float,
@@ -82,10 +86,6 @@ CONTACT = _record(
     normal=float,  # force of this step [N], on a
     shear=float,
     lag=float,  # shear force of a slipping contact in the current iteration [N]
-    state=int,  # OPEN, STICK, SLIP
-    kind=int,  # REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN
-    flips=int,
-    pair=int,  # off-diagonal block of the pair of bodies, -1: no coupling
 )
 """One contact in one step."""
 

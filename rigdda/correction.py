@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, SHOCK, SHOCK_SPEED, STEADY_RATE
 from rigdda.gauges import barrier_contact
+from rigdda.islands import root
 from rigdda.kernel import kernel
 from rigdda.open_close import assemble_blocks, load_moment
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
@@ -97,27 +98,24 @@ def pass_on_shares(
 
     Blocks that are struck through others would else move on for a while, into those that stopped.
     """
-    spreading, blows = False, 0
-    for s in range(work.block_start[island + 1] - work.block_start[island]):
-        spreading = spreading or m.direction[s, 0] > 0.0
-    if not spreading:
+    n, struck, share = work.block_start[island + 1] - work.block_start[island], False, m.direction
+    for s in range(n):
+        work.parent[s] = s
+        struck = struck or share[s, 0] > 0.0
+    if not struck:
         return
     for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
-        if c[k].pair >= 0 and c[k].state != OPEN:
-            lighter = min(bodies[c[k].a].mass, bodies[c[k].b].mass)
-            if c[k].normal * dt > SHOCK_SPEED * lighter:
-                work.picked[blows] = k
-                blows += 1
-    while spreading:
-        spreading = False
-        for blow in range(blows):
-            k = work.picked[blow]
-            i, j = work.slot[c[k].a], work.slot[c[k].b]
-            first = max(m.direction[i, 0], m.direction[j, 0])
-            if min(m.direction[i, 0], m.direction[j, 0]) < first:
-                m.direction[i, 0] = m.direction[j, 0] = first
-                spreading = True
+        if c[k].pair < 0 or c[k].state == OPEN:
+            continue
+        lighter = min(bodies[c[k].a].mass, bodies[c[k].b].mass)
+        if c[k].normal * dt > SHOCK_SPEED * lighter:
+            i, j = root(work.parent, work.slot[c[k].a]), root(work.parent, work.slot[c[k].b])
+            first = min(i, j)
+            work.parent[max(i, j)] = first
+            share[first, 0] = max(share[i, 0], share[j, 0])
+    for s in range(n):
+        share[s, 0] = share[root(work.parent, s), 0]
 
 
 @kernel

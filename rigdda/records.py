@@ -200,7 +200,7 @@ class Work(NamedTuple):
     row_i: Ints  # (C,) slots of their bodies
     row_j: Ints
     moved_in: Ints  # (M + 1,) last sweep in which a slot moved
-    picked: Ints  # (C,) some contacts of an island, or all in another order
+    ordered: Ints  # (C,) contacts of an island in another order
     layer: Ints  # (LAYERS + 1,) contacts of an island below a height
     field: Floats  # (2,) acceleration of free blocks in this step [m/s2]
 

@@ -61,16 +61,17 @@ def overlapping_pairs(bodies: Bodies, work: Work) -> int:
         status_i = bodies[i].status
         if status_i == RETIRED or status_i == HELD:
             continue
+        low, high, end = work.low_y[i], work.high_y[i], work.high_x[i]
         for m in range(k + 1, len(order)):
             j = order[m]
-            if work.low_x[j] > work.high_x[i]:
+            if work.low_x[j] > end:
                 break
+            if work.low_y[j] > high or low > work.high_y[j]:
+                continue
             status_j = bodies[j].status
             if status_j == RETIRED or status_j == HELD:
                 continue
             if status_i != AWAKE and status_j != AWAKE:
-                continue
-            if work.low_y[j] > work.high_y[i] or work.low_y[i] > work.high_y[j]:
                 continue
             if count == room:
                 return -1

@@ -167,10 +167,10 @@ def sort_by_height(c: Contacts, work: Work, low: int, high: int) -> None:
         work.layer[s + 1] += work.layer[s]
     for place in range(low, high):
         s = int(scale * (c[item[place]].y - least))
-        work.picked[work.layer[s]] = item[place]
+        work.ordered[work.layer[s]] = item[place]
         work.layer[s] += 1
     for place in range(low, high):
-        item[place] = work.picked[place - low]
+        item[place] = work.ordered[place - low]
 
 
 @kernel

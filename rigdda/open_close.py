@@ -391,6 +391,13 @@ def is_waiting(bodies: Bodies, work: Work, low: int, high: int) -> bool:
 
 
 @kernel
+def let_wait(bodies: Bodies, work: Work, low: int, high: int) -> None:
+    """Let the island of the blocks low:high be relaxed for a while before it is solved again."""
+    for place in range(low, high):
+        bodies[work.block_item[place]].wait = WAIT_STEPS
+
+
+@kernel
 def open_close(
     bodies: Bodies,
     c: Contacts,
@@ -399,11 +406,16 @@ def open_close(
     island: int,
     p: Parameters,
     counters: NDArray,
-) -> None:
+) -> bool:
     """Settle the contacts of an island, with less restitution where impacts would gain energy.
 
     Newton's restitution with friction can raise the kinetic energy of an eccentric impact; a
     plastic one cannot, since the springs act on the velocity after the step.
+
+    Returns
+    -------
+    bool
+        Whether they settled; a large island that did not is taken as it is.
     """
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     bouncing = False
@@ -414,20 +426,22 @@ def open_close(
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     speed = island_speed(bodies, work, b0, b1)
     waiting = is_waiting(bodies, work, b0, b1)
-    relaxing = b1 - b0 > 1 and (waiting or (b1 - b0 > SMALL_ISLAND and speed > QUIET_SPEED))
+    small, settled = b1 - b0 <= SMALL_ISLAND, True
+    relaxing = not small and (waiting or speed > QUIET_SPEED)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
             relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)
-            if relaxing:
-                for place in range(b0, b1):
-                    bodies[work.block_item[place]].wait = WAIT_STEPS
+            settled = settled and not (relaxing and small)
+            if relaxing and not small:
+                let_wait(bodies, work, b0, b1)
         if relaxing:
             relax(bodies, c, m, work, island, p, counters, speed)
         if not bouncing or impact_work(c, m, work, c0, c1, p.dt) <= 0.0:
-            return
+            return settled
         for item in range(c0, c1):
             k = work.contact_item[item]
             c[k].flips = 0
             if c[k].kind == IMPACT:
                 c[k].bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0
                 c[k].state = STICK
+    return settled

@@ -25,10 +25,11 @@ class Settings:
         of a rockfall within the scatter of its releases.
     displacement_limit : float
         Greatest displacement of a corner in a step off the straight path at its first velocity,
-        over the mean block size (the root of its area). An island that would exceed it takes the
-        step in up to 32 shorter ones. Contacts are foreseen along straight paths, and blows leave
-        blocks spinning: with 0.25 nothing passes a wall 0.2 m thick at 100 m/s in steps of up to
-        0.1 s, without it a block passed at 0.05 s. Rockfalls in steps of 5 ms do not reach it.
+        over the mean block size (the root of its area). An island that would exceed it, or one of
+        one or two blocks whose contacts do not settle, takes the step in up to 32 shorter ones.
+        Contacts are foreseen along straight paths, and blows leave blocks spinning: with 0.25
+        nothing passes a wall 0.2 m thick at 100 m/s in steps of up to 0.1 s, without it a block
+        passed at 0.05 s. Rockfalls in steps of 5 ms do not reach it.
     penetration : float or None
         Wanted penetration of a contact under the load it carries [m]; the penalty stiffness
         follows from it. None: 1e-4 of the mean block size (the root of its area), small enough

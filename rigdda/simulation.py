@@ -22,6 +22,7 @@ from rigdda.constants import (
     OPEN,
     PIN,
     PLAIN,
+    QUIET_SPEED,
     REST,
     SLACK_RATIO,
     SOFT,
@@ -283,8 +284,9 @@ class Simulation:
 
     def _compression(self) -> float:
         """Return the greatest compression of a contact at rest now, over the mean block size."""
-        c = self._now[: self._counters[CONTACTS]]
-        c = c[((c["kind"] == REST) | (c["kind"] == PLAIN)) & (c["state"] != OPEN)]
+        c, b = self._now[: self._counters[CONTACTS]], self._arrays.bodies
+        quiet = np.hypot(b["vx"], b["vy"]) + np.abs(b["omega"]) * b["radius"] < QUIET_SPEED
+        c = c[((c["kind"] == REST) | (c["kind"] == PLAIN)) & (c["state"] != OPEN) & quiet[c["a"]]]
         size = self._arrays.parameters[0].slack / SLACK_RATIO
         return float((c["normal"] / c["stiffness"]).max(initial=0.0) / size)
 

@@ -204,15 +204,16 @@ def solve_and_move(
 ) -> tuple[int, float]:  # fmt: skip
     """Settle every island, note hits, then move its blocks.
 
-    An island of which a corner would end farther than `limit` [m] from its straight path is left
-    where it is, and marked.
+    An island that does not settle, or of which a corner would end farther than `limit` [m] from its
+    straight path, is left where it is, and marked.
 
     Returns
     -------
     bad : int
         A block that went bad, or -1.
     excess : float
-        Greatest departure from a straight path in the islands left, over the limit; else 0.
+        Greatest departure from a straight path in the islands left, over the limit, at least 1;
+        0 if there are none.
     """
     since = lap(counters, MOTION, 0, p.timing)
     islands = find_islands(bodies, c, count, work, p.blocks, p.islands)
@@ -221,11 +222,11 @@ def solve_and_move(
         c0, c1 = work.contact_start[s], work.contact_start[s + 1]
         if c1 > c0:
             since = lap(counters, MOTION, since, p.timing)
-            open_close(bodies, c, m, work, s, p, counters)
+            settled = open_close(bodies, c, m, work, s, p, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
             far = greatest_departure(bodies, m, work, s, p.dt) / limit
-            if far > 1.0:
-                excess = max(excess, far)
+            if far > 1.0 or (not settled and limit < math.inf):
+                excess = max(excess, far, 1.0)
                 counters[CUT_BACKS] += 1
                 mark_cut(bodies, work, s)
                 continue

@@ -49,6 +49,14 @@ def kernel(function: Callable[..., Any]) -> Any:
     return numba.njit(nogil=True, error_model="numpy", _nrt=False)(function)
 
 
+def stage(function: Callable[..., Any]) -> Any:
+    """Compile a kernel as a part of the only one that calls it.
+
+    numba optimises every kernel together with all that it calls; one level less saves seconds.
+    """
+    return numba.njit(nogil=True, error_model="numpy", _nrt=False, inline="always")(function)
+
+
 def entry_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls, and keep the machine code on disk."""
     before = config.CACHE_DIR

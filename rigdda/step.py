@@ -40,7 +40,7 @@ from rigdda.correction import (
 from rigdda.fence import limit_fences, wake_behind
 from rigdda.gauges import barrier_contact, note_hits, note_passage
 from rigdda.islands import find_islands
-from rigdda.kernel import entry_kernel, kernel
+from rigdda.kernel import entry_kernel, kernel, stage
 from rigdda.motion import top_speed
 from rigdda.open_close import open_close
 from rigdda.records import (
@@ -107,7 +107,7 @@ def keep_held(c: Contacts, count: int, old: Contacts, work: Work, a: int) -> int
     return count
 
 
-@kernel
+@stage
 def collide_block(
     bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, count: int, old: Contacts,
     work: Work, a: int, start: bool, p: Parameters,
@@ -136,7 +136,7 @@ def collide_block(
     return count
 
 
-@kernel
+@stage
 def detect(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, c: Contacts, old: Contacts,
     old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters, counters: NDArray,
@@ -168,7 +168,7 @@ def detect(
     return count
 
 
-@kernel
+@stage
 def move_island(
     bodies: Bodies, outlines: Outlines, c: Contacts, m: Matrix, work: Work, island: int,
     gauges: Gauges, p: Parameters, ledger: NDArray,
@@ -196,7 +196,7 @@ def move_island(
     return bad
 
 
-@kernel
+@stage
 def solve_and_move(
     bodies: Bodies, outlines: Outlines, c: Contacts, count: int, m: Matrix, work: Work,
     gauges: Gauges, time: float, p: Parameters, limit: float, counters: NDArray,

@@ -77,9 +77,6 @@ RELAXATION_SPEED = 0.05
 """Greatest change of a contact's velocity in a sweep at which sweeps stop [m/s]; in an island
 slower than QUIET_SPEED less in proportion, so that it comes to rest."""
 
-QUIET_SHARE = 1.0
-"""Share of the change at which sweeps stop, below which a contact does not stir its neighbours."""
-
 QUIET_SWEEPS = 100
 """Most sweeps in a step over an island slower than QUIET_SPEED."""
 

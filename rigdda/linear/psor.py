@@ -20,7 +20,6 @@ from rigdda.constants import (
     LEAST_QUIET,
     PIN,
     PLAIN,
-    QUIET_SHARE,
     QUIET_SPEED,
     QUIET_SWEEPS,
     RELAXATION_SPEED,
@@ -197,12 +196,11 @@ def relax_forces(
     scale = dt / (2.0 * RELAXATION_STIFFNESS)
     share = min(max(speed / QUIET_SPEED, LEAST_QUIET), 1.0)
     limit, far = share * RELAXATION_SPEED * scale, FAR_SPEED * scale
-    quiet = QUIET_SHARE * limit
     most = QUIET_SWEEPS if share < 1.0 else RELAXATION_SWEEPS
     sweeps, worst = 0, 1e300
     while (sweeps < most and worst > limit) or (sweeps < LAST_SWEEPS and worst > far):
         worst = sweep(
-            work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps, work.moved_in, quiet
+            work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps, work.moved_in, limit
         )
         sweeps += 1
     for place in range(count):

@@ -66,6 +66,11 @@ FEW_MOVING = 16
 PATIENCE = 8
 """up to so many times the open-close iterations: in an arch joints open one after the other."""
 
+ONE_BY_ONE = 3
+"""Open-close iterations after which one contact at a time changes in a small island. Where all
+that are at odds change at once they may go on in a circle; one by one, lowest first, they do not
+(Murty's principal pivoting, for a matrix whose principal minors are positive)."""
+
 FLIPS = 3
 """A contact that changed between stick and slip, or open and closed, this often in one step keeps
 its state. Nearly every step that does not converge has one such contact."""

@@ -23,6 +23,7 @@ from rigdda.constants import (
     FRICTION_TOLERANCE,
     IMPACT,
     MOVING,
+    ONE_BY_ONE,
     OPEN,
     OPENING_TOLERANCE,
     PATIENCE,
@@ -42,7 +43,7 @@ from rigdda.contact.joint import break_joint
 from rigdda.contact.law import set_shock
 from rigdda.islands import pair_blocks
 from rigdda.kernel import kernel
-from rigdda.linear.direct import solve_block
+from rigdda.linear.direct import solve_block, solve_two_blocks
 from rigdda.linear.pcg import solve_pcg
 from rigdda.linear.psor import relax_forces
 from rigdda.linear.skyline import profile, solve_skyline
@@ -112,7 +113,7 @@ def assemble_contact(
 
     On the displacement d of the step the spring N = kappa (b - dt u_1) has stiffness 2 kappa and
     force kappa (b + dt u_0). The friction of a slipping contact is a force; `coupled` takes it
-    from the unknown normal force, which makes the matrix unsymmetric.
+    from the unknown normal force, which makes the matrix of one or two blocks unsymmetric.
     """
     stiffness = 2.0 * c[k].kappa
     normal = c[k].kappa * (c[k].bias + dt * c[k].un)
@@ -124,13 +125,13 @@ def assemble_contact(
     add_block(m.diagonal[i], stiffness, en, en)
     add_force(m.rhs[i], normal, en)
     stick = c[k].state == STICK
+    ratio = math.copysign(c[k].friction, c[k].lag) if coupled and not (stick or bolt) else 0.0
     if bolt:
         pass
     elif stick:
         add_block(m.diagonal[i], stiffness, es, es)
         add_force(m.rhs[i], shear, es)
     elif coupled:
-        ratio = math.copysign(c[k].friction, c[k].lag)
         add_block(m.diagonal[i], stiffness * ratio, es, en)
         add_force(m.rhs[i], normal * ratio, es)
     else:
@@ -141,12 +142,21 @@ def assemble_contact(
     add_block(m.diagonal[j], stiffness, fn, fn)
     add_block(m.off[c[k].pair], stiffness, en, fn)
     add_force(m.rhs[j], normal, fn)
+    if coupled:
+        add_block(m.lower, stiffness, fn, en)
     if bolt:
         return
     if stick:
         add_block(m.diagonal[j], stiffness, fs, fs)
         add_block(m.off[c[k].pair], stiffness, es, fs)
         add_force(m.rhs[j], shear, fs)
+        if coupled:
+            add_block(m.lower, stiffness, fs, es)
+    elif coupled:
+        add_block(m.diagonal[j], stiffness * ratio, fs, fn)
+        add_block(m.off[c[k].pair], stiffness * ratio, es, fn)
+        add_block(m.lower, stiffness * ratio, fs, en)
+        add_force(m.rhs[j], normal * ratio, fs)
     else:
         add_force(m.rhs[j], c[k].lag, fs)
 
@@ -182,10 +192,14 @@ def next_state_of_link(c: Contacts, k: int, normal: float, shear: float) -> int:
 
 
 @kernel
-def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) -> int:
+def next_state(
+    c: Contacts, k: int, normal: float, shear: float, weight: float, coupled: bool
+) -> int:
     """Move contact k to the state that its forces ask for; returns NONE, MOVED or LOCKED.
 
     A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
+    Where friction is `coupled` to the normal force a slipping contact is settled if its direction
+    is right.
     """
     if c[k].kind == BOLT or c[k].kind == PIN:
         return next_state_of_link(c, k, normal, shear)
@@ -197,6 +211,8 @@ def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) 
         if c[k].flips >= FLIPS:
             return LOCKED
         c[k].state = STICK
+        if coupled and abs(shear) > c[k].friction * normal:
+            c[k].state, c[k].lag = SLIP, shear
         return MOVED
     if c[k].bond > 0.0:
         strength = c[k].cohesion + c[k].friction * max(normal, 0.0)
@@ -222,6 +238,8 @@ def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) 
         c[k].flips += 1
         return MOVED
     change = abs(c[k].shear - c[k].lag) if state == SLIP else math.inf
+    if coupled and state == SLIP and c[k].shear * math.copysign(1.0, c[k].lag) >= 0.0:
+        change = 0.0
     c[k].state = SLIP
     c[k].lag = c[k].shear
     return MOVED if change > FRICTION_TOLERANCE * (limit - tension) else NONE
@@ -229,9 +247,13 @@ def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) 
 
 @kernel
 def update_states(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, p: Parameters
-) -> tuple[int, int]:
-    """Move every contact of an island to its next state; returns how many moved and are locked."""
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, coupled: bool,
+    one: bool, p: Parameters,
+) -> tuple[int, int]:  # fmt: skip
+    """Move every contact of an island to its next state; returns how many moved and are locked.
+
+    Or only the first that is at odds with its state, as often as it takes.
+    """
     moved = locked = 0
     for item in range(low, high):
         k = work.contact_item[item]
@@ -242,9 +264,14 @@ def update_states(
             set_shock(bodies, c, k, p)
             moved += 1
             continue
-        change = next_state(c, k, normal, shear, bodies[c[k].a].mass * p.gravity)
+        weight = bodies[c[k].a].mass * p.gravity
+        if one:
+            c[k].flips = 0
+        change = next_state(c, k, normal, shear, weight, coupled)
         moved += change == MOVED
         locked += change == LOCKED
+        if one and moved > 0:
+            break
     return moved, locked
 
 
@@ -274,6 +301,7 @@ def solve_states(
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     n = b1 - b0
+    small = n <= SMALL_ISLAND
     for s in range(n):
         i = work.block_item[b0 + s]
         m.d[s, 0], m.d[s, 1] = bodies[i].vx * p.dt, bodies[i].vy * p.dt
@@ -284,10 +312,13 @@ def solve_states(
         counters[ITERATIONS] += 1
         if n == 1:
             solve_block(m.diagonal[0], m.rhs[0], m.d[0])
+        elif n == 2:
+            solve_two_blocks(m)
         else:
             counters[SOLVES] += 1
             counters[SOLVER_ITERATIONS] += solve_island(m, n, pairs, p)
-        moved, locked = update_states(bodies, c, m, work, c0, c1, p)
+        one = small and iteration >= ONE_BY_ONE
+        moved, locked = update_states(bodies, c, m, work, c0, c1, small, one, p)
         if moved == 0:
             return locked == 0
         if iteration >= p.iterations - 1 and moved > few:
@@ -302,9 +333,10 @@ def assemble_island(
     """Set the system of an island with its contacts in their current states."""
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
-    for q in range(pairs):
-        for a in range(3):
-            for b in range(3):
+    for a in range(3):
+        for b in range(3):
+            m.lower[a, b] = 0.0
+            for q in range(max(pairs, 1)):
                 m.off[q, a, b] = 0.0
     for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
@@ -312,7 +344,7 @@ def assemble_island(
             c[k].normal = c[k].shear = 0.0
         else:
             j = work.slot[c[k].b] if c[k].pair >= 0 else -1
-            assemble_contact(c, k, m, work.slot[c[k].a], j, p.dt, b1 - b0 == 1)
+            assemble_contact(c, k, m, work.slot[c[k].a], j, p.dt, b1 - b0 <= SMALL_ISLAND)
 
 
 @kernel

@@ -272,6 +272,8 @@ def empty_matrix(blocks: int, room: int) -> Matrix:
         np.zeros((room, 3, 3)),
         np.zeros(room, dtype=np.int64),
         np.zeros(room, dtype=np.int64),
+        np.zeros((3, 3)),
+        np.zeros((6, 7)),
         np.zeros((blocks, 3)),
         np.zeros((blocks + 1, 3)),
         np.zeros((blocks, 3)),

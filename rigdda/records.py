@@ -166,6 +166,8 @@ class Matrix(NamedTuple):
     off: Floats  # (pairs, 3, 3) row block pair_i, column block pair_j
     pair_i: Ints
     pair_j: Ints
+    lower: Floats  # (3, 3) block below the diagonal of two blocks with friction, unsymmetric
+    dense: Floats  # (6, 7) their matrix and forces
     rhs: Floats  # (N, 3)
     d: Floats  # (N + 1, 3) displacements u0, v0 [m], r0 [rad]; the last of what cannot move
     residual: Floats  # (N, 3) and the vectors of conjugate gradients

@@ -27,6 +27,8 @@ by Coulomb friction: a return mapping.
 
 from __future__ import annotations
 
+import math
+
 from rigdda.constants import (
     AWAKE,
     BLOW_SPEED,
@@ -253,9 +255,12 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
     c[k].friction = p.friction[surface, c[k].other]
     c[k].restitution = p.restitution[surface, c[k].other]
     c[k].flips = 0
+    c[k].lag = c[k].start_shear
     c[k].cohesion = c[k].bond * p.cohesion[surface, c[k].other]
     c[k].tension = c[k].bond * p.tension[surface, c[k].other]
     strike(bodies, c, k, 0.5 * p.dt, pull, p)
+    if c[k].lag == 0.0:
+        c[k].lag = math.copysign(0.0, -c[k].us)  # the direction of friction once it slips
     if c[k].restitution == PLAIN_CONTACT:
         set_plain(c, k, p)
         return

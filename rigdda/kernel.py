@@ -49,6 +49,15 @@ def kernel(function: Callable[..., Any]) -> Any:
     return numba.njit(nogil=True, error_model="numpy", _nrt=False)(function)
 
 
+def arithmetic_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel in which a product and a sum may be one operation, rounded once.
+
+    The only liberty: NaN and order stay as they are. The same results on one kind of machine.
+    """
+    options = {"nogil": True, "error_model": "numpy", "_nrt": False}
+    return numba.njit(fastmath={"contract"}, **options)(function)
+
+
 def stage(function: Callable[..., Any]) -> Any:
     """Compile a kernel as a part of the only one that calls it.
 

@@ -192,42 +192,28 @@ def next_state_of_link(c: Contacts, k: int, normal: float, shear: float) -> int:
 
 
 @kernel
-def next_state(
-    c: Contacts, k: int, normal: float, shear: float, weight: float, coupled: bool
-) -> int:
-    """Move contact k to the state that its forces ask for; returns NONE, MOVED or LOCKED.
+def close(c: Contacts, k: int, normal: float, shear: float, coupled: bool) -> int:
+    """Close contact k, which would bear these forces if it stuck; returns MOVED or LOCKED.
 
-    A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
-    Where friction is `coupled` to the normal force a slipping contact is settled if its direction
+    Where friction is coupled to the normal force it slips at once if it slides faster than it
+    closes: a contact that stuck would be torn open again.
+    """
+    if c[k].flips >= FLIPS:
+        return LOCKED
+    c[k].state = STICK
+    if coupled and abs(shear) > c[k].friction * normal:
+        c[k].state, c[k].lag = SLIP, shear
+    return MOVED
+
+
+@kernel
+def next_friction(c: Contacts, k: int, shear: float, tension: float, coupled: bool) -> int:
+    """Let closed contact k, whose normal force is set, stick or slip: a return mapping.
+
+    Where friction is coupled to the normal force a slipping contact is settled if its direction
     is right.
     """
-    if c[k].kind == BOLT or c[k].kind == PIN:
-        return next_state_of_link(c, k, normal, shear)
-    state = c[k].state
-    tension = -OPENING_TOLERANCE * weight
-    if state == OPEN:
-        if normal <= -tension:
-            return NONE
-        if c[k].flips >= FLIPS:
-            return LOCKED
-        c[k].state = STICK
-        if coupled and abs(shear) > c[k].friction * normal:
-            c[k].state, c[k].lag = SLIP, shear
-        return MOVED
-    if c[k].bond > 0.0:
-        strength = c[k].cohesion + c[k].friction * max(normal, 0.0)
-        if normal >= -c[k].tension and abs(shear) <= strength:
-            c[k].normal, c[k].shear = normal, shear
-            return NONE
-        break_joint(c, k)
-        if normal >= tension:
-            return MOVED
-    if normal < tension:
-        c[k].state = OPEN
-        c[k].flips += 1
-        return MOVED
-    c[k].normal = max(normal, 0.0)
-    limit = c[k].friction * c[k].normal
+    state, limit = c[k].state, c[k].friction * c[k].normal
     c[k].shear = min(max(shear, -limit), limit)
     if abs(shear) <= limit:
         if state == STICK:
@@ -243,6 +229,35 @@ def next_state(
     c[k].state = SLIP
     c[k].lag = c[k].shear
     return MOVED if change > FRICTION_TOLERANCE * (limit - tension) else NONE
+
+
+@kernel
+def next_state(
+    c: Contacts, k: int, normal: float, shear: float, weight: float, coupled: bool
+) -> int:
+    """Move contact k to the state that its forces ask for; returns NONE, MOVED or LOCKED.
+
+    A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
+    """
+    if c[k].kind == BOLT or c[k].kind == PIN:
+        return next_state_of_link(c, k, normal, shear)
+    tension = -OPENING_TOLERANCE * weight
+    if c[k].state == OPEN:
+        return NONE if normal <= -tension else close(c, k, normal, shear, coupled)
+    if c[k].bond > 0.0:
+        strength = c[k].cohesion + c[k].friction * max(normal, 0.0)
+        if normal >= -c[k].tension and abs(shear) <= strength:
+            c[k].normal, c[k].shear = normal, shear
+            return NONE
+        break_joint(c, k)
+        if normal >= tension:
+            return MOVED
+    if normal < tension:
+        c[k].state = OPEN
+        c[k].flips += 1
+        return MOVED
+    c[k].normal = max(normal, 0.0)
+    return next_friction(c, k, shear, tension, coupled)
 
 
 @kernel
@@ -363,7 +378,7 @@ def relax(
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
     counters[RELAXED] += 1
-    counters[SWEEPS] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt, speed)
+    counters[SWEEPS] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt, speed, p.gravity)
     for item in range(c0, c1):
         k = work.contact_item[item]
         limit = c[k].cohesion + c[k].friction * max(c[k].normal, 0.0)

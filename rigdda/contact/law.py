@@ -280,6 +280,7 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
         set_rest(c, k, weight, most, p)
         return
     set_new(bodies, c, k, start, p)
-    # what touches starts closed: in a stack no block moves before those below it are held
-    if gap - mean * p.dt < p.penetration:
+    # what touches starts closed: in a stack no block moves before those below it are held, and
+    # what hangs on a joint is held by it
+    if c[k].bond > 0.0 or gap - mean * p.dt < p.penetration:
         c[k].state = STICK

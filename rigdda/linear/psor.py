@@ -17,24 +17,25 @@ from rigdda.constants import (
     BOLT,
     FAR_SPEED,
     LAST_SWEEPS,
-    LEAST_QUIET,
+    LEAST_RELAXATION,
     PIN,
     PLAIN,
-    QUIET_SPEED,
     QUIET_SWEEPS,
+    RELAXATION_SHARE,
     RELAXATION_SPEED,
     RELAXATION_STIFFNESS,
     RELAXATION_SWEEPS,
 )
-from rigdda.kernel import kernel
+from rigdda.kernel import arithmetic_kernel, kernel
 from rigdda.records import Contacts, Floats, Ints, Matrix, Work
 
-# columns of work.row: rows of a and b along the normal and the shear direction, then by direction
-# gain [N/m], free displacement [m], force [N]; friction, and forces that it bears beside [N]
-NORMAL_A, NORMAL_B, SHEAR_A, SHEAR_B = 0, 3, 6, 9
-GAIN, FREE, SOFT, FORCE = 12, 14, 16, 18
-FRICTION, COHESION, TENSION = 20, 21, 22
-COLUMNS = 23
+# columns of work.row: normal (x, y); moments of a unit force along normal and shear about a and b,
+# by direction gain [N/m], free displacement [m], softness [m/N], force [N]; friction, and forces
+# that it bears beside [N]
+NORMAL, TURN_A, TURN_B = 0, 2, 4
+GAIN, FREE, SOFT, FORCE = 6, 8, 10, 12
+FRICTION, COHESION, TENSION = 14, 15, 16
+COLUMNS = 17
 
 
 @kernel
@@ -55,9 +56,9 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, dt:
     work.row_i[place], work.row_j[place] = i, j
     en, es = normal_row(c, k, True), shear_row(c, k, True)
     fn, fs = normal_row(c, k, False), shear_row(c, k, False)
-    for q in range(3):
-        row[place, NORMAL_A + q], row[place, SHEAR_A + q] = en[q], es[q]
-        row[place, NORMAL_B + q], row[place, SHEAR_B + q] = fn[q], fs[q]
+    row[place, NORMAL], row[place, NORMAL + 1] = en[0], en[1]
+    row[place, TURN_A], row[place, TURN_A + 1] = en[2], es[2]
+    row[place, TURN_B], row[place, TURN_B + 1] = fn[2], fs[2]
     soft_n = flexibility(m.scaled, i, en) + flexibility(m.scaled, j, fn)
     soft_s = flexibility(m.scaled, i, es) + flexibility(m.scaled, j, fs)
     own = old.kind == PLAIN or old.kind == BOLT or old.kind == PIN
@@ -73,21 +74,20 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, dt:
     row[place, FORCE], row[place, FORCE + 1] = old.start_normal, old.start_shear
     row[place, FRICTION], row[place, TENSION] = old.friction, old.tension
     row[place, COHESION] = math.inf if old.kind == PIN else old.cohesion
-    push(row, place, NORMAL_A, i, j, m.d, m.scaled, old.start_normal)
-    push(row, place, SHEAR_A, i, j, m.d, m.scaled, old.start_shear)
+    push(m.d, m.scaled, i, en, old.start_normal)
+    push(m.d, m.scaled, i, es, old.start_shear)
+    push(m.d, m.scaled, j, fn, old.start_normal)
+    push(m.d, m.scaled, j, fs, old.start_shear)
 
 
 @kernel
-def push(
-    row: Floats, place: int, column: int, i: int, j: int, d: Floats, inverse: Floats, force: float
-) -> None:
-    """Move the blocks of a row by what a force along its direction displaces each alone."""
+def push(d: Floats, inverse: Floats, i: int, e: tuple[float, float, float], force: float) -> None:
+    """Move slot i by what a force along e displaces it alone."""
     for q in range(3):
-        d[i, q] += force * inverse[i, q] * row[place, column + q]
-        d[j, q] += force * inverse[j, q] * row[place, column + 3 + q]
+        d[i, q] += force * inverse[i, q] * e[q]
 
 
-@kernel
+@arithmetic_kernel
 def sweep(
     row: Floats, row_i: Ints, row_j: Ints, d: Floats, inverse: Floats, count: int, number: int,
     moved_in: Ints, quiet: float,
@@ -107,41 +107,34 @@ def sweep(
         if moved_in[i] < number - 1 and moved_in[j] < number - 1:
             continue
         r = row[place]
-        u, v, w, light, turn = d[i, 0], d[i, 1], d[i, 2], inverse[i, 0], inverse[i, 2]
-        u2, v2, w2, light2, turn2 = d[j, 0], d[j, 1], d[j, 2], inverse[j, 0], inverse[j, 2]
-        moved = r[NORMAL_A] * u + r[NORMAL_A + 1] * v + r[NORMAL_A + 2] * w
-        moved += r[NORMAL_B] * u2 + r[NORMAL_B + 1] * v2 + r[NORMAL_B + 2] * w2
-        force = r[FORCE]
-        normal = force + r[GAIN] * (r[FREE] - 2.0 * moved - force * r[SOFT])
+        nx, ny, turn_i, turn_j = r[NORMAL], r[NORMAL + 1], r[TURN_A], r[TURN_B]
+        u, v, w, u2, v2, w2 = d[i, 0], d[i, 1], d[i, 2], d[j, 0], d[j, 1], d[j, 2]
+        moved = (nx * (u - u2) + ny * (v - v2)) + (turn_i * w + turn_j * w2)
+        force, before = r[FORCE], r[FORCE + 1]
+        normal = force + r[GAIN] * ((r[FREE] - force * r[SOFT]) - 2.0 * moved)
         normal = max(normal, -r[TENSION])
         push = normal - force
         limit = r[COHESION] + r[FRICTION] * max(normal, 0.0)
-        before = r[FORCE + 1]
         if push == 0.0 and limit == 0.0 and before == 0.0:
             continue
         change = abs(push) * r[SOFT]
         worst = max(worst, change)
-        u += push * light * r[NORMAL_A]
-        v += push * light * r[NORMAL_A + 1]
-        w += push * turn * r[NORMAL_A + 2]
-        u2 += push * light2 * r[NORMAL_B]
-        v2 += push * light2 * r[NORMAL_B + 1]
-        w2 += push * turn2 * r[NORMAL_B + 2]
-        moved = r[SHEAR_A] * u + r[SHEAR_A + 1] * v + r[SHEAR_A + 2] * w
-        moved += r[SHEAR_B] * u2 + r[SHEAR_B + 1] * v2 + r[SHEAR_B + 2] * w2
-        shear = before + r[GAIN + 1] * (r[FREE + 1] - 2.0 * moved - before * r[SOFT + 1])
+        light_i, slow_i = inverse[i, 0], inverse[i, 2]
+        light_j, slow_j = inverse[j, 0], inverse[j, 2]
+        u, v, w = u + push * light_i * nx, v + push * light_i * ny, w + push * slow_i * turn_i
+        u2, v2, w2 = u2 - push * light_j * nx, v2 - push * light_j * ny, w2 + push * slow_j * turn_j
+        turn_i, turn_j = r[TURN_A + 1], r[TURN_B + 1]
+        moved = (nx * (v - v2) - ny * (u - u2)) + (turn_i * w + turn_j * w2)
+        shear = before + r[GAIN + 1] * ((r[FREE + 1] - before * r[SOFT + 1]) - 2.0 * moved)
         shear = min(max(shear, -limit), limit)
         push = shear - before
         if change + abs(push) * r[SOFT + 1] > quiet:
             moved_in[i] = number
-            if light2 > 0.0:
+            if light_j > 0.0:
                 moved_in[j] = number
-        d[i, 0] = u + push * light * r[SHEAR_A]
-        d[i, 1] = v + push * light * r[SHEAR_A + 1]
-        d[i, 2] = w + push * turn * r[SHEAR_A + 2]
-        d[j, 0] = u2 + push * light2 * r[SHEAR_B]
-        d[j, 1] = v2 + push * light2 * r[SHEAR_B + 1]
-        d[j, 2] = w2 + push * turn2 * r[SHEAR_B + 2]
+        d[i, 0], d[i, 1] = u - push * light_i * ny, v + push * light_i * nx
+        d[j, 0], d[j, 1] = u2 + push * light_j * ny, v2 - push * light_j * nx
+        d[i, 2], d[j, 2] = w + push * slow_i * turn_i, w2 + push * slow_j * turn_j
         r[FORCE], r[FORCE + 1] = normal, shear
     return worst
 
@@ -174,8 +167,9 @@ def sort_by_height(c: Contacts, work: Work, low: int, high: int) -> None:
 
 @kernel
 def relax_forces(
-    c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int, dt: float, speed: float
-) -> int:
+    c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int, dt: float, speed: float,
+    gravity: float,
+) -> int:  # fmt: skip
     """Sweep to and fro over the contacts low:high until their forces settle; returns the sweeps.
 
     The matrix holds inertia and weight only; m.d is set to the displacements. `speed` is the
@@ -194,9 +188,9 @@ def relax_forces(
     for place in range(count):
         pack_row(c, work.contact_item[low + place], m, work, place, n, dt)
     scale = dt / (2.0 * RELAXATION_STIFFNESS)
-    share = min(max(speed / QUIET_SPEED, LEAST_QUIET), 1.0)
-    limit, far = share * RELAXATION_SPEED * scale, FAR_SPEED * scale
-    most = QUIET_SWEEPS if share < 1.0 else RELAXATION_SWEEPS
+    tolerance = max(RELAXATION_SHARE * speed, LEAST_RELAXATION * gravity * dt)
+    most = QUIET_SWEEPS if tolerance < RELAXATION_SPEED else RELAXATION_SWEEPS
+    limit, far = min(tolerance, RELAXATION_SPEED) * scale, FAR_SPEED * scale
     sweeps, worst = 0, 1e300
     while (sweeps < most and worst > limit) or (sweeps < LAST_SWEEPS and worst > far):
         worst = sweep(

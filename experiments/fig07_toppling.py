@@ -20,7 +20,7 @@ from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, mai
 from rigdda.limit_equilibrium import Toppling
 from rigdda.validation import toppling
 from rigdda.validation.case import Lab, Metered
-from rigdda.validation.scenes import Floats, polygon
+from rigdda.validation.scenes import Floats
 
 MODES_DEG = 38.0
 """Friction angle at which the modes are told [deg]."""

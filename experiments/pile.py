@@ -1,8 +1,6 @@
-"""A wall of bricks, pressed by its weight and a load, for measurements of one step."""
+"""A pile of bricks, pressed by its weight and a load, for measurements of one step."""
 
 from __future__ import annotations
-
-import numpy as np
 
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
 from rigdda.islands import find_islands, pair_blocks
@@ -12,8 +10,8 @@ from rigdda.records import CONTACTS, Bodies, Contacts, Matrix, Parameters, Work
 from rigdda.scene import Surface
 from rigdda.validation.scenes import GRAVITY, box
 
-WIDTH, HEIGHT = 2.0, 1.0
-"""Size of a brick [m]."""
+WIDTH, HEIGHT, JOINT = 2.0, 1.0, 0.01
+"""Size of a brick and width of the open joint beside it [m]."""
 
 DT = 5e-3
 """Time step [s]."""
@@ -25,20 +23,21 @@ SETTLING = 20
 """Static steps after which every contact is pressed."""
 
 
-def wall(courses: int, columns: int) -> Scene:
-    """Return bricks in running bond on level ground, every other course shifted by half a brick.
+def pile(courses: int) -> Scene:
+    """Return bricks on level ground, each on two of the course below, as many on top as courses.
 
-    Contacts are the paper's plain penalty springs.
+    A pile with n courses has n^2 + n (n - 1) / 2 bricks. It narrows upwards and bricks of a course
+    do not touch: so every contact is pressed, and none flips for want of a load. Contacts are the
+    paper's plain penalty springs.
     """
-    blocks = tuple(
-        box(WIDTH * (column + 0.5 * (course % 2)), HEIGHT * (course + 0.5), WIDTH, HEIGHT)
-        for course in range(courses)
-        for column in range(columns)
-    )
-    top = range((courses - 1) * columns, courses * columns)
-    loads = [_load(i, blocks[i]) for i in top]
-    ground = Terrain(((-50.0, 0.0), (WIDTH * columns + 50.0, 0.0)))
-    return Scene(ground, blocks, {"rock": Surface(30.0, restitution=None)}, loads=tuple(loads))
+    blocks, pitch = [], WIDTH + JOINT
+    for course in range(courses):
+        y = HEIGHT * (course + 0.5)
+        for column in range(2 * courses - 1 - course):
+            blocks.append(box(pitch * (column + 0.5 * course), y, WIDTH, HEIGHT))
+    loads = tuple(_load(i, blocks[i]) for i in range(len(blocks) - courses, len(blocks)))
+    ground = Terrain(((-50.0, 0.0), (2.0 * pitch * courses + 50.0, 0.0)))
+    return Scene(ground, tuple(blocks), {"rock": Surface(30.0, restitution=None)}, loads=loads)
 
 
 def _load(index: int, block: Block) -> PointLoad:
@@ -72,9 +71,7 @@ def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
 
 
 @entry_kernel
-def assemble(
-    bodies: Bodies, c: Contacts, count: int, m: Matrix, work: Work, p: Parameters
-) -> int:
+def assemble(bodies: Bodies, c: Contacts, count: int, m: Matrix, work: Work, p: Parameters) -> int:
     """Assemble all blocks as one island with their contacts as they are; returns the pairs."""
     find_islands(bodies, c, count, work, p.blocks, False)
     pairs = pair_blocks(bodies, c, m, work, 0, count)

@@ -34,7 +34,7 @@ from rigdda.records import Matrix
 STIFFNESS = (0.1, 1.0, 10.0)
 """k_n dt^2 / (2 m) [-]."""
 
-COURSES, QUICK_COURSES = (2, 3, 5, 7, 10, 14, 19, 26), (2, 4, 7, 13)
+COURSES, QUICK_COURSES = (2, 3, 5, 8, 11, 16, 22, 32), (2, 4, 8, 16)
 """Courses of the pile."""
 
 TOLERANCE = 1e-7

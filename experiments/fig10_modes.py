@@ -10,6 +10,7 @@ from the slope than it is large, and the touches in a turn, are told beside it.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def separation(rows: list[dict[str, Any]]) -> float:
     """Return the least distance of neighbouring intervals of the touches; below 0: they overlap."""
     gaps = [
         a["touches"] - a["half_interval"] - b["touches"] - b["half_interval"]
-        for a, b in zip(rows, rows[1:], strict=False)
+        for a, b in pairwise(rows)
         if a["contact"] == b["contact"]
     ]
     return min(gaps)
@@ -117,7 +118,8 @@ def run(quick: bool, out: Path) -> Number:
     write(out / "fig10_modes.csv", rows)
     draw(out / "fig10_modes.png", (13.0, 6.0), picture)
     told = (
-        f"{r['mode']}, {r['contact']}: {r['touches']:.1f} touches, {r['touches_a_turn']:.2f} a turn, "
+        f"{r['mode']}, {r['contact']}: {r['touches']:.1f} touches, "
+        f"{r['touches_a_turn']:.2f} a turn, "
         f"aloft {r['time_aloft']:.2f} of the time"
         for r in rows
     )

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
+import numpy as np
+
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
+from rigdda.geometry import polygon_properties
 from rigdda.islands import find_islands, pair_blocks
 from rigdda.kernel import entry_kernel
 from rigdda.open_close import assemble_island
@@ -17,33 +22,41 @@ DT = 5e-3
 """Time step [s]."""
 
 LOAD = 10.0
-"""Load on each brick of the top course over its weight [-]."""
+"""Load on a brick of the top course over its weight [-]."""
+
+STIR = 0.3
+"""Standard deviation of random forces over the greatest force [-]."""
 
 SETTLING = 20
 """Static steps after which every contact is pressed."""
 
 
 def pile(courses: int) -> Scene:
-    """Return bricks on level ground, each on two of the course below, as many on top as courses.
+    """Return a pile of bricks in running bond on level ground, as many in a course as courses.
 
-    A pile with n courses has n^2 + n (n - 1) / 2 bricks. It narrows upwards and bricks of a course
-    do not touch: so every contact is pressed, and none flips for want of a load. Contacts are the
-    paper's plain penalty springs.
+    Every other course ends in half bricks, and the load on the top course is even: so all contacts
+    of a course bear the same, and none flips. They are the paper's plain penalty springs.
     """
-    blocks, pitch = [], WIDTH + JOINT
+    end = courses * (WIDTH + JOINT)
+    blocks = []
     for course in range(courses):
-        y = HEIGHT * (course + 0.5)
-        for column in range(2 * courses - 1 - course):
-            blocks.append(box(pitch * (column + 0.5 * course), y, WIDTH, HEIGHT))
-    loads = tuple(_load(i, blocks[i]) for i in range(len(blocks) - courses, len(blocks)))
-    ground = Terrain(((-50.0, 0.0), (2.0 * pitch * courses + 50.0, 0.0)))
-    return Scene(ground, tuple(blocks), {"rock": Surface(30.0, restitution=None)}, loads=loads)
+        joints = [
+            (WIDTH + JOINT) * (i - 0.5 * (course % 2)) for i in range(courses + 1 + course % 2)
+        ]
+        edges = [max(joints[0], 0.0), *joints[1:-1], min(joints[-1], end)]
+        for left, right in pairwise(edges):
+            width, y = right - left - JOINT, HEIGHT * (course + 0.5)
+            blocks.append(box(0.5 * (left + right), y, width, HEIGHT))
+    top = range(len(blocks) - len(edges) + 1, len(blocks))
+    ground = Terrain(((-50.0, 0.0), (end + 50.0, 0.0)))
+    surfaces = {"rock": Surface(30.0, restitution=None)}
+    return Scene(ground, tuple(blocks), surfaces, loads=tuple(_load(i, blocks[i]) for i in top))
 
 
 def _load(index: int, block: Block) -> PointLoad:
-    x, y = block.vertices.mean(axis=0)
-    weight = block.density * WIDTH * HEIGHT * GRAVITY
-    return PointLoad(index, (float(x), float(y)), (0.0, -LOAD * weight))
+    """Return a load on the centroid of a block, in proportion to its weight."""
+    area, (x, y), _ = polygon_properties(block.vertices)
+    return PointLoad(index, (x, y), (0.0, -LOAD * block.density * area * GRAVITY))
 
 
 def settings(h: float, **more: object) -> Settings:
@@ -52,7 +65,10 @@ def settings(h: float, **more: object) -> Settings:
 
 
 def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
-    """Return the simultaneous equations of the next step of a pressed scene.
+    """Return the simultaneous equations of a step of a pressed scene.
+
+    A random force and moment on each block stand for its motion. Without them an even load leaves
+    most modes at rest, which helps conjugate gradients but not over-relaxation.
 
     Returns
     -------
@@ -67,7 +83,10 @@ def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
     count = int(sim._counters[CONTACTS])
     a.bodies["vx"] = a.bodies["vy"] = a.bodies["omega"] = 0.0
     pairs = assemble(a.bodies, sim._now, count, a.matrix, a.work, a.parameters[0])
-    return a.matrix, len(scene.blocks), pairs
+    n = len(scene.blocks)
+    stir = STIR * np.random.default_rng(n).standard_normal((n, 3))
+    a.matrix.rhs[:n] += stir * np.abs(a.matrix.rhs[:n]).max()
+    return a.matrix, n, pairs
 
 
 @entry_kernel

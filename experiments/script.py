@@ -110,10 +110,11 @@ def draw(
     path: Path,
     size: tuple[float, float],
     picture: Callable[[Figure], None],
+    dpi: int = DPI,
 ) -> None:
     """Write what `picture` draws into a figure of `size` [inch] as PNG; whole or not at all."""
     with rc_context(STYLE), atomic(path) as part:
-        figure = Figure(size, dpi=DPI, layout="compressed")
+        figure = Figure(size, dpi=dpi, layout="constrained")
         picture(figure)
         figure.savefig(part, format="png")
 

@@ -30,11 +30,11 @@ SLOPES_DEG = {"rolling": 35, "bouncing": 60, "falling": 80}
 
 CONTACTS = {"restitution 0.35": 0.35, "plain": None}
 
-RELEASES, QUICK_RELEASES = 64, 24
+RELEASES, QUICK_RELEASES = 64, 16
 """Blocks pushed off each crest."""
 
-DRAWN, EVERY, WATCHED = 3, 0.2, 8.0
-"""Blocks that are drawn, how often, and for how long [s]."""
+DRAWN, EVERY, STRIDE, WATCHED = 3, 0.2, 4, 8.0
+"""Blocks that are drawn, how often [s], steps from point to point of a path, and how long [s]."""
 
 
 def site_of(slope_deg: int, restitution: float | None) -> Site:
@@ -91,10 +91,10 @@ def draw_descents(axes: Axes, mode: str, contact: str) -> None:
         block, _ = ritchie.pushed(site, lab.random(slope_deg, i))
         sim = Simulation(Scene(site.profile, (block,), site.surfaces), Settings(dt=lab.dt))
         path = [sim.poses[0, :2]]
-        for step in range(lab.steps(WATCHED)):
+        for step in range(0, lab.steps(WATCHED), STRIDE):
             if step % lab.steps(EVERY) == 0:
                 axes.fill(*sim.vertices(0).T, color=colour, alpha=0.6, linewidth=0)
-            sim.step()
+            sim.step(STRIDE)
             path.append(sim.poses[0, :2])
         axes.plot(*np.array(path).T, color=colour, linewidth=0.6)
     axes.set(aspect="equal", xlim=(-2.0, 36.0), ylim=(-1.5, 22.5))
@@ -116,7 +116,7 @@ def run(quick: bool, out: Path) -> Number:
         figure.supylabel("y [m]", fontsize=10)
 
     write(out / "fig10_modes.csv", rows)
-    draw(out / "fig10_modes.png", (13.0, 6.0), picture)
+    draw(out / "fig10_modes.png", (13.0, 6.8), picture)
     told = (
         f"{r['mode']}, {r['contact']}: {r['touches']:.1f} touches, "
         f"{r['touches_a_turn']:.2f} a turn, "

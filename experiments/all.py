@@ -1,4 +1,4 @@
-"""Every figure, table and study, one after the other: `python -m experiments.all [--quick]`."""
+"""Every figure, table and study, one after the other."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from experiments.script import RESULTS, Number, say
+from experiments.script import Number, folder, options, say
 
 SCRIPTS = (
     "fig01_expansion",
@@ -66,14 +66,13 @@ def summary(results: list[Result]) -> Table:
 
 
 @click.command(help=__doc__)
-@click.option("--quick", is_flag=True, help="Fewer sizes, releases and steps: minutes.")
-@click.option("--out", type=click.Path(path_type=Path), default=RESULTS, show_default=True)
-def main(quick: bool, out: Path) -> None:
+@options
+def main(quick: bool, out: Path | None) -> None:
     """Run all scripts; exits with 1 and names those that failed or missed their target."""
     results = []
     for i, script in enumerate(SCRIPTS):
         say(f"[{i + 1}/{len(SCRIPTS)}] {script}")
-        results.append(attempt(script, quick, out))
+        results.append(attempt(script, quick, folder(quick, out)))
         say(str(results[-1].number or results[-1].error))
     Console(width=None if sys.stdout.isatty() else 140).print(summary(results))
     failed = [r.script for r in results if not r.passed]

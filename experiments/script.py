@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 from rigdda.files import atomic
 
 RESULTS = Path("experiments/results")
+"""Where results are recorded; quick ones go into its folder `quick`."""
 
 BLUE, RED, GREEN, ORANGE, GREY = "#1c5aa0", "#c0392b", "#2e8b57", "#e85d04", "#68584a"
 """Colours of curves."""
@@ -78,14 +79,27 @@ class Number(NamedTuple):
 Run = Callable[[bool, Path], Number]
 
 
+def options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of every script to a function of (quick, out); None is where results go."""
+    quick = click.option("--quick", is_flag=True, help="Fewer sizes, releases and steps: minutes.")
+    out = click.option(
+        "--out", type=click.Path(path_type=Path), help=f"Folder of CSV and pictures: {RESULTS}."
+    )
+    return quick(out(command))
+
+
+def folder(quick: bool, out: Path | None) -> Path:
+    """Return the folder that was asked for, or where results go."""
+    return out or (RESULTS / "quick" if quick else RESULTS)
+
+
 def main(run: Run) -> None:
     """Run one script from the command line; exits with 1 if its target is not reached."""
 
     @click.command(help=sys.modules[run.__module__].__doc__)
-    @click.option("--quick", is_flag=True, help="Fewer sizes, releases and steps.")
-    @click.option("--out", type=click.Path(path_type=Path), default=RESULTS, show_default=True)
-    def command(quick: bool, out: Path) -> None:
-        number = run(quick, out)
+    @options
+    def command(quick: bool, out: Path | None) -> None:
+        number = run(quick, folder(quick, out))
         click.echo(number)
         sys.exit(not number.passed)
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
+from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
 from rigdda.correction import keep_memory, place_normals
 from rigdda.islands import find_islands, pair_blocks
 from rigdda.kernel import kernel
-from rigdda.open_close import MOVED, next_state
 from rigdda.records import (
     CONTACT_TOTAL,
     CONTACTS,
@@ -54,7 +54,7 @@ def settle(
         for k in range(count):
             normal, shear = forces(c, k, s)
             weight = bodies[c[k].a].mass * p.gravity
-            moved += next_state(c, k, normal, shear, weight) == MOVED
+            moved += next_state(c, k, normal, shear, weight)
         if moved == 0:
             return
 

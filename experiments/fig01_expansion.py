@@ -31,7 +31,7 @@ ROTATIONS = (1e-3, 3e-3, 1e-2, 3e-2, 5e-2)
 SLOPE = ((-6.0, 16.0), (0.0, 16.0), (16.0, 0.0), (60.0, 0.0))
 """Where the block falls [m]."""
 
-DURATION, FRAMES = 6.0, 9
+DURATION, FRAMES = 5.4, 9
 """Time of its fall [s] and how often it is drawn."""
 
 

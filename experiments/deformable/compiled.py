@@ -1,0 +1,27 @@
+"""Compilation of an entry kernel whose parts lie here and in the core, and its cache."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+
+from rigdda.kernel import cache_directory
+
+
+def entry(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that Python calls; kept on disk under the hash of both sets of sources."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    folder = cache_directory() / f"deformable-{digest.hexdigest()[:16]}"
+    folder.mkdir(exist_ok=True)
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    try:
+        return numba.njit(nogil=True, cache=True, error_model="numpy", _nrt=False)(function)
+    finally:
+        config.CACHE_DIR = before

@@ -1,0 +1,135 @@
+"""One step of deformable blocks: detect contacts, settle them, move."""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import NDArray
+
+from experiments.deformable.compiled import entry
+from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
+from experiments.deformable.states import next_state
+from experiments.deformable.submatrices import UNKNOWNS
+from rigdda.correction import keep_memory, place_normals
+from rigdda.islands import find_islands, pair_blocks
+from rigdda.kernel import kernel
+from rigdda.records import (
+    CONTACT_TOTAL,
+    CONTACTS,
+    ITERATIONS,
+    SOLVER_ITERATIONS,
+    SOLVES,
+    STEPS,
+    Bodies,
+    Contacts,
+    Floats,
+    Gauges,
+    Ground,
+    Links,
+    Matrix,
+    Outlines,
+    Parameters,
+    Shaking,
+    Work,
+)
+from rigdda.shaking import set_field
+from rigdda.step import detect
+
+
+@kernel
+def settle(
+    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, s: Solid, m: Matrix, work: Work,
+    n: int, pairs: int, p: Parameters, counters: NDArray,
+) -> None:  # fmt: skip
+    """Iterate until no contact opens, closes, slips or sticks any more."""
+    for i in range(n):
+        for a in range(UNKNOWNS):
+            s.d[i, a] = p.dt * s.velocity[i, a]
+    for _ in range(p.iterations):
+        assemble(bodies, outlines, c, count, s, work, n, pairs, p)
+        counters[ITERATIONS] += 1
+        counters[SOLVES] += 1
+        counters[SOLVER_ITERATIONS] += solve_pcg(s, m, n, pairs, p.tolerance)
+        moved = 0
+        for k in range(count):
+            normal, shear = forces(c, k, s)
+            weight = bodies[c[k].a].mass * p.gravity
+            moved += next_state(c, k, normal, shear, weight)
+        if moved == 0:
+            return
+
+
+@kernel
+def move_block(bodies: Bodies, outlines: Outlines, s: Solid, i: int, dt: float) -> None:
+    """Move and strain block i by T D, without post-correction; V1 = 2 D / dt - V0."""
+    for a in range(UNKNOWNS):
+        s.velocity[i, a] = 2.0 * s.d[i, a] / dt - s.velocity[i, a]
+    for a in range(3):
+        for b in range(3):
+            s.stress[i, a] += s.elasticity[a, b] * s.d[i, 3 + b]
+    u, v, r, ex, ey, g = s.d[i, 0], s.d[i, 1], s.d[i, 2], s.d[i, 3], s.d[i, 4], s.d[i, 5]
+    radius = 0.0
+    for k in range(bodies[i].count):
+        x, y = outlines.world_x[i, k] - bodies[i].x, outlines.world_y[i, k] - bodies[i].y
+        moved_x, moved_y = x - y * r + x * ex + 0.5 * y * g, y + x * r + y * ey + 0.5 * x * g
+        outlines.world_x[i, k] = bodies[i].x + u + moved_x
+        outlines.world_y[i, k] = bodies[i].y + v + moved_y
+        radius = max(radius, math.hypot(moved_x, moved_y))
+    place_normals(outlines, i)
+    bodies[i].radius = radius
+    bodies[i].x += u
+    bodies[i].y += v
+    bodies[i].theta += r
+    bodies[i].vx, bodies[i].vy, bodies[i].omega = (
+        s.velocity[i, 0],
+        s.velocity[i, 1],
+        s.velocity[i, 2],
+    )
+
+
+@kernel
+def rest_all(bodies: Bodies, velocity: Floats) -> None:
+    """Take the velocity from every block: static mode."""
+    velocity[:] = 0.0
+    for i in range(len(velocity)):
+        bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
+
+
+@entry
+def advance(
+    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
+    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters,
+    counters: NDArray, s: Solid, steps: int,
+) -> tuple[bool, bool]:  # fmt: skip
+    """Take steps with the contact detection of the core.
+
+    Returns
+    -------
+    fits, swapped : bool
+        Whether all contacts fitted; whether `now` and `before` have changed roles.
+    """
+    n, swapped = len(s.d), False
+    for _ in range(steps):
+        start = counters[STEPS] * p.dt
+        if p.static:
+            rest_all(bodies, s.velocity)
+        set_field(work, shaking, start, start + p.dt, p)
+        count = detect(
+            bodies, outlines, ground, links, before, now, counters[CONTACTS], work, gauges,
+            start + p.dt, p, counters,
+        )  # fmt: skip
+        if count < 0:
+            return False, swapped
+        now, before = before, now
+        swapped = not swapped
+        counters[CONTACTS] = count
+        counters[CONTACT_TOTAL] += count
+        find_islands(bodies, now, count, work, p.blocks, False)
+        pairs = pair_blocks(bodies, now, m, work, 0, count)
+        settle(bodies, outlines, now, count, s, m, work, n, pairs, p, counters)
+        for k in range(count):
+            keep_memory(now, k, False)
+        for i in range(n):
+            move_block(bodies, outlines, s, i, p.dt)
+        counters[STEPS] += 1
+    return True, swapped

@@ -1,0 +1,68 @@
+"""The highway site of Figs 11 to 14, with the contact and the damping of a variant."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from msgspec.structs import replace as changed
+
+from envs.picture import draw as draw_frame
+from rigdda import Run, Site, release
+from rigdda.barriers import Layout
+from rigdda.errors import SoftContacts
+from rigdda.geometry import polygon_properties
+from rigdda.outcome import Outcome
+
+SITE = Site.load("shu-hwa")
+
+ALPHA = SITE.motion.damping
+"""Damping coefficient of the paper, 0.6 1/s."""
+
+CONTACTS = {"restitution 0.2": 0.2, "plain": None}
+"""Prescribed restitution of all surfaces; None is the paper's plain penalty contact."""
+
+DURATION = 60.0
+"""Simulated time [s]: at 1.2 1/s blocks fall at 8 m/s at most, and some still do after 40 s."""
+
+ABOUT = 10.0
+"""Distance uphill of the toe up to which a deposit lies about it [m]."""
+
+ZONES = ("slope", "toe", "road", "beyond")
+"""The slope, about the toe up to the road, the road, and beyond it."""
+
+
+def variant(contact: str, alpha: float = ALPHA) -> Site:
+    """Return the site with this contact and damping coefficient [1/s]."""
+    surfaces = {k: replace(s, restitution=CONTACTS[contact]) for k, s in SITE.surfaces.items()}
+    motion = changed(SITE.motion, damping=alpha, duration=DURATION)
+    return changed(SITE, surfaces=surfaces, motion=motion)
+
+
+def releases(site: Site, layout: Layout, seeds: Iterable[int]) -> list[tuple[Run, Outcome]]:
+    """Return the releases of these seeds, over all cores in threads."""
+    with warnings.catch_warnings(), ThreadPoolExecutor() as pool:
+        # plain contacts are all of one stiffness, too soft for what lies lowest in a deposit
+        warnings.simplefilter("ignore", SoftContacts)
+        return list(pool.map(lambda seed: release(site, layout, seed), seeds))
+
+
+def shares(run: Run) -> dict[str, float]:
+    """Return the shares of the released rock in each zone at the end [-]."""
+    area = np.array([polygon_properties(b.vertices)[0] for b in run.scene.blocks])
+    edges = [SITE.slope.toe - ABOUT, SITE.road.start, SITE.road.end]
+    zone = np.searchsorted(edges, run.poses[-1, :, 0])
+    total = np.bincount(zone, weights=area, minlength=len(ZONES)) / area.sum()
+    return dict(zip(ZONES, total.tolist(), strict=True))
+
+
+def draw_slope(axes: Axes, run: Run, title: str, frame: int = -1, foot: bool = False) -> None:
+    """Draw a frame of a run: the whole slope, or its foot."""
+    draw_frame(axes, run, (SITE.road.start, SITE.road.end), frame)
+    x, y = ((55.0, 120.0), (-6.0, 45.0)) if foot else ((-8.0, 128.0), (-8.0, 140.0))
+    axes.set(xlim=x, ylim=y)
+    axes.set_title(title, fontsize=10)

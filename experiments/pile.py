@@ -1,0 +1,98 @@
+"""A pile of bricks, pressed by its weight and a load, for measurements of one step."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
+from rigdda.geometry import polygon_properties
+from rigdda.islands import find_islands, pair_blocks
+from rigdda.kernel import entry_kernel
+from rigdda.open_close import assemble_island
+from rigdda.records import CONTACTS, Bodies, Contacts, Matrix, Parameters, Work
+from rigdda.scene import Surface
+from rigdda.validation.scenes import GRAVITY, box
+
+WIDTH, HEIGHT, JOINT = 2.0, 1.0, 0.01
+"""Size of a brick and width of the open joint beside it [m]."""
+
+DT = 5e-3
+"""Time step [s]."""
+
+LOAD = 10.0
+"""Load on a brick of the top course over its weight [-]."""
+
+STIR = 0.3
+"""Standard deviation of random forces over the greatest force [-]."""
+
+SETTLING = 20
+"""Static steps after which every contact is pressed."""
+
+
+def pile(courses: int) -> Scene:
+    """Return a pile of bricks in running bond on level ground, as many in a course as courses.
+
+    Every other course ends in half bricks, and the load on the top course is even: so all contacts
+    of a course bear the same, and none flips. They are the paper's plain penalty springs.
+    """
+    end = courses * (WIDTH + JOINT)
+    blocks = []
+    for course in range(courses):
+        joints = [
+            (WIDTH + JOINT) * (i - 0.5 * (course % 2)) for i in range(courses + 1 + course % 2)
+        ]
+        edges = [max(joints[0], 0.0), *joints[1:-1], min(joints[-1], end)]
+        for left, right in pairwise(edges):
+            width, y = right - left - JOINT, HEIGHT * (course + 0.5)
+            blocks.append(box(0.5 * (left + right), y, width, HEIGHT))
+    top = range(len(blocks) - len(edges) + 1, len(blocks))
+    ground = Terrain(((-50.0, 0.0), (end + 50.0, 0.0)))
+    surfaces = {"rock": Surface(30.0, restitution=None)}
+    return Scene(ground, tuple(blocks), surfaces, loads=tuple(_load(i, blocks[i]) for i in top))
+
+
+def _load(index: int, block: Block) -> PointLoad:
+    """Return a load on the centroid of a block, in proportion to its weight."""
+    area, (x, y), _ = polygon_properties(block.vertices)
+    return PointLoad(index, (x, y), (0.0, -LOAD * block.density * area * GRAVITY))
+
+
+def settings(h: float, **more: object) -> Settings:
+    """Return settings with k_n dt^2 / (2 m) = h in contacts: the penetration g dt^2 / (2 h)."""
+    return Settings(dt=DT, penetration=0.5 * GRAVITY * DT**2 / h, sleeping=False, **more)  # type: ignore[arg-type]
+
+
+def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
+    """Return the simultaneous equations of a step of a pressed scene.
+
+    A random force and moment on each block stand for its motion. Without them an even load leaves
+    most modes at rest, which helps conjugate gradients but not over-relaxation.
+
+    Returns
+    -------
+    matrix : Matrix
+        K d = F, block-sparse.
+    n, pairs : int
+        Blocks, and pairs of blocks that touch.
+    """
+    sim = Simulation(scene, settings(h, mode="static", islands=False))
+    sim.step(SETTLING)
+    a = sim._arrays
+    count = int(sim._counters[CONTACTS])
+    a.bodies["vx"] = a.bodies["vy"] = a.bodies["omega"] = 0.0
+    pairs = assemble(a.bodies, sim._now, count, a.matrix, a.work, a.parameters[0])
+    n = len(scene.blocks)
+    stir = STIR * np.random.default_rng(n).standard_normal((n, 3))
+    a.matrix.rhs[:n] += stir * np.abs(a.matrix.rhs[:n]).max()
+    return a.matrix, n, pairs
+
+
+@entry_kernel
+def assemble(bodies: Bodies, c: Contacts, count: int, m: Matrix, work: Work, p: Parameters) -> int:
+    """Assemble all blocks as one island with their contacts as they are; returns the pairs."""
+    find_islands(bodies, c, count, work, p.blocks, False)
+    pairs = pair_blocks(bodies, c, m, work, 0, count)
+    assemble_island(bodies, c, m, work, 0, pairs, p)
+    return pairs

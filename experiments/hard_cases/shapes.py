@@ -155,12 +155,11 @@ CASES = (
     ),
     Case(
         "overlapping-start",
-        "greatest speed [m/s]: pushed apart gently",
+        "greatest speed [m/s]: no burst, and the overlap does not grow",
         overlapping(0.009),
         20.0,
         top_speed,
         1.0,
-        depth=2e-3,
         gain=0.1,
         settled=15.0,
     ),

@@ -20,7 +20,7 @@ BOULDER, PEBBLE = 5.0, 0.05
 """Sides [m]: a mass ratio of 1e4."""
 
 
-def way_error(slope_deg: float, friction_deg: float):
+def way_error(slope_deg: float, friction_deg: float) -> Callable[[History], float]:
     """Return the relative error of the way of the first block down a slope, from rest [-]."""
 
     def error(history: History) -> float:

@@ -30,10 +30,10 @@ def trial(case: Case, dt: float) -> Result:
         return Result(case.name, dt, FAILS, note="not a number")
     late = history.times >= case.settled
     depth = float(penetration(history.scene, history.poses[late]).max()) / size(history.scene)
-    error, gain = float(case.error(history)), growth(history)
-    verdict, note = judge(case, error, depth, gain, lost(history))
+    missed, gain = float(case.error(history)), growth(history)
+    verdict, note = judge(case, missed, depth, gain, lost(history))
     per_second = 1e3 * cpu / case.duration
-    return Result(case.name, dt, verdict, error, case.bar, depth, gain, per_second, note)
+    return Result(case.name, dt, verdict, missed, case.bar, depth, gain, per_second, note)
 
 
 def play(case: Case, dt: float) -> tuple[History, float]:

@@ -20,8 +20,8 @@ from rigdda.validation import arches, rolling, slides, toppling
 from rigdda.validation.case import Case, Lab, Metered
 from rigdda.validation.scenes import masses
 
-COARSE = (1e-1, 5e-2)
-"""Longer steps, which closed forms stand [s]."""
+MORE_STEPS = (1e-1, 5e-2, *STEPS, 1e-3)
+"""Longer and shorter steps, which closed forms stand [s]."""
 
 PEER_PARTS = (5, 10, 20, 50, 100, 200)
 """Steps of the peers, as parts of the longest."""
@@ -77,7 +77,7 @@ def with_peers(quick: bool) -> list[bench.Case]:
 
 def sweep(case: bench.Case) -> Iterator[Point]:
     """Yield a point for each choice on a case of the bench."""
-    for choice in choices(size(case.scenes[0]), (*COARSE, *STEPS)):
+    for choice in choices(size(case.scenes[0]), MORE_STEPS):
         settings = dict(choice.settings)
         dt = settings.pop("dt", DEFAULT.dt)
         done = timing.Setting(engine, dt, settings)
@@ -106,7 +106,7 @@ def sweep_alone(case: Case) -> Iterator[Point]:
     """Yield a point for each choice on the first figure of a case of the accuracy suite."""
     check = case.checks[0]
     what = f"{check.quantity} [{'-' if check.error == 'relative' else check.unit}]"
-    for choice in choices(1.0, STEPS):
+    for choice in choices(1.0, (*STEPS, 1e-3)):
         lab = TunedLab(choice)
         try:
             measured = case.measure(lab)[0]

@@ -11,8 +11,8 @@ from rigdda.constants import PENETRATION_RATIO
 
 DEFAULT = Settings()
 
-STEPS = (2e-2, 1e-2, 5e-3, 2.5e-3, 1e-3)
-"""Steps [s]; the longest divides the interval of a rockfall's frames."""
+STEPS = (2e-2, 1e-2, 5e-3, 2.5e-3)
+"""Steps [s]; the longest is the interval of a rockfall's frames."""
 
 COMPRESSIONS = (1e-2, 1e-3, 1e-4, 1e-5)
 """Compressions of contacts under their load over the mean block size [-]: `Settings.penetration`.
@@ -21,7 +21,7 @@ Stiffness is the load over it."""
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-10)
 """Of conjugate gradients, `Settings.tolerance` [-]."""
 
-OPEN_CLOSE = (1, 3, 6, 12, 24)
+OPEN_CLOSE = (1, 3, 12, 50)
 """Most open-close iterations a step."""
 
 STEP, STIFFNESS, TOLERANCE, ITERATIONS = "step", "compression", "tolerance", "open-close"

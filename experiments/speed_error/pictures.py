@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from experiments.bench.pictures import COLOURS, LEAST
 from experiments.speed_error.closed_forms import Point
@@ -69,6 +70,7 @@ def _panel(ax: Axes, points: Sequence[Point]) -> None:
             ax.plot(p.cpu_us_per_simulated_s, max(p.error, LEAST), "*", color="black",
                     markersize=11, label="default", zorder=4)  # fmt: skip
     ax.set(xscale="log", yscale="log", title=points[0].case)
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set_xlabel("CPU µs per simulated s", fontsize=8)
     ax.set_ylabel(points[0].quantity, fontsize=8)
 
@@ -103,10 +105,11 @@ def _biases(ax: Axes, samples: Sequence[Sample], reference: Sample, k: int) -> N
         if s.default:
             ax.plot(s.cpu, off[k], "*", color="black", markersize=11, label="default", zorder=4)
     ax.set(xscale="log", xlabel="CPU s a release")
+    ax.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _totals(ax: Axes, samples: Sequence[Sample], reference: Sample, k: int) -> None:
-    points = []
+    points: list[tuple[float, float]] = []
     for s in samples:
         own = s.engine == "rigdda"
         if own and s.knob != STEP:
@@ -121,4 +124,5 @@ def _totals(ax: Axes, samples: Sequence[Sample], reference: Sample, k: int) -> N
         points += zip(cost, error, strict=True)
     ax.plot(*zip(*front(points), strict=True), color="0.8", linewidth=4.0, zorder=0)
     ax.set(xscale="log", yscale="log")
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set_xlabel(f"CPU s of {', '.join(map(str, RELEASES))} releases")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -40,10 +39,13 @@ def highway_rows(samples: Iterable[Sample], reference: Sample) -> list[dict[str,
 
 
 def total_error(sample: Sample, reference: Sample, releases: int) -> np.ndarray:
-    """Return the root mean square error of the means of so many releases, (3,): bias and noise."""
-    off, _ = bias(sample, reference)
-    noise = sample.outcomes.std(axis=0, ddof=1) / math.sqrt(releases)
-    return np.hypot(off, noise)
+    """Return the root mean square error of the means of so many releases, (3,): bias and noise.
+
+    Of the bias, what goes beyond the noise with which it is known.
+    """
+    off, sure = bias(sample, reference)
+    certain = np.maximum(off**2 - (sure / 1.96) ** 2, 0.0)
+    return np.sqrt(certain + sample.outcomes.var(axis=0, ddof=1) / releases)
 
 
 def highway_table(samples: Sequence[Sample], reference: Sample) -> str:
@@ -57,10 +59,10 @@ def highway_table(samples: Sequence[Sample], reference: Sample) -> str:
         off, sure = bias(s, reference)
         for k in range(len(OUTCOMES)):
             if s is reference:
-                cells.append(f"{s.mean[k]:.3g} ± {s.half()[k]:.2g}")
+                cells.append(f"{s.mean[k]:.3g} ± {s.half()[k]:.3g}")
             else:
                 mark = "**" if abs(off[k]) > sure[k] else ""
-                cells.append(f"{mark}{off[k]:+.2g} ± {sure[k]:.2g}{mark}")
+                cells.append(f"{mark}{off[k]:+.3g} ± {sure[k]:.3g}{mark}")
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

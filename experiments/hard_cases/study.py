@@ -17,8 +17,8 @@ from experiments.script import Number, draw, say, write
 from rigdda import Settings
 from rigdda.files import atomic
 
-LIMIT, QUICK_LIMIT = 1800.0, 300.0
-"""Time after which a trial counts as hung [s]: many times what it takes, for a busy machine."""
+LIMIT, QUICK_LIMIT = 600.0, 60.0
+"""Processor time after which a trial counts as hung [s]: twice what the longest takes."""
 
 DEFAULT = Settings().dt
 

@@ -3,35 +3,42 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Iterable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any
 
 from experiments.hard_cases.case import FAILS, Case, Result
+from experiments.hard_cases.suite import CASES
 from experiments.hard_cases.trial import trial
 from rigdda import Scene, Simulation, Terrain
 from rigdda.validation.scenes import FLAT, box
 
-START = 600.0
+START = 1800.0
 """Time within which a process must have loaded or compiled the kernels [s]."""
+
+IDLE = 20.0
+"""Time over processor time after which a trial counts as hung although it does not compute [-]:
+more than a busy machine makes of it."""
 
 Trial = tuple[Case, float]
 
 
-def serve(pipe: Connection, cases: dict[str, Case]) -> None:
-    """Run trials as they are asked for, by name and step, until there is nothing more."""
+def serve(pipe: Connection, limit: float) -> None:
+    """Run trials as they are asked for, by name and step; scenes cannot be sent.
+
+    The timer counts processor time, which other load does not change, and ends the process even
+    within a kernel.
+    """
+    cases = {case.name: case for case in CASES}
     Simulation(Scene(Terrain(FLAT), (box(0.0, 0.5),))).step()  # compiled, or loaded, before times
     pipe.send(None)
-    while (asked := pipe.recv()) is not None:
-        name, dt = asked
-        pipe.send(trial(cases[name], dt))
-
-
-def serve_suite(pipe: Connection) -> None:
-    """Serve the cases of the suite, which a new process imports: scenes cannot be sent."""
-    from experiments.hard_cases.suite import CASES
-
-    serve(pipe, {case.name: case for case in CASES})
+    while True:
+        name, dt = pipe.recv()
+        signal.setitimer(signal.ITIMER_PROF, limit)
+        result = trial(cases[name], dt)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        pipe.send(result)
 
 
 class Worker:
@@ -40,12 +47,12 @@ class Worker:
     Parameters
     ----------
     limit : float
-        Time in which a trial must end [s].
+        Processor time in which a trial must end [s].
     target : callable
-        What the process runs, with its end of the pipe.
+        What the process runs, with its end of the pipe and the limit.
     """
 
-    def __init__(self, limit: float, target: Any = serve_suite):
+    def __init__(self, limit: float, target: Any = serve):
         self._limit, self._target = limit, target
         self._process: Any = None
         self._pipe: Any = None
@@ -56,18 +63,23 @@ class Worker:
             self._start()
         try:
             self._pipe.send((name, dt))
-            if self._pipe.poll(self._limit):
+            if self._pipe.poll(IDLE * self._limit):
                 return self._pipe.recv()
-            note = f"no end within {self._limit:g} s"
+            note = f"no end within {IDLE * self._limit:g} s"
         except (EOFError, OSError):
-            note = "the process died"
+            self._process.join()
+            code = self._process.exitcode
+            late = code == -signal.SIGPROF
+            note = f"no end within {self._limit:g} s" if late else f"the process died: {code}"
         self.stop()
         return Result(name, dt, FAILS, note=note)
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=self._target, args=(theirs,), daemon=True)
+        self._process = context.Process(
+            target=self._target, args=(theirs, self._limit), daemon=True
+        )
         self._process.start()
         theirs.close()
         if not self._pipe.poll(START):
@@ -85,7 +97,7 @@ class Worker:
 
 
 def sweep(trials: Iterable[Trial], limit: float) -> Iterator[Result]:
-    """Yield the results of trials in their order, each ended after `limit` [s]."""
+    """Yield the results of trials in their order, each ended after a processor time [s]."""
     worker = Worker(limit)
     try:
         for case, dt in trials:

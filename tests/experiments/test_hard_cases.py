@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import time
 
 import numpy as np
@@ -43,14 +44,23 @@ def history(y: list[float], energy: list[float]) -> History:
     return History(BLOCK, times, poses, 0.0 * poses, np.array(energy), Simulation(BLOCK))
 
 
-def hang(pipe) -> None:
-    """Never answer."""
+def hang(pipe, limit) -> None:
+    """Never answer, and compute nothing."""
     pipe.send(None)
     pipe.recv()
     time.sleep(600.0)
 
 
-def die(pipe) -> None:
+def loop(pipe, limit) -> None:
+    """Compute for ever."""
+    pipe.send(None)
+    pipe.recv()
+    signal.setitimer(signal.ITIMER_PROF, limit)
+    while True:
+        pass
+
+
+def die(pipe, limit) -> None:
     """End without a word."""
     pipe.send(None)
     pipe.recv()
@@ -112,9 +122,16 @@ def test_work_of_shaking_is_no_growth_of_energy():
     assert supports.YIELD == pytest.approx(9.81 * math.tan(math.radians(10.0)))
 
 
-@pytest.mark.parametrize(("target", "told"), [(hang, "no end within"), (die, "the process died")])
+@pytest.mark.parametrize(
+    ("target", "told"),
+    [
+        (hang, "no end within 2 s"),
+        (loop, "no end within 0.1 s"),
+        (die, "the process died: 1"),
+    ],
+)
 def test_a_process_that_hangs_or_dies_is_a_result(target, told):
-    worker = Worker(0.5, target)
+    worker = Worker(0.1, target)
     try:
         result = worker.run("stack-50", 0.005)
         assert result.verdict == FAILS

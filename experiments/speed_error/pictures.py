@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from experiments.bench.pictures import COLOURS, LEAST
 from experiments.speed_error.closed_forms import Point
@@ -105,6 +105,8 @@ def _biases(ax: Axes, samples: Sequence[Sample], reference: Sample, k: int) -> N
         if s.default:
             ax.plot(s.cpu, off[k], "*", color="black", markersize=11, label="default", zorder=4)
     ax.set(xscale="log", xlabel="CPU s a release")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     ax.xaxis.set_minor_formatter(NullFormatter())
 
 
@@ -120,7 +122,8 @@ def _totals(ax: Axes, samples: Sequence[Sample], reference: Sample, k: int) -> N
         style = "-*" if s.default else "--" if own else ":"
         ax.plot(cost, error, style, color="black" if s.default else colour, linewidth=1.0,
                 markersize=8)  # fmt: skip
-        ax.annotate(f"{1e3 * s.value:g} ms", (cost[-1], error[-1]), fontsize=7)
+        if own:
+            ax.annotate(f"{1e3 * s.value:g} ms", (cost[-1], error[-1]), fontsize=7)
         points += zip(cost, error, strict=True)
     ax.plot(*zip(*front(points), strict=True), color="0.8", linewidth=4.0, zorder=0)
     ax.set(xscale="log", yscale="log")

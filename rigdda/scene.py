@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.validation import explain_validity
 
 from rigdda import check
+from rigdda.apart import check_apart
 from rigdda.barriers import Barrier, Earthwork, GravityWall, Layout, Wall, earthworks
 from rigdda.errors import BadInput
 from rigdda.geometry import is_convex
@@ -144,7 +145,8 @@ class Scene:
     Raises
     ------
     BadInput
-        If a name has no surface, an index no block or a value is outside its range.
+        If a name has no surface, an index no block, a value is outside its range or a block starts
+        deep in another one.
     """
 
     terrain: Terrain | None
@@ -178,6 +180,7 @@ class Scene:
         check.one_of("damping_when", self.damping_when, ("always", "contact"))
         if not any(not b.fixed for b in self.blocks):
             raise BadInput("blocks", f"{len(self.blocks)} blocks", "give at least one free block")
+        check_apart([b.vertices for b in self.blocks], [b.fixed for b in self.blocks])
         self._check_loads()
         if self.base_motion is not None:
             object.__setattr__(self, "base_motion", _history(self.base_motion))

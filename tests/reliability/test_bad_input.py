@@ -78,6 +78,8 @@ CASES = {
     "unknown surface": (lambda _: scene(blocks=(box(surface="ice"),)), "block 0: surface"),
     "unknown ground": (lambda _: scene(terrain=Terrain(FLAT, ["ice"])), "terrain surfaces[0]"),
     "no blocks": (lambda _: scene(blocks=()), "blocks"),
+    "coincident": (lambda _: scene(blocks=(box(0.0, 0.5), box(0.0, 0.5))), "blocks[1]"),
+    "deep in another": (lambda _: scene(blocks=(box(0.0, 0.5), box(0.8, 0.6))), "blocks[1]"),
     "only fixed": (lambda _: scene(blocks=(box(fixed=True),)), "blocks"),
     "negative gravity": (lambda _: scene(gravity=-9.81), "gravity"),
     "negative damping": (lambda _: scene(damping=-0.1), "damping"),

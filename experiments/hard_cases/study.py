@@ -1,0 +1,67 @@
+"""Hard cases over the step: each holds, degrades, refuses with a clear error, or fails.
+
+Judged by the number of cases that neither hold nor refuse at the default step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from itertools import groupby
+from pathlib import Path
+
+from experiments.hard_cases.case import DEGRADES, FAILS, HOLDS, REFUSES, Result
+from experiments.hard_cases.picture import verdicts
+from experiments.hard_cases.suite import CASES, QUICK_STEPS, STEPS
+from experiments.hard_cases.worker import sweep
+from experiments.script import Number, draw, say, write
+from rigdda import Settings
+from rigdda.files import atomic
+
+LIMIT, QUICK_LIMIT = 600.0, 60.0
+"""Processor time after which a trial counts as hung [s]: twice what the longest takes."""
+
+DEFAULT = Settings().dt
+
+
+def table(results: list[Result]) -> str:
+    """Return the verdicts as a table in Markdown: a row a case, a column a step."""
+    steps = sorted({r.dt for r in results})
+    lines = ["| case | criterion | " + " | ".join(f"{1e3 * dt:g} ms" for dt in steps) + " |"]
+    lines.append("|---" * (len(steps) + 2) + "|")
+    criteria = {case.name: case.criterion for case in CASES}
+    for name, trials in groupby(results, key=lambda r: r.case):
+        cells = " | ".join(r.verdict for r in sorted(trials, key=lambda r: r.dt))
+        lines.append(f"| {name} | {criteria[name]} | {cells} |")
+    return "\n".join(lines) + "\n"
+
+
+def report(results: list[Result]) -> str:
+    """Return the counts at each step and what does not hold at the default one."""
+    lines = []
+    for dt in sorted({r.dt for r in results}):
+        here = [r.verdict for r in results if r.dt == dt]
+        counts = ", ".join(f"{here.count(v)} {v}" for v in (HOLDS, REFUSES, DEGRADES, FAILS))
+        lines.append(f"{1e3 * dt:g} ms: {counts}")
+    wrong = [r for r in results if r.dt == DEFAULT and r.verdict not in (HOLDS, REFUSES)]
+    return "\n".join([*lines, *(f"{r.case} {r.verdict}: {r.note}" for r in wrong)])
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Compute, write and draw."""
+    steps = QUICK_STEPS if quick else STEPS
+    trials = [(case, dt) for case in CASES for dt in steps]
+    results = []
+    for result in sweep(trials, QUICK_LIMIT if quick else LIMIT):
+        results.append(result)
+        say(f"hard cases: {result.case} {1e3 * result.dt:g} ms {result.verdict} {result.note}")
+    write(out / "hard_cases.csv", [asdict(r) for r in results])
+    with atomic(out / "hard_cases.md") as part:
+        part.write_text(table(results))
+    draw(out / "hard_cases.png", (9.0, 11.0), lambda figure: verdicts(figure, results))
+    bad = [r for r in results if r.dt == DEFAULT and r.verdict not in (HOLDS, REFUSES)]
+    return Number(
+        f"hard cases of {len(CASES)} that neither hold nor refuse at {1e3 * DEFAULT:g} ms",
+        len(bad),
+        high=0.0,
+        note=report(results),
+    )

@@ -1,0 +1,5 @@
+"""What a setting costs and errs: closed forms and the outcome of the highway case."""
+
+from experiments.speed_error.study import run
+
+__all__ = ["run"]

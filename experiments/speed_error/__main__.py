@@ -1,0 +1,7 @@
+"""Run it all: `python -m experiments.speed_error [--quick] [--out DIR]`."""
+
+from experiments.script import main
+from experiments.speed_error.study import run
+
+if __name__ == "__main__":
+    main(run)

@@ -1,0 +1,129 @@
+"""Closed forms: error against processor time of every choice, and of the peers where they can."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from experiments.bench import cases as bench
+from experiments.bench import timing
+from experiments.speed_error import engine
+from experiments.speed_error.knobs import DEFAULT, STEP, STEPS, Choice, choices
+from rigdda.errors import Diverged
+from rigdda.scene import Scene
+from rigdda.validation import arches, rolling, slides, toppling
+from rigdda.validation.case import Case, Lab, Metered
+from rigdda.validation.scenes import masses
+
+MORE_STEPS = (1e-1, 5e-2, *STEPS, 1e-3)
+"""Longer and shorter steps, which closed forms stand [s]."""
+
+PEER_PARTS = (5, 10, 20, 50, 100, 200)
+"""Steps of the peers, as parts of the longest."""
+
+ALONE = ("newmark", "16-gon", "arch-stands", "toppling-forces")
+"""Cases of the accuracy suite that no peer computes, since they have no adapter for it."""
+
+QUICK_ALONE = ("newmark",)
+
+
+@dataclass(frozen=True)
+class Point:
+    """What a choice erred, in the unit of `quantity`, and took: CPU per simulated second [us/s].
+
+    `default`: it is the default choice. Of peers, `choice` are their options.
+    """
+
+    case: str
+    quantity: str
+    engine: str
+    knob: str
+    value: float
+    dt: float
+    error: float
+    cpu_us_per_simulated_s: float
+    default: bool
+    options: str = ""
+
+
+class TunedLab(Lab):
+    """A lab whose simulations all have the settings of a choice."""
+
+    def __init__(self, choice: Choice):
+        self._settings = {k: v for k, v in choice.settings.items() if k != "dt"}
+        super().__init__(choice.settings.get("dt", DEFAULT.dt))
+
+    def simulate(self, scene: Scene, dt: float | None = None, **settings: Any) -> Metered:
+        """Return the scene in motion with the settings of the choice."""
+        return super().simulate(scene, dt, **(settings | self._settings))
+
+
+def size(scene: Scene) -> float:
+    """Return the mean block size: the root of the mean area [m]."""
+    density = np.array([b.density for b in scene.blocks])
+    return math.sqrt(float(np.mean(masses(scene)[0] / density)))
+
+
+def with_peers(quick: bool) -> list[bench.Case]:
+    """Return the closed forms that the bench compares engines on."""
+    found = [c for c in bench.all_cases() if not c.name.startswith("rockfall")]
+    return [replace(c, scenes=c.scenes[:1]) for c in found] if quick else found
+
+
+def sweep(case: bench.Case) -> Iterator[Point]:
+    """Yield a point for each choice on a case of the bench."""
+    for choice in choices(size(case.scenes[0]), MORE_STEPS):
+        settings = dict(choice.settings)
+        dt = settings.pop("dt", DEFAULT.dt)
+        done = timing.Setting(engine, dt, settings)
+        timing.first_run(done, case)
+        row = done.row(case)
+        yield Point(
+            case.name, case.quantity, engine.NAME, choice.knob, choice.value, dt, row.error,
+            row.cpu_us_per_simulated_s, choice.default,
+        )  # fmt: skip
+
+
+def sweep_peers(
+    case: bench.Case, peers: list[ModuleType], say: Callable[[str], None]
+) -> Iterator[Point]:
+    """Yield the points of the peers, each with its first options."""
+    short = replace(case, options=1, parts=PEER_PARTS)
+    for done in timing.sweep(short, peers, timing.QUICK, say):
+        row = done.row(case)
+        yield Point(
+            case.name, case.quantity, row.engine, STEP, row.dt, row.dt, row.error,
+            row.cpu_us_per_simulated_s, False, row.options,
+        )  # fmt: skip
+
+
+def sweep_alone(case: Case) -> Iterator[Point]:
+    """Yield a point for each choice on the first figure of a case of the accuracy suite."""
+    check = case.checks[0]
+    what = f"{check.quantity} [{'-' if check.error == 'relative' else check.unit}]"
+    for choice in choices(1.0, (*STEPS, 1e-3)):
+        lab = TunedLab(choice)
+        try:
+            measured = case.measure(lab)[0]
+            computed, exact = np.broadcast_arrays(
+                np.atleast_1d(measured.computed), np.atleast_1d(measured.exact)
+            )
+            error = float(check.errors(computed, exact).max())
+        except Diverged:
+            error = math.inf
+        cpu = 1e6 * lab.cpu / lab.simulated if lab.simulated else math.nan
+        yield Point(
+            case.name, what, engine.NAME, choice.knob, choice.value, lab.dt, error, cpu,
+            choice.default,
+        )  # fmt: skip
+
+
+def alone(quick: bool) -> list[Case]:
+    """Return the cases of the accuracy suite that are swept without peers."""
+    modules = (slides, rolling, arches, toppling)
+    return [c for m in modules for c in m.CASES if c.name in (QUICK_ALONE if quick else ALONE)]

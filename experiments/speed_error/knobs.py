@@ -1,0 +1,54 @@
+"""The settings that are varied, one at a time from the defaults, and what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rigdda import Settings
+from rigdda.constants import PENETRATION_RATIO
+
+DEFAULT = Settings()
+
+STEPS = (2e-2, 1e-2, 5e-3, 2.5e-3)
+"""Steps [s]; the longest is the interval of a rockfall's frames."""
+
+COMPRESSIONS = (1e-2, 1e-3, 1e-4, 1e-5)
+"""Compressions of contacts under their load over the mean block size [-]: `Settings.penetration`.
+Stiffness is the load over it."""
+
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-10)
+"""Of conjugate gradients, `Settings.tolerance` [-]."""
+
+OPEN_CLOSE = (1, 3, 12, 50)
+"""Most open-close iterations a step."""
+
+STEP, STIFFNESS, TOLERANCE, ITERATIONS = "step", "compression", "tolerance", "open-close"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Settings that differ from the defaults in one: its name, its value, and what to set."""
+
+    knob: str
+    value: float
+    settings: dict[str, Any]
+    default: bool = False
+
+
+def choices(size: float, steps: Sequence[float] = STEPS) -> Iterator[Choice]:
+    """Yield all choices for a scene of a mean block size [m], the default one once."""
+    yield Choice(STEP, DEFAULT.dt, {"dt": DEFAULT.dt}, default=True)
+    for dt in steps:
+        if dt != DEFAULT.dt:
+            yield Choice(STEP, dt, {"dt": dt})
+    for ratio in COMPRESSIONS:
+        if ratio != PENETRATION_RATIO:
+            yield Choice(STIFFNESS, ratio, {"penetration": ratio * size})
+    for tolerance in TOLERANCES:
+        if tolerance != DEFAULT.tolerance:
+            yield Choice(TOLERANCE, tolerance, {"tolerance": tolerance})
+    for most in OPEN_CLOSE:
+        if most != DEFAULT.open_close_iterations:
+            yield Choice(ITERATIONS, most, {"open_close_iterations": most})

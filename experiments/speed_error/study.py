@@ -1,0 +1,79 @@
+"""Speed against error: what each setting costs and errs, and where the default lies.
+
+Judged by the greatest bias of an outcome of the highway case at the default settings, against a
+converged reference, over half the 95 % interval of its mean over 100 releases.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from experiments.bench.engines import PEERS, PeerMissing, adapter
+from experiments.script import Number, draw, say, write
+from experiments.speed_error import closed_forms, highway, pictures
+from experiments.speed_error.closed_forms import Point
+from experiments.speed_error.tables import bias, closed_table, highway_rows, highway_table
+from rigdda.files import atomic
+
+JUDGED = 100
+"""Releases of whose mean the 95 % interval is the measure."""
+
+
+def peers() -> list[ModuleType]:
+    """Return the adapters of the peers that are installed."""
+    found = []
+    for name in PEERS:
+        try:
+            found.append(adapter(name))
+        except PeerMissing as missing:
+            say(f"speed against error: without a peer: {missing}")
+    return found
+
+
+def closed(quick: bool, others: list[ModuleType]) -> list[Point]:
+    """Return all points of the closed forms."""
+    points: list[Point] = []
+    for case in closed_forms.with_peers(quick):
+        say(f"closed form: {case.name}")
+        points += closed_forms.sweep(case)
+        points += closed_forms.sweep_peers(case, others, say)
+    for alone in closed_forms.alone(quick):
+        say(f"closed form: {alone.name}")
+        points += closed_forms.sweep_alone(alone)
+    return points
+
+
+def worst_bias(default: highway.Sample, reference: highway.Sample) -> tuple[float, float]:
+    """Return the greatest bias of an outcome and how far it is known, over its interval [-]."""
+    off, sure = bias(default, reference)
+    measure = default.half(JUDGED)
+    worst = int(np.argmax(np.abs(off) / measure))
+    return float(np.abs(off)[worst] / measure[worst]), float(sure[worst] / measure[worst])
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Compute, write and draw."""
+    others = peers()
+    points = closed(quick, others)
+    write(out / "speed_error.csv", [asdict(p) for p in points])
+    draw(out / "speed_error.png", (15.0, 10.0), lambda f: pictures.closed_forms(f, points))
+    budget = highway.QUICK if quick else highway.FULL
+    say(f"highway: reference, {budget.reference} releases")
+    reference = highway.reference(budget)
+    samples = [*highway.samples(budget, say), *highway.peer_samples(budget, others, say)]
+    write(out / "highway.csv", highway_rows([*samples, reference], reference))
+    draw(out / "highway.png", (13.0, 8.0), lambda f: pictures.highway(f, samples, reference))
+    with atomic(out / "speed_error.md") as part:
+        part.write_text(f"{closed_table(points)}\n{highway_table(samples, reference)}")
+    default = next(s for s in samples if s.default)
+    value, known = worst_bias(default, reference)
+    return Number(
+        f"bias of the highway outcome at the default over its 95 % interval at {JUDGED} releases",
+        value,
+        high=1.0 + known if quick else 1.0,  # a quick run tells biases beyond its noise only
+        note=f"known to ± {known:.2g}\n{highway_table(samples, reference)}",
+    )

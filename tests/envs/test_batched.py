@@ -114,7 +114,7 @@ def test_the_bridge_says_what_the_batch_says(ramp: Site) -> None:
     bridge.seed(3)
     seen, info = plain.reset(seed=3)
     assert data_equivalence(bridge.reset(), seen, exact=True)
-    assert [one["objective"] for one in bridge.reset_infos] == info["objective"].tolist()
+    assert [one["objective"] for one in bridge.venv.reset_infos] == info["objective"].tolist()
     plain.action_space.seed(0)
     truncations = 0
     for _ in range(6):

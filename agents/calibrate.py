@@ -140,7 +140,7 @@ def table(found: Sequence[Calibration]) -> Table:
     for c in found:
         low, high = (100.0 * value for value in c.bias_ci)
         out.add_row(
-            f"{len(c.layout)} fences" if c.layout else _words(c.layout),
+            ("no barrier", "one fence", "two fences")[len(c.layout)],
             f"{100 * c.full.mean():.1f}",
             f"{100 * c.fast.mean():.1f}",
             f"{100 * c.bias:+.1f} ({low:+.1f} to {high:+.1f})",

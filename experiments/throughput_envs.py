@@ -70,7 +70,7 @@ def main() -> None:
     for name in ENVIRONMENTS:
         one = None
         for copies in COPIES:
-            row = measure(name, copies, 8 if options.quick else EPISODES, 1000 * (len(rows) + 1))
+            row = measure(name, copies, 8 if options.quick else EPISODES, 100 * (len(rows) + 1))
             one = one or row["episodes_per_second"]
             rows.append(row | {"speed_up": round(row["episodes_per_second"] / one, 3)})
             print(rows[-1], flush=True)

@@ -1,4 +1,4 @@
-"""The command line: `rigdda sites | simulate | design | validate | replay`.
+"""The command line: `rigdda sites | simulate | design | calibrate | validate | replay`.
 
 Start-up imports click only; a command imports what it needs.
 """
@@ -169,6 +169,30 @@ def design(
         f"(seeds of a stream of their own){resumed}\nlayout.toml, evaluations.csv, profile.png, "
         f"search.png and episode.rrd are in {folder}"
     )
+
+
+@cli.command()
+@click.argument("site")
+@releases_option("--releases", 2, 64, "Releases of each layout at each fidelity.")
+@seed_option("Seed of the releases.")
+@out_option("calibrate")
+def calibrate(site: str, releases: int, seed: int, out: Path | None) -> None:
+    """Measure what fidelity "fast" costs and gains on SITE (a name or a TOML file).
+
+    Compares the debris of no barrier, one fence and two fences, and the processor time of a
+    release. Writes calibrate.csv.
+    """
+    import rigdda
+    from agents import calibrate as job
+
+    where = rigdda.Site.load(site)
+    total = 2 * releases * len(job.layouts(where))
+    folder = folder_for(out, "calibrate", where.name)
+    with kept(folder), progress(total) as tick:
+        found = job.calibrate(where, releases, seed, tick)
+    job.write(folder / "calibrate.csv", where, found)
+    show(job.table(found))
+    click.echo(f"{releases} releases of each; calibrate.csv is in {folder}")
 
 
 @cli.command()

@@ -23,6 +23,8 @@ SCRIPTS = (
     "fig10_modes",
     "fig13_deposit",
     "fig14_retained",
+    "hard_cases",
+    "speed_error",
 )
 """Modules of `experiments` with `run(quick, out) -> Number`, in the order in which they run."""
 

@@ -129,11 +129,15 @@ def break_through(
     If no share s does, it takes less or nothing: never more than is left and `tolerance` [J].
     """
     low, high = work.contact_start[island], work.contact_start[island + 1]
+    if left <= 0.0:
+        let_go(c, work, low, high, fence, p.dt)
+        open_close(bodies, c, m, work, island, p, counters)
+        return
     # squares of shares with which it takes too much and too little, and by how much
     small, over = 0.0, taken - left
     large, under = 1.0, -left
     side = 0
-    square = 1.0 if left <= 0.0 else 1.0 - left / taken
+    square = 1.0 - left / taken
     for _ in range(BREAK_SOLVES):
         let_pass(c, work, low, high, fence, math.sqrt(square), p.dt)
         open_close(bodies, c, m, work, island, p, counters)

@@ -12,7 +12,7 @@ import rigdda
 from agents.crossings import ensemble, ensemble_seeds
 from agents.names import DESIGNERS
 from agents.protocol import Designer, DesignResult, Entry
-from agents.rule import rule
+from agents.rule import kind_for, rule
 from agents.store import Store
 from agents.tables import EvaluationsFile
 from agents.verify import verify
@@ -132,7 +132,7 @@ def _cases(
     looked = ensemble(problem.site, ensemble_seeds(seed, simulations))
     return [
         (NOTHING, ()),
-        (RULE, rule(problem.site, looked)),
+        (RULE, rule(problem.site, looked, kind_for(problem))),
         (f"optimised ({name})", result.layout),
     ]
 

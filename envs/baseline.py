@@ -1,46 +1,52 @@
-"""Memory of what happens without barriers: environments and designers ask for it again and again.
-
-Only outcomes of the empty layout are kept, by site and seed, the latest `ROOM` of this process.
-"""
+"""Outcomes of releases, many at once; those without barriers are asked for again and again."""
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Iterable, Mapping
-from threading import Lock
+from collections.abc import Sequence
+from concurrent.futures import Executor
 
-import msgspec
+import rigdda
+from envs.memory import Memory, fingerprint
+from rigdda import Layout, Outcome, Site
 
-from rigdda import Outcome, Site
+Job = tuple[Site, Layout, int]
+"""A site, what stands on it and the seed of a release."""
 
-ROOM = 4096
-"""Outcomes kept, about 1 kB each."""
+Key = tuple[bytes, Layout, int]
 
-_kept: OrderedDict[tuple[bytes, int], Outcome] = OrderedDict()
-_lock = Lock()
-
-
-def fingerprint(site: Site) -> bytes:
-    """Return a key for a site: the whole of it as JSON, in which numbers survive exactly."""
-    return msgspec.json.encode(site)
+memory: Memory[Key, Outcome] = Memory(4096)
+"""Outcomes without barriers by site and seed, about 1 kB each."""
 
 
-def recall(site: Site, seeds: Iterable[int]) -> dict[int, Outcome]:
-    """Return the outcomes without barriers that are known, by seed."""
-    key, known = fingerprint(site), {}
-    with _lock:
-        for seed in seeds:
-            if (key, seed) in _kept:
-                _kept.move_to_end((key, seed))
-                known[seed] = _kept[key, seed]
-    return known
+def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> list[Outcome]:
+    """Return the outcome of every job; equal jobs are simulated once.
+
+    Parameters
+    ----------
+    jobs : sequence of (Site, Layout, int)
+        Releases.
+    executor : Executor, optional
+        Where to simulate; None: in threads over all cores.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `rigdda.release` does.
+    """
+    prints = {id(site): fingerprint(site) for site, _, _ in jobs}
+    keys = [(prints[id(site)], layout, seed) for site, layout, seed in jobs]
+    known = memory.recall(key for key in keys if not key[1])
+    new = {key: job for key, job in zip(keys, jobs, strict=True) if key not in known}
+    if executor is None:
+        found = rigdda.release_many(list(new.values()))
+    else:
+        found = list(executor.map(_outcome, new.values()))
+    fresh = dict(zip(new, found, strict=True))
+    memory.remember({key: outcome for key, outcome in fresh.items() if not key[1]})
+    known |= fresh
+    return [known[key] for key in keys]
 
 
-def remember(site: Site, outcomes: Mapping[int, Outcome]) -> None:
-    """Keep outcomes without barriers, by seed, and forget the oldest beyond `ROOM`."""
-    key = fingerprint(site)
-    with _lock:
-        for seed, outcome in outcomes.items():
-            _kept[key, seed] = outcome
-        while len(_kept) > ROOM:
-            _kept.popitem(last=False)
+def _outcome(job: Job) -> Outcome:
+    """Return the outcome of one release; at module level, for process pools to find it."""
+    return rigdda.release_outcome(*job)

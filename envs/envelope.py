@@ -1,18 +1,19 @@
-"""What comes down a site without barriers: energies, bounce heights and the deposit."""
+"""What comes down a site: energies, bounce heights and the deposit, without barriers or with."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from itertools import islice
+from typing import NamedTuple
 
-import msgspec
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-import rigdda
-from envs.baseline import fingerprint
-from rigdda import Run, Site
+from envs.memory import Memory, fingerprint
+from rigdda import Layout, Run, Simulation, Site
+from rigdda.geometry import polygon_properties
 
 Floats = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ SEEDS = range(2**32, 2**32 + 4)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Envelope:
-    """Barrier-free transit of a site, over the releases of `SEEDS`.
+    """What passes and what is left, over some releases of a site.
 
     Parameters
     ----------
@@ -49,6 +50,22 @@ class Envelope:
     deposit: Floats
 
 
+class Transit(NamedTuple):
+    """What passed in one release.
+
+    `energy` [J] and `bounce` [m]: of each block's first passage of every station, STATIONS arrays;
+    `deposit`: (BINS + 1,), see `Envelope`.
+    """
+
+    energy: list[Floats]
+    bounce: list[Floats]
+    deposit: Floats
+
+
+memory: Memory[bytes, Envelope] = Memory(8192)
+"""Envelopes without barriers by site, about 3 kB each."""
+
+
 def stations(site: Site) -> Floats:
     """Return the chainages at which blocks are watched, (STATIONS,) [m]."""
     return np.linspace(site.barrier_zone.start, site.barrier_zone.end, STATIONS)
@@ -62,25 +79,60 @@ def envelope(site: Site) -> Envelope:
     Diverged
         If a simulation diverges.
     """
-    return _envelope(fingerprint(site))
+    return barrier_free([site])[0]
 
 
-@lru_cache(maxsize=64)
-def _envelope(text: bytes) -> Envelope:
-    site = msgspec.json.decode(text, type=Site)
-    lines = stations(site)
-    runs = rigdda.simulate_many(
-        [site.realise((), seed) for seed in SEEDS],
-        site.settings(),
-        site.motion.duration,
-        stations=lines.tolist(),
-    )
-    passing = [np.concatenate([run.crossings(i) for run in runs]) for i in range(STATIONS)]
-    out = Envelope(
-        energy=np.array([_quantile(p["energy"]) for p in passing]),
-        bounce=np.array([_quantile(p["height"]) for p in passing]),
-        deposit=np.mean([_deposit(site, run) for run in runs], axis=0),
-    )
+def barrier_free(sites: Sequence[Site]) -> list[Envelope]:
+    """Return the barrier-free envelope of every site; the unknown ones are simulated together.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    keys = [fingerprint(site) for site in sites]
+    known = memory.recall(keys)
+    new = {key: site for key, site in zip(keys, sites, strict=True) if key not in known}
+    found = standing([(site, (), SEEDS) for site in new.values()])
+    fresh = dict(zip(new, found, strict=True))
+    memory.remember(fresh)
+    known |= fresh
+    return [known[key] for key in keys]
+
+
+def standing(cases: Sequence[tuple[Site, Layout, Sequence[int]]]) -> list[Envelope]:
+    """Return the envelope of every case (site, layout, seeds), simulated in threads over all cores.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `rigdda.release` does.
+    """
+    jobs = [(site, layout, seed) for site, layout, seeds in cases for seed in seeds]
+    with ThreadPoolExecutor() as pool:
+        transits = pool.map(lambda job: _transit(*job), jobs)
+        return [_summary(list(islice(transits, len(seeds)))) for _, _, seeds in cases]
+
+
+def _transit(site: Site, layout: Layout, seed: int) -> Transit:
+    """Simulate a release and return what passed."""
+    lines = stations(site).tolist()
+    simulation = Simulation(site.realise(layout, seed), site.settings(), lines)
+    run = simulation.run(site.motion.duration, site.motion.duration)
+    passing = [run.crossings(i) for i in range(STATIONS)]
+    energy, bounce = ([p[name] for p in passing] for name in ("energy", "height"))
+    return Transit(energy, bounce, _deposit(site, run))
+
+
+def _summary(transits: Sequence[Transit]) -> Envelope:
+    """Return the envelope of some releases of a site."""
+
+    def quantiles(name: str) -> Floats:
+        parts = zip(*(getattr(transit, name) for transit in transits), strict=True)
+        return np.array([_quantile(np.concatenate(part)) for part in parts])
+
+    deposit = np.mean([transit.deposit for transit in transits], axis=0)
+    out = Envelope(quantiles("energy"), quantiles("bounce"), deposit)
     for array in (out.energy, out.bounce, out.deposit):
         array.setflags(write=False)
     return out
@@ -94,6 +146,6 @@ def _deposit(site: Site, run: Run) -> Floats:
     """Return the share of a run's mass in each part of the profile and beyond, (BINS + 1,)."""
     edges = np.linspace(site.slope.points[0][0], site.road.end, BINS + 1)
     part = np.searchsorted(edges[1:], run.poses[-1, :, 0])
-    mass = [block.density * shapely.Polygon(block.vertices).area for block in run.scene.blocks]
+    mass = [b.density * polygon_properties(b.vertices)[0] for b in run.scene.blocks]
     weight = np.bincount(part, mass, BINS + 1)
     return weight / weight.sum()

@@ -30,9 +30,19 @@ bounce     (16,)           0 to 1       barrier-free 95 % height of the centroid
                                         at the same stations [100 m]
 deposit    (17,)           0 to 1       barrier-free share of the mass at the end in 16 equal parts
                                         of the profile and beyond it
-layout     (size,)         -1 to 1      what stands, encoded as an action; at reset nothing
+layout     (size,)         -1 to 1      what stands, encoded as a vector; at reset nothing
 cost_left  (1,)            -10 to 1     1 - cost / cost limit
 =========  ==============  ===========  ===========================================================
+
+When barriers are placed one by one, these are seen as well. They are of releases that are not
+scored: of as many as are scored, at most 4; at reset they equal the barrier-free ones.
+
+===========  =======  ========  =================================================================
+energy_now   (16,)    0 to 1    like `energy`, with what stands
+bounce_now   (16,)    0 to 1    like `bounce`, with what stands
+deposit_now  (17,)    0 to 1    like `deposit`, with what stands
+slots_left   (1,)     0 to 1    share of the barriers that may still be placed
+===========  =======  ========  =================================================================
 """
 
 from __future__ import annotations
@@ -45,7 +55,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from envs import encoding
-from envs.envelope import BINS, STATIONS, envelope
+from envs.envelope import BINS, STATIONS, Envelope, envelope
 from envs.problem import DesignProblem
 from rigdda import Barrier, Site
 
@@ -84,13 +94,31 @@ FIELDS: dict[str, tuple[int, float, float]] = {
 here that of one slot for one kind."""
 
 
+PLACEMENT_FIELDS: dict[str, tuple[int, float, float]] = FIELDS | {
+    "energy_now": FIELDS["energy"],
+    "bounce_now": FIELDS["bounce"],
+    "deposit_now": FIELDS["deposit"],
+    "slots_left": (1, 0.0, 1.0),
+}
+"""The same for barriers that are placed one by one."""
+
+
 def space(problem: DesignProblem) -> spaces.Dict:
     """Return the space of a problem's observations."""
+    return _space(problem, FIELDS)
+
+
+def placement_space(problem: DesignProblem) -> spaces.Dict:
+    """Return the space of observations when barriers are placed one by one."""
+    return _space(problem, PLACEMENT_FIELDS)
+
+
+def _space(problem: DesignProblem, fields: dict[str, tuple[int, float, float]]) -> spaces.Dict:
     sizes = {"layout": problem.size}
     return spaces.Dict(
         {
             name: spaces.Box(low, high, (sizes.get(name, size),), np.float32)
-            for name, (size, low, high) in FIELDS.items()
+            for name, (size, low, high) in fields.items()
         }
     )
 
@@ -107,20 +135,58 @@ def observe(problem: DesignProblem, layout: Sequence[Barrier]) -> Observation:
     Diverged
         If a simulation diverges.
     """
-    site, passing = problem.site, envelope(problem.site)
-    values: dict[str, ArrayLike] = {
+    site = problem.site
+    values = {
         **_slope(site),
         **_rock(site),
         **_barriers(problem),
-        "energy": np.log10(1.0 + passing.energy) / 10.0,
-        "bounce": passing.bounce / LENGTH,
-        "deposit": passing.deposit,
+        **_passing(envelope(site)),
         "layout": problem.encode(layout),
         "cost_left": [1.0 - site.cost(layout) / problem.cost_limit],
     }
+    return _within(values, FIELDS)
+
+
+def observe_placement(
+    problem: DesignProblem, layout: Sequence[Barrier], now: Envelope, left: float
+) -> Observation:
+    """Return the observation when barriers are placed one by one.
+
+    Parameters
+    ----------
+    now : Envelope
+        With `layout` in place.
+    left : float
+        Share of the slots that are left.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `observe` does.
+    """
+    seen = {f"{name}_now": values for name, values in _passing(now).items()} | {
+        "slots_left": [left]
+    }
+    more = {name: PLACEMENT_FIELDS[name] for name in seen}
+    return observe(problem, layout) | _within(seen, more)
+
+
+def _within(
+    values: dict[str, ArrayLike], fields: dict[str, tuple[int, float, float]]
+) -> Observation:
+    """Return values as float32 arrays of their own, clipped to their bounds."""
     return {
         name: np.clip(np.array(values[name], dtype=np.float32), np.float32(low), np.float32(high))
-        for name, (_, low, high) in FIELDS.items()
+        for name, (_, low, high) in fields.items()
+    }
+
+
+def _passing(envelope: Envelope) -> dict[str, ArrayLike]:
+    """Return what passes and what is left."""
+    return {
+        "energy": np.log10(1.0 + envelope.energy) / 10.0,
+        "bounce": envelope.bounce / LENGTH,
+        "deposit": envelope.deposit,
     }
 
 

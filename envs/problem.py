@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import rigdda
 from envs import baseline, encoding
 from envs.evaluation import Evaluation, student_interval
 from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
@@ -19,8 +18,9 @@ from rigdda.barriers import Earthwork
 
 Floats = NDArray[np.float64]
 
-KINDS = ("wall",)
-"""Kinds of barrier that are designed if none are named."""
+KINDS = ("fence",)
+"""Kinds of barrier that are designed if none are named: fences, whose capacity is a decision. What
+nothing can break, a wall, makes sizes trivial."""
 
 OVERRUN = 10.0
 """How many times the cost above the limit is charged. Soft, so that a search sees a way back."""
@@ -162,15 +162,21 @@ class DesignProblem:
         Diverged
             If a simulation diverges.
         """
-        walls = encoding.check_layout(self.site.barrier_zone, layout)
+        standing = encoding.check_layout(self.site.barrier_zone, layout)
         drawn = _seeds(seeds)
-        outcomes = self._simulate(walls, drawn, executor)
-        cost = self.site.cost(walls)
+        found = baseline.outcomes([(self.site, standing, seed) for seed in drawn], executor)
+        return self.judge(standing, drawn, tuple(found))
+
+    def judge(
+        self, layout: Layout, seeds: tuple[int, ...], outcomes: tuple[Outcome, ...]
+    ) -> Evaluation:
+        """Return what a layout is worth that had these outcomes, one for each seed."""
+        cost = self.site.cost(layout)
         debris = np.array([outcome.debris_fraction for outcome in outcomes])
         low, high = student_interval(debris)
         return Evaluation(
-            layout=walls,
-            seeds=drawn,
+            layout=layout,
+            seeds=seeds,
             objective=self.objective(float(debris.mean()), cost),
             debris=float(debris.mean()),
             ci=student_interval([self.objective(d, cost) for d in debris.tolist()]),
@@ -178,24 +184,6 @@ class DesignProblem:
             cost=cost,
             outcomes=outcomes,
         )
-
-    def _simulate(
-        self, layout: Layout, seeds: tuple[int, ...], executor: Executor | None
-    ) -> tuple[Outcome, ...]:
-        """Return the outcome of every seed; without barriers, what was simulated is remembered."""
-        known = {} if layout else baseline.recall(self.site, seeds)
-        jobs = [(self.site, layout, seed) for seed in dict.fromkeys(seeds) if seed not in known]
-        new = rigdda.release_many(jobs) if executor is None else executor.map(_outcome, jobs)
-        fresh = {seed: outcome for (_, _, seed), outcome in zip(jobs, new, strict=True)}
-        if not layout:
-            baseline.remember(self.site, fresh)
-        known |= fresh
-        return tuple(known[seed] for seed in seeds)
-
-
-def _outcome(job: tuple[Site, Layout, int]) -> Outcome:
-    """Return the outcome of one release; at module level, for process pools to find it."""
-    return rigdda.release(*job)[1]
 
 
 def _site(site: object) -> Site:

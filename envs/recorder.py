@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import rigdda
 from envs.evaluation import Evaluation
-from rigdda import BadInput, Run, Site
+from rigdda import BadInput, Site
 from rigdda.barriers import describe
 
 Trigger = Callable[[int], bool]
@@ -49,9 +50,7 @@ class Recorder:
         """Return whether episode number `episode` is to be recorded."""
         return self.trigger is None or bool(self.trigger(episode))
 
-    def write(
-        self, episode: int, site: Site, run: Run, evaluation: Evaluation, reward: float
-    ) -> Path:
+    def write(self, episode: int, site: Site, stages: Sequence[Evaluation]) -> Path:
         """Write the replay of an episode and return its path; no stream stays open.
 
         Parameters
@@ -60,23 +59,21 @@ class Recorder:
             Its number.
         site : Site
             Where it was.
-        run : Run
-            The typical release of `evaluation`.
-        evaluation : Evaluation
-            The layout that the episode ended with.
-        reward : float
-            Sum of the episode's rewards.
+        stages : sequence of Evaluation
+            What stood at the start, nothing, and after each step, on the same releases.
         """
         from rigdda.replay import Marks
 
-        barriers = [describe(barrier, 2) for barrier in evaluation.layout]
+        start, end = stages[0], stages[-1]
+        run, _ = rigdda.release(site, end.layout, end.typical)
+        barriers = [describe(barrier, 2) for barrier in end.layout]
         notes = {
-            "seed": f"{evaluation.typical}, the nearest to the mean of {len(evaluation.seeds)}",
+            "seed": f"{end.typical}, the nearest to the mean of {len(end.seeds)}",
             "layout": "; ".join(barriers) or "no barrier",
-            "reward": f"{reward:+.4f}",
-            "objective": f"{evaluation.objective:.4f}",
-            "debris": f"{evaluation.debris:.4f}",
-            "cost": f"{evaluation.cost:.2f}",
+            "reward": f"{start.objective - end.objective:+.4f}",
+            "objective": f"{end.objective:.4f}",
+            "debris": f"{end.debris:.4f}",
+            "cost": f"{end.cost:.2f}",
         }
         path = self.folder / f"episode-{episode:06d}.rrd"
         road = (site.road.start, site.road.end)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import gymnasium
 
-ENVIRONMENTS = {"rigdda/BarrierDesign-v0": "envs.design:BarrierDesign"}
+ENVIRONMENTS = {
+    "rigdda/BarrierDesign-v0": "envs.design:BarrierDesign",
+    "rigdda/BarrierPlacement-v0": "envs.placement:BarrierPlacement",
+}
 """Entry point of every environment, imported when it is made first."""
 
 

@@ -5,7 +5,7 @@ from rigdda.barriers import Barrier, Ditch, Embankment, Fence, GravityWall, Layo
 from rigdda.errors import BadInput, Diverged, Error, SoftContacts
 from rigdda.loads import BodyForce, LineLoad, PointLoad
 from rigdda.outcome import BarrierOutcome, Outcome
-from rigdda.release import release, release_many
+from rigdda.release import release, release_many, release_outcome
 from rigdda.run import Run
 from rigdda.scene import Block, Scene, Surface
 from rigdda.settings import Settings
@@ -46,6 +46,7 @@ __all__ = [
     "load_layout",
     "release",
     "release_many",
+    "release_outcome",
     "save_layout",
     "simulate_many",
     "sites",

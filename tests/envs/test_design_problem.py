@@ -16,6 +16,7 @@ from scipy import stats
 import rigdda
 from envs import DesignProblem, baseline
 from envs.evaluation import student_interval
+from envs.memory import Memory
 from rigdda import BadInput, Site, Surface, Wall
 from rigdda.site import BarrierZone
 
@@ -97,7 +98,7 @@ def test_what_happens_without_barriers_is_remembered(
         return [rigdda.release(*job)[1] for job in jobs]
 
     monkeypatch.setattr(rigdda, "release_many", count)
-    monkeypatch.setattr(baseline, "_kept", type(baseline._kept)())
+    monkeypatch.setattr(baseline, "memory", Memory(8))
     first = problem.evaluate((), [8, 9, 8])
     assert simulated == [((), 8), ((), 9)]
     assert first.outcomes[0] == first.outcomes[2]
@@ -110,12 +111,12 @@ def test_what_happens_without_barriers_is_remembered(
     assert simulated[3:] == [((), 8), (LAYOUT, 8), (LAYOUT, 8)]
 
 
-def test_memory_is_bounded(problem: DesignProblem, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(baseline, "ROOM", 2)
-    monkeypatch.setattr(baseline, "_kept", type(baseline._kept)())
-    for seeds in ([1, 2], [1], [3]):
-        problem.evaluate((), seeds)
-    assert sorted(baseline.recall(problem.site, range(5))) == [1, 3]
+def test_memory_is_bounded() -> None:
+    memory: Memory[int, str] = Memory(2)
+    memory.remember({1: "a", 2: "b"})
+    assert memory.recall([1, 5]) == {1: "a"}  # and so it is the latest
+    memory.remember({3: "c"})
+    assert memory.recall(range(5)) == {1: "a", 3: "c"}
 
 
 def test_sites_by_name_file_and_object(ramp: Site, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import rigdda
 from envs import DesignProblem
-from envs.design import SCORED_SEEDS
+from envs.base import SCORED_SEEDS
 from envs.envelope import SEEDS, envelope, stations
 from envs.observation import FIELDS, observe, space
 from rigdda import Site, Surface, Wall

@@ -20,7 +20,7 @@ from agents.store import Store
 from envs import DesignProblem
 from rigdda import Layout
 
-LADDER = (0.8, 0.6, 0.4, 0.3, 0.2, 0.1, 0.05)
+LADDER = (0.8, 0.5, 0.3, 0.15, 0.05)
 """Limits of CVaR, as shares of that without barriers."""
 
 

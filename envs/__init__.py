@@ -4,10 +4,43 @@ Importing this package registers the environments; `gymnasium.make("envs:rigdda/
 imports it on its own.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from envs.evaluation import Evaluation
 from envs.problem import DesignProblem
 from envs.registration import register
 
-__all__ = ["DesignProblem", "Evaluation"]
+if TYPE_CHECKING:
+    from stable_baselines3.common.vec_env import VecEnv
+
+__all__ = ["DesignProblem", "Evaluation", "sb3_vec_env"]
+
+
+def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
+    """Return copies of an environment that Stable-Baselines3 steps together.
+
+    They are those of `gymnasium.make_vec(id, num_envs, ...)`, simulated in threads over all cores,
+    with SB3's own monitor of episodes around them. Needs the extra `rl`.
+
+    Parameters
+    ----------
+    id : str
+        A registered environment, such as "rigdda/BarrierPlacement-v0".
+    num_envs : int
+        Number of copies.
+    **keywords
+        Of each copy, and `max_episode_steps`.
+
+    Raises
+    ------
+    BadInput
+        If a keyword is unsound.
+    """
+    from envs import sb3
+
+    return sb3.sb3_vec_env(id, num_envs, **keywords)
+
 
 register()

@@ -26,7 +26,7 @@ from envs.recorder import Recorder, Trigger
 from envs.trial import Answer, Ask, simulate
 from rigdda import BadInput, Run, Site, check, sites
 
-Action = NDArray[np.float32]
+Action = NDArray[np.floating[Any]]
 Info = dict[str, Any]
 Step = tuple[Observation, float, bool, bool, Info]
 
@@ -70,13 +70,13 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         if render_mode is not None:
             check.one_of("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.action_space = spaces.Box(-1.0, 1.0, (self._width(),), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (self.width,), np.float32)
         self.observation_space = self._space()
         self._episode = 0
         self._slots = np.zeros(0)  # the numbers of this episode's actions
         self._answer: Answer | None = None  # the last one
         self._stages: list[Evaluation] = []  # without barriers, then after each step
-        self._open = False
+        self.open = False
         self._shown: Run | None = None
 
     def _pose(self, site: str | os.PathLike[str] | Site) -> DesignProblem:
@@ -85,8 +85,9 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         cheaper = fidelity.at(problem.site, self.fidelity)
         return problem if cheaper is problem.site else DesignProblem(cheaper, *self._terms)
 
-    def _width(self) -> int:
-        """Return the numbers in an action, of whole slots."""
+    @property
+    def width(self) -> int:
+        """Numbers in an action, of whole slots."""
         raise NotImplementedError
 
     def _space(self) -> spaces.Dict:
@@ -126,7 +127,7 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
 
     def tell_reset(self, answer: Answer) -> tuple[Observation, Info]:
         """Start the episode; return its first observation and info."""
-        self._slots, self._stages, self._open = np.zeros(0), [answer.evaluation], True
+        self._slots, self._stages, self.open = np.zeros(0), [answer.evaluation], True
         return self._show(answer)
 
     def ask_step(self, action: Action) -> Ask | None:
@@ -134,9 +135,9 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
 
         If the action is refused, the episode can go on with another.
         """
-        if not self._open:
+        if not self.open:
             raise ResetNeeded("the episode has ended: call reset() before the next step")
-        numbers = encoding.vector("action", action, self._width())
+        numbers = encoding.vector("action", action, self.width)
         slots = np.concatenate([self._slots, numbers])
         layout = self._layout(slots)
         self._slots = slots
@@ -157,11 +158,11 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         now = answer.evaluation
         self._stages.append(now)
         reward = self._stages[-2].objective - now.objective
-        added = self._slots[-self._width() :]
+        added = self._slots[-self.width :]
         terminated = len(self._slots) == self.problem.size or not self._layout(added)
         seen, info = self._show(answer)
         if terminated:
-            self._open = False
+            self.open = False
             if self.recorder and self.recorder.wants(self._episode):
                 self.recorder.write(self._episode, self.problem.site, self._stages)
             self._episode += 1

@@ -57,7 +57,9 @@ class BarrierDesign(BarrierEnv):
 
     looks = False
 
-    def _width(self) -> int:
+    @property
+    def width(self) -> int:
+        """Numbers in an action."""
         return self.problem.size
 
     def _space(self) -> spaces.Dict:

@@ -55,7 +55,9 @@ class BarrierPlacement(BarrierEnv):
 
     looks = True
 
-    def _width(self) -> int:
+    @property
+    def width(self) -> int:
+        """Numbers in an action."""
         return encoding.slot_size(self.problem.kinds)
 
     def _space(self) -> spaces.Dict:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import gymnasium
 
 ENVIRONMENTS = {
-    "rigdda/BarrierDesign-v0": "envs.design:BarrierDesign",
-    "rigdda/BarrierPlacement-v0": "envs.placement:BarrierPlacement",
+    "rigdda/BarrierDesign-v0": ("envs.design:BarrierDesign", "envs.vector:BarrierDesignVector"),
+    "rigdda/BarrierPlacement-v0": (
+        "envs.placement:BarrierPlacement",
+        "envs.vector:BarrierPlacementVector",
+    ),
 }
-"""Entry point of every environment, imported when it is made first."""
+"""Entry points of every environment, alone and batched, imported when it is made first."""
 
 
 def register() -> None:
     """Register every environment of the table; no time limit, an episode ends by itself."""
-    for name, entry_point in ENVIRONMENTS.items():
-        gymnasium.register(id=name, entry_point=entry_point)
+    for name, (alone, batched) in ENVIRONMENTS.items():
+        gymnasium.register(id=name, entry_point=alone, vector_entry_point=batched)

@@ -1,0 +1,109 @@
+"""The bridge to Stable-Baselines3, the only module that knows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor
+
+from envs.vector import BarrierVector, stack
+
+
+class Bridge(VecEnv):
+    """A batched environment as Stable-Baselines3 wants it.
+
+    Parameters
+    ----------
+    batch : BarrierVector
+        The environment.
+    """
+
+    def __init__(self, batch: BarrierVector):
+        self.batch = batch
+        self.render_mode = batch.render_mode
+        super().__init__(batch.num_envs, batch.single_observation_space, batch.single_action_space)
+        self._actions: NDArray[np.float32] | None = None
+
+    def reset(self) -> dict[str, NDArray[np.float32]]:
+        """Start an episode in every copy, with the seeds that `seed` gave."""
+        starts = self.batch.start(self._seeds)
+        self._reset_seeds()
+        self._reset_options()
+        self.reset_infos = [info for _, info in starts]
+        return stack([seen for seen, _ in starts])
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Take actions to be stepped with."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Step every copy; those that end start anew and say what they saw last in their info."""
+        assert self._actions is not None
+        shown, rewards, dones, infos = [], [], [], []
+        for i, (step, start) in enumerate(self.batch.advance(self._actions)):
+            seen, reward, terminated, truncated, info = step
+            if start is not None:
+                limited = truncated and not terminated
+                info |= {"terminal_observation": seen, "TimeLimit.truncated": limited}
+                seen, self.reset_infos[i] = start
+            shown.append(seen)
+            rewards.append(reward)
+            dones.append(start is not None)
+            infos.append(info)
+        return stack(shown), np.array(rewards, dtype=np.float32), np.array(dones), infos
+
+    def close(self) -> None:
+        """Release the environment."""
+        self.batch.close()
+
+    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
+        """Return the picture of every copy."""
+        return list(self.batch.render())
+
+    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
+        """Return an attribute of some copies."""
+        return [getattr(copy, attr_name) for copy in self._some(indices)]
+
+    def set_attr(
+        self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None
+    ) -> None:
+        """Set an attribute of some copies."""
+        for copy in self._some(indices):
+            setattr(copy, attr_name, value)
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: int | Iterable[int] | None = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Call a method of some copies."""
+        return [
+            getattr(copy, method_name)(*method_args, **method_kwargs)
+            for copy in self._some(indices)
+        ]
+
+    def env_is_wrapped(
+        self,
+        wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
+        indices: int | Iterable[int] | None = None,
+    ) -> list[bool]:
+        """Return that no copy is wrapped."""
+        return [False for _ in self._some(indices)]
+
+    def _some(self, indices: int | Iterable[int] | None) -> list[Any]:
+        return [self.batch.copies[i] for i in self._get_indices(indices)]
+
+
+def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
+    """Return a batched environment for Stable-Baselines3; see `envs.sb3_vec_env`."""
+    batch = gymnasium.make_vec(
+        id, num_envs=num_envs, vectorization_mode="vector_entry_point", **keywords
+    )
+    assert isinstance(batch, BarrierVector)
+    return VecMonitor(Bridge(batch))

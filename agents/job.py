@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 import rigdda
+from agents import extra
 from agents.crossings import ensemble, ensemble_seeds
-from agents.names import DESIGNERS
-from agents.protocol import Designer, DesignResult, Entry
+from agents.protocol import DesignResult, Entry
 from agents.rule import kind_for, rule
 from agents.store import Store
 from agents.tables import EvaluationsFile
 from agents.verify import verify
 from envs import DesignProblem, Evaluation
-from rigdda import Layout, Outcome, Run, Site, check
+from rigdda import Layout, Outcome, Run, Site
 from rigdda.barriers import describe
 
 Tick = Callable[[int, str], None]
@@ -44,17 +43,6 @@ class Study:
     problem: DesignProblem
     result: DesignResult
     cases: tuple[tuple[str, Evaluation], ...]
-
-
-def designer(name: str) -> Designer:
-    """Return a designer by its name.
-
-    Raises
-    ------
-    BadInput
-        If there is none of that name.
-    """
-    return import_module(f"agents.{check.one_of('designer', name, DESIGNERS)}").design
 
 
 def simulate(
@@ -103,7 +91,7 @@ def study(
     BadInput, Diverged
         As the designer does.
     """
-    design = designer(name)
+    design = extra.module(name).design
     store = Store(out / "evaluations.jsonl")
     tick(0, "looking at releases without barriers")
     ensemble(problem.site, ensemble_seeds(seed, simulations))

@@ -118,6 +118,11 @@ class Plan:
         finalists = min(most, max(2, final // 16))
         return cls(min(8, max(1, simulations // 40)), finalists, min(32, final // finalists))
 
+    @property
+    def reserve(self) -> int:
+        """Releases that are kept for the finalists."""
+        return self.finalists * self.final_releases
+
 
 class Ledger:
     """Counts a designer's simulations against its budget and keeps every evaluation."""
@@ -164,11 +169,12 @@ class Ledger:
         return list({e.layout: e for e in reversed(ranked)}.values())[::-1][:n]
 
 
+Choose = Callable[[Ledger, int], list[Evaluation]]
+"""Returns at most so many finalists of a search."""
+
+
 def search(
-    ledger: Ledger,
-    proposals: Proposals,
-    choose: Callable[[Ledger, int], list[Evaluation]] = Ledger.best,
-    most: int = 5,
+    ledger: Ledger, proposals: Proposals, choose: Choose = Ledger.best, most: int = 5
 ) -> DesignResult:
     """Evaluate what is proposed as far as the budget goes, then the finalists on other releases.
 
@@ -179,7 +185,7 @@ def search(
     proposals : Proposals
         What is evaluated in the search.
     choose : callable
-        Returns at most so many finalists of a ledger; by default those of least objective.
+        Chooses the finalists, by default those of least objective.
     most : int
         Finalists at most.
 
@@ -189,14 +195,24 @@ def search(
         As `DesignProblem.evaluate` does.
     """
     plan = Plan.of(ledger.left, most)
-    reserve = plan.finalists * plan.final_releases
     layout = next(proposals)
-    while ledger.left >= reserve + plan.releases:
+    while ledger.left >= plan.reserve + plan.releases:
         evaluation = ledger.evaluate(layout, "search", plan.releases)
         try:
             layout = proposals.send(evaluation)
         except StopIteration:
             break
+    return finish(ledger, plan, choose)
+
+
+def finish(ledger: Ledger, plan: Plan, choose: Choose = Ledger.best) -> DesignResult:
+    """Evaluate the finalists of a search on other releases; return the best as the result.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `DesignProblem.evaluate` does.
+    """
     finalists = choose(ledger, plan.finalists)
     if plan.final_releases > 0:
         finalists = [ledger.evaluate(e.layout, "final", plan.final_releases) for e in finalists]

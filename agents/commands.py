@@ -50,10 +50,10 @@ def train(sites: int, lessons: int, episodes: int, seed: int, out: Path | None) 
     terms = training.Terms(sites, lessons, episodes, seed)
     folder = out or Path("runs/train")
     folder.mkdir(parents=True, exist_ok=True)
-    with kept(folder), progress(terms.total) as tick:
+    with kept(folder), progress(terms.sites + terms.episodes) as tick:
         trained = training.train(terms, folder, tick)
     click.echo(
-        f"fall of the objective on {training.EXAMINED} sites beside the training sites: cloned "
+        f"fall of the objective on {terms.beside} sites beside the training sites: cloned "
         f"{trained.cloned:.3f}, after PPO {trained.tuned:.3f}; policy.safetensors is in {folder}"
     )
 

@@ -1,7 +1,7 @@
 """Training of a policy: lessons of a short search on a pool of sites, cloned, then PPO on them.
 
 What is made lands in one folder and is taken up again from there: `training.json` (the terms),
-`lessons.jsonl`, `checkpoint.zip` (the trainer), `ppo_1/` (TensorBoard), `policy.safetensors`.
+`lessons.jsonl`, `checkpoint.zip` (the trainer), `ppo_0/` (TensorBoard), `policy.safetensors`.
 """
 
 from __future__ import annotations
@@ -24,9 +24,8 @@ from rigdda.files import atomic
 
 Tick = Callable[[int, str], None]
 
-EXAMINED, RELEASES = 12, 8
-"""Sites beside the pool on which the cloned and the tuned policy are compared, and releases of
-each."""
+RELEASES = 8
+"""Releases of each site on which the cloned and the tuned policy are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,24 +51,24 @@ class Terms:
 
     def __post_init__(self) -> None:
         check.integer("sites", self.sites, 2)
-        if self.sites + EXAMINED > len(sites.TRAIN_SEEDS):
-            most = len(sites.TRAIN_SEEDS) - EXAMINED
-            raise BadInput("sites", self.sites, f"give a whole number of at most {most}")
+        if self.sites > len(sites.TRAIN_SEEDS) // 2:
+            mend = f"give a whole number of at most {len(sites.TRAIN_SEEDS) // 2}"
+            raise BadInput("sites", self.sites, mend)
         check.integer("lessons", self.lessons, 16)
         check.integer("episodes", self.episodes, 0)
         check.integer("seed", self.seed, 0)
 
     @property
-    def total(self) -> int:
-        """Ticks of the whole training."""
-        return self.sites + self.episodes + 2 * EXAMINED
+    def beside(self) -> int:
+        """Sites beside those to train on, on which the cloned and the tuned policy are compared."""
+        return max(2, self.sites // 16)
 
 
 @dataclass(frozen=True, slots=True)
 class Trained:
     """A trained policy and what cloning alone and all of the training took off the objective.
 
-    On sites beside the pool, mean of `EXAMINED`.
+    Means over sites beside the training sites.
     """
 
     network: Network
@@ -89,9 +88,8 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     """
     ppo = extra.module("ppo")
     _same(terms, out)
-    drawn = np.random.default_rng(terms.seed).permutation(len(sites.TRAIN_SEEDS)).tolist()
-    pool = [sites.TRAIN_SEEDS[i] for i in drawn[: terms.sites]]
-    beside = [sites.TRAIN_SEEDS[i] for i in drawn[terms.sites : terms.sites + EXAMINED]]
+    pool = sites.TRAIN_SEEDS[: terms.sites]
+    beside = sites.TRAIN_SEEDS[terms.sites : terms.sites + terms.beside]
     lessons = teacher.teach(
         pool, terms.lessons, out / "lessons.jsonl", lambda n: tick(n, "lessons")
     )

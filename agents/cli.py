@@ -132,8 +132,9 @@ def design(
 ) -> None:
     """Design the barriers of SITE (a name or a TOML file) and verify them on unseen releases.
 
-    Writes layout.toml, evaluations.csv, profile.png, search.png and episode.rrd. What a killed
-    or former run has simulated is in evaluations.jsonl and is not simulated again.
+    Writes layout.toml, evaluations.csv, profile.png, search.png and episode.rrd; the designer
+    pareto front.csv and front.png too. What a killed or former run has simulated is in
+    evaluations.jsonl and is not simulated again.
     """
     from agents import job, tables
     from envs import DesignProblem

@@ -10,6 +10,7 @@ from pathlib import Path
 import rigdda
 from agents import extra
 from agents.crossings import ensemble, ensemble_seeds
+from agents.pareto import ParetoResult
 from agents.protocol import DesignResult, Entry
 from agents.rule import kind_for, rule
 from agents.store import Store
@@ -128,6 +129,7 @@ def _cases(
 def write(done: Study, out: Path) -> None:
     """Write `layout.toml`, `profile.png`, `search.png` and `episode.rrd` of a study into `out`.
 
+    Of a front of cost against debris, `front.csv` and `front.png` as well.
     The release shown is the one whose debris is nearest the mean of the verified layout.
     """
     from agents import pictures
@@ -144,6 +146,12 @@ def write(done: Study, out: Path) -> None:
     ]
     pictures.profile(out / "profile.png", site, panels)
     pictures.search(out / "search.png", done.result.history, done.cases)
+    if isinstance(done.result, ParetoResult):
+        entries = [Entry(done.result.simulations, "front", e) for e in done.result.front]
+        with EvaluationsFile(out / "front.csv") as file:
+            for entry in entries:
+                file.add(entry)
+        pictures.front(out / "front.png", done.result.history, done.result.front, done.cases)
     notes = {
         "layout": "; ".join(map(describe, verified.layout)) or "no barrier",
         "release": f"seed {verified.typical}, {outcome.debris_fraction:.1%} past the road's edge",

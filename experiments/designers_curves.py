@@ -115,7 +115,8 @@ def picture(path: str | os.PathLike[str], rows: Sequence[Row]) -> None:
         shown = list(used)
         values = [gains(own, name, b) for b in shown]
         mean = np.array([v.mean() for v in values])
-        low, high = np.nan_to_num(np.array([student_interval(v) for v in values])).T
+        bounds = np.array([student_interval(v) for v in values])
+        low, high = np.where(np.isfinite(bounds), bounds, mean[:, None]).T
         x, style = [used[b] for b in shown], {"color": COLOURS[name], "label": name}
         if len(shown) == 1:
             axes.errorbar(x, mean, [mean - low, high - mean], fmt="D", capsize=4, **style)

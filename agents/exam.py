@@ -120,7 +120,7 @@ def mean_and_interval(values: Sequence[float]) -> tuple[float, Interval]:
 def table(scores: Sequence[Score]) -> Table:
     """Return the table of designers: means over sites with their 95 % intervals."""
     names = list(dict.fromkeys(score.designer for score in scores))
-    out = empty_table(("designer", "simulations", "objective", "fall of it (95 %)", "less first"))
+    out = empty_table(("designer", "releases", "objective", "fall (95 %)", f"beyond {names[0]}"))
     first = gains(scores, names[0])
     nothing = float(np.mean([s.nothing.objective for s in scores if s.designer == names[0]]))
     out.add_row("no barrier", "0", f"{nothing:.3f}", "-", "-")

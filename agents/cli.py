@@ -158,6 +158,30 @@ def design(
 
 
 @cli.command()
+@click.argument("site")
+@count_option("--releases", 2, 64, "Releases of each layout at each fidelity.")
+@seed_option("Seed of the releases.")
+@out_option("calibrate-SITE")
+def calibrate(site: str, releases: int, seed: int, out: Path | None) -> None:
+    """Measure what fidelity "fast" costs and gains on SITE (a name or a TOML file).
+
+    Compares the debris of no barrier, one fence and two fences, and the processor time of a
+    release. Writes calibrate.csv.
+    """
+    import rigdda
+    from agents import calibrate as job
+
+    where = rigdda.Site.load(site)
+    total = 2 * releases * len(job.layouts(where))
+    folder = folder_for(out, "calibrate", where.name)
+    with kept(folder), progress(total) as tick:
+        found = job.calibrate(where, releases, seed, tick)
+    job.write(folder / "calibrate.csv", where, found)
+    show(job.table(found))
+    click.echo(f"{releases} releases of each; calibrate.csv is in {folder}")
+
+
+@cli.command()
 @click.option("--only", multiple=True, metavar="NAME",
               help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
 @click.option("--slow", is_flag=True, help="Run the cases that take long as well.")

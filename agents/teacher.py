@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 
 from agents.features import features
 from agents.policy import KINDS, SLOTS
+from agents.store import mechanics
 from envs import DesignProblem, fidelity
 from envs.observation import observe
-from rigdda import sites
+from rigdda import __version__, sites
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,14 +60,23 @@ def teach(
         If a simulation diverges.
     """
     known = _read(path)
+    lessons = []
     for done, site in enumerate(pool):
-        if site not in known:
-            known[site] = _lesson(site, simulations)
-            row = msgspec.to_builtins(known[site], enc_hook=lambda array: array.tolist())
+        key = _key(site, simulations)
+        if key not in known:
+            known[key] = _lesson(site, simulations)
+            row = msgspec.to_builtins(known[key], enc_hook=lambda array: array.tolist())
             with path.open("a") as file:
-                file.write(json.dumps(row) + "\n")
+                file.write(json.dumps({"key": key} | row) + "\n")
+        lessons.append(known[key])
         tick(done + 1)
-    return [known[site] for site in pool]
+    return lessons
+
+
+def _key(site: int, simulations: int) -> str:
+    """Return a hash of all that a lesson depends on."""
+    asked = [__version__, mechanics(), problem(site).site, simulations]
+    return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:16]
 
 
 def _lesson(site: int, simulations: int) -> Lesson:
@@ -78,9 +89,9 @@ def _lesson(site: int, simulations: int) -> Lesson:
     return Lesson(site, features(observe(posed, ())), posed.encode(found.layout), gain)
 
 
-def _read(path: Path) -> dict[int, Lesson]:
-    """Return the lessons of the whole lines of a file, by site, and cut off the rest."""
-    known: dict[int, Lesson] = {}
+def _read(path: Path) -> dict[str, Lesson]:
+    """Return the lessons of the whole lines of a file by their keys, and cut off the rest."""
+    known: dict[str, Lesson] = {}
     if not path.is_file():
         return known
     text = path.read_text()
@@ -88,6 +99,7 @@ def _read(path: Path) -> dict[int, Lesson]:
     for line in whole.splitlines():
         row = json.loads(line)
         seen = np.array(row["features"], dtype=np.float32)
-        known[row["site"]] = Lesson(row["site"], seen, np.array(row["vector"]), row["gain"])
+        found = Lesson(row["site"], seen, np.array(row["vector"]), row["gain"])
+        known[row["key"]] = found
     path.write_text(whole)
     return known

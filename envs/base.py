@@ -164,9 +164,13 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         if terminated:
             self.open = False
             if self.recorder and self.recorder.wants(self._episode):
-                self.recorder.write(self._episode, self.problem.site, self._stages)
+                self._record(self.recorder)
             self._episode += 1
         return seen, reward, terminated, False, info
+
+    def _record(self, recorder: Recorder) -> None:
+        """Write the replay of the episode that has ended."""
+        raise NotImplementedError
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the end of the release nearest the mean as an image, (450, 800, 3)."""

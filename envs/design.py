@@ -7,6 +7,7 @@ from gymnasium import spaces
 from envs import observation
 from envs.base import BarrierEnv
 from envs.observation import Observation
+from envs.recorder import Recorder
 from envs.trial import Answer
 
 
@@ -67,3 +68,6 @@ class BarrierDesign(BarrierEnv):
 
     def _observe(self, answer: Answer) -> Observation:
         return observation.observe(self.problem, answer.evaluation.layout)
+
+    def _record(self, recorder: Recorder) -> None:
+        recorder.write(self._episode, self.problem.site, self._stages)

@@ -7,6 +7,7 @@ from gymnasium import spaces
 from envs import encoding, observation
 from envs.base import BarrierEnv
 from envs.observation import Observation
+from envs.recorder import Recorder
 from envs.trial import Answer
 
 
@@ -68,3 +69,6 @@ class BarrierPlacement(BarrierEnv):
         left = 1.0 - len(self._slots) / self.problem.size
         layout = answer.evaluation.layout
         return observation.observe_placement(self.problem, layout, answer.envelope, left)
+
+    def _record(self, recorder: Recorder) -> None:
+        recorder.write_placements(self._episode, self.problem.site, self._stages)

@@ -51,7 +51,7 @@ class Recorder:
         return self.trigger is None or bool(self.trigger(episode))
 
     def write(self, episode: int, site: Site, stages: Sequence[Evaluation]) -> Path:
-        """Write the replay of an episode and return its path; no stream stays open.
+        """Write the replay of an episode of one step and return its path; no stream stays open.
 
         Parameters
         ----------
@@ -60,22 +60,65 @@ class Recorder:
         site : Site
             Where it was.
         stages : sequence of Evaluation
-            What stood at the start, nothing, and after each step, on the same releases.
+            What stood at the start, nothing, and in the end, on the same releases.
         """
         from rigdda.replay import Marks
 
         start, end = stages[0], stages[-1]
         run, _ = rigdda.release(site, end.layout, end.typical)
-        barriers = [describe(barrier, 2) for barrier in end.layout]
         notes = {
-            "seed": f"{end.typical}, the nearest to the mean of {len(end.seeds)}",
-            "layout": "; ".join(barriers) or "no barrier",
+            "seed": _seed(end),
+            "layout": _words(end),
             "reward": f"{start.objective - end.objective:+.4f}",
             "objective": f"{end.objective:.4f}",
             "debris": f"{end.debris:.4f}",
             "cost": f"{end.cost:.2f}",
         }
-        path = self.folder / f"episode-{episode:06d}.rrd"
-        road = (site.road.start, site.road.end)
-        run.to_rerun(path, Marks(road=road, notes=notes, title=f"{site.name}, episode {episode}"))
+        path = self._path(episode)
+        run.to_rerun(path, Marks((site.road.start, site.road.end), notes, _title(site, episode)))
         return path
+
+    def write_placements(self, episode: int, site: Site, stages: Sequence[Evaluation]) -> Path:
+        """Write the replay of an episode of several steps and return its path.
+
+        All stages show one release, the one whose debris is nearest the mean in the end.
+
+        Parameters
+        ----------
+        episode, site
+            See `write`.
+        stages : sequence of Evaluation
+            What stood at the start, nothing, and after each step, on the same releases.
+        """
+        from rigdda.episode import Placement, write_episode
+
+        end, before = stages[-1], [stages[0], *stages[:-1]]
+        placements = [
+            Placement(
+                run=rigdda.release(site, now.layout, end.typical)[0],
+                layout=_words(now),
+                reward=former.objective - now.objective,
+                objective=now.objective,
+                debris=now.debris,
+                cost=now.cost,
+            )
+            for former, now in zip(before, stages, strict=True)
+        ]
+        path, road = self._path(episode), (site.road.start, site.road.end)
+        write_episode(path, placements, road, _seed(end), _title(site, episode))
+        return path
+
+    def _path(self, episode: int) -> Path:
+        return self.folder / f"episode-{episode:06d}.rrd"
+
+
+def _seed(end: Evaluation) -> str:
+    return f"{end.typical}, the nearest to the mean of {len(end.seeds)}"
+
+
+def _words(now: Evaluation) -> str:
+    return "; ".join(describe(barrier, 2) for barrier in now.layout) or "no barrier"
+
+
+def _title(site: Site, episode: int) -> str:
+    return f"{site.name}, episode {episode}"

@@ -119,12 +119,10 @@ def _cells(
         draws = 1.0 + joint.scatter * rng.standard_normal(int(2 * reach / spacing) + 4)
         steps = spacing * np.clip(draws, 0.5, 1.5)
         offsets = np.cumsum(steps) - reach - spacing * rng.random()
-        for offset in offsets[np.abs(offsets) < reach]:
-            mid = centre + offset * across
-            line = shapely.LineString([mid - reach * along, mid + reach * along])
-            near = shapely.intersection(line, around)
-            if near.length > 0.0:
-                lines.append(near)
+        mids = centre + offsets[np.abs(offsets) < reach, None] * across
+        traces = shapely.linestrings(np.stack([mids - reach * along, mids + reach * along], axis=1))
+        near = shapely.intersection(traces, around)
+        lines.extend(near[shapely.length(near) > 0.0])
     pieces = polygonize(shapely.node(shapely.MultiLineString(lines)))
     return [p for p in pieces if source.contains(p.representative_point())]
 

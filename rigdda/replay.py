@@ -13,7 +13,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from uuid import uuid4
@@ -34,8 +34,12 @@ from rigdda.scene import Scene
 
 Floats = NDArray[np.float64]
 Colour = tuple[int, int, int]
+Clock = Callable[[Sequence[float] | Floats], list[rr.TimeColumn]]
+"""Gives the time columns of rows at some times [s]."""
 
 TIMELINE = "sim_time"
+PLACEMENT = "placement"
+"""Timeline of an episode in which barriers are placed one by one."""
 MOVING = 0.1
 """Speed above which a block counts as moving [m/s]; slower is a creep of under 1 m in 10 s."""
 CAMERA = 1000.0
@@ -111,9 +115,9 @@ def write_rerun(run: Run, path: str | os.PathLike[str], marks: Marks | None = No
         If the name does not end in .rrd.
     """
     marks = marks or Marks()
-    with _recording(path, _blueprint(run, marks)) as rec:
+    with recording(path, _blueprint(run, marks)) as rec:
         rec.send_recording_name(marks.title)
-        _log_run(rec, run, marks)
+        log_run(rec, run, marks)
 
 
 def open_viewer(path: str | os.PathLike[str]) -> None:
@@ -152,7 +156,7 @@ def _rrd(path: str | os.PathLike[str]) -> Path:
 
 
 @contextlib.contextmanager
-def _recording(
+def recording(
     path: str | os.PathLike[str], blueprint: rrb.Blueprint
 ) -> Iterator[rr.RecordingStream]:
     """Yield a stream of its own that is at `path` when the block ends without error."""
@@ -166,19 +170,29 @@ def _recording(
             rec.disconnect()
 
 
-def _log_run(rec: rr.RecordingStream, run: Run, marks: Marks, root: str = "") -> None:
-    """Log a whole run below the entity `root`."""
+def log_run(
+    rec: rr.RecordingStream, run: Run, marks: Marks, root: str = "", placement: int | None = None
+) -> None:
+    """Log a whole run below the entity `root`; its frames are those of a `placement`, if any."""
+
+    def clock(times: Sequence[float] | Floats) -> list[rr.TimeColumn]:
+        columns = [rr.TimeColumn(TIMELINE, duration=times)]
+        if placement is not None:
+            columns.append(rr.TimeColumn(PLACEMENT, sequence=[placement] * len(times)))
+        return columns
+
     _log_setting(rec, f"{root}/world", run.scene, marks)
-    time = rr.TimeColumn(TIMELINE, duration=run.times)
     for i in range(len(run.scene.barriers)):
-        _log_barrier(rec, f"{root}/world/barriers/{i}", time, run, i)
+        _log_barrier(rec, f"{root}/world/barriers/{i}", clock, run, i)
     for i in range(len(run.scene.blocks)):
-        _log_block(rec, f"{root}/world/blocks/{i}", time, run, i)
+        _log_block(rec, f"{root}/world/blocks/{i}", clock, run, i)
     for name, values in _scalars(run, marks).items():
         title, colour = PLOTS[name]
         style = rr.SeriesLines(names=title, colors=colour, widths=2.0)
         rec.log(f"{root}/plots/{name}", style, static=True)
-        rec.send_columns(f"{root}/plots/{name}", [time], rr.Scalars.columns(scalars=values))
+        rec.send_columns(
+            f"{root}/plots/{name}", clock(run.times), rr.Scalars.columns(scalars=values)
+        )
     words = [f"## {marks.title}", *(f"**{key}**: {text}" for key, text in marks.notes.items())]
     page = rr.TextDocument("\n\n".join(words), media_type="text/markdown")
     rec.log(f"{root}/notes", page, static=True)
@@ -210,9 +224,7 @@ def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks
         rec.log(f"{world}/road", line, static=True)
 
 
-def _log_barrier(
-    rec: rr.RecordingStream, entity: str, time: rr.TimeColumn, run: Run, i: int
-) -> None:
+def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i: int) -> None:
     """Log barrier `i`: a gravity wall moves, a failed fence turns pale, a ditch is a line."""
     barrier, z = run.scene.barriers[i], LAYER["barriers"]
     outline = run.scene.outline(i)
@@ -224,18 +236,18 @@ def _log_barrier(
     if isinstance(barrier, GravityWall):
         body = shapely.Polygon(outline - polygon_properties(outline)[1])
         _log_shape(rec, entity, body, 0.0, BARRIER)
-        _log_motion(rec, entity, time, run.barrier_poses[:, i], z)
+        _log_motion(rec, entity, clock(run.times), run.barrier_poses[:, i], z)
         return
     failure = run.failure(i)
     whole = shapely.Polygon(outline)
     _log_shape(rec, entity, whole, z, BARRIER if np.isinf(failure) else None)
     if np.isfinite(failure):
-        when = rr.TimeColumn(TIMELINE, duration=[run.times[0], failure])
-        rec.send_columns(entity, [when], rr.Mesh3D.columns(albedo_factor=[BARRIER, BROKEN]))
+        when = clock([run.times[0], failure])
+        rec.send_columns(entity, when, rr.Mesh3D.columns(albedo_factor=[BARRIER, BROKEN]))
 
 
 def _log_motion(
-    rec: rr.RecordingStream, entity: str, time: rr.TimeColumn, poses: Floats, z: float
+    rec: rr.RecordingStream, entity: str, when: list[rr.TimeColumn], poses: Floats, z: float
 ) -> None:
     """Log where a body is in every frame, from its poses, (T, 3)."""
     x, y, theta = poses.T
@@ -244,16 +256,16 @@ def _log_motion(
         translation=np.column_stack([x, y, still + z]),
         quaternion=np.column_stack([still, still, np.sin(theta / 2), np.cos(theta / 2)]),
     )
-    rec.send_columns(entity, [time], columns)
+    rec.send_columns(entity, when, columns)
 
 
-def _log_block(rec: rr.RecordingStream, entity: str, time: rr.TimeColumn, run: Run, i: int) -> None:
+def _log_block(rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i: int) -> None:
     """Log block `i`: its polygon about its centroid once, and where that is in every frame."""
     block = run.scene.blocks[i]
     body = block.vertices - polygon_properties(block.vertices)[1]
     colour = GROUND if block.fixed else ROCK[i % len(ROCK)]
     _log_shape(rec, entity, shapely.Polygon(body), 0.0, colour)
-    _log_motion(rec, entity, time, run.poses[:, i], LAYER["blocks"])
+    _log_motion(rec, entity, clock(run.times), run.poses[:, i], LAYER["blocks"])
 
 
 def _log_shape(
@@ -335,16 +347,21 @@ def _passed(run: Run, edge: float) -> NDArray[np.bool_]:
     return np.logical_or.accumulate(seen, axis=0)
 
 
-def _blueprint(run: Run, marks: Marks) -> rrb.Blueprint:
-    """Return the layout: the slope, beside it the notes and the plots."""
+def slope_view(run: Run, name: str, root: str = "") -> rrb.Spatial2DView:
+    """Return the view on the slope of a run that is logged below the entity `root`."""
     left, bottom, right, top = _frame(run.scene)
-    slope = rrb.Spatial2DView(
-        origin="/world/camera",
-        contents="/world/**",
-        name=marks.title,
+    return rrb.Spatial2DView(
+        origin=f"{root}/world/camera",
+        contents=f"{root}/world/**",
+        name=name,
         background=SKY,
         visual_bounds=rrb.VisualBounds2D(x_range=(0, right - left), y_range=(0, top - bottom)),
     )
+
+
+def _blueprint(run: Run, marks: Marks) -> rrb.Blueprint:
+    """Return the layout: the slope, beside it the notes and the plots."""
+    slope = slope_view(run, marks.title)
     plots = {
         name: rrb.TimeSeriesView(
             origin=f"/plots/{name}",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -256,14 +257,11 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         BadInput
             If a barrier does not stand on the slope or the seed is not a whole number >= 0.
         """
-        rng = np.random.default_rng(check.integer("seed", seed, 0))
-        shift = self.scatter.friction_deg * rng.standard_normal()
+        shift, blocks = _drawn(msgspec.json.encode(self.source), check.integer("seed", seed, 0))
+        shift *= self.scatter.friction_deg
         return Scene(
             terrain=self.profile,
-            blocks=tuple(
-                Block(b, density=self.source.density, surface=self.source.surface)
-                for b in self.source.draw(rng)
-            ),
+            blocks=blocks,
             surfaces={
                 name: Surface(
                     min(max(s.friction_deg + shift, 0.0), 85.0),
@@ -309,6 +307,19 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             case Embankment():
                 return c.base + c.embankment * area
         return (c.base + c.square * barrier.height**2) * (1.0 + barrier.thickness) / 2.0
+
+
+@lru_cache(maxsize=4096)
+def _drawn(source: bytes, seed: int) -> tuple[float, tuple[Block, ...]]:
+    """Return what a seed draws: a standard normal number and the blocks of a source, as JSON.
+
+    Cutting takes as long as simulating a small release, and a search asks for the same releases
+    again and again; one takes about 10 kB.
+    """
+    rng, rock = np.random.default_rng(seed), msgspec.json.decode(source, type=Source)
+    normal = rng.standard_normal()
+    cells = rock.draw(rng)
+    return normal, tuple(Block(c, density=rock.density, surface=rock.surface) for c in cells)
 
 
 def load_layout(path: str | os.PathLike[str]) -> Layout:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rigdda.site import Site
 
-TRAIN_SEEDS = range(4096)
+TRAIN_SEEDS = range(1024)
 """Seeds of the random sites to train on. So many that a policy cannot learn them by heart, and few
 enough that what falls without barriers need not be simulated again and again."""
 

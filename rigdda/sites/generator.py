@@ -1,7 +1,8 @@
 """Random sites: slopes of many shapes, loose rock on the face below the crest, a road at the foot.
 
-The ranges are chosen, not measured: rock that slides at once, slopes of 20 to 75 m, a catch area of
-5 to 9 m, and 0.2 to 0.8 of the rock on the unprotected road (a test keeps that).
+The ranges are chosen, not measured: rock that slides at once, slopes of 20 to 75 m, a catch area
+that is the wider the higher the slope, as in Ritchie's table, 5 to 10 m, and 0.2 to 0.8 of the rock
+past the edge of the unprotected road (a test keeps that).
 """
 
 from __future__ import annotations
@@ -21,6 +22,13 @@ PLATEAU = 10.0
 
 BEYOND = 40.0
 """Length of the ground beyond the road [m], which falls gently."""
+
+MARGIN = 2.0
+"""Distance from the last barrier to the road [m]."""
+
+ROOM = 8.0
+"""Least length of the zone for barriers [m], more than any barrier's; slopes are drawn until they
+have it."""
 
 CLEAR = 0.05
 """Height of the rock above its face at the start [m]: clear of it whatever the rounding."""
@@ -45,14 +53,18 @@ def generate(seed: int) -> Site:
 
     From the crest down: the upper face with the rock; one to three steeper faces of 10 to 20 m
     with benches of 1.5 to 3.5 m between them that dip outwards; the catch area; the road.
-    Barriers may stand from the end of the upper face to 2 m before the road.
+    Barriers may stand from below the rock to 2 m before the road.
     """
     rng = np.random.default_rng(seed)
-    friction = rng.uniform(22.0, 29.0)
+    friction = rng.uniform(22.0, 28.0)
     rock = _rock(rng, friction)
-    chain = _faces(rng, rock)
-    toe, bottom = chain[-1]
-    road = toe + rng.uniform(5.0, 9.0)
+    clear, road = 0.0, 0.0
+    while road - MARGIN - clear < ROOM:
+        chain = _faces(rng, rock)
+        (_, rock_end), (toe, bottom) = chain[2], chain[-1]
+        catch = 4.0 + 0.1 * (rock_end - bottom) + rng.uniform(-0.75, 0.75)
+        road = toe + min(max(catch, 5.0), 10.0)
+        clear = max(chain[2][0], max(x for x, _ in rock.corners) + 0.5)
     end = road + rng.uniform(7.0, 11.0)
     chain += [(road, bottom - 0.3), (end, bottom - 0.3), (end + BEYOND, bottom - 2.0)]
     return Site(
@@ -65,9 +77,9 @@ def generate(seed: int) -> Site:
             block_area=rock.block_area,
         ),
         road=Road(_millimetres(road), _millimetres(end)),
-        barrier_zone=BarrierZone(_millimetres(chain[2][0]), _millimetres(road - 2.0)),
+        barrier_zone=BarrierZone(_millimetres(clear), _millimetres(road - MARGIN)),
         surfaces={"rock": Surface(friction, restitution=rng.uniform(0.05, 0.3))},
-        motion=Motion(damping=rng.uniform(0.0, 0.15), duration=12.0),
+        motion=Motion(damping=rng.uniform(0.0, 0.12), duration=12.0),
     )
 
 

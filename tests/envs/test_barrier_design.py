@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import data_equivalence
 
 from envs import DesignProblem
 from envs.design import BarrierDesign
-from rigdda import BadInput, Outcome, Site, Wall
+from rigdda import BadInput, Fence, Outcome, Site
 
 ACTION = np.array([0.2, -0.4, -0.3, 0.9, -1.0, 0.0], dtype=np.float32)
 
@@ -67,7 +67,7 @@ def test_info_holds_plain_values(env: BarrierDesign) -> None:
     env.reset(seed=1)
     info = env.step(ACTION)[-1]
     assert type(info["objective"]) is type(info["cost"]) is float
-    assert [type(wall) for wall in info["layout"]] == [Wall]
+    assert [type(barrier) for barrier in info["layout"]] == [Fence]
     assert [type(outcome) for outcome in info["outcomes"]] == [Outcome] * 2
 
 

@@ -26,7 +26,7 @@ LAYOUT = (Wall(18.0, 1.0, 1.0),)
 
 @pytest.fixture
 def problem(ramp: Site) -> DesignProblem:
-    return DesignProblem(ramp, max_barriers=2, risk_weight=2.0, cost_weight=0.5)
+    return DesignProblem(ramp, 2, ("wall",), risk_weight=2.0, cost_weight=0.5)
 
 
 def test_objective_is_that_of_the_releases(problem: DesignProblem, ramp: Site) -> None:
@@ -162,7 +162,7 @@ def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:
 def test_sites_without_room_or_matter_for_barriers_are_refused(ramp: Site) -> None:
     short = msgspec.structs.replace(ramp, barrier_zone=BarrierZone(10.0, 11.0))
     with pytest.raises(BadInput, match=r"barrier_zone\.end = 11\.0: put it at least max_thickness"):
-        DesignProblem(short)
+        DesignProblem(short, kinds=("wall",))
     clay = msgspec.structs.replace(
         ramp,
         surfaces={"clay": Surface(25.0)},

@@ -97,7 +97,7 @@ def test_envelopes_are_simulated_once_and_on_seeds_that_are_not_scored(
 
 
 def test_the_layout_and_what_is_left_are_told(ramp: Site) -> None:
-    problem = DesignProblem(ramp, cost_limit=50.0)
+    problem = DesignProblem(ramp, kinds=("wall",), cost_limit=50.0)
     layout = (Wall(12.0, 2.0), Wall(17.0, 3.0))
     seen = observe(problem, layout)
     np.testing.assert_allclose(seen["layout"], problem.encode(layout), rtol=1e-6)
@@ -105,7 +105,7 @@ def test_the_layout_and_what_is_left_are_told(ramp: Site) -> None:
 
 
 def test_extremes_stay_in_bounds(ramp: Site) -> None:
-    problem = DesignProblem(ramp, risk_weight=1e9, cost_limit=1e-3)
+    problem = DesignProblem(ramp, kinds=("wall",), risk_weight=1e9, cost_limit=1e-3)
     seen = observe(problem, (Wall(12.0, 4.0),))
     assert seen in space(problem)
     assert seen["weights"][0] == 10.0

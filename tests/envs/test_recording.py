@@ -12,6 +12,7 @@ from rerun.chunk import RrdReader
 import rigdda
 from envs import DesignProblem
 from envs.design import BarrierDesign
+from envs.placement import BarrierPlacement
 from rigdda import Site
 from rigdda.barriers import describe
 
@@ -87,3 +88,34 @@ def test_recording_changes_nothing_else(ramp: Site, tmp_path: Path) -> None:
         env.reset(seed=9)
     assert plain.step(ACTION)[1:] == recorded.step(ACTION)[1:]
     assert plain.reset()[1] == recorded.reset()[1]
+
+
+def test_every_placement_is_recorded(ramp: Site, tmp_path: Path) -> None:
+    """On the timelines `placement` and `sim_time`, with seed, layout, reward and objective."""
+    env = BarrierPlacement(ramp, max_barriers=2, releases=2, record=tmp_path)
+    said = [env.reset(seed=5)[1]]
+    rewards = [0.0]
+    for slot in (ACTION, -ACTION):
+        _, reward, *_, info = env.step(slot)
+        said.append(info)
+        rewards.append(reward)
+    (path,) = tmp_path.iterdir()
+    fractions = [outcome.debris_fraction for outcome in said[-1]["outcomes"]]
+    nearest = int(np.argmin(np.abs(np.array(fractions) - np.mean(fractions))))
+    objectives = np.ravel(rows(path, "/episode/objective", "Scalars:scalars"))
+    assert objectives.tolist() == [info["objective"] for info in said]
+    assert np.ravel(rows(path, "/episode/reward", "Scalars:scalars")).tolist() == rewards
+    for k, info in enumerate(said):
+        run, _ = rigdda.release(ramp, info["layout"], env.seeds[nearest])
+        entity = f"/placement_{k}/world/blocks/0"
+        places = rows(path, entity, "Transform3D:translation")
+        assert places[-1][0][:2] == pytest.approx(run.poses[-1, 0, :2], rel=1e-6)
+        assert set(rows(path, entity, "placement")) == {k}
+        (chunk,) = RrdReader(path).stream().filter(content=entity, is_static=False).to_chunks()
+        sim_time = chunk.to_record_batch().column("sim_time").cast("int64").to_numpy()
+        np.testing.assert_allclose(1e-9 * sim_time, run.times, atol=1e-8)
+    ((notes,),) = rows(path, "/notes", "TextDocument:text", static=True)
+    assert f"**seed**: {env.seeds[nearest]}, the nearest to the mean of 2" in notes
+    for info, reward in zip(said, rewards, strict=True):
+        words = "; ".join(describe(b, 2) for b in info["layout"]) or "no barrier"
+        assert f"{words} | {reward:+.4f} | {info['objective']:.4f}" in notes

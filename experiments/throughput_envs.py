@@ -1,0 +1,84 @@
+"""Episodes a second of the environments: one copy, and batches as Stable-Baselines3 steps them.
+
+Run with `python -m experiments.throughput_envs [--quick]`; writes
+`experiments/results/throughput_envs.csv`. Every batch plays 192 episodes or more of random actions
+on the site quick with one release an episode. Speed-up: episodes a second over those of one copy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import envs
+from envs.registration import ENVIRONMENTS
+
+COPIES = (1, 8, 64)
+RESULTS = Path(__file__).parent / "results" / "throughput_envs.csv"
+
+
+def play(env: Any, episodes: int) -> tuple[int, int]:
+    """Play at least so many episodes; return how many, and the steps they took."""
+    ended = steps = 0
+    while ended < episodes:
+        actions = np.stack([env.action_space.sample() for _ in range(env.num_envs)])
+        _, _, done, _ = env.step(actions)
+        ended, steps = ended + int(done.sum()), steps + env.num_envs
+    return ended, steps
+
+
+def measure(name: str, copies: int, episodes: int, fidelity: str) -> dict[str, Any]:
+    """Return the row of one batch."""
+    env = envs.sb3_vec_env(name, copies, site="quick", releases=1, fidelity=fidelity)
+    env.seed(0)
+    env.action_space.seed(0)
+    env.reset()
+    wall, cpu = time.perf_counter(), time.process_time()
+    ended, steps = play(env, episodes)
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    env.close()
+    return {
+        "environment": name,
+        "fidelity": fidelity,
+        "copies": copies,
+        "cores": os.cpu_count(),
+        "episodes": ended,
+        "steps": steps,
+        "seconds": round(wall, 3),
+        "episodes_per_second": round(ended / wall, 3),
+        "steps_per_second": round(steps / wall, 3),
+        "cores_busy": round(cpu / wall, 3),
+    }
+
+
+def main() -> None:
+    """Measure all batches and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="few episodes of the fast fidelity")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="the table, a CSV file")
+    options = parser.parse_args()
+    measure("rigdda/BarrierPlacement-v0", 2, 4, "fast")  # compiles
+    rows: list[dict[str, Any]] = []
+    for fidelity in ("fast",) if options.quick else ("fast", "full"):
+        for name in ENVIRONMENTS:
+            one = None
+            for copies in COPIES:
+                row = measure(name, copies, 8 if options.quick else 192, fidelity)
+                one = one or row["episodes_per_second"]
+                rows.append(row | {"speed_up": round(row["episodes_per_second"] / one, 3)})
+                print(rows[-1])
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    with options.out.open("w", newline="") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""Batched environments: copies that step together give what each gives alone."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+import envs
+from envs.registration import ENVIRONMENTS
+from rigdda import BadInput, Site
+
+COPIES = 3
+every = pytest.mark.parametrize("name", ENVIRONMENTS)
+
+
+def batch(name: str, site: Site | str, **keywords: Any) -> Any:
+    return gymnasium.make_vec(
+        name, num_envs=COPIES, vectorization_mode="vector_entry_point",
+        site=site, releases=1, **keywords,
+    )  # fmt: skip
+
+
+@every
+@pytest.mark.parametrize("limit", [None, 2])
+@pytest.mark.parametrize("random", [False, True])
+def test_copies_give_what_singles_give(
+    name: str, limit: int | None, random: bool, ramp: Site
+) -> None:
+    """Five episodes of every copy, bit for bit, the last observations and infos included."""
+    site = "random" if random else ramp
+    together = batch(name, site, fidelity="fast", max_episode_steps=limit)
+
+    def single() -> gymnasium.Env:
+        terms = {"site": site, "releases": 1, "fidelity": "fast", "max_episode_steps": limit}
+        return gymnasium.make(name, **terms, disable_env_checker=True)
+
+    alone = SyncVectorEnv([single] * COPIES, autoreset_mode=AutoresetMode.SAME_STEP)
+    assert together.action_space == alone.action_space
+    assert together.observation_space == alone.observation_space
+    assert data_equivalence(together.reset(seed=7), alone.reset(seed=7), exact=True)
+    together.action_space.seed(1)
+    ended, cut = np.zeros(COPIES, int), 0
+    while ended.min() < (2 if random else 5):
+        actions = together.action_space.sample()
+        one, other = together.step(actions), alone.step(actions)
+        assert data_equivalence(list(one), list(other), exact=True)
+        assert one[0] in together.observation_space
+        ended += one[2] | one[3]
+        cut += one[3].sum()
+    assert (cut > 0) == (limit is not None and "Placement" in name)
+
+
+@every
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_goes_on_like_the_original(name: str, ramp: Site, clone: Any) -> None:
+    env = batch(name, ramp)
+    env.reset(seed=2)
+    env.action_space.seed(0)
+    actions = env.action_space.sample()
+    env.step(actions)
+    other = clone(env)
+    assert data_equivalence(list(env.step(actions)), list(other.step(actions)), exact=True)
+
+
+def test_bad_input_is_refused_and_changes_nothing(ramp: Site) -> None:
+    env = batch("rigdda/BarrierPlacement-v0", ramp)
+    actions = np.zeros((COPIES, 3), np.float32)
+    with pytest.raises(ResetNeeded):
+        env.step(actions)
+    with pytest.raises(BadInput, match=r"seed = \[1, 2\]: give one number, or 3"):
+        env.reset(seed=[1, 2])
+    env.reset(seed=[4, 5, 6])
+    with pytest.raises(BadInput, match=r"shape of actions\[0\] = \(2,\)"):
+        env.step(actions[:, :2])
+    with pytest.raises(BadInput, match="actions = '2 rows': give 3"):
+        env.step(actions[:2])
+    other = batch("rigdda/BarrierPlacement-v0", ramp)
+    other.reset(seed=4)
+    assert data_equivalence(list(env.step(actions)), list(other.step(actions)), exact=True)
+    for keywords in ({"num_envs": 0}, {"num_envs": 1, "max_episode_steps": 0}):
+        with pytest.raises(BadInput, match=r"= 0: give a whole number of at least 1"):
+            gymnasium.make_vec("rigdda/BarrierDesign-v0", site=ramp, **keywords)
+
+
+def test_every_copy_has_a_picture(ramp: Site) -> None:
+    env = batch("rigdda/BarrierDesign-v0", ramp, render_mode="rgb_array")
+    env.reset(seed=0)
+    pictures = env.render()
+    assert [picture.shape for picture in pictures] == [(450, 800, 3)] * COPIES
+
+
+def test_every_copy_has_a_folder_for_its_replays(ramp: Site, tmp_path: Any) -> None:
+    env = batch("rigdda/BarrierDesign-v0", ramp, record=tmp_path)
+    env.reset(seed=0)
+    env.step(np.zeros(env.action_space.shape, np.float32))
+    found = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.rrd"))
+    assert found == [f"copy-{i}/episode-000000.rrd" for i in range(COPIES)]
+
+
+def test_the_bridge_says_what_the_batch_says(ramp: Site) -> None:
+    """Observations, rewards, ends, what was seen last and why an episode ended."""
+    pytest.importorskip("stable_baselines3")
+    name, terms = "rigdda/BarrierPlacement-v0", {"site": ramp, "releases": 1}
+    bridge = envs.sb3_vec_env(name, COPIES, **terms, max_episode_steps=2)
+    plain = batch(name, ramp, max_episode_steps=2)
+    bridge.seed(3)
+    seen, info = plain.reset(seed=3)
+    assert data_equivalence(bridge.reset(), seen, exact=True)
+    assert [one["objective"] for one in bridge.venv.reset_infos] == info["objective"].tolist()
+    plain.action_space.seed(0)
+    truncations = 0
+    for _ in range(6):
+        actions = plain.action_space.sample()
+        seen, rewards, done, infos = bridge.step(actions)
+        other, exact, terminated, truncated, info = plain.step(actions)
+        assert data_equivalence(seen, other, exact=True)
+        np.testing.assert_array_equal(rewards, exact.astype(np.float32))
+        np.testing.assert_array_equal(done, terminated | truncated)
+        for i in np.flatnonzero(done):
+            final = {key: values[i] for key, values in info["final_obs"].items()}
+            assert data_equivalence(infos[i]["terminal_observation"], final, exact=True)
+            assert infos[i]["TimeLimit.truncated"] == (truncated[i] and not terminated[i])
+            assert infos[i]["objective"] == info["final_info"]["objective"][i]
+            assert "episode" in infos[i]
+            truncations += truncated[i]
+    assert truncations > 0
+
+
+@every
+def test_ppo_learns_on_copies(name: str, ramp: Site) -> None:
+    ppo = pytest.importorskip("stable_baselines3").PPO
+    env = envs.sb3_vec_env(name, COPIES, site=ramp, releases=1)
+    model = ppo("MultiInputPolicy", env, n_steps=6, batch_size=9, n_epochs=2, gamma=1.0, seed=0)
+    before = [p.detach().clone() for p in model.policy.parameters()]
+    model.learn(36)
+    assert model.num_timesteps == 36
+    after = model.policy.parameters()
+    assert any((a != b).any() for a, b in zip(after, before, strict=True))
+    assert env.get_attr("releases", [0]) == [1]
+    env.close()

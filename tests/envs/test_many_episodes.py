@@ -1,0 +1,53 @@
+"""A thousand random episodes: no exception, no value that is not finite, no memory that grows."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from envs import baseline
+from envs.registration import ENVIRONMENTS
+from rigdda import Site
+from rigdda.barriers import KINDS
+
+EPISODES, COPIES = 1000, 8
+
+
+def play(env: Any, episodes: int) -> None:
+    ended = 0
+    while ended < episodes:
+        seen, rewards, terminated, truncated, infos = env.step(env.action_space.sample())
+        assert np.isfinite(rewards).all()
+        assert np.isfinite(infos["objective"]).all()
+        assert all(np.isfinite(array).all() for array in seen.values())
+        ended += int((terminated | truncated).sum())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_a_thousand_random_episodes(name: str, ramp: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is remembered on purpose is made small, so that it is full from the start."""
+    from rigdda import site as module
+
+    monkeypatch.setattr(baseline.memory, "room", 16)
+    env = gymnasium.make_vec(name, num_envs=COPIES, site=ramp, kinds=tuple(KINDS), releases=1)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    play(env, 50)
+    module._drawn.cache_clear()
+    gc.collect()
+    tracemalloc.start()
+    play(env, 50)
+    sizes = []
+    for _ in range(2):
+        play(env, (EPISODES - 100) // 2)
+        module._drawn.cache_clear()
+        gc.collect()
+        sizes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    assert sizes[1] - sizes[0] < 2e5

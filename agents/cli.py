@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from agents.commands import evaluate, study, train
+from agents.commands import evaluate, study, train, validate
 from agents.names import DESIGNERS
 from agents.options import count_option, out_option, seed_option
 from agents.terminal import Stopped, fail, folder_for, kept, progress, show
@@ -77,7 +77,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (study, train, evaluate):
+for command in (study, train, evaluate, validate):
     cli.add_command(command)
 
 
@@ -179,35 +179,6 @@ def calibrate(site: str, releases: int, seed: int, out: Path | None) -> None:
     job.write(folder / "calibrate.csv", where, found)
     show(job.table(found))
     click.echo(f"{releases} releases of each; calibrate.csv is in {folder}")
-
-
-@cli.command()
-@click.option("--only", multiple=True, metavar="NAME",
-              help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
-@click.option("--slow", is_flag=True, help="Run the cases that take long as well.")
-@seed_option("Seed of the random shapes, speeds and offsets.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path),
-              default=Path("runs/validate"), show_default=True,
-              help="Folder to write into.")  # fmt: skip
-def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path) -> None:
-    """Compare computed motions with closed forms, and the observed order of convergence.
-
-    Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
-    last column of the table is processor time per simulated time, in microseconds a second.
-    """
-    from agents import accuracy
-
-    cases = accuracy.choose(only, slow)
-    out.mkdir(parents=True, exist_ok=True)
-    with kept(out), progress(accuracy.runs(cases)) as tick:
-        results, studies = accuracy.validate(cases, seed, out, tick)
-    show(accuracy.table(results))
-    if studies:
-        show(accuracy.convergence_table(studies))
-    missed = [f"{r.case} ({r.check.quantity})" for r in results if not r.passed]
-    if missed:
-        raise Stopped(f"{len(missed)} of {len(results)} miss their bars: {', '.join(missed)}", 1)
-    click.echo(f"{len(results)} figures within their bars; the tables are in {out}")
 
 
 @cli.command()

@@ -1,4 +1,4 @@
-"""Commands for many layouts and many sites: `rigdda study | train | evaluate`."""
+"""Commands that run many simulations: `rigdda study | train | evaluate | validate`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import click
 
 from agents.names import DESIGNERS
 from agents.options import count_option, out_option, seed_option
-from agents.terminal import folder_for, kept, progress, show
+from agents.terminal import Stopped, folder_for, kept, progress, show
 
 
 @click.command()
@@ -100,3 +100,32 @@ def evaluate(
     resumed = f", {store.resumed} releases taken from a former run" if store.resumed else ""
     click.echo(f"{len(posed)} sites, verified on {verify} releases each{resumed}; "
                f"scores.csv is in {folder}")  # fmt: skip
+
+
+@click.command()
+@click.option("--only", multiple=True, metavar="NAME",
+              help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
+@click.option("--slow", is_flag=True, help="Run the cases that take long as well.")
+@seed_option("Seed of the random shapes, speeds and offsets.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path),
+              default=Path("runs/validate"), show_default=True,
+              help="Folder to write into.")  # fmt: skip
+def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path) -> None:
+    """Compare computed motions with closed forms, and the observed order of convergence.
+
+    Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
+    last column of the table is processor time per simulated time, in microseconds a second.
+    """
+    from agents import accuracy
+
+    cases = accuracy.choose(only, slow)
+    out.mkdir(parents=True, exist_ok=True)
+    with kept(out), progress(accuracy.runs(cases)) as tick:
+        results, studies = accuracy.validate(cases, seed, out, tick)
+    show(accuracy.table(results))
+    if studies:
+        show(accuracy.convergence_table(studies))
+    missed = [f"{r.case} ({r.check.quantity})" for r in results if not r.passed]
+    if missed:
+        raise Stopped(f"{len(missed)} of {len(results)} miss their bars: {', '.join(missed)}", 1)
+    click.echo(f"{len(results)} figures within their bars; the tables are in {out}")

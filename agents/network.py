@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
+from safetensors.numpy import save
 
 from rigdda import BadInput
 from rigdda.files import atomic
@@ -51,7 +52,7 @@ class Network:
             tensors |= {f"weight {i}": weight, f"bias {i}": bias}
         arrays = {k: np.ascontiguousarray(v, dtype=np.float32) for k, v in tensors.items()}
         with atomic(path) as part:
-            save_file(arrays, part, dict(self.notes))
+            part.write_bytes(_in_order(save(arrays, dict(self.notes))))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Network:
@@ -71,3 +72,11 @@ class Network:
         except (OSError, SafetensorError) as error:
             mend = f"name a file that `rigdda train` wrote ({error})"
             raise BadInput("policy", str(path), mend) from None
+
+
+def _in_order(raw: bytes) -> bytes:
+    """Return a safetensors file with its header in alphabetical order: else notes come in any."""
+    size = int.from_bytes(raw[:8], "little")
+    header = json.dumps(json.loads(raw[8 : 8 + size]), sort_keys=True).encode()
+    header += b" " * (-len(header) % 8)
+    return len(header).to_bytes(8, "little") + header + raw[8 + size :]

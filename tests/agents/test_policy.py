@@ -65,10 +65,14 @@ def test_a_policy_survives_its_file(fences: DesignProblem, tmp_path: Path) -> No
         (rng.normal(0, 0.2, (8, len(seen))).astype(np.float32), np.zeros(8, np.float32)),
         (rng.normal(0, 0.5, (9, 8)).astype(np.float32), np.zeros(9, np.float32)),
     ]
-    made = Network(np.zeros_like(seen), np.ones_like(seen), layers, {"seed": "3"})
+    notes = {name: "3" for name in ("seed", "command", "version", "how")}
+    made = Network(np.zeros_like(seen), np.ones_like(seen), layers, notes)
     made.save(tmp_path / "it.safetensors")
     read = Network.load(tmp_path / "it.safetensors")
-    assert read.notes == {"seed": "3"} and (read(seen) == made(seen)).all()
+    assert read.notes == notes and (read(seen) == made(seen)).all()
+    read.save(tmp_path / "again.safetensors")
+    written = [(tmp_path / f"{name}.safetensors").read_bytes() for name in ("it", "again")]
+    assert written[0] == written[1]
     assert (np.abs(read(1e9 * seen)) <= 1.0).all()
 
 

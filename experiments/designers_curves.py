@@ -80,16 +80,21 @@ def table(summed: Sequence[Row]) -> Table:
     out = empty_table(("designer", "fall of the objective", "ahead of random", "share of cma"))
     for row in summed:
         if row["budget"] == last:
-            keys = (("gain", "gain"), ("ahead_of_random", "ahead"), ("share_of_cma", "share"))
-            out.add_row(row["designer"], *(_words(row, *key) for key in keys))
+            share = "-"
+            if "share_of_cma" in row:
+                share = f"{row['share_of_cma']:.2f} ({row['share_low']:.2f} to "
+                share += f"{row['share_high']:.2f})"
+            spans = _span(row, "gain", "gain"), _span(row, "ahead_of_random", "ahead")
+            out.add_row(row["designer"], *spans, share)
     return out
 
 
-def _words(row: Row, name: str, interval: str) -> str:
+def _span(row: Row, name: str, interval: str) -> str:
+    """Return a mean with half its 95 % interval in words."""
     if name not in row:
         return "-"
-    low, high = row[f"{interval}_low"], row[f"{interval}_high"]
-    return f"{row[name]:.3f} ({low:.3f} to {high:.3f})"
+    half = 0.5 * (row[f"{interval}_high"] - row[f"{interval}_low"])
+    return f"{row[name]:.3f} ± {half:.3f}" if np.isfinite(half) else f"{row[name]:.3f}"
 
 
 def _shown(own: Sequence[Row]) -> dict[int, float]:
@@ -124,7 +129,10 @@ def picture(path: str | os.PathLike[str], rows: Sequence[Row]) -> None:
             axes.plot(x, mean, "o-", markersize=4, linewidth=1.6, **style)
             axes.fill_between(x, low, high, color=COLOURS[name], alpha=0.12, linewidth=0)
     axes.set(xscale="log", xlabel="simulated releases",
-             ylabel="fall of the objective (verified, mean over cases)")  # fmt: skip
+             ylabel="fall of the objective (verified; mean over cases, 95 %)")  # fmt: skip
+    budgets = sorted({row["budget"] for row in rows})
+    axes.set_xticks(budgets, [str(budget) for budget in budgets])
+    axes.minorticks_off()
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
     figure.legend(loc="outside right upper", frameon=False)

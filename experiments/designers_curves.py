@@ -77,7 +77,7 @@ def share_interval(part: NDArray[np.float64], whole: NDArray[np.float64]) -> tup
 def table(summed: Sequence[Row]) -> Table:
     """Return the table of the whole budget."""
     last = max(row["budget"] for row in summed)
-    out = empty_table(("designer", "fall of the objective", "ahead of random", "share of cma"))
+    out = empty_table(("designer", "fall", "ahead of random", "share of cma (95 %)"))
     for row in summed:
         if row["budget"] == last:
             share = "-"

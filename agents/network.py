@@ -39,7 +39,7 @@ class Network:
 
     def __call__(self, features: Floats) -> NDArray[np.float64]:
         """Return the outputs for (F,) features, clipped to [-1, 1]."""
-        values = (features.astype(np.float64) - self.mean) / self.scale
+        values = scaled(features, self.mean, self.scale).astype(np.float64)
         for weight, bias in self.layers[:-1]:
             values = np.tanh(weight @ values + bias)
         weight, bias = self.layers[-1]
@@ -72,6 +72,11 @@ class Network:
         except (OSError, SafetensorError) as error:
             mend = f"name a file that `rigdda train` wrote ({error})"
             raise BadInput("policy", str(path), mend) from None
+
+
+def scaled(features: Floats, mean: Floats, scale: Floats) -> Floats:
+    """Return features of mean 0 and deviation 1 on the training sites, at most 3 in size."""
+    return np.clip((features - mean) / scale, np.float32(-3.0), np.float32(3.0))
 
 
 def _in_order(raw: bytes) -> bytes:

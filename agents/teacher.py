@@ -41,6 +41,16 @@ class Lesson:
     vector: NDArray[np.float64]
     gain: float
 
+    @property
+    def decides(self) -> NDArray[np.float64]:
+        """1 for the numbers of `vector` that decide something, else 0: all but a height, where that
+        says that the barrier is absent.
+        """
+        slots = self.vector.reshape(SLOTS, -1)
+        out = np.ones_like(slots)
+        out[slots[:, 1] <= -1.0] = (0.0, 1.0, 0.0)
+        return out.ravel()
+
 
 def problem(site: int) -> DesignProblem:
     """Return the problem of a training site, at fidelity "fast"."""

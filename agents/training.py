@@ -106,7 +106,7 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     halves.append(ppo.export(model, mean, scale, _notes(terms, "cloned, then PPO")))
     posed = [teacher.problem(site) for site in beside]
     cloned, tuned = (examine(network, posed) for network in halves)
-    better = halves[tuned >= cloned]
+    better = halves[tuned > cloned]
     better.save(out / "policy.safetensors")
     return Trained(better, cloned, tuned)
 

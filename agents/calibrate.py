@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-FENCES = ((0.5, 0.0, 0.2), (-0.3, 0.0, 0.2))
-"""Slots of the fences that are compared, none, the first and both: in the lower half of the zone
-and above its middle, of half the greatest height and about 1 MJ."""
+FENCES = ((0.5, 0.5, 0.6), (-0.3, 0.5, 0.6))
+"""Slots of the fences that are compared, none, the first and both: at three quarters and at a third
+of the zone, of three quarters of the greatest height and, in the default limits, 2.3 MJ."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,10 +97,10 @@ def _name(k: int) -> str:
 def _words(placements: Sequence[Placement], seed: str, title: str) -> str:
     """Return the whole episode as a page with a table."""
     lines = [f"## {title}", "", f"**seed**: {seed}", ""]
-    lines += ["| | layout | reward | objective | debris | cost |", "|-|-|-|-|-|-|"]
+    lines += ["| | reward | objective | debris | cost | layout |", "|-|-|-|-|-|-|"]
     for k, p in enumerate(placements):
         numbers = f"{p.reward:+.4f} | {p.objective:.4f} | {p.debris:.4f} | {p.cost:.2f}"
-        lines.append(f"| {k} | {p.layout} | {numbers} |")
+        lines.append(f"| {k} | {numbers} | {p.layout} |")
     return "\n".join(lines)
 
 

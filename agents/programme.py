@@ -58,7 +58,7 @@ def choose(catalogue: Catalogue, slots: int, limit: float) -> Choice | None:
         return None
     built = np.argwhere(found > 0.5)
     layout = tuple(catalogue.barriers[k][j] for k, j in built)
-    cost = float(catalogue.cost[tuple(built.T)].sum())
+    cost = float((catalogue.cost * (found > 0.5)).sum())
     return Choice(layout, cost, float((catalogue.cost * bound).sum()))
 
 
@@ -68,6 +68,9 @@ def _solve(catalogue: Catalogue, slots: int, limit: float, boolean: bool) -> Flo
 
     releases = len(catalogue.base)
     stations, options = np.nonzero(_worth_it(catalogue))
+    if not len(stations):  # nothing helps
+        kept = limit >= 1.0 or not catalogue.base.any()
+        return np.zeros_like(catalogue.cost) if kept else None
     relief, cost = catalogue.relief[:, stations, options], catalogue.cost[stations, options]
     z = cp.Variable(len(stations), boolean=boolean)
     passing = cp.Variable(releases, nonneg=True)

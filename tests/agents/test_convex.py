@@ -13,7 +13,7 @@ from agents.catalogue import CAPACITIES, HEIGHTS, Catalogue, room_behind, tabula
 from agents.crossings import CROSSING, Ensemble, ensemble
 from agents.programme import choose
 from envs import DesignProblem
-from rigdda import Fence, Site, Wall
+from rigdda import Barrier, Fence, Site, Wall
 
 
 def cvar(values: np.ndarray, beta: float) -> float:
@@ -119,3 +119,11 @@ def test_optima_are_layouts_that_may_be_built(kinds: tuple[str, ...], site: Site
         again = problem.decode(problem.encode(choice.layout))
         assert [b.x for b in again] == pytest.approx([b.x for b in choice.layout])
         assert [b.height for b in again] == pytest.approx([b.height for b in choice.layout])
+
+
+@pytest.mark.parametrize("limit, layout", [(0.5, None), (1.0, ())])
+def test_where_nothing_helps_nothing_is_built(limit: float, layout: tuple | None) -> None:
+    walls: list[list[Barrier]] = [[Wall(10.0, 1.0)]]
+    table = Catalogue(walls, np.full(4, 0.3), np.zeros((4, 1, 1)), np.ones((1, 1)))
+    choice = choose(table, 2, limit)
+    assert (choice and choice.layout) == layout

@@ -58,7 +58,7 @@ def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
                 low, high = student_interval(own - other)
                 row |= {"ahead_of_random": float((own - other).mean())}
                 row |= {"ahead_low": low, "ahead_high": high}
-            if len(best):
+            if len(best) and best.mean() > 0.0:
                 low, high = share_interval(own, best)
                 row |= {"share_of_cma": float(own.mean() / best.mean())}
                 row |= {"share_low": low, "share_high": high}
@@ -69,7 +69,8 @@ def summary(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def share_interval(part: NDArray[np.float64], whole: NDArray[np.float64]) -> tuple[float, float]:
     """Return the 95 % interval of the ratio of two means over the same cases, by bootstrap."""
     drawn = np.random.default_rng(0).integers(len(part), size=(RESAMPLES, len(part)))
-    ratios = part[drawn].mean(axis=1) / whole[drawn].mean(axis=1)
+    whole_means = np.maximum(whole[drawn].mean(axis=1), 1e-9)  # a sample may gain nothing
+    ratios = part[drawn].mean(axis=1) / whole_means
     low, high = np.quantile(ratios, (0.025, 0.975)).tolist()
     return low, high
 

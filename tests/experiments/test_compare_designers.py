@@ -20,7 +20,7 @@ from rigdda import Fence, Layout, Site
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file of the site for tests with a shorter release."""
     site = Site.load("quick")
-    site = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, duration=3.0))
+    site = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, duration=7.0))
     file = tmp_path_factory.mktemp("site") / "small.toml"
     site.save(file)
     return file

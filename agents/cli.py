@@ -1,4 +1,4 @@
-"""The command line: `rigdda sites | simulate | design | calibrate | validate | replay`.
+"""The command line: `rigdda sites | simulate | design | study | train | evaluate | ...`.
 
 Start-up imports click only; a command imports what it needs.
 """
@@ -6,13 +6,15 @@ Start-up imports click only; a command imports what it needs.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from agents.commands import evaluate, study, train, validate
 from agents.names import DESIGNERS
+from agents.options import count_option, out_option, seed_option
 from agents.terminal import Stopped, fail, folder_for, kept, progress, show
 
 if TYPE_CHECKING:
@@ -60,27 +62,6 @@ def _version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
         context.exit()
 
 
-def out_option(default: str) -> Callable[..., Any]:
-    """Return the option --out, into runs/ by default."""
-    return click.option(
-        "--out",
-        type=click.Path(file_okay=False, path_type=Path),
-        help=f"Folder to write into.  [default: runs/{default}-SITE]",
-    )
-
-
-def seed_option(words: str) -> Callable[..., Any]:
-    """Return the option --seed with its help."""
-    return click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help=words)
-
-
-def releases_option(name: str, least: int, default: int, words: str) -> Callable[..., Any]:
-    """Return an option that counts releases."""
-    return click.option(
-        name, type=click.IntRange(least), default=default, show_default=True, help=words
-    )
-
-
 layout_option = click.option(
     "--layout", type=click.Path(), help="Barriers: a TOML or JSON file, as `design` writes."
 )
@@ -96,6 +77,10 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
+for command in (study, train, evaluate, validate):
+    cli.add_command(command)
+
+
 @cli.command()
 def sites() -> None:
     """List the built-in sites."""
@@ -108,9 +93,9 @@ def sites() -> None:
 @cli.command()
 @click.argument("site")
 @layout_option
-@releases_option("--releases", 1, 16, "Releases to average.")
+@count_option("--releases", 1, 16, "Releases to average.")
 @seed_option("Seed of the first release; the others follow it.")
-@out_option("simulate")
+@out_option("simulate-SITE")
 def simulate(site: str, layout: str | None, releases: int, seed: int, out: Path | None) -> None:
     """Simulate releases of SITE (a name or a TOML file) and say what reaches the road.
 
@@ -138,17 +123,18 @@ def simulate(site: str, layout: str | None, releases: int, seed: int, out: Path 
 @click.argument("site")
 @click.option("--designer", type=click.Choice(DESIGNERS), default="cma", show_default=True,
               help="How to search.")  # fmt: skip
-@releases_option("--simulations", 2, SIMULATIONS, "Releases that the search may simulate.")
-@releases_option("--verify", 2, RELEASES, "Unseen releases that each layout is verified on.")
+@count_option("--simulations", 2, SIMULATIONS, "Releases that the search may simulate.")
+@count_option("--verify", 2, RELEASES, "Unseen releases that each layout is verified on.")
 @seed_option("Seed of the search and of its releases.")
-@out_option("design")
+@out_option("design-SITE")
 def design(
     site: str, designer: str, simulations: int, verify: int, seed: int, out: Path | None
 ) -> None:
     """Design the barriers of SITE (a name or a TOML file) and verify them on unseen releases.
 
-    Writes layout.toml, evaluations.csv, profile.png, search.png and episode.rrd. What a killed
-    or former run has simulated is in evaluations.jsonl and is not simulated again.
+    Writes layout.toml, evaluations.csv, profile.png, search.png and episode.rrd; the designer
+    pareto front.csv and front.png too. What a killed or former run has simulated is in
+    evaluations.jsonl and is not simulated again.
     """
     from agents import job, tables
     from envs import DesignProblem
@@ -158,14 +144,14 @@ def design(
     folder = folder_for(out, "design", problem.site.name)
     with kept(folder):
         with progress(simulations + CASES * verify) as tick:
-            study, store = job.study(problem, designer, simulations, seed, verify, folder, tick)
-        job.write(study, folder)
-    show(tables.designs(study.cases))
-    for wall in study.cases[-1][1].layout:
+            done, store = job.study(problem, designer, simulations, seed, verify, folder, tick)
+        job.write(done, folder)
+    show(tables.designs(done.cases))
+    for wall in done.cases[-1][1].layout:
         click.echo(describe(wall))
     resumed = f", {store.resumed} taken from a former run" if store.resumed else ""
     click.echo(
-        f"search: {study.result.simulations} releases; verification: {verify} unseen ones each "
+        f"search: {done.result.simulations} releases; verification: {verify} unseen ones each "
         f"(seeds of a stream of their own){resumed}\nlayout.toml, evaluations.csv, profile.png, "
         f"search.png and episode.rrd are in {folder}"
     )
@@ -173,9 +159,9 @@ def design(
 
 @cli.command()
 @click.argument("site")
-@releases_option("--releases", 2, 64, "Releases of each layout at each fidelity.")
+@count_option("--releases", 2, 64, "Releases of each layout at each fidelity.")
 @seed_option("Seed of the releases.")
-@out_option("calibrate")
+@out_option("calibrate-SITE")
 def calibrate(site: str, releases: int, seed: int, out: Path | None) -> None:
     """Measure what fidelity "fast" costs and gains on SITE (a name or a TOML file).
 
@@ -196,39 +182,10 @@ def calibrate(site: str, releases: int, seed: int, out: Path | None) -> None:
 
 
 @cli.command()
-@click.option("--only", multiple=True, metavar="NAME",
-              help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
-@click.option("--slow", is_flag=True, help="Run the cases that take long as well.")
-@seed_option("Seed of the random shapes, speeds and offsets.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path),
-              default=Path("runs/validate"), show_default=True,
-              help="Folder to write into.")  # fmt: skip
-def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path) -> None:
-    """Compare computed motions with closed forms, and the observed order of convergence.
-
-    Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
-    last column of the table is processor time per simulated time, in microseconds a second.
-    """
-    from agents import accuracy
-
-    cases = accuracy.choose(only, slow)
-    out.mkdir(parents=True, exist_ok=True)
-    with kept(out), progress(accuracy.runs(cases)) as tick:
-        results, studies = accuracy.validate(cases, seed, out, tick)
-    show(accuracy.table(results))
-    if studies:
-        show(accuracy.convergence_table(studies))
-    missed = [f"{r.case} ({r.check.quantity})" for r in results if not r.passed]
-    if missed:
-        raise Stopped(f"{len(missed)} of {len(results)} miss their bars: {', '.join(missed)}", 1)
-    click.echo(f"{len(results)} figures within their bars; the tables are in {out}")
-
-
-@cli.command()
 @click.argument("target")
 @layout_option
 @seed_option("Seed of the release.")
-@out_option("replay")
+@out_option("replay-SITE")
 def replay(target: str, layout: str | None, seed: int, out: Path | None) -> None:
     """Open a replay (FILE.rrd, or a run FILE.npz) or make one of a release of a site.
 

@@ -1,33 +1,30 @@
 """CMA-ES (Hansen 2016, arXiv:1604.00772; pycma) on the decision vector, ask and tell.
 
-It starts from the best in simulation of what one barrier-free ensemble suggests: the optima of
-`convex`, the engineering rule, its wall at lower heights (the rule does not know what height
-costs), and no barrier at all.
+It starts from the best in simulation of what one barrier-free ensemble suggests, see
+`agents.starts`.
 """
 
 from __future__ import annotations
 
 import math
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import convex
-from agents.crossings import Ensemble, ensemble_for
+from agents.crossings import ensemble_for
+from agents.policy import SHIPPED, decide, load
 from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
-from agents.rule import rule
+from agents.starts import starts
 from agents.store import Store
 from envs import DesignProblem
 from envs.encoding import MIN_HEIGHT, slot_size
-from rigdda import Layout
+from envs.envelope import SEEDS
+from rigdda import Layout, check
 
 Floats = NDArray[np.float64]
 
 SIGMA = 0.25
 """Step at the start, an eighth of the decision box: stations are searched across a bench."""
-LOWER = (0.75, 0.5)
-"""Shares of the rule's height that are tried."""
 POPULATION = 6
 """Layouts a generation: few, for budgets of some tens of layouts."""
 
@@ -47,27 +44,38 @@ def design(
         If the budget is below 2 or the seed below 0; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    starts = _starts(problem, ensemble_for(ledger))
-    return search(ledger, _propose(problem, starts, np.random.default_rng(seed)))
+    first = starts(problem, ensemble_for(ledger))
+    return search(ledger, _propose(problem, first, np.random.default_rng(seed)))
 
 
-def _starts(problem: DesignProblem, ensemble: Ensemble) -> list[Layout]:
-    """Return the different layouts that an ensemble suggests, of walls if they may be built."""
-    if "wall" not in problem.kinds:
-        return [()]
-    wall = rule(problem.site, ensemble)
-    lower = [
-        tuple(msgspec.structs.replace(w, height=share * w.height) for w in wall) for share in LOWER
-    ]
-    return list(dict.fromkeys([*convex.candidates(problem, ensemble), wall, *lower, ()]))
+def warm_started(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> DesignResult:
+    """Return the best layout that CMA-ES finds from the shipped policy's, without an ensemble.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 6 or the seed below 0; if fences are not among the kinds; if a
+        simulation diverges.
+    """
+    ledger = Ledger(problem, simulations, seed, progress, store)
+    check.integer("simulations", simulations, len(SEEDS) + 2)
+    first = [decide(load(SHIPPED), problem), ()]
+    ledger.used += len(SEEDS)
+    return search(ledger, _propose(problem, first, np.random.default_rng(seed)))
 
 
-def _propose(problem: DesignProblem, starts: list[Layout], rng: np.random.Generator) -> Proposals:
+def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generator) -> Proposals:
     """Yield the starts, then the generations of CMA-ES around the best; restart when it stops."""
     import cma
 
     best: tuple[float, Layout] = (math.inf, ())
-    for layout in starts:
+    for layout in first:
         best = min(best, ((yield layout).objective, layout), key=lambda pair: pair[0])
     low, high = problem.bounds
     options = {

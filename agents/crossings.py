@@ -26,6 +26,7 @@ CROSSING = np.dtype(
         ("release", "i4"),
         ("station", "i4"),
         ("block", "i4"),
+        ("time", "f8"),
         ("height", "f8"),
         ("radius", "f8"),
         ("speed", "f8"),
@@ -33,9 +34,9 @@ CROSSING = np.dtype(
         ("mass", "f8"),
     ]
 )
-"""The first crossing of a station by a block. height: of the centroid above the ground [m];
-radius: circumscribed, about the centroid [m]; speed [m/s]; energy of translation and rotation [J];
-mass per metre of slope width [kg/m]."""
+"""The first crossing of a station by a block. time: since the release [s]; height: of the centroid
+above the ground [m]; radius: circumscribed, about the centroid [m]; speed [m/s]; energy of
+translation and rotation [J]; mass per metre of slope width [kg/m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +114,7 @@ def _ensemble(text: bytes, seeds: tuple[int, ...]) -> Ensemble:
             run.events["target"],
             run.events["block"],
         )
-        out["height"] = run.events["height"]
+        out["time"], out["height"] = run.events["time"], run.events["height"]
         out["radius"], out["mass"] = radius[out["block"]], mass[out["block"]]
         out["speed"], out["energy"] = run.events["speed"], run.events["energy"]
         return out, float(mass.sum()), float(radius.mean())

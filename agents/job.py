@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 import rigdda
+from agents import extra
 from agents.crossings import ensemble, ensemble_seeds
-from agents.names import DESIGNERS
-from agents.protocol import Designer, DesignResult, Entry
-from agents.rule import rule
+from agents.pareto import ParetoResult
+from agents.protocol import DesignResult, Entry
+from agents.rule import kind_for, rule
 from agents.store import Store
 from agents.tables import EvaluationsFile
 from agents.verify import verify
 from envs import DesignProblem, Evaluation
-from rigdda import Layout, Outcome, Run, Site, check
+from rigdda import Layout, Outcome, Run, Site
 from rigdda.barriers import describe
 
 Tick = Callable[[int, str], None]
@@ -44,17 +44,6 @@ class Study:
     problem: DesignProblem
     result: DesignResult
     cases: tuple[tuple[str, Evaluation], ...]
-
-
-def designer(name: str) -> Designer:
-    """Return a designer by its name.
-
-    Raises
-    ------
-    BadInput
-        If there is none of that name.
-    """
-    return import_module(f"agents.{check.one_of('designer', name, DESIGNERS)}").design
 
 
 def simulate(
@@ -103,7 +92,7 @@ def study(
     BadInput, Diverged
         As the designer does.
     """
-    design = designer(name)
+    design = extra.module(name).design
     store = Store(out / "evaluations.jsonl")
     tick(0, "looking at releases without barriers")
     ensemble(problem.site, ensemble_seeds(seed, simulations))
@@ -132,7 +121,7 @@ def _cases(
     looked = ensemble(problem.site, ensemble_seeds(seed, simulations))
     return [
         (NOTHING, ()),
-        (RULE, rule(problem.site, looked)),
+        (RULE, rule(problem.site, looked, kind_for(problem))),
         (f"optimised ({name})", result.layout),
     ]
 
@@ -140,6 +129,7 @@ def _cases(
 def write(done: Study, out: Path) -> None:
     """Write `layout.toml`, `profile.png`, `search.png` and `episode.rrd` of a study into `out`.
 
+    Of a front of cost against debris, `front.csv` and `front.png` as well.
     The release shown is the one whose debris is nearest the mean of the verified layout.
     """
     from agents import pictures
@@ -156,6 +146,12 @@ def write(done: Study, out: Path) -> None:
     ]
     pictures.profile(out / "profile.png", site, panels)
     pictures.search(out / "search.png", done.result.history, done.cases)
+    if isinstance(done.result, ParetoResult):
+        entries = [Entry(done.result.simulations, "front", e) for e in done.result.front]
+        with EvaluationsFile(out / "front.csv") as file:
+            for entry in entries:
+                file.add(entry)
+        pictures.front(out / "front.png", done.result.history, done.result.front, done.cases)
     notes = {
         "layout": "; ".join(map(describe, verified.layout)) or "no barrier",
         "release": f"seed {verified.typical}, {outcome.debris_fraction:.1%} past the road's edge",

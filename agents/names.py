@@ -1,3 +1,3 @@
 """Names of the designers, known without importing one."""
 
-DESIGNERS = ("cma", "convex", "random", "rule")
+DESIGNERS = ("cma", "convex", "pareto", "policy", "ppo", "random", "rule", "tpe")

@@ -167,6 +167,57 @@ def _points(axes: Axes, history: History) -> None:
         )
 
 
+def front(
+    path: str | os.PathLike[str],
+    history: History,
+    found: Sequence[Evaluation],
+    points: Sequence[tuple[str, Evaluation]],
+) -> None:
+    """Write a PNG of cost against debris: all layouts of a search, the front, and named layouts.
+
+    Parameters
+    ----------
+    path : path
+        The PNG.
+    history : History
+        What the search evaluated.
+    found : sequence of Evaluation
+        The front, the cheapest first, drawn with its 95 % intervals.
+    points : sequence of (str, Evaluation)
+        Verified layouts to show beside it, with theirs.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(FONT):
+        figure = Figure((9.0, 5.4), dpi=DPI, layout="constrained")
+        axes = figure.subplots()
+        tried = [entry.evaluation for entry in history.stage("search")]
+        axes.plot([e.cost for e in tried], [100 * e.debris for e in tried], "o", color=SEARCH,
+                  markersize=3.5, alpha=0.6, label="layout in the search")  # fmt: skip
+        steps = [e.cost for e in found], [100 * e.debris for e in found]
+        axes.step(*steps, where="post", color=BARRIER, linewidth=1.4)
+        _crosses(axes, found, "o", BARRIER, "front, on other releases")
+        for i, (name, e) in enumerate(points):
+            _crosses(axes, [e], "Ds^v<>pX"[i % 8], f"C{i}", name)
+        axes.set(xlabel="cost per metre of slope width", ylabel="debris past the road's edge [%]")
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.25)
+        figure.legend(loc="outside lower center", ncols=3, frameon=False)
+        _save(figure, path)
+
+
+def _crosses(
+    axes: Axes, evaluations: Sequence[Evaluation], marker: str, colour: str, label: str
+) -> None:
+    """Draw costs and debris of evaluations with the intervals of the debris."""
+    debris = np.array([e.debris for e in evaluations])
+    spread = np.abs(np.array([e.debris_ci for e in evaluations]) - debris[:, None]).T
+    cost = [e.cost for e in evaluations]
+    axes.errorbar(cost, 100 * debris, 100 * spread, fmt=marker, color=colour, markersize=6,
+                  capsize=3, linewidth=1.0, label=label)  # fmt: skip
+
+
 def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure as PNG, whole or not at all."""
     with atomic(path) as part:

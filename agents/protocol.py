@@ -112,11 +112,16 @@ class Plan:
     final_releases: int
 
     @classmethod
-    def of(cls, simulations: int) -> Plan:
-        """Return the plan for a budget."""
+    def of(cls, simulations: int, most: int = 5) -> Plan:
+        """Return the plan for a budget, with at most so many finalists."""
         final = 2 * simulations // 5
-        finalists = min(5, max(2, final // 16))
+        finalists = min(most, max(2, final // 16))
         return cls(min(8, max(1, simulations // 40)), finalists, min(32, final // finalists))
+
+    @property
+    def reserve(self) -> int:
+        """Releases that are kept for the finalists."""
+        return self.finalists * self.final_releases
 
 
 class Ledger:
@@ -136,7 +141,7 @@ class Ledger:
         self.used = 0
         self._progress = progress
         self._store = store or Store()
-        self._entries: list[Entry] = []
+        self.entries: list[Entry] = []
 
     @property
     def left(self) -> int:
@@ -148,40 +153,67 @@ class Ledger:
         seeds = release_seeds(stage, self.seed, releases)
         evaluation = self._store.evaluate(self.problem, layout, seeds)
         self.used += releases
-        self._entries.append(Entry(self.used, stage, evaluation))
+        self.entries.append(Entry(self.used, stage, evaluation))
         if self._progress is not None:
-            self._progress(self._entries[-1])
+            self._progress(self.entries[-1])
         return evaluation
 
     def result(self, evaluation: Evaluation) -> DesignResult:
         """Return the result whose layout has this evaluation."""
-        history = History(tuple(self._entries))
+        history = History(tuple(self.entries))
         return DesignResult(evaluation.layout, evaluation, history, self.used)
 
     def best(self, n: int) -> list[Evaluation]:
         """Return the best `n` different layouts of the search, the best first."""
-        ranked = sorted((e.evaluation for e in self._entries), key=lambda e: e.objective)
+        ranked = sorted((e.evaluation for e in self.entries), key=lambda e: e.objective)
         return list({e.layout: e for e in reversed(ranked)}.values())[::-1][:n]
 
 
-def search(ledger: Ledger, proposals: Proposals) -> DesignResult:
-    """Evaluate what is proposed as far as the budget goes, then the best ones on other releases.
+Choose = Callable[[Ledger, int], list[Evaluation]]
+"""Returns at most so many finalists of a search."""
+
+
+def search(
+    ledger: Ledger, proposals: Proposals, choose: Choose = Ledger.best, most: int = 5
+) -> DesignResult:
+    """Evaluate what is proposed as far as the budget goes, then the finalists on other releases.
+
+    Parameters
+    ----------
+    ledger : Ledger
+        Counts the releases.
+    proposals : Proposals
+        What is evaluated in the search.
+    choose : callable
+        Chooses the finalists, by default those of least objective.
+    most : int
+        Finalists at most.
 
     Raises
     ------
     BadInput, Diverged
         As `DesignProblem.evaluate` does.
     """
-    plan = Plan.of(ledger.left)
-    reserve = plan.finalists * plan.final_releases
+    plan = Plan.of(ledger.left, most)
     layout = next(proposals)
-    while ledger.left >= reserve + plan.releases:
+    while ledger.left >= plan.reserve + plan.releases:
         evaluation = ledger.evaluate(layout, "search", plan.releases)
         try:
             layout = proposals.send(evaluation)
         except StopIteration:
             break
-    finalists = ledger.best(plan.finalists)
+    return finish(ledger, plan, choose)
+
+
+def finish(ledger: Ledger, plan: Plan, choose: Choose = Ledger.best) -> DesignResult:
+    """Evaluate the finalists of a search on other releases; return the best as the result.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `DesignProblem.evaluate` does.
+    """
+    finalists = choose(ledger, plan.finalists)
     if plan.final_releases > 0:
         finalists = [ledger.evaluate(e.layout, "final", plan.final_releases) for e in finalists]
     return ledger.result(min(finalists, key=lambda e: e.objective))

@@ -84,11 +84,11 @@ def _key(problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> str:
     """Return a hash of all that an evaluation depends on."""
     limit = problem.cost_limit
     weights = [problem.objective(1.0, 0.0), problem.objective(0.0, limit), limit]
-    asked = [__version__, _mechanics(), problem.site, weights, list(layout), list(seeds)]
+    asked = [__version__, mechanics(), problem.site, weights, list(layout), list(seeds)]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:32]
 
 
 @cache
-def _mechanics() -> str:
+def mechanics() -> str:
     """Return the hash of the kernels that this process runs."""
     return source_hash()

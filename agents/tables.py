@@ -87,19 +87,31 @@ def write_outcomes(
     """Write a CSV file with one row a release: its seed, its outcome, what each barrier took."""
     rows = []
     for seed, outcome in zip(seeds, outcomes, strict=True):
-        row: dict[str, Any] = {"seed": seed, "released_mass": outcome.released_mass}
-        row |= {name: getattr(outcome, name) for name in OUTCOME}
-        row |= zip(("run_out_50", "run_out_95", "run_out_100"), outcome.run_out, strict=True)
-        for i, barrier in enumerate(outcome.barriers):
-            row |= {f"barrier_{i}_{name}": getattr(barrier, name) for name in HIT}
-        rows.append(row)
+        rows.append({"seed": seed} | outcome_row(outcome))
     write_rows(path, rows)
 
 
-def write_rows(path: str | os.PathLike[str], rows: Sequence[dict[str, Any]]) -> None:
-    """Write a CSV file with one row a dictionary, all with the same keys."""
+def outcome_row(outcome: Outcome) -> dict[str, Any]:
+    """Return an outcome, and what each barrier took, as columns of a CSV file."""
+    row: dict[str, Any] = {"released_mass": outcome.released_mass}
+    row |= {name: getattr(outcome, name) for name in OUTCOME}
+    row |= zip(("run_out_50", "run_out_95", "run_out_100"), outcome.run_out, strict=True)
+    for i, barrier in enumerate(outcome.barriers):
+        row |= {f"barrier_{i}_{name}": getattr(barrier, name) for name in HIT}
+    return row
+
+
+def write_rows(
+    path: str | os.PathLike[str],
+    rows: Sequence[dict[str, Any]],
+    fields: Sequence[str] | None = None,
+) -> None:
+    """Write a CSV file with one row a dictionary.
+
+    `fields` are the columns, by default the keys of the first row; a row may lack some.
+    """
     with atomic(path) as part, part.open("w", newline="") as file:
-        table = csv.DictWriter(file, rows[0])
+        table = csv.DictWriter(file, rows[0] if fields is None else fields, restval="")
         table.writeheader()
         table.writerows(rows)
 

@@ -21,7 +21,7 @@ from rigdda import Site
 from rigdda.barriers import to_tables
 
 TINY = ("--simulations", "24", "--verify", "4")
-COMMANDS = ("sites", "simulate", "design", "validate", "replay")
+COMMANDS = ("sites", "simulate", "design", "study", "train", "evaluate", "validate", "replay")
 
 
 def rig(*arguments: object, folder: Path, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
@@ -125,7 +125,12 @@ def test_a_killed_design_goes_on(designed: tuple[Path, str], tmp_path: Path) -> 
 def test_every_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
     words = run("design", toml, "--designer", designer, *TINY, folder=tmp_path)
     assert ("engineering rule" if designer == "rule" else f"optimised ({designer})") in words
-    assert (tmp_path / "runs/design-chute/layout.toml").is_file()
+    folder = tmp_path / "runs/design-chute"
+    assert (folder / "layout.toml").is_file()
+    if designer == "pareto":
+        assert png_size(folder / "front.png")[0] > 900
+        costs = [float(row["cost"]) for row in rows(folder / "front.csv")]
+        assert costs and costs == sorted(costs)
 
 
 def test_simulate_writes_what_it_says(toml: Path, tmp_path: Path) -> None:

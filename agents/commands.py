@@ -1,0 +1,131 @@
+"""Commands that run many simulations: `rigdda study | train | evaluate | validate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from agents.names import DESIGNERS
+from agents.options import count_option, out_option, seed_option
+from agents.terminal import Stopped, folder_for, kept, progress, show
+
+
+@click.command()
+@click.argument("file", metavar="STUDY.toml")
+@seed_option("Seed of the first release; the others follow it.")
+@out_option("study-NAME")
+def study(file: str, seed: int, out: Path | None) -> None:
+    """Simulate every layout of STUDY.toml in the same releases: one row each in study.csv.
+
+    The file names a `site`, how many `releases`, and `layouts`: tables with a `name` and either
+    `barriers`, as in a layout file, or the `file` that holds them. A study that was killed goes on
+    from its study.csv.
+    """
+    from agents import studies
+
+    asked = studies.load(file)
+    folder = folder_for(out, "study", Path(file).stem)
+    with kept(folder), progress(asked.size) as tick:
+        resumed = studies.run(asked, seed, folder / "study.csv", tick)
+    show(studies.table(asked, folder / "study.csv"))
+    words = f", {resumed} taken from a former run" if resumed else ""
+    click.echo(f"{asked.size} releases{words}; study.csv is in {folder}")
+
+
+@click.command()
+@count_option("--sites", 2, 256, "Random sites to train on.")
+@count_option("--lessons", 16, 96, "Simulations of the search that makes the lesson of a site.")
+@count_option("--episodes", 0, 16384, "Episodes of PPO after the lessons were cloned.")
+@seed_option("Seed of all that is random.")
+@out_option("train")
+def train(sites: int, lessons: int, episodes: int, seed: int, out: Path | None) -> None:
+    """Train a policy that designs fences for a site from what it sees of it, without a search.
+
+    Writes policy.safetensors, which `rigdda evaluate --policy` takes, and logs for TensorBoard.
+    A training that was killed goes on where it stopped. Needs the extra rl.
+    """
+    from agents import training
+
+    terms = training.Terms(sites, lessons, episodes, seed)
+    folder = out or Path("runs/train")
+    folder.mkdir(parents=True, exist_ok=True)
+    with kept(folder), progress(terms.sites + terms.episodes) as tick:
+        trained = training.train(terms, folder, tick)
+    click.echo(
+        f"fall of the objective on {terms.beside} sites beside the training sites: cloned "
+        f"{trained.cloned:.3f}, after PPO {trained.tuned:.3f}; policy.safetensors is in {folder}"
+    )
+
+
+@click.command()
+@click.option("--designer", "names", type=click.Choice(DESIGNERS), multiple=True,
+              default=("rule", "policy"), show_default=True,
+              help="What to try; repeatable.")  # fmt: skip
+@click.option("--policy", type=click.Path(), help="What `train` wrote; else the shipped policy.")
+@count_option("--simulations", 2, 176, "Releases that each designer may simulate on a site.")
+@count_option("--sites", 1, 20, "Unseen random sites, at most 20.")
+@count_option("--verify", 2, 32, "Unseen releases that each layout is verified on.")
+@seed_option("Seed of the searches and of their releases.")
+@out_option("evaluate")
+def evaluate(
+    names: tuple[str, ...],
+    policy: str | None,
+    simulations: int,
+    sites: int,
+    verify: int,
+    seed: int,
+    out: Path | None,
+) -> None:
+    """Try designers on random sites that no training sees, at fidelity "fast".
+
+    Prints means over the sites with 95 % intervals, each designer also against the first; writes
+    scores.csv. What a killed or former run has simulated is not simulated again.
+    """
+    from agents import exam, extra, tables
+    from agents.policy import load, using
+    from agents.store import Store
+
+    designers = {name: extra.module(name).design for name in dict.fromkeys(names)}
+    if policy is not None:
+        designers["policy"] = using(load(policy))
+    posed = exam.unseen(sites)
+    folder = out or Path("runs/evaluate")
+    folder.mkdir(parents=True, exist_ok=True)
+    store = Store(folder / "evaluations.jsonl")
+    with kept(folder), progress(len(posed) * len(designers)) as tick:
+        scores = exam.sit(posed, designers, simulations, verify, seed, store, tick)
+    tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
+    show(exam.table(scores))
+    resumed = f", {store.resumed} releases taken from a former run" if store.resumed else ""
+    click.echo(f"{len(posed)} sites, verified on {verify} releases each{resumed}; "
+               f"scores.csv is in {folder}")  # fmt: skip
+
+
+@click.command()
+@click.option("--only", multiple=True, metavar="NAME",
+              help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
+@click.option("--slow", is_flag=True, help="Run the cases that take long as well.")
+@seed_option("Seed of the random shapes, speeds and offsets.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path),
+              default=Path("runs/validate"), show_default=True,
+              help="Folder to write into.")  # fmt: skip
+def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path) -> None:
+    """Compare computed motions with closed forms, and the observed order of convergence.
+
+    Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
+    last column of the table is processor time per simulated time, in microseconds a second.
+    """
+    from agents import accuracy
+
+    cases = accuracy.choose(only, slow)
+    out.mkdir(parents=True, exist_ok=True)
+    with kept(out), progress(accuracy.runs(cases)) as tick:
+        results, studies = accuracy.validate(cases, seed, out, tick)
+    show(accuracy.table(results))
+    if studies:
+        show(accuracy.convergence_table(studies))
+    missed = [f"{r.case} ({r.check.quantity})" for r in results if not r.passed]
+    if missed:
+        raise Stopped(f"{len(missed)} of {len(results)} miss their bars: {', '.join(missed)}", 1)
+    click.echo(f"{len(results)} figures within their bars; the tables are in {out}")

@@ -1,0 +1,139 @@
+"""Designers on many problems, what each found verified on releases that none of them has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from agents.protocol import Designer
+from agents.store import Store
+from agents.tables import empty_table
+from agents.verify import verify
+from envs import DesignProblem, Evaluation, fidelity
+from envs.evaluation import Interval, student_interval
+from rigdda import BadInput, check, sites
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Tick = Callable[[int, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What a designer found for a problem.
+
+    Parameters
+    ----------
+    site, designer : str
+        Names.
+    simulations : int
+        Releases that the designer used.
+    nothing, built : Evaluation
+        No barrier and the found layout, verified on the same unseen releases.
+    """
+
+    site: str
+    designer: str
+    simulations: int
+    nothing: Evaluation
+    built: Evaluation
+
+    @property
+    def gain(self) -> float:
+        """What the layout takes off the objective."""
+        return self.nothing.objective - self.built.objective
+
+    def row(self) -> dict[str, Any]:
+        """Return the score as a row of a CSV file."""
+        e = self.built
+        return {
+            "site": self.site,
+            "designer": self.designer,
+            "simulations": self.simulations,
+            "releases": len(e.seeds),
+            "nothing": self.nothing.objective,
+            "objective": e.objective,
+            "objective_low": e.ci[0],
+            "objective_high": e.ci[1],
+            "gain": self.gain,
+            "debris": e.debris,
+            "cost": e.cost,
+            "barriers": len(e.layout),
+        }
+
+
+def unseen(count: int) -> list[DesignProblem]:
+    """Return the problems of the first random sites that no training sees, at fidelity "fast".
+
+    Raises
+    ------
+    BadInput
+        If there are fewer.
+    """
+    found = sites.test_sites()
+    if check.integer("sites", count, 1) > len(found):
+        raise BadInput("sites", count, f"give a whole number of at most {len(found)}")
+    return [DesignProblem(fidelity.at(site, "fast")) for site in found[:count]]
+
+
+def sit(
+    problems: Sequence[DesignProblem],
+    designers: Mapping[str, Designer],
+    simulations: int,
+    releases: int,
+    seed: int,
+    store: Store,
+    tick: Tick,
+) -> list[Score]:
+    """Return the score of every designer on every problem, each with so many simulations.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As the designers do.
+    """
+    scores: list[Score] = []
+    for posed in problems:
+        nothing = verify(posed, (), releases, seed, store)
+        for name, design in designers.items():
+            tick(len(scores), f"{posed.site.name}: {name}")
+            found = design(posed, simulations, seed, None, store)
+            built = verify(posed, found.layout, releases, seed, store)
+            scores.append(Score(posed.site.name, name, found.simulations, nothing, built))
+    return scores
+
+
+def gains(scores: Sequence[Score], designer: str) -> list[float]:
+    """Return what a designer took off the objective, site by site."""
+    return [score.gain for score in scores if score.designer == designer]
+
+
+def mean_and_interval(values: Sequence[float]) -> tuple[float, Interval]:
+    """Return the mean over sites and its 95 % interval."""
+    return float(np.mean(values)), student_interval(values)
+
+
+def table(scores: Sequence[Score]) -> Table:
+    """Return the table of designers: means over sites with their 95 % intervals."""
+    names = list(dict.fromkeys(score.designer for score in scores))
+    out = empty_table(("designer", "releases", "objective", "fall (95 %)", f"beyond {names[0]}"))
+    first = gains(scores, names[0])
+    nothing = float(np.mean([s.nothing.objective for s in scores if s.designer == names[0]]))
+    out.add_row("no barrier", "0", f"{nothing:.3f}", "-", "-")
+    for name in names:
+        own = [score for score in scores if score.designer == name]
+        used = round(float(np.mean([score.simulations for score in own])))
+        objective = float(np.mean([score.built.objective for score in own]))
+        ahead = np.subtract(gains(scores, name), first).tolist()
+        fall, more = (_words(*mean_and_interval(v)) for v in (gains(scores, name), ahead))
+        out.add_row(name, f"{used}", f"{objective:.3f}", fall, "-" if name == names[0] else more)
+    return out
+
+
+def _words(mean: float, interval: Interval) -> str:
+    low, high = interval
+    return f"{mean:.3f} ({low:.3f} to {high:.3f})" if np.isfinite(high - low) else f"{mean:.3f}"

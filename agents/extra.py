@@ -1,0 +1,24 @@
+"""Designers' modules by name; what an extra brings is asked for in one line if it is missing."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from agents.names import DESIGNERS
+from rigdda import BadInput, check
+
+
+def module(name: str) -> ModuleType:
+    """Return the module of a designer.
+
+    Raises
+    ------
+    BadInput
+        If there is none of that name, or it needs what is not installed.
+    """
+    try:
+        return import_module(f"agents.{check.one_of('designer', name, DESIGNERS)}")
+    except ModuleNotFoundError as error:
+        mend = f"install {error.name}: pip install 'rigdda[rl]'"
+        raise BadInput("designer", name, mend) from None

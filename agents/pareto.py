@@ -1,0 +1,115 @@
+"""The front of cost against debris by NSGA-II (Deb et al. 2002, IEEE TEC 6, 182-197; Optuna).
+
+It starts from what one barrier-free ensemble suggests at several weights of cost, see
+`agents.starts`. What nothing dominates in the search is evaluated again on other releases, and what
+nothing dominates there is the front: so no layout is in it because it was lucky in the search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents import trials
+from agents.crossings import Ensemble, ensemble_for
+from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
+from agents.starts import starts
+from agents.store import Store
+from envs import DesignProblem, Evaluation
+from rigdda import Layout
+
+FINALISTS = 12
+"""Layouts of the search's front that are evaluated again, at most."""
+POPULATION = 16
+"""Layouts a generation."""
+CHEAPER = (1.0, 0.3, 3.0)
+"""Factors of the weight of cost at which layouts to start from are sought."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParetoResult(DesignResult):
+    """What the search found: the layout of least objective, and the front it was chosen from.
+
+    Parameters
+    ----------
+    front : tuple of Evaluation
+        Layouts of which none is both cheaper and safer than another, the cheapest first, evaluated
+        on releases that the search did not see.
+    """
+
+    front: tuple[Evaluation, ...]
+
+
+def design(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> ParetoResult:
+    """Return the layout of least objective and the front that NSGA-II finds within the budget.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 2 or the seed below 0; if a simulation diverges.
+    """
+    ledger = Ledger(problem, simulations, seed, progress, store)
+    first = _starts(problem, ensemble_for(ledger))
+    found = search(ledger, _propose(problem, first, ledger.seed), finalists, FINALISTS)
+    ends = found.history.stage("final") or found.history.stage("search")
+    best = (found.layout, found.evaluation, found.history, found.simulations)
+    return ParetoResult(*best, front=front(entry.evaluation for entry in ends))
+
+
+def front(evaluations: Iterable[Evaluation]) -> tuple[Evaluation, ...]:
+    """Return those of which none other is as cheap and as safe, the cheapest first."""
+    kept: list[Evaluation] = []
+    for e in sorted(evaluations, key=lambda e: (e.cost, e.debris)):
+        if not kept or e.debris < kept[-1].debris:
+            kept.append(e)
+    return tuple(kept)
+
+
+def finalists(ledger: Ledger, n: int) -> list[Evaluation]:
+    """Return at most `n` of the search's front: the best objective, the others evenly spread."""
+    found = front(ledger.best(len(ledger.entries)))
+    if len(found) <= n:
+        return list(found)
+    best = min(range(len(found)), key=lambda i: found[i].objective)
+    spread = np.linspace(0, len(found) - 1, n - 1).round().astype(int).tolist()
+    return [found[i] for i in sorted({best, *spread})]
+
+
+def _starts(problem: DesignProblem, looked: Ensemble) -> list[Layout]:
+    """Return the different starts at every weight of cost; those of the problem's own first."""
+    found: dict[Layout, None] = {}
+    for factor in CHEAPER:
+        weighed = DesignProblem(
+            problem.site,
+            problem.max_barriers,
+            problem.kinds,
+            problem.risk_weight,
+            factor * problem.cost_weight,
+            problem.cost_limit,
+        )
+        found |= dict.fromkeys(starts(weighed, looked))
+    return list(found)
+
+
+def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:
+    """Yield the starts, then the generations of NSGA-II, without end."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    sampler = optuna.samplers.NSGAIISampler(population_size=POPULATION, seed=seed)
+    study = optuna.create_study(directions=["minimize", "minimize"], sampler=sampler)
+    for layout in first:
+        study.enqueue_trial(trials.parameters(problem, layout))
+    space = trials.space(problem)
+    while True:
+        trial = study.ask(space)
+        evaluation = yield problem.decode(trials.vector(problem, trial.params))
+        study.tell(trial, (problem.penalised(evaluation.cost), evaluation.debris))

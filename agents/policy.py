@@ -1,0 +1,103 @@
+"""A trained policy: from what is seen of a site without barriers to its fences, with no search.
+
+`rigdda train` makes it; the one that is shipped says by which command, with which seed and version.
+Torch is not needed to use it.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+from pathlib import Path
+
+from agents.features import features
+from agents.network import Network
+from agents.protocol import Designer, DesignResult, Ledger, Progress
+from agents.store import Store
+from envs import DesignProblem
+from envs.envelope import SEEDS
+from envs.observation import observe
+from rigdda import BadInput, Fence, Layout, check
+
+KINDS = ("fence",)
+"""What a policy builds."""
+SLOTS = 3
+"""Fences that it decides on."""
+SHIPPED = Path(__file__).with_suffix(".safetensors")
+
+
+def design(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> DesignResult:
+    """Return the layout of the shipped policy and its evaluation.
+
+    At most 36 simulations are used: 4 to look at, 32 to evaluate.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 5, the seed below 0 or fences are not among the kinds; if a
+        simulation diverges.
+    """
+    return using(load(SHIPPED))(problem, simulations, seed, progress, store)
+
+
+def using(network: Network) -> Designer:
+    """Return the designer that builds what a network decides."""
+
+    def design(
+        problem: DesignProblem,
+        simulations: int,
+        seed: int = 0,
+        progress: Progress | None = None,
+        store: Store | None = None,
+    ) -> DesignResult:
+        ledger = Ledger(problem, simulations, seed, progress, store)
+        if ledger.budget <= len(SEEDS):
+            mend = (
+                f"give at least {len(SEEDS) + 1}: the policy looks at {len(SEEDS)} releases first"
+            )
+            raise BadInput("simulations", simulations, mend)
+        layout = decide(network, problem)
+        ledger.used += len(SEEDS)
+        return ledger.result(ledger.evaluate(layout, "final", min(32, ledger.left)))
+
+    return design
+
+
+def decide(network: Network, problem: DesignProblem) -> Layout:
+    """Return what a network builds: of more fences than there are slots, the highest.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If fences are not among the kinds; if a simulation diverges.
+    """
+    check.one_of("kind of the policy's barriers", *KINDS, problem.kinds)
+    posed = pose(problem)
+    layout = posed.decode(network(features(observe(posed, ()))))
+    fences = [barrier for barrier in layout if isinstance(barrier, Fence)]
+    kept = sorted(fences, key=lambda fence: -fence.height)[: problem.max_barriers]
+    return tuple(sorted(kept, key=lambda fence: fence.x))
+
+
+def pose(problem: DesignProblem) -> DesignProblem:
+    """Return a problem as policies are trained on it: of `SLOTS` fences."""
+    weights = problem.risk_weight, problem.cost_weight, problem.cost_limit
+    return DesignProblem(problem.site, SLOTS, KINDS, *weights)
+
+
+@lru_cache(maxsize=4)
+def load(path: str | os.PathLike[str]) -> Network:
+    """Return the network of a file, read once.
+
+    Raises
+    ------
+    BadInput
+        If there is no such file or it is not a network.
+    """
+    return Network.load(path)

@@ -1,0 +1,249 @@
+"""Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347; Stable-Baselines3).
+
+`design` lets it search on one problem. `fine_tune` is the second half of `rigdda train`: it goes on
+from a policy that was cloned from lessons, on a pool of sites, one release an episode.
+The only module of the designers that knows torch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+
+from agents.features import features
+from agents.network import Network, scaled
+from agents.protocol import DesignResult, Ledger, Plan, Progress, finish
+from agents.store import Store
+from agents.teacher import Lesson
+from envs import DesignProblem, sb3_vec_env
+from rigdda.files import atomic
+
+Floats = NDArray[np.float32]
+
+HIDDEN = [64, 64]
+"""Neurons of the hidden layers; few, since lessons are few."""
+EXPLORATION = -1.6
+"""Logarithm of the standard deviation of actions at the start: 0.2, a tenth of the decision box."""
+EPOCHS = 300
+"""Passes of cloning over all lessons."""
+JITTER = 11.0
+"""Noise on scaled features in cloning, over the root of the number of lessons: 2 at 32 lessons,
+where a cross-validation found less to overfit; a network that is not sure says the mean."""
+COMMON: dict[str, Any] = {"gamma": 1.0, "device": "cpu", "verbose": 0}
+
+
+def design(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> DesignResult:
+    """Return the best layout that PPO tries within the budget, all of it on this problem.
+
+    A policy learned for one problem is a point of the decision box with a spread, so this is a
+    search as the others are; what pays is a policy for many sites, see `agents.policy`.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 2 or the seed below 0; if a simulation diverges.
+    """
+    ledger = Ledger(problem, simulations, seed, progress, store)
+    plan = Plan.of(ledger.left)
+    bandit = _Bandit(ledger, plan)
+    torch.set_num_threads(1)
+    model = PPO(
+        "MlpPolicy", bandit, n_steps=16, batch_size=16, n_epochs=10, learning_rate=1e-3,
+        policy_kwargs={"net_arch": [16], "log_std_init": -0.7}, seed=ledger.seed, **COMMON,
+    )  # fmt: skip
+    if bandit.paid():
+        model.learn(10**9, callback=_WhilePaid(bandit))
+    return finish(ledger, plan)
+
+
+class _Bandit(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """One problem as an environment without anything to see; a ledger pays for its steps."""
+
+    def __init__(self, ledger: Ledger, plan: Plan):
+        self.ledger, self.plan = ledger, plan
+        self.observation_space = spaces.Box(0.0, 1.0, (1,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (ledger.problem.size,), np.float32)
+
+    def paid(self) -> bool:
+        """Return whether the budget has another layout of the search."""
+        return self.ledger.left >= self.plan.reserve + self.plan.releases
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Show nothing."""
+        super().reset(seed=seed)
+        return np.zeros(1, dtype=np.float32), {}
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Evaluate what the action stands for."""
+        layout = self.ledger.problem.decode(action)
+        evaluation = self.ledger.evaluate(layout, "search", self.plan.releases)
+        return np.zeros(1, dtype=np.float32), -evaluation.objective, True, False, {}
+
+
+class _WhilePaid(BaseCallback):
+    """Goes on while the budget has another layout."""
+
+    def __init__(self, bandit: _Bandit):
+        super().__init__()
+        self.bandit = bandit
+
+    def _on_step(self) -> bool:
+        return self.bandit.paid()
+
+
+class Featured(VecEnvWrapper):
+    """Shows the scaled features of `BarrierDesign` instead of its observations."""
+
+    def __init__(self, venv: VecEnv, mean: NDArray[np.float32], scale: NDArray[np.float32]):
+        self.mean, self.scale = mean, scale
+        super().__init__(venv, spaces.Box(-np.inf, np.inf, mean.shape, np.float32))
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start every copy."""
+        return self._scaled(self.venv.reset())
+
+    def step_wait(self) -> Any:
+        """Step every copy."""
+        seen, rewards, dones, infos = self.venv.step_wait()
+        for info in infos:
+            if "terminal_observation" in info:
+                info["terminal_observation"] = self._one(info["terminal_observation"])
+        return self._scaled(seen), rewards, dones, infos
+
+    def _scaled(self, seen: Any) -> NDArray[np.float32]:
+        count = len(seen["span"])
+        return np.stack([self._one({k: v[i] for k, v in seen.items()}) for i in range(count)])
+
+    def _one(self, seen: Any) -> NDArray[np.float32]:
+        return scaled(features(seen), self.mean, self.scale)
+
+
+def pool(problems: Sequence[DesignProblem]) -> VecEnv:
+    """Return one copy of `BarrierDesign` for each problem, of one release an episode.
+
+    Every copy keeps its site, so that what is seen of it is simulated once.
+    """
+    first = problems[0]
+    copies = sb3_vec_env(
+        "rigdda/BarrierDesign-v0", len(problems), site=first.site, kinds=first.kinds,
+        max_barriers=first.max_barriers, releases=1,
+    )  # fmt: skip
+    for i, posed in enumerate(problems):
+        copies.set_attr("problem", posed, i)
+    return copies
+
+
+def learner(copies: VecEnv, seed: int, logs: Path) -> PPO:
+    """Return an untrained policy and its trainer, one mini-batch a step of all copies."""
+    torch.set_num_threads(1)
+    return PPO(
+        "MlpPolicy", copies, n_steps=4, batch_size=copies.num_envs, n_epochs=4,
+        learning_rate=1e-4, target_kl=0.02, seed=seed, tensorboard_log=str(logs),
+        policy_kwargs={"net_arch": HIDDEN, "log_std_init": EXPLORATION}, **COMMON,
+    )  # fmt: skip
+
+
+def clone(model: PPO, lessons: Sequence[Lesson], mean: Floats, scale: Floats, seed: int) -> None:
+    """Fit a policy to lessons: its actions to their layouts, its values to their gains.
+
+    Stations and sizes of absent barriers teach nothing. A lesson counts by its gain.
+    """
+    policy, rng = _net(model), np.random.default_rng(seed)
+    seen = np.stack([scaled(lesson.features, mean, scale) for lesson in lessons])
+    aim = np.stack([lesson.vector for lesson in lessons])
+    gain = np.array([lesson.gain for lesson in lessons])
+    decides = np.stack([lesson.decides for lesson in lessons])
+    counts = np.maximum(gain, 0.0)[:, None] * decides / max(gain.mean(), 1e-3)
+    y, w, v = (torch.as_tensor(a, dtype=torch.float32) for a in (aim, counts, gain))
+    fit = torch.optim.AdamW(policy.parameters(), lr=1e-3)
+    mean_aim = (counts * aim).sum(axis=0) / np.maximum(counts.sum(axis=0), 1e-9)
+    assert isinstance(policy.action_net, torch.nn.Linear)
+    with torch.no_grad():
+        policy.action_net.bias.copy_(torch.as_tensor(mean_aim))
+    jitter = JITTER / math.sqrt(len(lessons))
+    for _ in range(EPOCHS):
+        noisy = seen + jitter * rng.standard_normal(seen.shape)
+        x = torch.as_tensor(noisy, dtype=torch.float32)
+        wrong = w * (_actions(policy, x) - y) ** 2
+        off = policy.predict_values(x).squeeze(-1) - v
+        fit.zero_grad()
+        (wrong.mean() + (off**2).mean()).backward()
+        fit.step()
+
+
+def _net(model: PPO) -> ActorCriticPolicy:
+    assert isinstance(model.policy, ActorCriticPolicy)
+    return model.policy
+
+
+def _actions(policy: ActorCriticPolicy, x: torch.Tensor) -> torch.Tensor:
+    """Return the mean actions of a policy for scaled features."""
+    hidden = policy.mlp_extractor.forward_actor(x)
+    means: torch.Tensor = policy.action_net(hidden)
+    return means
+
+
+def fine_tune(model: PPO, episodes: int, checkpoint: Path, tick: Callable[[int], None]) -> None:
+    """Go on training up to so many episodes in all; the trainer is kept after every rollout."""
+    if model.num_timesteps < episodes:
+        kept = _Keep(checkpoint, tick)
+        model.learn(
+            episodes - model.num_timesteps, kept, reset_num_timesteps=False, tb_log_name="ppo"
+        )
+
+
+def resume(checkpoint: Path, copies: VecEnv) -> PPO:
+    """Return the trainer that was kept in a file."""
+    torch.set_num_threads(1)
+    return PPO.load(checkpoint, copies, device="cpu")
+
+
+class _Keep(BaseCallback):
+    """Keeps the trainer in a file after every rollout and says how many episodes were seen."""
+
+    def __init__(self, checkpoint: Path, tick: Callable[[int], None]):
+        super().__init__()
+        self.checkpoint, self.tick = checkpoint, tick
+
+    def _on_step(self) -> bool:
+        self.tick(self.num_timesteps)
+        return True
+
+    def _on_rollout_start(self) -> None:
+        with atomic(self.checkpoint) as part, part.open("wb") as file:
+            self.model.save(file)
+
+
+def export(model: PPO, mean: Floats, scale: Floats, notes: dict[str, str]) -> Network:
+    """Return the policy of a trainer as a network that needs no torch."""
+    policy = _net(model)
+    hidden = policy.mlp_extractor.policy_net.children()
+    linear = [module for module in hidden if isinstance(module, torch.nn.Linear)]
+    layers = [
+        (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
+        for layer in (*linear, policy.action_net)
+        if isinstance(layer, torch.nn.Linear)
+    ]
+    return Network(mean, scale, layers, notes)

@@ -1,0 +1,51 @@
+"""Tree-structured Parzen estimator (Bergstra et al. 2011, NeurIPS 24; Optuna), ask and tell.
+
+It is told first what one barrier-free ensemble suggests, see `agents.starts`.
+"""
+
+from __future__ import annotations
+
+from agents import trials
+from agents.crossings import ensemble_for
+from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
+from agents.starts import starts
+from agents.store import Store
+from envs import DesignProblem
+from rigdda import Layout
+
+DRAWN = 10
+"""Layouts, the starts among them, before the estimator is trusted: Optuna's default."""
+
+
+def design(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> DesignResult:
+    """Return the best layout that the estimator finds within the budget.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 2 or the seed below 0; if a simulation diverges.
+    """
+    ledger = Ledger(problem, simulations, seed, progress, store)
+    return search(ledger, _propose(problem, starts(problem, ensemble_for(ledger)), ledger.seed))
+
+
+def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:
+    """Yield the starts, then what the estimator samples, without end."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    sampler = optuna.samplers.TPESampler(n_startup_trials=DRAWN, multivariate=True, seed=seed)
+    study = optuna.create_study(sampler=sampler)
+    for layout in first:
+        study.enqueue_trial(trials.parameters(problem, layout))
+    space = trials.space(problem)
+    while True:
+        trial = study.ask(space)
+        evaluation = yield problem.decode(trials.vector(problem, trial.params))
+        study.tell(trial, evaluation.objective)

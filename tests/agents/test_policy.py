@@ -1,0 +1,105 @@
+"""The policy: its file, its network against torch, and that it always has an answer."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents import policy
+from agents.features import features
+from agents.network import Network
+from agents.policy import SHIPPED, decide
+from envs import DesignProblem
+from envs.observation import observe
+from rigdda import BadInput, Fence, Site, __version__
+
+
+def network(outputs: np.ndarray, inputs: int) -> Network:
+    """A network that always says the same."""
+    layer = (np.zeros((len(outputs), inputs), np.float32), outputs.astype(np.float32))
+    zeros, ones = np.zeros(inputs, np.float32), np.ones(inputs, np.float32)
+    return Network(zeros, ones, [layer], {})
+
+
+@pytest.fixture
+def fences(site: Site) -> DesignProblem:
+    return DesignProblem(site)
+
+
+def test_features_lie_at_the_stations_of_the_zone(fences: DesignProblem, site: Site) -> None:
+    seen = features(observe(fences, ()))
+    assert seen.dtype == np.float32 and np.isfinite(seen).all()
+    zone, ground = site.barrier_zone, site.profile
+    x = np.linspace(zone.start, zone.end, 16)
+    elevation = [(ground.height(at) - ground.height(site.road.start)) / 100.0 for at in x]
+    assert seen[:16] == pytest.approx(elevation, abs=0.012)  # from the 33 points of the profile
+    assert seen[17:24] == pytest.approx(np.full(7, 25.0 / 20.0), abs=0.35)
+    assert seen[32:35] == pytest.approx([0.12, 0.1, 10.0 / 12.0], abs=1e-6)
+
+
+def test_the_shipped_policy_says_how_it_was_made() -> None:
+    notes = Network.load(SHIPPED).notes
+    assert notes["command"].startswith("rigdda train --sites")
+    assert notes["version"] == __version__ and notes["seed"].isdigit()
+    assert SHIPPED.stat().st_size < 200_000
+
+
+def test_it_decides_without_torch_or_a_search() -> None:
+    code = (
+        "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
+        "from envs import DesignProblem; from agents import policy\n"
+        "found = policy.design(DesignProblem('quick'), 8)\n"
+        "assert found.simulations == 8 and len(found.history.entries) == 1\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_policy_survives_its_file(fences: DesignProblem, tmp_path: Path) -> None:
+    seen = features(observe(fences, ()))
+    rng = np.random.default_rng(0)
+    layers = [
+        (rng.normal(0, 0.2, (8, len(seen))).astype(np.float32), np.zeros(8, np.float32)),
+        (rng.normal(0, 0.5, (9, 8)).astype(np.float32), np.zeros(9, np.float32)),
+    ]
+    notes = {name: "3" for name in ("seed", "command", "version", "how")}
+    made = Network(np.zeros_like(seen), np.ones_like(seen), layers, notes)
+    made.save(tmp_path / "it.safetensors")
+    read = Network.load(tmp_path / "it.safetensors")
+    assert read.notes == notes and (read(seen) == made(seen)).all()
+    read.save(tmp_path / "again.safetensors")
+    written = [(tmp_path / f"{name}.safetensors").read_bytes() for name in ("it", "again")]
+    assert written[0] == written[1]
+    assert (np.abs(read(1e9 * seen)) <= 1.0).all()
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no tensors"])
+def test_another_file_is_refused(content: bytes | None, tmp_path: Path) -> None:
+    file = tmp_path / "it.safetensors"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(BadInput, match="rigdda train"):
+        Network.load(file)
+
+
+@pytest.mark.parametrize("slots", [1, 2, 3, 5])
+@pytest.mark.parametrize("kinds", [("fence",), ("wall", "fence")])
+def test_it_fits_any_number_of_slots(slots: int, kinds: tuple[str, ...], site: Site) -> None:
+    problem = DesignProblem(site, slots, kinds)
+    said = np.array([-1, 0, 0, 0, 1.0, 0, 1, 0.5, 0])
+    inputs = len(features(observe(DesignProblem(site), ())))
+    layout = decide(network(said, inputs), problem)
+    assert len(layout) == min(slots, 3)
+    heights = sorted(b.height for b in layout if isinstance(b, Fence))
+    assert heights == pytest.approx([2.5, 3.75, 5.0][-slots:])
+    assert problem.decode(problem.encode(layout)) == pytest.approx(layout) or len(kinds) > 1
+
+
+def test_what_it_cannot_build_or_pay_is_refused(site: Site) -> None:
+    with pytest.raises(BadInput, match="= 'fence': choose one of wall"):
+        policy.design(DesignProblem(site, kinds=("wall",)), 40)
+    with pytest.raises(BadInput, match="simulations = 4: give at least 5"):
+        policy.design(DesignProblem(site), 4)

@@ -1,0 +1,133 @@
+"""Studies of layouts by file and by script: their rows, and going on after a kill."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import signal
+import time
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from test_command_line import refused, rig, rows, run
+
+import rigdda
+from agents import studies
+from rigdda import Site
+
+EXAMPLES = Path(rigdda.__file__).parents[1] / "examples"
+STUDY = """
+site = "chute.toml"
+releases = 6
+
+[[layouts]]
+name = "nothing"
+
+[[layouts]]
+name = "one"
+barriers = [{ kind = "fence", x = 18.0, height = 2.0, capacity = 4e5 }]
+
+[[layouts]]
+name = "from a file"
+file = "walls.json"
+"""
+
+
+@pytest.fixture
+def folder(site: Site, tmp_path: Path) -> Path:
+    """A folder with a study and what it names."""
+    site.save(tmp_path / "chute.toml")
+    rigdda.save_layout((rigdda.Wall(20.0, 2.0), rigdda.Wall(15.0, 1.0)), tmp_path / "walls.json")
+    (tmp_path / "study.toml").write_text(STUDY)
+    return tmp_path
+
+
+def test_a_study_is_one_row_a_layout_and_release(folder: Path, site: Site) -> None:
+    words = run("study", "study.toml", "--seed", 3, "--out", "o", folder=folder)
+    table = rows(folder / "o/study.csv")
+    names = ["nothing", "one", "from a file"]
+    assert [(r["layout"], int(r["seed"])) for r in table] == [
+        (name, seed) for name in names for seed in range(3, 9)
+    ]
+    layout = (rigdda.Wall(20.0, 2.0), rigdda.Wall(15.0, 1.0))
+    _, outcome = rigdda.release(site, layout, 8)
+    assert float(table[-1]["debris_fraction"]) == outcome.debris_fraction
+    assert float(table[-1]["barrier_1_max_energy"]) == outcome.barriers[1].max_energy
+    assert float(table[-1]["cost"]) == site.cost(layout)
+    assert table[0]["barrier_0_hits"] == "" and table[6]["barrier_1_hits"] == ""
+    assert all(name in words for name in names)
+
+
+def test_a_killed_study_goes_on_and_ends_the_same(folder: Path) -> None:
+    whole = run("study", "study.toml", "--out", "o", folder=folder)
+    text = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(text.replace("releases = 6", "releases = 600"))
+    killed = rig("study", "study.toml", "--out", "k", folder=folder)
+    file = folder / "k/study.csv"
+    while not (file.is_file() and file.read_bytes().count(b"\n") > 3):
+        assert killed.poll() is None
+        time.sleep(0.02)
+    killed.send_signal(signal.SIGKILL)
+    killed.communicate()
+    (folder / "study.toml").write_text(text)
+    again = run("study", "study.toml", "--out", "k", folder=folder)
+    assert "taken from a former run" in again and "former" not in whole
+    assert file.read_bytes() == (folder / "o/study.csv").read_bytes()
+
+
+def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> None:
+    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
+    assert studies.run(asked, 0, file, lambda *_: None) == 0
+    whole = file.read_bytes()
+    file.write_bytes(whole[:-9])
+    assert studies.run(asked, 0, file, lambda *_: None) == asked.size - 1
+    assert file.read_bytes() == whole
+    assert studies.run(asked, 2, file, lambda *_: None) == 3 * 4
+    with file.open(newline="") as lines:
+        assert {row["seed"] for row in csv.DictReader(lines)} == set("234567")
+    (folder / "chute.toml").write_text((folder / "chute.toml").read_text().replace("22.0", "23.0"))
+    assert studies.run(studies.load(folder / "study.toml"), 2, file, lambda *_: None) == 0
+
+
+@pytest.mark.parametrize(
+    "change, named",
+    [
+        (("releases = 6", "releases = 0"), ("releases", "0")),
+        (("releases = 6", "relases = 6"), ("relases",)),
+        (('name = "one"', 'name = "nothing"'), ("layouts[1].name", "nothing")),
+        (("capacity = 4e5", "capacity = -1"), ("fence capacity", "-1")),
+        (("x = 18.0", "x = 500.0"), ("x", "500", "terrain")),
+        (("walls.json", "none.json"), ("none.json", "existing")),
+        (("chute.toml", "nowhere.toml"), ("nowhere.toml", "existing")),
+        (("[[layouts]]", "[[layouts"), ("TOML",)),
+    ],
+)
+def test_a_bad_study_is_one_line(
+    change: tuple[str, str], named: tuple[str, ...], folder: Path
+) -> None:
+    (folder / "study.toml").write_text(STUDY.replace(*change))
+    before = set(folder.iterdir())
+    line = refused("study", "study.toml", folder=folder)
+    assert all(word in line for word in named), line
+    assert set(folder.iterdir()) == before
+
+
+def example(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_example_in_python_says_that_stronger_fences_fail_less() -> None:
+    found = example("study").study(releases=4)
+    failed = [sum(o.barriers[0].failed for o in e.outcomes) for e in found.values()]
+    assert failed == sorted(failed, reverse=True) and failed[0] == 4 > failed[-1]
+    assert [e.cost for e in found.values()] == sorted(e.cost for e in found.values())
+
+
+def test_the_example_by_file_is_sound() -> None:
+    asked = studies.load(EXAMPLES / "study.toml")
+    assert len(asked.layouts) == 4 and asked.size == 64

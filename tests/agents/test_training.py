@@ -1,0 +1,172 @@
+"""Training, small but real: lessons, cloning, PPO, and going on after a kill."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_command_line import refused, rig, rows, run
+
+from agents import ppo, teacher, training
+from agents.network import Network
+from agents.teacher import Lesson
+from envs import DesignProblem
+
+SMALL = ("--sites", 2, "--lessons", 16, "--episodes", 8)
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder and the words of a small training."""
+    folder = tmp_path_factory.mktemp("trained")
+    return folder, run("train", *SMALL, "--out", folder, folder=folder)
+
+
+def test_a_training_leaves_a_policy_and_its_logs(trained: tuple[Path, str]) -> None:
+    folder, words = trained
+    lessons = [json.loads(line) for line in (folder / "lessons.jsonl").read_text().splitlines()]
+    assert [lesson["site"] for lesson in lessons] == [0, 1]
+    assert list((folder / "ppo_0").glob("events.out.tfevents*"))
+    notes = Network.load(folder / "policy.safetensors").notes
+    assert notes["command"] == "rigdda train --sites 2 --lessons 16 --episodes 8 --seed 0"
+    assert "cloned" in words and "after PPO" in words
+
+
+def test_a_policy_is_tried_on_unseen_sites(trained: tuple[Path, str], tmp_path: Path) -> None:
+    file = trained[0] / "policy.safetensors"
+    options = ("--policy", file, "--sites", 2, "--verify", 3, "--simulations", 12, "--out", "o")
+    words = run("evaluate", *options, folder=tmp_path)
+    table = rows(tmp_path / "o/scores.csv")
+    assert [row["designer"] for row in table] == 2 * ["rule", "policy"]
+    assert len({row["site"] for row in table}) == 2
+    for row in table:
+        assert float(row["gain"]) == float(row["nothing"]) - float(row["objective"])
+    assert "rule" in words and "policy" in words
+    again = run("evaluate", *options, folder=tmp_path)
+    assert "taken from a former run" in again and rows(tmp_path / "o/scores.csv") == table
+
+
+def test_a_killed_training_goes_on_and_ends_the_same(
+    trained: tuple[Path, str], tmp_path: Path
+) -> None:
+    killed = rig("train", *SMALL, "--out", "o", folder=tmp_path)
+    lessons = tmp_path / "o/lessons.jsonl"
+    while not (lessons.is_file() and lessons.read_bytes().count(b"\n")):
+        assert killed.poll() is None
+        time.sleep(0.02)
+    killed.send_signal(signal.SIGKILL)
+    killed.communicate()
+    assert run("train", *SMALL, "--out", "o", folder=tmp_path).startswith("fall of the objective")
+    for name in ("lessons.jsonl", "policy.safetensors"):
+        assert (tmp_path / "o" / name).read_bytes() == (trained[0] / name).read_bytes()
+    line = refused("train", *SMALL, "--seed", 1, "--out", "o", folder=tmp_path)
+    assert "terms" in line and "another folder" in line
+
+
+def test_bad_terms_are_one_line(tmp_path: Path) -> None:
+    line = refused("train", "--sites", 100_000, folder=tmp_path)
+    assert "sites" in line and "100000" in line
+    line = refused("evaluate", "--policy", "none.safetensors", folder=tmp_path)
+    assert "none.safetensors" in line
+    line = refused("evaluate", "--sites", 21, folder=tmp_path)
+    assert "21" in line and "20" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def scripted(n: int) -> tuple[list[Lesson], np.ndarray, np.ndarray]:
+    """Lessons whose best station is the first feature and whose second slot is empty."""
+    rng = np.random.default_rng(1)
+    lessons = []
+    for i in range(n):
+        seen = rng.uniform(-1, 1, 4).astype(np.float32)
+        vector = np.array([seen[0], 0.5, 0.0, *rng.uniform(-1, 1, 1), -1, 0.3, 0, -1, 0])
+        lessons.append(Lesson(i, seen, vector, 0.3))
+    return lessons, *training.scaling(np.stack([lesson.features for lesson in lessons]))
+
+
+def test_cloning_learns_what_decides(site_problem: DesignProblem, tmp_path: Path) -> None:
+    lessons, mean, scale = scripted(64)
+    model = ppo.learner(Toy(site_problem), 0, tmp_path)
+    ppo.clone(model, lessons, mean, scale, 0)
+    network = ppo.export(model, mean, scale, {})
+    said = np.stack([network(lesson.features) for lesson in lessons])
+    aim = np.stack([lesson.vector for lesson in lessons])
+    assert np.corrcoef(said[:, 0], aim[:, 0])[0, 1] > 0.9
+    assert np.abs(said - aim)[:, 1].mean() < 0.08 and (said[:, 4] < -0.85).all()
+    x = ppo.torch.as_tensor((lessons[0].features - mean) / scale)[None]
+    action, _ = model.predict(x.numpy(), deterministic=True)
+    assert network(lessons[0].features) == pytest.approx(action[0], abs=1e-5)
+
+
+class Toy(ppo.VecEnv):
+    """Four features, nine numbers, and a reward for the first number being 0.8."""
+
+    def __init__(self, problem: DesignProblem, copies: int = 16):
+        from gymnasium import spaces
+
+        box = spaces.Box(-np.inf, np.inf, (4,), np.float32)
+        super().__init__(copies, box, spaces.Box(-1.0, 1.0, (problem.size,), np.float32))
+        self.seen = np.zeros((copies, 4), np.float32)
+
+    def reset(self) -> np.ndarray:
+        return self.seen
+
+    def step_async(self, actions: np.ndarray) -> None:
+        self.actions = actions
+
+    def step_wait(self):
+        reward = -np.abs(self.actions[:, 0] - 0.8).astype(np.float32)
+        done = np.ones(self.num_envs, dtype=bool)
+        infos = [{"terminal_observation": seen} for seen in self.seen]
+        return self.seen, reward, done, infos
+
+    def close(self) -> None: ...
+
+    def get_attr(self, attr_name, indices=None):
+        return [None] * self.num_envs
+
+    def set_attr(self, attr_name, value, indices=None) -> None: ...
+
+    def env_method(self, method_name, *args, indices=None, **kwargs):
+        return [None] * self.num_envs
+
+    def env_is_wrapped(self, wrapper_class, indices=None):
+        return [False] * self.num_envs
+
+
+@pytest.fixture
+def site_problem() -> DesignProblem:
+    return DesignProblem("quick")
+
+
+def test_ppo_learns_and_goes_on_from_its_checkpoint(
+    site_problem: DesignProblem, tmp_path: Path
+) -> None:
+    toy, file = Toy(site_problem), tmp_path / "checkpoint.zip"
+    zeros, ones = np.zeros(4, np.float32), np.ones(4, np.float32)
+    model = ppo.learner(toy, 0, tmp_path)
+    seen: list[int] = []
+    ppo.fine_tune(model, 16 * 4 * 3, file, seen.append)
+    before = ppo.export(model, zeros, ones, {})(zeros)[0]
+    kept = ppo.resume(file, toy)
+    assert kept.num_timesteps == 16 * 4 * 2  # kept when the last rollout began
+    ppo.fine_tune(kept, 16 * 4 * 60, file, seen.append)
+    after = ppo.export(kept, zeros, ones, {})(zeros)[0]
+    assert abs(after - 0.8) < abs(before - 0.8) - 0.05
+    assert seen[-1] == 16 * 4 * 60
+
+
+def test_every_copy_of_the_pool_keeps_its_site() -> None:
+    posed = [teacher.problem(site) for site in (0, 1)]
+    copies = ppo.pool(posed)
+    copies.seed(0)
+    first = copies.reset()
+    second, _, done, _ = copies.step(np.full((2, posed[0].size), -1.0, np.float32))
+    assert done.all()
+    assert (first["profile"] == second["profile"]).all()
+    assert (first["profile"][0] != first["profile"][1]).any()
+    assert copies.get_attr("problem") == posed

@@ -399,7 +399,11 @@ def relax(
 
 @kernel
 def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int, dt: float) -> float:
-    """Return the work of the contact forces of an island in this step [J], supports left out."""
+    """Return the work of the contact forces of an island in this step [J], supports left out.
+
+    Friction that gives energy counts twice: to rebound out of a wedge a block would be pressed
+    against its sides with any force, which friction there would have to yield.
+    """
     total = 0.0
     for item in range(low, high):
         k = work.contact_item[item]
@@ -412,7 +416,7 @@ def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int, dt: flo
         if j >= 0:
             dn += along(normal_row(c, k, False), m.d[j])
             ds += along(shear_row(c, k, False), m.d[j])
-        total += c[k].normal * dn + c[k].shear * ds
+        total += c[k].normal * dn + c[k].shear * ds + max(c[k].shear * ds, 0.0)
     return total
 
 

@@ -154,10 +154,11 @@ def _points(axes: Axes, history: History) -> None:
     if finals:
         mean = np.array([entry.evaluation.objective for entry in finals])
         spread = np.array([entry.evaluation.ci[1] for entry in finals]) - mean
+        spread[~np.isfinite(spread) | (spread < 0.0)] = 0.0  # one release; equal ones, rounded
         axes.errorbar(
             [entry.simulations for entry in finals],
             mean,
-            yerr=np.where(np.isfinite(spread), spread, 0.0),
+            yerr=spread,
             fmt="D",
             color="black",
             markersize=5,

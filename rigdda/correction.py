@@ -10,7 +10,7 @@ from rigdda.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, SHOCK, SHOCK_SPEED, STEADY_RATE
 from rigdda.gauges import barrier_contact
 from rigdda.islands import root
-from rigdda.kernel import kernel
+from rigdda.kernel import entry_kernel, kernel
 from rigdda.open_close import assemble_blocks, load_moment
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
 
@@ -30,6 +30,13 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
             outlines.world_x[row, k] = bodies[i].x + cos * x - sin * y
             outlines.world_y[row, k] = bodies[i].y + sin * x + cos * y
         place_normals(outlines, row)
+
+
+@entry_kernel
+def place_all_corners(bodies: Bodies, outlines: Outlines) -> None:
+    """Set the corners and edge normals of all bodies, when a scene is packed."""
+    for i in range(len(bodies)):
+        place_corners(bodies, outlines, i)
 
 
 @kernel

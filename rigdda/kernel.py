@@ -40,13 +40,24 @@ def cache_directory() -> Path:
     return folder
 
 
-def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that other kernels call; without fast-math, so that NaN checks hold.
+INSIDE = {
+    "nogil": True,
+    "error_model": "numpy",
+    "_nrt": False,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+"""How kernels are compiled that only kernels call.
 
-    Kernels allocate nothing, so `_nrt=False` leaves reference counting out: its atomic operations
-    on every array that a kernel passes on cost four fifths of a step.
-    """
-    return numba.njit(nogil=True, error_model="numpy", _nrt=False)(function)
+They allocate nothing, so `_nrt=False` leaves reference counting out: its atomic operations on every
+array that a kernel passes on cost four fifths of a step. Without wrappers for calls from Python and
+C compilation takes two thirds of the time; Python that calls such a kernel crashes, see
+`from_python`."""
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that other kernels call; without fast-math, so that NaN checks hold."""
+    return numba.njit(**INSIDE)(function)
 
 
 def arithmetic_kernel(function: Callable[..., Any]) -> Any:
@@ -54,8 +65,7 @@ def arithmetic_kernel(function: Callable[..., Any]) -> Any:
 
     The only liberty: NaN and order stay as they are. The same results on one kind of machine.
     """
-    options = {"nogil": True, "error_model": "numpy", "_nrt": False}
-    return numba.njit(fastmath={"contract"}, **options)(function)
+    return numba.njit(fastmath={"contract"}, **INSIDE)(function)
 
 
 def stage(function: Callable[..., Any]) -> Any:
@@ -63,7 +73,7 @@ def stage(function: Callable[..., Any]) -> Any:
 
     numba optimises every kernel together with all that it calls; one level less saves seconds.
     """
-    return numba.njit(nogil=True, error_model="numpy", _nrt=False, inline="always")(function)
+    return numba.njit(inline="always", **INSIDE)(function)
 
 
 def entry_kernel(function: Callable[..., Any]) -> Any:
@@ -71,6 +81,12 @@ def entry_kernel(function: Callable[..., Any]) -> Any:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_directory())
     try:
-        return numba.njit(nogil=True, cache=True, error_model="numpy", _nrt=False)(function)
+        options = {**INSIDE, "no_cpython_wrapper": False, "cache": True}
+        return numba.njit(**options)(function)
     finally:
         config.CACHE_DIR = before
+
+
+def from_python(inner: Any) -> Any:
+    """Compile a kernel once more, for Python to call: for tests."""
+    return numba.njit(error_model="numpy", _nrt=False)(inner.py_func)

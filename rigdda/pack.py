@@ -21,7 +21,7 @@ from rigdda.constants import (
     SLACK_RATIO,
     TERRAIN,
 )
-from rigdda.correction import place_corners
+from rigdda.correction import place_all_corners
 from rigdda.geometry import convex_parts, polygon_properties, turns
 from rigdda.linear.psor import COLUMNS
 from rigdda.records import (
@@ -134,10 +134,10 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
         bodies["status"][i] = FIXED if (block.fixed if block else not heavy) else AWAKE
         if block and not block.fixed:
             bodies["vx"][i], bodies["vy"][i], bodies["omega"][i] = block.velocity
-        place_corners(bodies, outlines, i)
         for load in scene.loads:
             if load.block == i:
                 _add_load(bodies, i, *load.resultant(area, centre))
+    place_all_corners(bodies, outlines)
     return bodies, outlines
 
 

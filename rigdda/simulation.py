@@ -27,7 +27,7 @@ from rigdda.constants import (
     SLACK_RATIO,
     SOFT,
 )
-from rigdda.contact.links import anchor, tension
+from rigdda.contact.links import bolt_energy
 from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.geometry import polygon_properties
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
@@ -228,12 +228,7 @@ class Simulation:
     def _elastic(self) -> float:
         """Return the energy stored in bolts and plain contacts now [J]."""
         b, links = self._arrays.bodies, self._arrays.links
-        total = 0.0
-        for q in np.flatnonzero(links["kind"] == BOLT):
-            bolt = links[q]
-            start = anchor(b, bolt["a"], bolt["ax"], bolt["ay"])
-            end = anchor(b, bolt["b"], bolt["bx"], bolt["by"])
-            total += 0.5 * tension(links, q, math.dist(start, end)) ** 2 / bolt["stiffness"]
+        total = bolt_energy(b, links) if len(links) else 0.0
         c = self._now[: self._counters[CONTACTS]]
         c = c[(c["kind"] == PLAIN) & (c["state"] != OPEN)]
         return float(total + 0.5 * (c["stiffness"] * np.minimum(c["gap"], 0.0) ** 2).sum())

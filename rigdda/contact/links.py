@@ -10,7 +10,7 @@ import math
 
 from rigdda.constants import BOLT, PIN_RECOVERY, STICK
 from rigdda.contact.law import effective_mass, impact_stiffness, set_velocities
-from rigdda.kernel import kernel
+from rigdda.kernel import entry_kernel, kernel
 from rigdda.records import Bodies, Contacts, Links, Parameters
 
 
@@ -35,6 +35,19 @@ def arm(bodies: Bodies, i: int, x: float, y: float, time: float) -> tuple[float,
 def tension(links: Links, q: int, length: float) -> float:
     """Return the tension of bolt q at a length [N]."""
     return links[q].prestress + links[q].stiffness * (length - links[q].length)
+
+
+@entry_kernel
+def bolt_energy(bodies: Bodies, links: Links) -> float:
+    """Return the energy stored in the bolts now [J]."""
+    total = 0.0
+    for q in range(len(links)):
+        if links[q].kind == BOLT:
+            ax, ay = anchor(bodies, links[q].a, links[q].ax, links[q].ay)
+            bx, by = anchor(bodies, links[q].b, links[q].bx, links[q].by)
+            force = tension(links, q, math.hypot(ax - bx, ay - by))
+            total += 0.5 * force * force / links[q].stiffness
+    return total
 
 
 @kernel

@@ -365,7 +365,8 @@ class Simulation:
         Warns
         -----
         SoftContacts
-            If contacts at rest in the end are too soft for their load.
+            If contacts at rest in the end are too soft for their load, by `Settings.penetration`
+            or by the one stiffness of plain contacts.
         """
         check.number("duration", duration, 0.0, open_low=True)
         check.number("every", every, 0.0, open_low=True)
@@ -382,7 +383,10 @@ class Simulation:
                 raise
             done = mark
             frames.append(self._frame())
-        if self._compression() > SOFT:
+        # what follows from the load by default is as stiff as it should be
+        contacts = self._now[: self._counters[CONTACTS]]
+        chosen = self.settings.penetration is not None or bool((contacts["kind"] == PLAIN).any())
+        if chosen and self._compression() > SOFT:
             warnings.warn(
                 f"contacts at rest give way by {self._compression():.2g} of a block: what stands "
                 "or falls may hang on it; give Settings a smaller penetration",

@@ -130,7 +130,7 @@ CASES = (
         "hopper-1000",
         "weight carried by the ground [-]",
         hopper,
-        12.0,
+        25.0,
         carried_error,
         0.05,
         depth=0.05,

@@ -119,14 +119,16 @@ def test_a_plan_shrinks_with_the_budget(simulations: int, plan: Plan) -> None:
     assert Plan.of(simulations) == plan
 
 
-@pytest.mark.parametrize("name, error", [("cma", 0.01), ("tpe", 0.05)])
-def test_a_search_finds_a_known_optimum_and_random_search_less_well(
-    name: str, error: float, valley: Valley
-) -> None:
-    found = design(name, valley, 2400)
-    assert found.evaluation.objective < error
+def test_a_search_finds_a_known_optimum(valley: Valley) -> None:
+    found = design("cma", valley, 2400)
+    assert found.evaluation.objective < 0.01
     assert len(found.layout) == 1
-    assert found.evaluation.objective < design("random", valley, 2400).evaluation.objective
+
+
+@pytest.mark.parametrize("name", ["cma", "tpe"])
+def test_a_search_beats_random_search(name: str, valley: Valley) -> None:
+    searched, drawn = design(name, valley, 1200), design("random", valley, 1200)
+    assert searched.evaluation.objective < drawn.evaluation.objective
 
 
 class Lucky(Valley):

@@ -125,7 +125,7 @@ def test_the_bridge_says_what_the_batch_says(ramp: Site) -> None:
         np.testing.assert_array_equal(rewards, exact.astype(np.float32))
         np.testing.assert_array_equal(done, terminated | truncated)
         for i in np.flatnonzero(done):
-            final = {key: values[i] for key, values in info["final_obs"].items()}
+            final = info["final_obs"][i]
             assert data_equivalence(infos[i]["terminal_observation"], final, exact=True)
             assert infos[i]["TimeLimit.truncated"] == (truncated[i] and not terminated[i])
             assert infos[i]["objective"] == info["final_info"]["objective"][i]

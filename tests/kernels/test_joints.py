@@ -34,7 +34,7 @@ def check(source: shapely.Polygon, blocks: list[np.ndarray], block_area: float) 
     assert areas.min() > 0.1 * block_area
     for block, cell in zip(blocks, cells, strict=True):
         Block(block)  # raises unless simple
-        assert cell.convex_hull.area - cell.area < 0.5 * block_area
+        assert cell.convex_hull.area - cell.area < block_area
     concave = sum(cell.convex_hull.area - cell.area > 1e-6 * cell.area for cell in cells)
     assert concave <= 0.05 * len(cells) + 1
     tree = shapely.STRtree(cells)

@@ -11,19 +11,12 @@ from rigdda import Settings
 
 REFUSED = {"coincident-blocks", "deeply-overlapping-start", "empty-segment"}
 
-FAULTS = {
-    "tension-just-holds": "a joint in tension is lost where gravity opens it in the first step",
-    "hopper-1000": "large piles never come quite to rest",
-}
-
 SLOW = {"hopper-1000", "stack-100"}
 
 
 def marked(case: Case):
     """Return a case with its marks."""
     marks = [pytest.mark.slow] if case.name in SLOW else []
-    if case.name in FAULTS:
-        marks.append(pytest.mark.xfail(reason=FAULTS[case.name]))
     return pytest.param(case, id=case.name, marks=marks)
 
 

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import Valley
+from valley import Valley
 
 import agents
 from agents import DESIGNERS

@@ -23,6 +23,7 @@ SCRIPTS = (
     "fig10_modes",
     "fig13_deposit",
     "fig14_retained",
+    "ablation",
     "hard_cases",
     "speed_error",
 )

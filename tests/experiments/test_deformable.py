@@ -15,6 +15,7 @@ from rigdda.validation.scenes import FLAT, box, ngon
 PLAIN = {"rock": Surface(30.0, restitution=None)}
 
 
+@pytest.mark.slow
 def test_bar_bears_its_weight() -> None:
     computed, exact = cases.bar_under_its_weight()
     np.testing.assert_allclose(computed, exact, rtol=0.01)

@@ -13,7 +13,7 @@ from experiments import ablation, fig04_deformable, fig05_solvers, pile
 from experiments import all as every
 from experiments.script import Number
 
-SLOW = {"fig10_modes", "fig13_deposit", "fig14_retained"}
+SLOW = {"fig10_modes", "fig13_deposit", "fig14_retained", "hard_cases", "speed_error"}
 TIMED = {"fig04_deformable", "fig05_solvers", "ablation"}
 """Their numbers or notes are processor times: tested below without them."""
 

@@ -10,6 +10,7 @@ from experiments.deformable.model import Deformable, Rock
 from experiments.deformable.submatrices import area_moments, set_inertia
 from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
 from rigdda.geometry import polygon_properties
+from rigdda.kernel import from_python
 from rigdda.validation.scenes import FLAT, box, ngon
 
 PLAIN = {"rock": Surface(30.0, restitution=None)}
@@ -41,10 +42,10 @@ def test_inertia_of_a_polygon_is_that_of_a_rigid_block() -> None:
     scene = Scene(None, (Block(corners, density=1.0),), PLAIN)
     arrays = Simulation(scene)._arrays
     area, (x, y), polar = polygon_properties(corners)
-    moments = area_moments(arrays.outlines, 0, len(corners), x, y)
+    moments = from_python(area_moments)(arrays.outlines, 0, len(corners), x, y)
     assert moments[0] == pytest.approx(area)
     matrix = np.zeros((6, 6))
-    set_inertia(matrix, area, moments)
+    from_python(set_inertia)(matrix, area, moments)
     assert matrix[2, 2] == pytest.approx(polar)
     assert matrix[5, 5] == pytest.approx(0.25 * polar)
     assert np.linalg.eigvalsh(matrix).min() > 0.0

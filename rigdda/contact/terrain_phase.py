@@ -171,22 +171,6 @@ def corners_on_segment(
 
 
 @kernel
-def end_in_ground(outlines: Outlines, ground: Ground, part: int, edge: int, corner: int) -> bool:
-    """Return whether the end of an edge near a convex corner of the terrain is in the ground."""
-    n, nearest, inside = outlines.polygon[part].count, math.inf, False
-    for end in (edge, (edge + 1) % n):
-        x, y = outlines.world_x[part, end], outlines.world_y[part, end]
-        away = math.hypot(x - ground.x[corner], y - ground.y[corner])
-        if away < nearest:
-            nearest = away
-            inside = (
-                max(below_segment(ground, corner - 1, x, y), below_segment(ground, corner, x, y))
-                < 0.0
-            )
-    return inside
-
-
-@kernel
 def edge_on_ridge(
     bodies: Bodies,
     outlines: Outlines,
@@ -233,12 +217,9 @@ def edge_on_ridge(
             best, best_time, best_gap = edge, time, gap
         if time > last or (time == last and gap > depth):
             last, depth = time, gap
-    if best < 0 or best_time < last:
-        return k
     # beside a corner that slides over the ridge another edge is soon the nearest one: as long as
-    # the depths are alike, or that corner is in the air, what fits counts
-    alike = best_gap >= 2.0 * min(depth, 0.0) - p.slack
-    if not alike and end_in_ground(outlines, ground, part, best, corner):
+    # the depths are alike, what fits counts
+    if best < 0 or best_time < last or best_gap < 2.0 * min(depth, 0.0) - p.slack:
         return k
     nx, ny = outlines.normal_x[part, best], outlines.normal_y[part, best]
     gap = nx * (x - outlines.world_x[part, best]) + ny * (y - outlines.world_y[part, best])

@@ -171,6 +171,20 @@ def corners_on_segment(
 
 
 @kernel
+def bridges(
+    outlines: Outlines, ground: Ground, part: int, edge: int, corner: int, least: float
+) -> bool:
+    """Return whether the ends of an edge are on either side of a ridge, no deeper than `least` [m].
+
+    The start on the left and the end on the right, since outlines run anticlockwise.
+    """
+    end = edge + 1 if edge + 1 < outlines.polygon[part].count else 0
+    x, y = outlines.world_x[part], outlines.world_y[part]
+    left = below_segment(ground, corner - 1, x[edge], y[edge])
+    return left >= least and below_segment(ground, corner, x[end], y[end]) >= least
+
+
+@kernel
 def edge_on_ridge(
     bodies: Bodies,
     outlines: Outlines,
@@ -217,9 +231,12 @@ def edge_on_ridge(
             best, best_time, best_gap = edge, time, gap
         if time > last or (time == last and gap > depth):
             last, depth = time, gap
-    # beside a corner that slides over the ridge another edge is soon the nearest one: as long as
-    # the depths are alike, what fits counts
-    if best < 0 or best_time < last or best_gap < 2.0 * min(depth, 0.0) - p.slack:
+    if best < 0 or best_time < last:
+        return k
+    # beside a corner that slides over the ridge another edge is soon the nearest one: what fits
+    # counts as long as the depths are alike, or while it bridges the ridge
+    alike = best_gap >= 2.0 * min(depth, 0.0) - p.slack
+    if not alike and not bridges(outlines, ground, part, best, corner, 0.5 * best_gap):
         return k
     nx, ny = outlines.normal_x[part, best], outlines.normal_y[part, best]
     gap = nx * (x - outlines.world_x[part, best]) + ny * (y - outlines.world_y[part, best])

@@ -25,10 +25,7 @@ def table(path: Path) -> list[dict[str, str]]:
 
 def marked(script: str):
     """Return a script with its marks."""
-    marks = [pytest.mark.slow] if script in SLOW else []
-    if script == "hard_cases":
-        marks.append(pytest.mark.xfail(reason="stairs: see test_hard_scenes", strict=False))
-    return pytest.param(script, marks=marks)
+    return pytest.param(script, marks=pytest.mark.slow if script in SLOW else ())
 
 
 @pytest.mark.parametrize("script", [marked(s) for s in every.SCRIPTS if s not in TIMED])

@@ -16,7 +16,6 @@ def test_phases_of_a_step_are_timed_on_demand():
     seconds = sim.diagnostics.seconds
     assert set(seconds) == {"broad phase", "narrow phase", "open-close", "motion"}
     assert all(value > 0.0 for value in seconds.values())
-    assert seconds["open-close"] > seconds["broad phase"]
     plain = Simulation(STACK, Settings(sleeping=False))
     plain.step(2000)
     assert sum(plain.diagnostics.seconds.values()) == 0.0

@@ -11,17 +11,12 @@ from rigdda import Settings
 
 REFUSED = {"coincident-blocks", "deeply-overlapping-start", "empty-segment"}
 
-FAULTS = {"stairs": "a tip that tumbles over a nose of the terrain may end with the nose inside it"}
-"""Cases that a known fault may spoil; chance decides whether it does."""
-
 SLOW = {"hopper-1000", "stack-100"}
 
 
 def marked(case: Case):
     """Return a case with its marks."""
     marks = [pytest.mark.slow] if case.name in SLOW else []
-    if case.name in FAULTS:
-        marks.append(pytest.mark.xfail(reason=FAULTS[case.name], strict=False))
     return pytest.param(case, id=case.name, marks=marks)
 
 

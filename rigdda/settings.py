@@ -42,7 +42,8 @@ class Settings:
     mode : {"dynamic", "static"}
         "static" starts every step at rest: steps are then increments of load, not of time.
     solver : {"auto", "pcg", "block-pcg", "sor", "direct"}
-        Of islands at rest. "pcg": conjugate gradients with the inverse diagonal, the paper's;
+        Of islands of more than two blocks at rest; one or two are solved directly, with their
+        friction. "pcg": conjugate gradients with the inverse diagonal, the paper's;
         "block-pcg": with the inverse 3x3 blocks; "sor": the original successive over-relaxation;
         "direct": Cholesky factors within the profile. "auto": direct where the profile is short,
         which it is for small islands and for stacks, else "pcg".

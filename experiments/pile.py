@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
+from rigdda.assembly.island import assemble_island
 from rigdda.geometry import polygon_properties
 from rigdda.islands import find_islands, pair_blocks
 from rigdda.kernel import entry_kernel
-from rigdda.open_close import assemble_island
 from rigdda.records import CONTACTS, Bodies, Contacts, Matrix, Parameters, Work
 from rigdda.scene import Surface
 from rigdda.validation.scenes import GRAVITY, box

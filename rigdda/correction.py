@@ -6,12 +6,12 @@ import math
 
 from numpy.typing import NDArray
 
+from rigdda.assembly.island import assemble_blocks, load_moment
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, SHOCK, SHOCK_SPEED, STEADY_RATE
 from rigdda.gauges import barrier_contact
 from rigdda.islands import root
 from rigdda.kernel import entry_kernel, kernel
-from rigdda.open_close import assemble_blocks, load_moment
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
 
 

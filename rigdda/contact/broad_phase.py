@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rigdda.constants import AWAKE, HELD, RETIRED
 from rigdda.kernel import kernel
 from rigdda.records import Bodies, Outlines, Parameters, Work
@@ -9,7 +11,7 @@ from rigdda.records import Bodies, Outlines, Parameters, Work
 
 @kernel
 def sweep_boxes(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -> None:
-    """Set the box of each body that holds it over the whole step, with slack."""
+    """Set the box of each body that holds it over the step, however it is deflected, with slack."""
     for i in range(len(bodies)):
         n = bodies[i].count
         low_x = high_x = outlines.world_x[i, 0]
@@ -20,14 +22,11 @@ def sweep_boxes(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -
             low_y = min(low_y, outlines.world_y[i, k])
             high_y = max(high_y, outlines.world_y[i, k])
         grow = p.slack
-        dx = dy = 0.0
         if bodies[i].status == AWAKE:
-            grow += abs(bodies[i].omega) * bodies[i].radius * p.dt + p.gravity * p.dt * p.dt
-            dx, dy = bodies[i].vx * p.dt, bodies[i].vy * p.dt
-        work.low_x[i] = low_x - grow + min(dx, 0.0)
-        work.high_x[i] = high_x + grow + max(dx, 0.0)
-        work.low_y[i] = low_y - grow + min(dy, 0.0)
-        work.high_y[i] = high_y + grow + max(dy, 0.0)
+            speed = math.hypot(bodies[i].vx, bodies[i].vy) + abs(bodies[i].omega) * bodies[i].radius
+            grow += speed * p.dt + p.gravity * p.dt * p.dt
+        work.low_x[i], work.high_x[i] = low_x - grow, high_x + grow
+        work.low_y[i], work.high_y[i] = low_y - grow, high_y + grow
 
 
 @kernel

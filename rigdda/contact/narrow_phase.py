@@ -1,8 +1,9 @@
 """Contacts between two polygons over a step, one convex part against another.
 
 Separating axes with time of entry: of the axes that separate the polygons now, the one that they
-stop separating last is the face of contact. An axis that separates them over the whole step rules
-the contact out, so a fast block cannot pass a thin wall.
+stop separating last is the face of contact. An axis along which they are farther apart than their
+paths in this step are long rules the contact out: a fast block cannot pass a thin wall, nor can one
+that a third block deflects within the step be driven into a neighbour.
 
 Where the last edge to separate two parts, or the one that faces it, is inside its body, the way in
 leads through a neighbouring part, and that one has the contact.
@@ -37,7 +38,8 @@ def face_of_contact(
 ) -> tuple[bool, float, float, int]:  # fmt: skip
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
-    (dx, dy) is the displacement of j relative to i over the step, `spread` what rotation adds.
+    (dx, dy) is the displacement of j relative to i over the step if nothing deflects them, `spread`
+    how far any of their points may come nearer, whatever does.
     The best edge comes with its rank: time of entry, and its gap for the shallow ones. Edges
     inside the body count as deeper by `sunk`, so that on a tie the real one is best.
     """
@@ -49,7 +51,7 @@ def face_of_contact(
             nx, ny, corner_x[i, edge], corner_y[i, edge], corner_x, corner_y, j, corners
         )
         approach = -(nx * dx + ny * dy)
-        if gap > max(approach, 0.0) + spread:
+        if gap > spread:
             return False, time, depth, edge
         if sunk > 0.0 and outlines.corner[i, edge].inner:
             gap -= sunk
@@ -182,33 +184,31 @@ def collide_pair(
     dt = p.dt
     ax, ay, aw = bodies[a].vx, bodies[a].vy, abs(bodies[a].omega) * bodies[a].radius
     dx, dy, spin = -ax * dt, -ay * dt, aw * dt
+    path = math.hypot(ax, ay) * dt
     fall = p.gravity * dt * dt
     if bodies[b].status == AWAKE:
-        dx += bodies[b].vx * dt
-        dy += bodies[b].vy * dt
+        bx, by = bodies[b].vx, bodies[b].vy
+        dx += bx * dt
+        dy += by * dt
         spin += abs(bodies[b].omega) * bodies[b].radius * dt
+        path += math.hypot(bx, by) * dt
         fall = 0.0
-    together = 0.0
-    if bodies[b].status == AWAKE:
-        together = dt * min(math.hypot(ax, ay), math.hypot(bodies[b].vx, bodies[b].vy))
-    spread = spin + fall + p.slack
+    spread = path + spin + fall + p.slack
     if bodies[a].parts == 1 and bodies[b].parts == 1:
-        return collide_parts(
-            bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0, together
-        )
+        return collide_parts(bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0)
     first = k
     k = collide_all_parts(
-        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack, together
+        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack
     )
     if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
-        k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0)
+        k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300)
     return k
 
 
 @kernel
 def collide_all_parts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, dx: float,
-    dy: float, spread: float, slack: float, sunk: float, together: float,
+    dy: float, spread: float, slack: float, sunk: float,
 ) -> int:  # fmt: skip
     """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
     first = k
@@ -216,9 +216,7 @@ def collide_all_parts(
         for j in range(bodies[b].part, bodies[b].part + bodies[b].parts):
             if k + 2 > len(c):
                 return -1
-            found = collide_parts(
-                bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk, together
-            )
+            found = collide_parts(bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk)
             for new in range(k, found):
                 k = keep_nearest(c, first, k, new)
     return k
@@ -248,12 +246,11 @@ def keep_nearest(c: Contacts, first: int, k: int, new: int) -> int:
 @kernel
 def collide_parts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, j: int,
-    dx: float, dy: float, spread: float, slack: float, sunk: float, together: float,
+    dx: float, dy: float, spread: float, slack: float, sunk: float,
 ) -> int:  # fmt: skip
     """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
 
-    (dx, dy) is the displacement of b relative to a over the step; see `face_of_contact`. Both move
-    by `together`: when something stops one of two that touch, the other turns about it.
+    (dx, dy) is the displacement of b relative to a over the step; see `face_of_contact`.
     """
     ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
     possible, time_i, gap_i, edge_i = face_of_contact(
@@ -270,8 +267,6 @@ def collide_parts(
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
     reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(gap_i, gap_j) <= slack
-    if touching:
-        reach += together
     # corner beside corner, the better face may miss the other body where the second one does not
     for _ in range(2):
         face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)

@@ -3,7 +3,7 @@
 The cheapest layouts are sought that keep the CVaR of what passes below a ladder of limits, see
 `agents.programme`, as a catalogue of barriers estimates it, see `agents.catalogue`: for both bounds
 of what a barrier holds. The estimate does not know what a barrier does to the flow further down, so
-the simulation has the last word.
+the simulation has the last word, and the engineering rule's barrier is tried beside the optima.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from agents.catalogue import tabulate
 from agents.crossings import Ensemble, ensemble_for
 from agents.programme import Choice, choose
 from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
-from agents.rule import kind_for
+from agents.rule import kind_for, rule
 from agents.store import Store
 from envs import DesignProblem
 from rigdda import Layout
@@ -52,10 +52,12 @@ def design(
         If the budget is below 2, the seed below 0 or neither fences nor walls are among the kinds;
         if a simulation diverges.
     """
-    kind_for(problem)
+    kind = kind_for(problem)
     ledger = Ledger(problem, simulations, seed, progress, store)
-    choices = optima(problem, ensemble_for(ledger))
-    found = search(ledger, _propose([choice.layout for choice in choices]))
+    ensemble = ensemble_for(ledger)
+    choices = optima(problem, ensemble)
+    layouts = [*(choice.layout for choice in choices), rule(problem.site, ensemble, kind)]
+    found = search(ledger, _propose(layouts))
     best = (found.layout, found.evaluation, found.history, found.simulations)
     return ConvexResult(*best, choices=choices)
 

@@ -38,12 +38,12 @@ class Network:
     notes: Mapping[str, str]
 
     def __call__(self, features: Floats) -> NDArray[np.float64]:
-        """Return the outputs for (F,) features, clipped to [-1, 1]."""
+        """Return the outputs for (F,) features."""
         values = scaled(features, self.mean, self.scale).astype(np.float64)
         for weight, bias in self.layers[:-1]:
             values = np.tanh(weight @ values + bias)
         weight, bias = self.layers[-1]
-        return np.clip(weight @ values + bias, -1.0, 1.0)
+        return weight @ values + bias
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the network with its notes as safetensors."""

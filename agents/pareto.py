@@ -7,7 +7,7 @@ nothing dominates there is the front: so no layout is in it because it was lucky
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,9 +73,9 @@ def front(evaluations: Iterable[Evaluation]) -> tuple[Evaluation, ...]:
     return tuple(kept)
 
 
-def finalists(ledger: Ledger, n: int) -> list[Evaluation]:
-    """Return at most `n` of the search's front: the best objective, the others evenly spread."""
-    found = front(ledger.best(len(ledger.entries)))
+def finalists(evaluations: Sequence[Evaluation], n: int) -> list[Evaluation]:
+    """Return at most `n` of the front: the best objective, the others evenly spread."""
+    found = front(evaluations)
     if len(found) <= n:
         return list(found)
     best = min(range(len(found)), key=lambda i: found[i].objective)

@@ -1,5 +1,8 @@
 """A trained policy: from what is seen of a site without barriers to its fences, with no search.
 
+It starts from the engineering rule's fence, as far as that can be told from what is seen; the
+network says what is better, as differences of the vector.
+
 `rigdda train` makes it; the one that is shipped says by which command, with which seed and version.
 Torch is not needed to use it.
 """
@@ -10,7 +13,10 @@ import os
 from functools import lru_cache
 from pathlib import Path
 
-from agents.features import features
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.features import RULE, features
 from agents.network import Network
 from agents.protocol import Designer, DesignResult, Ledger, Progress
 from agents.store import Store
@@ -79,10 +85,18 @@ def decide(network: Network, problem: DesignProblem) -> Layout:
     """
     check.one_of("kind of the policy's barriers", *KINDS, problem.kinds)
     posed = pose(problem)
-    layout = posed.decode(network(features(observe(posed, ()))))
+    seen = features(observe(posed, ()))
+    layout = posed.decode(np.clip(anchor(seen) + network(seen), -1.0, 1.0))
     fences = [barrier for barrier in layout if isinstance(barrier, Fence)]
     kept = sorted(fences, key=lambda fence: -fence.height)[: problem.max_barriers]
     return tuple(sorted(kept, key=lambda fence: fence.x))
+
+
+def anchor(seen: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the vector that a network's outputs are added to: the rule's fence, then none."""
+    out = np.tile([0.0, -1.0, 0.0], (SLOTS, 1))
+    out[0] = seen[RULE]
+    return out.ravel()
 
 
 def pose(problem: DesignProblem) -> DesignProblem:

@@ -24,6 +24,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from agents.features import features
 from agents.network import Network, scaled
+from agents.policy import anchor
 from agents.protocol import DesignResult, Ledger, Plan, Progress, finish
 from agents.store import Store
 from agents.teacher import Lesson
@@ -114,30 +115,40 @@ class _WhilePaid(BaseCallback):
 
 
 class Featured(VecEnvWrapper):
-    """Shows the scaled features of `BarrierDesign` instead of its observations."""
+    """`BarrierDesign` as the policy's network sees it and acts on it.
 
-    def __init__(self, venv: VecEnv, mean: NDArray[np.float32], scale: NDArray[np.float32]):
+    Scaled features are seen; actions are added to the rule's fence, see `agents.policy.anchor`.
+    """
+
+    def __init__(self, venv: VecEnv, mean: Floats, scale: Floats):
         self.mean, self.scale = mean, scale
-        super().__init__(venv, spaces.Box(-np.inf, np.inf, mean.shape, np.float32))
+        self.anchors = np.zeros((venv.num_envs, *(venv.action_space.shape or ())))
+        seen = spaces.Box(-np.inf, np.inf, mean.shape, np.float32)
+        super().__init__(venv, seen, spaces.Box(-2.0, 2.0, venv.action_space.shape, np.float32))
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> Floats:
         """Start every copy."""
         return self._scaled(self.venv.reset())
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Start a step of every copy."""
+        built = np.clip(self.anchors + actions, -1.0, 1.0)
+        self.venv.step_async(built.astype(np.float32))
 
     def step_wait(self) -> Any:
         """Step every copy."""
         seen, rewards, dones, infos = self.venv.step_wait()
         for info in infos:
             if "terminal_observation" in info:
-                info["terminal_observation"] = self._one(info["terminal_observation"])
+                last = features(info["terminal_observation"])
+                info["terminal_observation"] = scaled(last, self.mean, self.scale)
         return self._scaled(seen), rewards, dones, infos
 
-    def _scaled(self, seen: Any) -> NDArray[np.float32]:
+    def _scaled(self, seen: Any) -> Floats:
         count = len(seen["span"])
-        return np.stack([self._one({k: v[i] for k, v in seen.items()}) for i in range(count)])
-
-    def _one(self, seen: Any) -> NDArray[np.float32]:
-        return scaled(features(seen), self.mean, self.scale)
+        plain = [features({k: v[i] for k, v in seen.items()}) for i in range(count)]
+        self.anchors = np.stack([anchor(one) for one in plain])
+        return np.stack([scaled(one, self.mean, self.scale) for one in plain])
 
 
 def pool(problems: Sequence[DesignProblem]) -> VecEnv:
@@ -166,13 +177,13 @@ def learner(copies: VecEnv, seed: int, logs: Path) -> PPO:
 
 
 def clone(model: PPO, lessons: Sequence[Lesson], mean: Floats, scale: Floats, seed: int) -> None:
-    """Fit a policy to lessons: its actions to their layouts, its values to their gains.
+    """Fit a policy to lessons: what it adds to the rule's fence, and its values to their gains.
 
     Stations and sizes of absent barriers teach nothing. A lesson counts by its gain.
     """
     policy, rng = _net(model), np.random.default_rng(seed)
     seen = np.stack([scaled(lesson.features, mean, scale) for lesson in lessons])
-    aim = np.stack([lesson.vector for lesson in lessons])
+    aim = np.stack([lesson.vector - anchor(lesson.features) for lesson in lessons])
     gain = np.array([lesson.gain for lesson in lessons])
     decides = np.stack([lesson.decides for lesson in lessons])
     counts = np.maximum(gain, 0.0)[:, None] * decides / max(gain.mean(), 1e-3)

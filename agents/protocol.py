@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,8 +23,8 @@ class Entry:
     ----------
     simulations : int
         Releases that the designer has simulated so far, those of this layout included.
-    stage : {"search", "final"}
-        "final": one of the best, evaluated again on other releases.
+    stage : {"search", "semifinal", "final"}
+        "semifinal", "final": one of the best, evaluated again on other releases.
     evaluation : Evaluation
         The layout, its objective, debris and cost.
     """
@@ -99,15 +99,18 @@ class Designer(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How a budget is spent: releases a layout in the search, finalists, releases a finalist.
+    """How a budget is spent: releases a layout in the search and in the finals, and who is in them.
 
     One release's debris scatters by about 0.05 and common seeds hardly help (chaos decorrelates
     releases after a barrier), so a search averages 8 and the best five are told apart on 32. A
-    budget below 400 keeps two fifths for the finals, with fewer releases of each, then fewer
-    finalists; below 320 the search averages less, so that it still sees some 20 layouts.
+    budget keeps two fifths for the finals: below 400 with fewer releases of each, then fewer
+    finalists; below 320 the search averages less, so that it still sees some 20 layouts. Of the
+    hundreds of layouts of a long search the best five are the luckiest, so what is left of the two
+    fifths is for semifinals.
     """
 
     releases: int
+    semifinalists: int
     finalists: int
     final_releases: int
 
@@ -116,12 +119,16 @@ class Plan:
         """Return the plan for a budget, with at most so many finalists."""
         final = 2 * simulations // 5
         finalists = min(most, max(2, final // 16))
-        return cls(min(8, max(1, simulations // 40)), finalists, min(32, final // finalists))
+        final_releases = min(32, final // finalists)
+        more = final // max(1, final_releases) - finalists
+        semifinalists = more if more >= 2 * finalists else 0
+        releases = min(8, max(1, simulations // 40))
+        return cls(releases, semifinalists, finalists, final_releases)
 
     @property
     def reserve(self) -> int:
-        """Releases that are kept for the finalists."""
-        return self.finalists * self.final_releases
+        """Releases that are kept for the semifinals and finals."""
+        return (self.semifinalists + self.finalists) * self.final_releases
 
 
 class Ledger:
@@ -163,18 +170,19 @@ class Ledger:
         history = History(tuple(self.entries))
         return DesignResult(evaluation.layout, evaluation, history, self.used)
 
-    def best(self, n: int) -> list[Evaluation]:
-        """Return the best `n` different layouts of the search, the best first."""
-        ranked = sorted((e.evaluation for e in self.entries), key=lambda e: e.objective)
-        return list({e.layout: e for e in reversed(ranked)}.values())[::-1][:n]
+
+Choose = Callable[[Sequence[Evaluation], int], list[Evaluation]]
+"""Returns at most so many of some evaluations."""
 
 
-Choose = Callable[[Ledger, int], list[Evaluation]]
-"""Returns at most so many finalists of a search."""
+def best(evaluations: Sequence[Evaluation], n: int) -> list[Evaluation]:
+    """Return those of the best `n` different layouts, the best first."""
+    ranked = sorted(evaluations, key=lambda e: e.objective)
+    return list({e.layout: e for e in reversed(ranked)}.values())[::-1][:n]
 
 
 def search(
-    ledger: Ledger, proposals: Proposals, choose: Choose = Ledger.best, most: int = 5
+    ledger: Ledger, proposals: Proposals, choose: Choose = best, most: int = 5
 ) -> DesignResult:
     """Evaluate what is proposed as far as the budget goes, then the finalists on other releases.
 
@@ -185,7 +193,7 @@ def search(
     proposals : Proposals
         What is evaluated in the search.
     choose : callable
-        Chooses the finalists, by default those of least objective.
+        Chooses who is in the finals, by default those of least objective.
     most : int
         Finalists at most.
 
@@ -205,15 +213,22 @@ def search(
     return finish(ledger, plan, choose)
 
 
-def finish(ledger: Ledger, plan: Plan, choose: Choose = Ledger.best) -> DesignResult:
+def finish(ledger: Ledger, plan: Plan, choose: Choose = best) -> DesignResult:
     """Evaluate the finalists of a search on other releases; return the best as the result.
+
+    Semifinalists, if the plan has any, are those of least objective in the search, and finalists
+    then those of least objective in the semifinals.
 
     Raises
     ------
     BadInput, Diverged
         As `DesignProblem.evaluate` does.
     """
-    finalists = choose(ledger, plan.finalists)
-    if plan.final_releases > 0:
-        finalists = [ledger.evaluate(e.layout, "final", plan.final_releases) for e in finalists]
+    left, releases = [entry.evaluation for entry in ledger.entries], plan.final_releases
+    if plan.semifinalists > 0:
+        chosen = choose(left, plan.semifinalists)
+        left = [ledger.evaluate(e.layout, "semifinal", releases) for e in chosen]
+    finalists = choose(left, plan.finalists)
+    if releases > 0:
+        finalists = [ledger.evaluate(e.layout, "final", releases) for e in finalists]
     return ledger.result(min(finalists, key=lambda e: e.objective))

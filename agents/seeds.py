@@ -6,9 +6,9 @@ import numpy as np
 
 from rigdda import check
 
-STREAMS = ("search", "final", "ensemble", "verification")
-"""search: all layouts of a search; final: the best of them again; ensemble: barrier-free releases
-that a designer looks at; verification: seen by no search."""
+STREAMS = ("search", "semifinal", "final", "ensemble", "verification")
+"""search: all layouts of a search; semifinal, final: the best of them again; ensemble: barrier-free
+releases that a designer looks at; verification: seen by no search."""
 
 
 def release_seeds(stream: str, seed: int, n: int) -> tuple[int, ...]:

@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.features import features
-from agents.policy import KINDS, SLOTS
+from agents.policy import KINDS, SLOTS, anchor
 from agents.store import mechanics
 from envs import DesignProblem, fidelity
 from envs.observation import observe
 from rigdda import __version__, sites
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +33,7 @@ class Lesson:
     features : (F,) array
         What a policy sees of it.
     vector : (size,) array
-        The layout, encoded.
+        The layout, encoded, the fence nearest to the rule's in the first slot.
     gain : float
         What the layout takes off the objective.
     """
@@ -94,7 +96,16 @@ def _lesson(site: int, simulations: int) -> Lesson:
     found = cma.design(posed, simulations, seed=site)
     nothing = posed.evaluate((), found.evaluation.seeds)
     gain = nothing.objective - found.evaluation.objective
-    return Lesson(site, features(observe(posed, ())), posed.encode(found.layout), gain)
+    seen = features(observe(posed, ()))
+    return Lesson(site, seen, nearest_first(posed.encode(found.layout), anchor(seen)), gain)
+
+
+def nearest_first(vector: Floats, rule: Floats) -> Floats:
+    """Return a vector with the fence whose station is nearest to that of the rule's first."""
+    slots, station = vector.reshape(SLOTS, -1), rule[0]
+    away = np.where(slots[:, 1] > -1.0, np.abs(slots[:, 0] - station), np.inf)
+    first = int(np.argmin(away))
+    return slots[[first, *(k for k in range(SLOTS) if k != first)]].ravel()
 
 
 def _read(path: Path) -> dict[str, Lesson]:

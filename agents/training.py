@@ -44,8 +44,8 @@ class Terms:
         Seed of all that is random.
     """
 
-    sites: int = 256
-    lessons: int = 96
+    sites: int = 128
+    lessons: int = 160
     episodes: int = 16384
     seed: int = 0
 

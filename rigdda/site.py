@@ -80,7 +80,7 @@ class Costs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ============  =========================================================================
     wall          (base + square height^2) (1 + thickness) / 2: it rises faster than height
     gravity wall  base + gravity_wall height thickness: by its concrete
-    fence         base + fence height (capacity / 1 MJ)^0.45
+    fence         base + fence height^2 (capacity / 1 MJ)^0.45: posts bend as height^2
     ditch         base + ditch area: by what is dug out [m2]
     embankment    base + embankment area: by what is filled in [m2]
     ============  =========================================================================
@@ -88,7 +88,7 @@ class Costs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     All times `off_toe` uphill of the toe, where access is dear. `limit` is the budget of a layout.
     Prices of fences rise about as E^0.45 (150, 270, 430, 600 per m2 at 0.25, 1, 3, 5 MJ, from
     memory); the others are plausible beside them: one unit is what a square metre of a 1 MJ fence
-    costs.
+    costs that is 3 m high.
     """
 
     base: float = 1.0
@@ -96,7 +96,7 @@ class Costs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     off_toe: float = 1.5
     limit: float = 40.0
     gravity_wall: float = 1.5
-    fence: float = 1.0
+    fence: float = 0.35
     ditch: float = 0.5
     embankment: float = 0.3
 
@@ -301,7 +301,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             case GravityWall():
                 return c.base + c.gravity_wall * barrier.height * barrier.thickness
             case Fence():
-                return c.base + c.fence * barrier.height * (barrier.capacity / 1e6) ** 0.45
+                return c.base + c.fence * barrier.height**2 * (barrier.capacity / 1e6) ** 0.45
             case Ditch():
                 return c.base + c.ditch * area
             case Embankment():

@@ -108,13 +108,14 @@ def test_streams_of_release_seeds_never_meet() -> None:
 @pytest.mark.parametrize(
     "simulations, plan",
     [
-        (1, Plan(1, 2, 0)),
-        (16, Plan(1, 2, 3)),
-        (80, Plan(2, 2, 16)),
-        (240, Plan(6, 5, 19)),
-        (320, Plan(8, 5, 25)),
-        (400, Plan(8, 5, 32)),
-        (10_000, Plan(8, 5, 32)),
+        (1, Plan(1, 0, 2, 0)),
+        (16, Plan(1, 0, 2, 3)),
+        (80, Plan(2, 0, 2, 16)),
+        (240, Plan(6, 0, 5, 19)),
+        (320, Plan(8, 0, 5, 25)),
+        (400, Plan(8, 0, 5, 32)),
+        (1200, Plan(8, 10, 5, 32)),
+        (2000, Plan(8, 20, 5, 32)),
     ],
 )
 def test_a_plan_shrinks_with_the_budget(simulations: int, plan: Plan) -> None:

@@ -34,8 +34,8 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
 
 @click.command()
-@count_option("--sites", 2, 256, "Random sites to train on.")
-@count_option("--lessons", 16, 96, "Simulations of the search that makes the lesson of a site.")
+@count_option("--sites", 2, 128, "Random sites to train on.")
+@count_option("--lessons", 16, 160, "Simulations of the search that makes the lesson of a site.")
 @count_option("--episodes", 0, 16384, "Episodes of PPO after the lessons were cloned.")
 @seed_option("Seed of all that is random.")
 @out_option("train")

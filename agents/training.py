@@ -44,10 +44,10 @@ class Terms:
         Seed of all that is random.
     """
 
-    sites: int = 128
-    lessons: int = 160
-    episodes: int = 16384
-    seed: int = 0
+    sites: int
+    lessons: int
+    episodes: int
+    seed: int
 
     def __post_init__(self) -> None:
         check.integer("sites", self.sites, 2)

@@ -39,7 +39,7 @@ class Priced(DesignProblem):
 def test_the_finalists_spread_over_the_front_and_hold_its_best(site: Site) -> None:
     ledger = Ledger(Priced(site), 100, 0, None, None)
     tried = [ledger.evaluate((Wall(16.0, 1.0 + cost),), "search", 1) for cost in range(30)]
-    chosen = pareto.finalists(ledger, 6)
+    chosen = pareto.finalists(tried, 6)
     assert 5 <= len(chosen) <= 6
     assert [e.cost for e in chosen] == sorted(e.cost for e in chosen)
     assert {0.0, 29.0} <= {e.cost for e in chosen}

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from agents import policy
-from agents.features import features
+from agents.crossings import ensemble
+from agents.features import features, rule_slot
 from agents.network import Network
-from agents.policy import SHIPPED, decide
-from envs import DesignProblem
+from agents.policy import SHIPPED, anchor, decide
+from agents.rule import rule
+from envs import DesignProblem, fidelity
 from envs.observation import observe
 from rigdda import BadInput, Fence, Site, __version__
 
@@ -73,7 +75,25 @@ def test_a_policy_survives_its_file(fences: DesignProblem, tmp_path: Path) -> No
     read.save(tmp_path / "again.safetensors")
     written = [(tmp_path / f"{name}.safetensors").read_bytes() for name in ("it", "again")]
     assert written[0] == written[1]
-    assert (np.abs(read(1e9 * seen)) <= 1.0).all()
+    assert read(1e9 * seen) == pytest.approx(read(1e6 * seen))  # features are clipped
+
+
+@pytest.mark.parametrize("name", ["quick", "shu-hwa"])
+def test_a_network_that_adds_nothing_builds_nearly_what_the_rule_does(name: str) -> None:
+    posed = DesignProblem(fidelity.at(Site.load(name), "fast"))
+    zeros = network(np.zeros(9), len(features(observe(posed, ()))))
+    (fence,) = decide(zeros, posed)
+    (ruled,) = rule(posed.site, ensemble(posed.site, range(16)), "fence")
+    length = posed.site.barrier_zone.end - posed.site.barrier_zone.start
+    assert isinstance(ruled, Fence) and isinstance(fence, Fence)
+    assert fence.x == pytest.approx(ruled.x, abs=0.3 * length)
+    assert fence.height == pytest.approx(ruled.height, rel=0.3)
+    assert 0.25 < fence.capacity / ruled.capacity < 4.0
+
+
+def test_where_nothing_comes_the_rule_it_starts_from_builds_nothing(fences: DesignProblem) -> None:
+    seen = observe(fences, ()) | {"energy": np.zeros(16, np.float32)}
+    assert rule_slot(seen).tolist() == [0.0, -1.0, 0.0]
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no tensors"])
@@ -89,9 +109,9 @@ def test_another_file_is_refused(content: bytes | None, tmp_path: Path) -> None:
 @pytest.mark.parametrize("kinds", [("fence",), ("wall", "fence")])
 def test_it_fits_any_number_of_slots(slots: int, kinds: tuple[str, ...], site: Site) -> None:
     problem = DesignProblem(site, slots, kinds)
-    said = np.array([-1, 0, 0, 0, 1.0, 0, 1, 0.5, 0])
-    inputs = len(features(observe(DesignProblem(site), ())))
-    layout = decide(network(said, inputs), problem)
+    wanted = np.array([-1, 0, 0, 0, 1.0, 0, 1, 0.5, 0])
+    seen = features(observe(DesignProblem(site), ()))
+    layout = decide(network(wanted - anchor(seen), len(seen)), problem)
     assert len(layout) == min(slots, 3)
     heights = sorted(b.height for b in layout if isinstance(b, Fence))
     assert heights == pytest.approx([2.5, 3.75, 5.0][-slots:])

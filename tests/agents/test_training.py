@@ -12,9 +12,12 @@ import pytest
 from test_command_line import refused, rig, rows, run
 
 from agents import ppo, teacher, training
+from agents.features import features
 from agents.network import Network
+from agents.policy import anchor, decide
 from agents.teacher import Lesson
 from envs import DesignProblem
+from envs.observation import observe
 
 SMALL = ("--sites", 2, "--lessons", 16, "--episodes", 8)
 
@@ -83,6 +86,7 @@ def scripted(n: int) -> tuple[list[Lesson], np.ndarray, np.ndarray]:
     lessons = []
     for i in range(n):
         seen = rng.uniform(-1, 1, 4).astype(np.float32)
+        seen[1:] = 0.3, 0.4, -0.2  # the rule's fence
         vector = np.array([seen[0], 0.5, 0.0, *rng.uniform(-1, 1, 1), -1, 0.3, 0, -1, 0])
         lessons.append(Lesson(i, seen, vector, 0.3))
     return lessons, *training.scaling(np.stack([lesson.features for lesson in lessons]))
@@ -93,13 +97,22 @@ def test_cloning_learns_what_decides(site_problem: DesignProblem, tmp_path: Path
     model = ppo.learner(Toy(site_problem), 0, tmp_path)
     ppo.clone(model, lessons, mean, scale, 0)
     network = ppo.export(model, mean, scale, {})
-    said = np.stack([network(lesson.features) for lesson in lessons])
+    said = np.stack([anchor(one.features) + network(one.features) for one in lessons])
     aim = np.stack([lesson.vector for lesson in lessons])
     assert np.corrcoef(said[:, 0], aim[:, 0])[0, 1] > 0.9
     assert np.abs(said - aim)[:, 1].mean() < 0.08 and (said[:, 4] < -0.85).all()
     x = ppo.torch.as_tensor((lessons[0].features - mean) / scale)[None]
     action, _ = model.predict(x.numpy(), deterministic=True)
     assert network(lessons[0].features) == pytest.approx(action[0], abs=1e-5)
+
+
+def test_the_first_slot_of_a_lesson_is_the_fence_nearest_to_the_rules() -> None:
+    vector = np.array([-0.5, 0.2, 0.1, 0.6, 0.4, 0.3, 0.0, -1.0, 0.0])
+    rule = np.array([0.5, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0])
+    first = teacher.nearest_first(vector, rule)
+    assert first.tolist() == [0.6, 0.4, 0.3, -0.5, 0.2, 0.1, 0.0, -1.0, 0.0]
+    nothing = np.tile([0.0, -1.0, 0.0], 3)
+    assert (teacher.nearest_first(nothing, rule) == nothing).all()
 
 
 class Toy(ppo.VecEnv):
@@ -170,3 +183,17 @@ def test_every_copy_of_the_pool_keeps_its_site() -> None:
     assert (first["profile"] == second["profile"]).all()
     assert (first["profile"][0] != first["profile"][1]).any()
     assert copies.get_attr("problem") == posed
+
+
+def test_an_action_of_nothing_builds_what_the_policy_starts_from() -> None:
+    posed = [teacher.problem(site) for site in (0, 1)]
+    size = len(features(observe(posed[0], ())))
+    zeros, ones = np.zeros(size, np.float32), np.ones(size, np.float32)
+    copies = ppo.Featured(ppo.pool(posed), zeros, ones)
+    assert copies.reset().shape == (2, size)
+    _, _, _, infos = copies.step(np.zeros((2, 9), np.float32))
+    nothing = Network(zeros, ones, [(np.zeros((9, size), np.float32), np.zeros(9, np.float32))], {})
+    for one, info in zip(posed, infos, strict=True):
+        for built, said in zip(info["layout"], decide(nothing, one), strict=True):
+            assert (built.x, built.height) == pytest.approx((said.x, said.height), rel=1e-5)
+            assert built.capacity == pytest.approx(said.capacity, rel=1e-5)

@@ -35,11 +35,10 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
 @click.command()
 @count_option("--sites", 2, 128, "Random sites to train on.")
-@count_option("--lessons", 16, 160, "Simulations of the search that makes the lesson of a site.")
-@count_option("--episodes", 0, 16384, "Episodes of PPO after the lessons were cloned.")
+@count_option("--episodes", 0, 16384, "Episodes, of one release each.")
 @seed_option("Seed of all that is random.")
 @out_option("train")
-def train(sites: int, lessons: int, episodes: int, seed: int, out: Path | None) -> None:
+def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
     """Train a policy that designs fences for a site from what it sees of it, without a search.
 
     Writes policy.safetensors, which `rigdda evaluate --policy` takes, and logs for TensorBoard.
@@ -47,14 +46,14 @@ def train(sites: int, lessons: int, episodes: int, seed: int, out: Path | None) 
     """
     from agents import training
 
-    terms = training.Terms(sites, lessons, episodes, seed)
+    terms = training.Terms(sites, episodes, seed)
     folder = out or Path("runs/train")
     folder.mkdir(parents=True, exist_ok=True)
-    with kept(folder), progress(terms.sites + terms.episodes) as tick:
-        trained = training.train(terms, folder, tick)
+    with kept(folder), progress(terms.episodes) as tick:
+        trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
     click.echo(
-        f"fall of the objective on {terms.beside} sites beside the training sites: cloned "
-        f"{trained.cloned:.3f}, after PPO {trained.tuned:.3f}; policy.safetensors is in {folder}"
+        f"fall of the objective on {terms.beside} sites beside the training sites: before "
+        f"{trained.before:.3f}, after {trained.after:.3f}; policy.safetensors is in {folder}"
     )
 
 

@@ -29,6 +29,8 @@ KINDS = ("fence",)
 """What a policy builds."""
 SLOTS = 3
 """Fences that it decides on."""
+VERGE = (-0.4, -0.8, 0.0), (0.4, -0.8, 0.0)
+"""Slots of the fences that are not built: at 0.4 m of the 4 m that sites allow by default."""
 SHIPPED = Path(__file__).with_suffix(".safetensors")
 
 
@@ -93,10 +95,12 @@ def decide(network: Network, problem: DesignProblem) -> Layout:
 
 
 def anchor(seen: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the vector that a network's outputs are added to: the rule's fence, then none."""
-    out = np.tile([0.0, -1.0, 0.0], (SLOTS, 1))
-    out[0] = seen[RULE]
-    return out.ravel()
+    """Return the vector that a network's outputs are added to.
+
+    The rule's fence, then none: two that are a little too low to be built, so that what is tried
+    around them sometimes is.
+    """
+    return np.concatenate([seen[RULE], *VERGE])
 
 
 def pose(problem: DesignProblem) -> DesignProblem:

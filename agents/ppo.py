@@ -1,13 +1,12 @@
 """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347; Stable-Baselines3).
 
-`design` lets it search on one problem. `fine_tune` is the second half of `rigdda train`: it goes on
-from a policy that was cloned from lessons, on a pool of sites, one release an episode.
+`design` lets it search on one problem. `learn` is what `rigdda train` does: a policy on a pool of
+sites, one release an episode.
 The only module of the designers that knows torch.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,21 +26,17 @@ from agents.network import Network, scaled
 from agents.policy import anchor
 from agents.protocol import DesignResult, Ledger, Plan, Progress, finish
 from agents.store import Store
-from agents.teacher import Lesson
 from envs import DesignProblem, sb3_vec_env
 from rigdda.files import atomic
 
 Floats = NDArray[np.float32]
 
 HIDDEN = [64, 64]
-"""Neurons of the hidden layers; few, since lessons are few."""
+"""Neurons of the hidden layers; few, since sites are few."""
 EXPLORATION = -1.6
 """Logarithm of the standard deviation of actions at the start: 0.2, a tenth of the decision box."""
-EPOCHS = 300
-"""Passes of cloning over all lessons."""
-JITTER = 11.0
-"""Noise on scaled features in cloning, over the root of the number of lessons: 2 at 32 lessons,
-where a cross-validation found less to overfit; a network that is not sure says the mean."""
+RECENT = 0.1
+"""Share of the last episode in what is usual at a site."""
 COMMON: dict[str, Any] = {"gamma": 1.0, "device": "cpu", "verbose": 0}
 
 
@@ -117,12 +112,15 @@ class _WhilePaid(BaseCallback):
 class Featured(VecEnvWrapper):
     """`BarrierDesign` as the policy's network sees it and acts on it.
 
-    Scaled features are seen; actions are added to the rule's fence, see `agents.policy.anchor`.
+    Scaled features are seen; actions are added to the rule's fence, see `agents.policy.anchor`. A
+    reward is what is better than usual at its site: sites differ in what can be gained by far more
+    than layouts do, and copies keep their site.
     """
 
     def __init__(self, venv: VecEnv, mean: Floats, scale: Floats):
         self.mean, self.scale = mean, scale
         self.anchors = np.zeros((venv.num_envs, *(venv.action_space.shape or ())))
+        self.usual = np.full(venv.num_envs, np.nan)
         seen = spaces.Box(-np.inf, np.inf, mean.shape, np.float32)
         super().__init__(venv, seen, spaces.Box(-2.0, 2.0, venv.action_space.shape, np.float32))
 
@@ -142,7 +140,10 @@ class Featured(VecEnvWrapper):
             if "terminal_observation" in info:
                 last = features(info["terminal_observation"])
                 info["terminal_observation"] = scaled(last, self.mean, self.scale)
-        return self._scaled(seen), rewards, dones, infos
+        self.usual = np.where(np.isnan(self.usual), rewards, self.usual)
+        better = rewards - self.usual
+        self.usual += RECENT * better
+        return self._scaled(seen), better.astype(np.float32), dones, infos
 
     def _scaled(self, seen: Any) -> Floats:
         count = len(seen["span"])
@@ -171,37 +172,9 @@ def learner(copies: VecEnv, seed: int, logs: Path) -> PPO:
     torch.set_num_threads(1)
     return PPO(
         "MlpPolicy", copies, n_steps=4, batch_size=copies.num_envs, n_epochs=4,
-        learning_rate=1e-4, target_kl=0.02, seed=seed, tensorboard_log=str(logs),
+        learning_rate=3e-4, target_kl=0.02, seed=seed, tensorboard_log=str(logs),
         policy_kwargs={"net_arch": HIDDEN, "log_std_init": EXPLORATION}, **COMMON,
     )  # fmt: skip
-
-
-def clone(model: PPO, lessons: Sequence[Lesson], mean: Floats, scale: Floats, seed: int) -> None:
-    """Fit a policy to lessons: what it adds to the rule's fence, and its values to their gains.
-
-    Stations and sizes of absent barriers teach nothing. A lesson counts by its gain.
-    """
-    policy, rng = _net(model), np.random.default_rng(seed)
-    seen = np.stack([scaled(lesson.features, mean, scale) for lesson in lessons])
-    aim = np.stack([lesson.vector - anchor(lesson.features) for lesson in lessons])
-    gain = np.array([lesson.gain for lesson in lessons])
-    decides = np.stack([lesson.decides for lesson in lessons])
-    counts = np.maximum(gain, 0.0)[:, None] * decides / max(gain.mean(), 1e-3)
-    y, w, v = (torch.as_tensor(a, dtype=torch.float32) for a in (aim, counts, gain))
-    fit = torch.optim.AdamW(policy.parameters(), lr=1e-3)
-    mean_aim = (counts * aim).sum(axis=0) / np.maximum(counts.sum(axis=0), 1e-9)
-    assert isinstance(policy.action_net, torch.nn.Linear)
-    with torch.no_grad():
-        policy.action_net.bias.copy_(torch.as_tensor(mean_aim))
-    jitter = JITTER / math.sqrt(len(lessons))
-    for _ in range(EPOCHS):
-        noisy = seen + jitter * rng.standard_normal(seen.shape)
-        x = torch.as_tensor(noisy, dtype=torch.float32)
-        wrong = w * (_actions(policy, x) - y) ** 2
-        off = policy.predict_values(x).squeeze(-1) - v
-        fit.zero_grad()
-        (wrong.mean() + (off**2).mean()).backward()
-        fit.step()
 
 
 def _net(model: PPO) -> ActorCriticPolicy:
@@ -209,14 +182,7 @@ def _net(model: PPO) -> ActorCriticPolicy:
     return model.policy
 
 
-def _actions(policy: ActorCriticPolicy, x: torch.Tensor) -> torch.Tensor:
-    """Return the mean actions of a policy for scaled features."""
-    hidden = policy.mlp_extractor.forward_actor(x)
-    means: torch.Tensor = policy.action_net(hidden)
-    return means
-
-
-def fine_tune(model: PPO, episodes: int, checkpoint: Path, tick: Callable[[int], None]) -> None:
+def learn(model: PPO, episodes: int, checkpoint: Path, tick: Callable[[int], None]) -> None:
     """Go on training up to so many episodes in all; the trainer is kept after every rollout."""
     if model.num_timesteps < episodes:
         kept = _Keep(checkpoint, tick)

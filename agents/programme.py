@@ -13,6 +13,7 @@ with CVaR as in Rockafellar and Uryasev (2000, J. Risk 2, 21-41), a linear progr
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,7 +85,8 @@ def _solve(catalogue: Catalogue, slots: int, limit: float, boolean: bool) -> Flo
         z >= 0,
         z <= 1,
     ]
-    cp.Problem(cp.Minimize(cost @ z), rules).solve(solver=cp.HIGHS)
+    with suppress(ValueError):  # HiGHS ends some infeasible programmes as "unknown"
+        cp.Problem(cp.Minimize(cost @ z), rules).solve(solver=cp.HIGHS)
     if z.value is None:
         return None
     out = np.zeros_like(catalogue.cost)

@@ -1,7 +1,7 @@
-"""Training of a policy: lessons of a short search on a pool of sites, cloned, then PPO on them.
+"""Training of a policy: PPO on a pool of random sites, from the engineering rule's fence on.
 
 What is made lands in one folder and is taken up again from there: `training.json` (the terms),
-`lessons.jsonl`, `checkpoint.zip` (the trainer), `ppo_0/` (TensorBoard), `policy.safetensors`.
+`checkpoint.zip` (the trainer), `ppo_0/` (TensorBoard), `policy.safetensors`.
 """
 
 from __future__ import annotations
@@ -14,18 +14,20 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import extra, teacher
+from agents import extra
+from agents.features import features
 from agents.network import Network
-from agents.policy import decide
+from agents.policy import KINDS, SLOTS, decide
 from agents.seeds import release_seeds
-from envs import DesignProblem
+from envs import DesignProblem, fidelity
+from envs.observation import observe
 from rigdda import BadInput, __version__, check, sites
 from rigdda.files import atomic
 
-Tick = Callable[[int, str], None]
+Tick = Callable[[int], None]
 
 RELEASES = 8
-"""Releases of each site on which the cloned and the tuned policy are compared."""
+"""Releases of each site on which the policy is compared with the one that it started from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,16 +38,13 @@ class Terms:
     ----------
     sites : int
         Training sites, at least 2.
-    lessons : int
-        Simulations of the search that makes the lesson of a site, at least 16.
     episodes : int
-        Episodes of PPO after that; 0: cloning only.
+        Episodes of PPO.
     seed : int
         Seed of all that is random.
     """
 
     sites: int
-    lessons: int
     episodes: int
     seed: int
 
@@ -54,30 +53,29 @@ class Terms:
         if self.sites > len(sites.TRAIN_SEEDS) // 2:
             mend = f"give a whole number of at most {len(sites.TRAIN_SEEDS) // 2}"
             raise BadInput("sites", self.sites, mend)
-        check.integer("lessons", self.lessons, 16)
         check.integer("episodes", self.episodes, 0)
         check.integer("seed", self.seed, 0)
 
     @property
     def beside(self) -> int:
-        """Sites beside those to train on, on which the cloned and the tuned policy are compared."""
-        return max(2, self.sites // 16)
+        """Sites beside those to train on, on which the policy is tried before and after."""
+        return max(2, self.sites // 8)
 
 
 @dataclass(frozen=True, slots=True)
 class Trained:
-    """A trained policy and what cloning alone and all of the training took off the objective.
+    """A policy and what it took off the objective before and after its training.
 
     Means over sites beside the training sites.
     """
 
     network: Network
-    cloned: float
-    tuned: float
+    before: float
+    after: float
 
 
 def train(terms: Terms, out: Path, tick: Tick) -> Trained:
-    """Train a policy, or go on with a training that was stopped; the better half is kept.
+    """Train a policy, or go on with a training that was stopped.
 
     Raises
     ------
@@ -88,27 +86,25 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     """
     ppo = extra.module("ppo")
     _same(terms, out)
-    pool = sites.TRAIN_SEEDS[: terms.sites]
-    beside = sites.TRAIN_SEEDS[terms.sites : terms.sites + terms.beside]
-    lessons = teacher.teach(
-        pool, terms.lessons, out / "lessons.jsonl", lambda n: tick(n, "lessons")
-    )
-    mean, scale = scaling(np.stack([lesson.features for lesson in lessons]))
-    copies = ppo.Featured(ppo.pool([teacher.problem(site) for site in pool]), mean, scale)
+    pool = [problem(site) for site in sites.TRAIN_SEEDS[: terms.sites]]
+    mean, scale = scaling(np.stack([features(observe(posed, ())) for posed in pool]))
+    copies = ppo.Featured(ppo.pool(pool), mean, scale)
     model = ppo.learner(copies, terms.seed, out)
-    ppo.clone(model, lessons, mean, scale, terms.seed)
-    halves = [ppo.export(model, mean, scale, _notes(terms, "cloned"))]
+    notes = _notes(terms)
+    start = ppo.export(model, mean, scale, notes)
     if (out / "checkpoint.zip").is_file():
         model = ppo.resume(out / "checkpoint.zip", copies)
-    ppo.fine_tune(
-        model, terms.episodes, out / "checkpoint.zip", lambda n: tick(terms.sites + n, "PPO")
-    )
-    halves.append(ppo.export(model, mean, scale, _notes(terms, "cloned, then PPO")))
-    posed = [teacher.problem(site) for site in beside]
-    cloned, tuned = (examine(network, posed) for network in halves)
-    better = halves[tuned > cloned]
-    better.save(out / "policy.safetensors")
-    return Trained(better, cloned, tuned)
+    ppo.learn(model, terms.episodes, out / "checkpoint.zip", tick)
+    network = ppo.export(model, mean, scale, notes)
+    network.save(out / "policy.safetensors")
+    beside = sites.TRAIN_SEEDS[terms.sites : terms.sites + terms.beside]
+    posed = [problem(site) for site in beside]
+    return Trained(network, examine(start, posed), examine(network, posed))
+
+
+def problem(site: int) -> DesignProblem:
+    """Return the problem of a training site, at fidelity "fast"."""
+    return DesignProblem(fidelity.at(sites.random(site), "fast"), SLOTS, KINDS)
 
 
 def scaling(
@@ -129,10 +125,10 @@ def examine(network: Network, problems: list[DesignProblem]) -> float:
     return float(np.mean(gains))
 
 
-def _notes(terms: Terms, how: str) -> dict[str, str]:
+def _notes(terms: Terms) -> dict[str, str]:
     """Return what a policy's file says of its making."""
     options = " ".join(f"--{name} {value}" for name, value in asdict(terms).items())
-    return {"command": f"rigdda train {options}", "how": how, "version": __version__} | {
+    return {"command": f"rigdda train {options}", "version": __version__} | {
         name: str(value) for name, value in asdict(terms).items()
     }
 

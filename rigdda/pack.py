@@ -22,6 +22,7 @@ from rigdda.constants import (
     TERRAIN,
 )
 from rigdda.correction import place_all_corners
+from rigdda.errors import BadInput
 from rigdda.geometry import convex_parts, polygon_properties, turns
 from rigdda.linear.psor import COLUMNS
 from rigdda.records import (
@@ -46,6 +47,10 @@ from rigdda.run import EVENT
 from rigdda.scene import Scene, Terrain
 from rigdda.settings import SOLVERS, Settings
 from rigdda.supports import FixedPoint
+
+LARGEST_FALL = 0.5
+"""Greatest displacement that gravity gives a block in a step, over its size [-]. With more, a small
+block goes through the ground."""
 
 FALL_BELOW = 20.0
 """Depth below the lowest terrain at which a block that left the site is retired [m]."""
@@ -357,6 +362,15 @@ def event_room(blocks: int, stations: int, barriers: int) -> int:
     return 2 * (blocks + 1) * (stations + barriers) + 1
 
 
+def check_step(settings: Settings, block: int, size: float, gravity: float) -> None:
+    """Refuse a step in which gravity alone moves the smallest block by most of its size [m]."""
+    fall = gravity * settings.dt**2
+    if fall > LARGEST_FALL * size and settings.mode == "dynamic":
+        most = math.sqrt(LARGEST_FALL * size / gravity)
+        mend = f"give at most {most:.2g} s: block {block} is small, {size:.2g} m, and would fall "
+        raise BadInput("dt", settings.dt, mend + f"{fall:.2g} m more in every step")
+
+
 def pack_parameters(
     scene: Scene, settings: Settings, bodies: Bodies, names: list[str]
 ) -> Parameters:
@@ -366,6 +380,7 @@ def pack_parameters(
     size = math.sqrt(np.mean(area))
     gx, gy = scene.gravity_vector
     gravity = math.hypot(gx, gy)
+    check_step(settings, free[int(np.argmin(area))], math.sqrt(min(area)), gravity)
     shaken = scene.base_motion is not None
     static = settings.mode == "static"
     weight = np.mean(bodies["mass"][free]) * (gravity or 9.81)

@@ -135,7 +135,8 @@ class Simulation:
     Raises
     ------
     BadInput
-        If stations are not ascending or the watched interval is empty.
+        If stations are not ascending, the watched interval is empty, or the step so long that
+        gravity moves the smallest block by half its size in it.
     """
 
     def __init__(

@@ -267,9 +267,11 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
     threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
     gap = max(c[k].gap, 0.0)
     mean = -c[k].un + 0.5 * pull * p.dt
-    # what was foreseen may still come fast when it is closed already
+    # what was foreseen may still come fast when it is closed already; but bodies that are in one
+    # another are held apart by the force of the last step, from which an impact would not start
     least = threshold if c[k].state == OPEN else max(threshold, BLOW_SPEED)
-    if mean > least and gap < mean * p.dt:
+    sunk = c[k].state != OPEN and c[k].gap < -p.slack
+    if mean > least and gap < mean * p.dt and not sunk:
         closing = strike(bodies, c, k, gap / mean, pull, p)
         if closing > threshold:
             set_impact(c, k, closing, effective_mass(bodies, c, k), p)

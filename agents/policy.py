@@ -95,7 +95,7 @@ def decide(network: Network, problem: DesignProblem) -> Layout:
 
 
 def anchor(seen: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the vector that a network's outputs are added to.
+    """Return the (9,) vector, for (F,) features, that a network's outputs are added to.
 
     The rule's fence, then none: two that are a little too low to be built, so that what is tried
     around them sometimes is.

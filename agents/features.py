@@ -43,7 +43,7 @@ RULE = slice(-3, None)
 ROUNDNESS = 0.75
 """Circumscribed radius of a block over the root of its area [-]: assumed, 0.71 for a square."""
 MEAN_ENERGY = 0.35
-"""Mean energy of the blocks that pass a station over the 95 % one [-]: assumed; training mends it."""
+"""Mean energy of the blocks that pass a station over the 95 % one [-]: assumed."""
 
 
 def features(seen: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:

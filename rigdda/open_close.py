@@ -261,7 +261,7 @@ def relax(
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
     counters[RELAXED] += 1
-    counters[SWEEPS] += relax_forces(c, m, work, c0, c1, b1 - b0, p.dt, speed, p.gravity)
+    counters[SWEEPS] += relax_forces(c, m, work, c0, c1, b1 - b0, speed, p)
     for item in range(c0, c1):
         k = work.contact_item[item]
         limit = c[k].cohesion + c[k].friction * max(c[k].normal, 0.0)

@@ -414,6 +414,7 @@ def pack_parameters(
         settings.penetration or PENETRATION_RATIO * size,
         SLACK_RATIO * size,
         settings.tolerance,
+        settings.sweep_tolerance,
         settings.open_close_iterations,
         static,
         settings.post_correction,

@@ -249,6 +249,7 @@ class Parameters(NamedTuple):
     penetration: float
     slack: float
     tolerance: float
+    sweep_tolerance: float  # [m/s]
     iterations: int
     static: bool
     post_correction: bool

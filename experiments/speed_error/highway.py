@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from experiments.bench.cases import FRAME, RUN_OUT
 from experiments.speed_error import engine
 from experiments.speed_error.knobs import DEFAULT, STEP, Choice, choices
+from experiments.speed_error.store import Outcomes, kept
 from rigdda import Scene, Site
 from rigdda.errors import Diverged
 from rigdda.validation.scenes import masses
@@ -30,7 +32,7 @@ BARRIER = SITE.slope.toe
 
 OUTCOMES = ("debris fraction [-]", "95 % run-out [m]", "energy at the barrier [kJ]")
 
-FINEST = {"dt": 1e-3, "tolerance": 1e-9, "open_close_iterations": 50}
+FINEST = {"dt": 1e-3, "tolerance": 1e-9, "sweep_tolerance": 2e-3, "open_close_iterations": 50}
 """Settings of the reference."""
 
 BLOCKS = "block area"
@@ -136,52 +138,58 @@ def release(
 
 
 def sample(
-    choice: Choice, releases: int, area: float, duration: float, module: Any = engine
+    choice: Choice,
+    releases: int,
+    area: float,
+    duration: float,
+    folder: Path,
+    module: Any = engine,
 ) -> Sample:
-    """Return the releases of a choice, seeds 0 onwards, over all cores."""
+    """Return the releases of a choice, seeds 0 onwards, over all cores; kept in `folder`."""
     options = dict(choice.settings)
     dt = options.pop("dt", DEFAULT.dt)
-    with ThreadPoolExecutor() as pool:
-        done = list(
-            pool.map(
-                lambda seed: release(module, area, duration, seed, dt, options), range(releases)
+
+    def compute() -> Outcomes:
+        with ThreadPoolExecutor() as pool:
+            done = list(
+                pool.map(
+                    lambda seed: release(module, area, duration, seed, dt, options), range(releases)
+                )
             )
-        )
-    outcomes, cpu = zip(*done, strict=True)
-    return Sample(
-        module.NAME,
-        choice.knob,
-        choice.value,
-        choice.default,
-        np.array(outcomes),
-        float(np.mean(cpu)),
-    )
+        outcomes, cpu = zip(*done, strict=True)
+        return np.array(outcomes), float(np.mean(cpu))
+
+    name = f"{module.NAME}-{choice.knob}-{choice.value:g}".replace(" ", "-")
+    what = (dt, options, releases, area, duration, BARRIER, SITE.road.start)
+    outcomes, cpu = kept(folder, name, what, compute)
+    return Sample(module.NAME, choice.knob, choice.value, choice.default, outcomes, cpu)
 
 
-def reference(budget: Budget) -> Sample:
+def reference(budget: Budget, folder: Path) -> Sample:
     """Return the converged reference."""
     finest = Choice("reference", FINEST["dt"], dict(FINEST))
-    return sample(finest, budget.reference, budget.area, budget.duration)
+    return sample(finest, budget.reference, budget.area, budget.duration, folder)
 
 
-def samples(budget: Budget, say: Callable[[str], None]) -> Iterator[Sample]:
+def samples(budget: Budget, folder: Path, say: Callable[[str], None]) -> Iterator[Sample]:
     """Yield the releases of all choices, then of other block sizes."""
     for choice in choices(math.sqrt(budget.area)):
         say(f"highway: {choice.knob} {choice.value:g}")
         releases = budget.reference if choice.default else budget.others
-        yield sample(choice, releases, budget.area, budget.duration)
+        yield sample(choice, releases, budget.area, budget.duration, folder)
     for factor in budget.factors:
         area = budget.area * factor
         say(f"highway: blocks of {area:g} m2")
-        yield sample(Choice(BLOCKS, area, {"dt": DEFAULT.dt}), budget.others, area, budget.duration)
+        other = Choice(BLOCKS, area, {"dt": DEFAULT.dt})
+        yield sample(other, budget.others, area, budget.duration, folder)
 
 
 def peer_samples(
-    budget: Budget, peers: Sequence[ModuleType], say: Callable[[str], None]
+    budget: Budget, peers: Sequence[ModuleType], folder: Path, say: Callable[[str], None]
 ) -> Iterator[Sample]:
     """Yield the releases of the peers at two steps, each with its first options."""
     for module in peers:
         for dt in (1e-2, 5e-3):
             say(f"highway: {module.NAME} {1e3 * dt:g} ms")
             choice = Choice(STEP, dt, {"dt": dt, **module.OPTIONS[0]})
-            yield sample(choice, budget.peers, budget.area, budget.duration, module)
+            yield sample(choice, budget.peers, budget.area, budget.duration, folder, module)

@@ -21,10 +21,14 @@ Stiffness is the load over it."""
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-10)
 """Of conjugate gradients, `Settings.tolerance` [-]."""
 
+SWEEP_TOLERANCES = (0.5, 0.05, 0.01, 0.002)
+"""Of the relaxation of blocks in motion, `Settings.sweep_tolerance` [m/s]."""
+
 OPEN_CLOSE = (1, 3, 12, 50)
 """Most open-close iterations a step."""
 
 STEP, STIFFNESS, TOLERANCE, ITERATIONS = "step", "compression", "tolerance", "open-close"
+SWEEPS = "sweep tolerance"
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,9 @@ def choices(size: float, steps: Sequence[float] = STEPS) -> Iterator[Choice]:
     for tolerance in TOLERANCES:
         if tolerance != DEFAULT.tolerance:
             yield Choice(TOLERANCE, tolerance, {"tolerance": tolerance})
+    for change in SWEEP_TOLERANCES:
+        if change != DEFAULT.sweep_tolerance:
+            yield Choice(SWEEPS, change, {"sweep_tolerance": change})
     for most in OPEN_CLOSE:
         if most != DEFAULT.open_close_iterations:
             yield Choice(ITERATIONS, most, {"open_close_iterations": most})

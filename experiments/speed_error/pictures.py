@@ -13,15 +13,17 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 from experiments.bench.pictures import COLOURS, LEAST
 from experiments.speed_error.closed_forms import Point
 from experiments.speed_error.highway import OUTCOMES, Sample
-from experiments.speed_error.knobs import ITERATIONS, STEP, STIFFNESS, TOLERANCE
+from experiments.speed_error.knobs import ITERATIONS, STEP, STIFFNESS, SWEEPS, TOLERANCE
 from experiments.speed_error.tables import RELEASES, bias, total_error
 
-MARKS = {STEP: "o", STIFFNESS: "s", TOLERANCE: "^", ITERATIONS: "v", "block area": "D"}
+MARKS = {
+    STEP: "o", STIFFNESS: "s", TOLERANCE: "^", SWEEPS: "<", ITERATIONS: "v", "block area": "D",
+}  # fmt: skip
 """Marker of each knob."""
 
 SHADES = {
-    STEP: "#c0392b", STIFFNESS: "#e67e22", TOLERANCE: "#7f8c8d", ITERATIONS: "#34495e",
-    "block area": "#16a085",
+    STEP: "#c0392b", STIFFNESS: "#e67e22", TOLERANCE: "#7f8c8d", SWEEPS: "#8e44ad",
+    ITERATIONS: "#34495e", "block area": "#16a085",
 }  # fmt: skip
 """Colour of each knob."""
 

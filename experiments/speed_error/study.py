@@ -19,6 +19,9 @@ from experiments.speed_error.closed_forms import Point
 from experiments.speed_error.tables import bias, closed_table, highway_rows, highway_table
 from rigdda.files import atomic
 
+SAMPLES = "highway-samples"
+"""Folder in that of the results that keeps the outcomes of every release."""
+
 JUDGED = 100
 """Releases of whose mean the 95 % interval is the measure."""
 
@@ -63,8 +66,10 @@ def run(quick: bool, out: Path) -> Number:
     draw(out / "speed_error.png", (15.0, 10.0), lambda f: pictures.closed_forms(f, points))
     budget = highway.QUICK if quick else highway.FULL
     say(f"highway: reference, {budget.reference} releases")
-    reference = highway.reference(budget)
-    samples = [*highway.samples(budget, say), *highway.peer_samples(budget, others, say)]
+    folder = out / SAMPLES
+    reference = highway.reference(budget, folder)
+    own = highway.samples(budget, folder, say)
+    samples = [*own, *highway.peer_samples(budget, others, folder, say)]
     write(out / "highway.csv", highway_rows([*samples, reference], reference))
     draw(out / "highway.png", (13.0, 8.0), lambda f: pictures.highway(f, samples, reference))
     with atomic(out / "speed_error.md") as part:

@@ -27,7 +27,7 @@ from rigdda.constants import (
     RELAXATION_SWEEPS,
 )
 from rigdda.kernel import arithmetic_kernel, kernel
-from rigdda.records import Contacts, Floats, Ints, Matrix, Work
+from rigdda.records import Contacts, Floats, Ints, Matrix, Parameters, Work
 
 # columns of work.row: normal (x, y); moments of a unit force along normal and shear about a and b,
 # by direction gain [N/m], free displacement [m], softness [m/N], force [N]; friction, and forces
@@ -167,9 +167,8 @@ def sort_by_height(c: Contacts, work: Work, low: int, high: int) -> None:
 
 @kernel
 def relax_forces(
-    c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int, dt: float, speed: float,
-    gravity: float,
-) -> int:  # fmt: skip
+    c: Contacts, m: Matrix, work: Work, low: int, high: int, n: int, speed: float, p: Parameters
+) -> int:
     """Sweep to and fro over the contacts low:high until their forces settle; returns the sweeps.
 
     The matrix holds inertia and weight only; m.d is set to the displacements. `speed` is the
@@ -186,11 +185,12 @@ def relax_forces(
     count = high - low
     sort_by_height(c, work, low, high)
     for place in range(count):
-        pack_row(c, work.contact_item[low + place], m, work, place, n, dt)
-    scale = dt / (2.0 * RELAXATION_STIFFNESS)
-    tolerance = max(RELAXATION_SHARE * speed, LEAST_RELAXATION * gravity * dt)
+        pack_row(c, work.contact_item[low + place], m, work, place, n, p.dt)
+    scale = p.dt / (2.0 * RELAXATION_STIFFNESS)
+    share = max(RELAXATION_SHARE * speed, LEAST_RELAXATION * p.gravity * p.dt)
+    tolerance = min(share, p.sweep_tolerance)
     most = QUIET_SWEEPS if tolerance < RELAXATION_SPEED else RELAXATION_SWEEPS
-    limit, far = min(tolerance, RELAXATION_SPEED) * scale, FAR_SPEED * scale
+    limit, far = tolerance * scale, FAR_SPEED * scale
     sweeps, worst = 0, 1e300
     while (sweeps < most and worst > limit) or (sweeps < LAST_SWEEPS and worst > far):
         worst = sweep(

@@ -104,7 +104,19 @@ def test_a_run_writes_its_tables_and_pictures(tmp_path, monkeypatch):
     number = study.run(True, tmp_path)
     assert number.passed, str(number)
     names = {"speed_error.csv", "speed_error.png", "speed_error.md", "highway.csv", "highway.png"}
-    assert {path.name for path in tmp_path.iterdir()} == names
+    assert {path.name for path in tmp_path.iterdir()} == names | {study.SAMPLES}
+
+
+def test_a_study_goes_on_with_the_samples_it_has(tmp_path, monkeypatch):
+    choice = knobs.Choice(knobs.STEP, 0.01, {"dt": 0.01})
+    first = highway.sample(choice, 2, 12.0, 4.0, tmp_path)
+    assert len(list(tmp_path.glob("rigdda-step-0.01-*.npz"))) == 1
+    monkeypatch.setattr(highway, "release", None)  # nothing is computed again
+    again = highway.sample(choice, 2, 12.0, 4.0, tmp_path)
+    assert np.array_equal(again.outcomes, first.outcomes)
+    assert again.cpu == first.cpu
+    with pytest.raises(TypeError):
+        highway.sample(choice, 3, 12.0, 4.0, tmp_path)
 
 
 @pytest.mark.slow

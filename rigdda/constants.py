@@ -54,6 +54,14 @@ PUSHED = 0.1
 RECOVERY_SPEED = 0.2
 """Greatest speed of that push [m/s]; adds at most v^2/2 = 0.02 J/kg."""
 
+RETARDATION_TIME = 5e-3
+"""Retardation time of contacts at rest: viscosity over stiffness [s]. Longer steps damp more, as
+the force follows the velocity at their end. Without it an arch near its limit vibrates in steps of
+0.1 ms until it falls."""
+
+TOUCHING = 1e-5
+"""Gap over wanted penetration up to which a contact that closes counts as touching [-]."""
+
 FRICTION_TOLERANCE = 2e-2
 """Relative change of a friction limit between open-close iterations that counts as settled [-]."""
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rigdda.assembly.island import assemble_blocks, load_moment
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
-from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, SHOCK, SHOCK_SPEED, STEADY_RATE
+from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, REST, SHOCK, SHOCK_SPEED, STEADY_RATE
 from rigdda.gauges import barrier_contact
 from rigdda.islands import root
 from rigdda.kernel import entry_kernel, kernel
@@ -247,5 +247,7 @@ def keep_memory(c: Contacts, k: int, struck: bool) -> None:
         lasting = c[k].memory_normal / c[k].normal if c[k].normal > 0.0 else 1.0
         c[k].memory_shear = lasting * c[k].shear
     elif not struck:
-        c[k].memory_normal, c[k].memory_shear = c[k].normal, c[k].shear
+        elastic = c[k].stiffness / c[k].kappa if c[k].kind == REST else 1.0
+        c[k].memory_normal += elastic * (c[k].normal - c[k].memory_normal)
+        c[k].memory_shear += elastic * (c[k].shear - c[k].memory_shear)
     c[k].start_normal, c[k].start_shear = c[k].normal, c[k].shear

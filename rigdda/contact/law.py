@@ -10,9 +10,11 @@ stiff, which makes resting contacts chatter; on the end velocity it loses energy
 What differs is the bias b:
 
 =======  ====================================================================================
-at rest  b = N_0 / k_n, the force carried over from the last step. Penetration beyond what N_0
-         explains is pushed out slowly, a small gap closed so. An open gap g gives b = -g: the
-         contact closes within the step, at most.
+at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
+         shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
+         on, the rest viscous (Kelvin and Voigt's solid). Penetration beyond what N_0 explains is
+         pushed out slowly, a small gap closed so. An open gap g gives b = -g: the contact closes
+         within the step, at most.
 impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
          impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
@@ -46,10 +48,12 @@ from rigdda.constants import (
     RECOVERY_SPEED,
     RECOVERY_TIME,
     REST,
+    RETARDATION_TIME,
     SHOCK,
     START_STIFFNESS,
     STICK,
     STIFFNESS_CHANGE,
+    TOUCHING,
     UNLOADED,
 )
 from rigdda.kernel import kernel
@@ -167,13 +171,13 @@ def set_rest(c: Contacts, k: int, weight: float, most: float, p: Parameters) -> 
     nor under next to no load, where blocks that collide would gain energy.
     """
     c[k].kind = REST
-    c[k].kappa = c[k].stiffness
+    c[k].kappa = c[k].stiffness * max(1.0, RETARDATION_TIME / p.dt)
     elastic = c[k].memory_normal / c[k].stiffness
     if c[k].gap > p.penetration and c[k].bond == 0.0:
         c[k].memory_normal = c[k].start_normal = 0.0
         c[k].bias = -c[k].gap
     else:
-        c[k].bias = elastic
+        c[k].bias = c[k].memory_normal / c[k].kappa
         if PUSHED * weight < c[k].memory_normal < most:
             surplus = max(-c[k].gap - elastic, 0.0) - max(c[k].gap, 0.0)
             c[k].bias += recovery(surplus, p.dt)
@@ -185,7 +189,8 @@ def set_new(bodies: Bodies, c: Contacts, k: int, start: bool, p: Parameters) -> 
     c[k].kind = NEW
     stiffness = impact_stiffness(effective_mass(bodies, c, k), p.dt)
     c[k].kappa = max(START_STIFFNESS * stiffness if start else stiffness, c[k].stiffness)
-    c[k].bias = -max(c[k].gap, 0.0)
+    # a gap of rounding would be a force in so stiff a spring
+    c[k].bias = -c[k].gap if c[k].gap > TOUCHING * p.penetration else 0.0
 
 
 @kernel

@@ -96,7 +96,7 @@ def test_prices():
 
 @pytest.fixture(scope="module")
 def released():
-    return rigdda.release(QUICK, LAYOUT, 3)
+    return rigdda.release(QUICK, LAYOUT, 2)
 
 
 def test_every_kind_reports(released):
@@ -114,7 +114,8 @@ def test_every_kind_reports(released):
     shares = ("slope_fraction", "held_fraction", "road_fraction", "beyond_fraction")
     assert sum(getattr(outcome, name) for name in shares) == 1.0
     assert outcome.held_fraction >= ditch.caught
-    assert outcome.released_mass == rigdda.release(QUICK, (), 3)[1].released_mass
+    released_mass = rigdda.release(QUICK, (), 2)[1].released_mass
+    assert outcome.released_mass == pytest.approx(released_mass, rel=1e-12)
 
 
 def test_what_passes_a_failed_fence_did_not_overtop_it(released):

@@ -53,7 +53,7 @@ class Budget(NamedTuple):
     duration: float
 
 
-FULL = Budget(300, 100, 40, SITE.source.block_area, (4.0, 2.0, 0.5), SITE.motion.duration)
+FULL = Budget(300, 50, 30, SITE.source.block_area, (4.0, 2.0, 0.5), SITE.motion.duration)
 QUICK = Budget(12, 6, 4, 8.0, (2.0,), 20.0)
 
 

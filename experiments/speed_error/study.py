@@ -54,8 +54,10 @@ def worst_bias(default: highway.Sample, reference: highway.Sample) -> tuple[floa
     """Return the greatest bias of an outcome and how far it is known, over its interval [-]."""
     off, sure = bias(default, reference)
     measure = default.half(JUDGED)
-    worst = int(np.argmax(np.abs(off) / measure))
-    return float(np.abs(off)[worst] / measure[worst]), float(sure[worst] / measure[worst])
+    scattered = measure > 0.0  # what is alike in all releases has no interval
+    off, sure = np.abs(off[scattered]) / measure[scattered], sure[scattered] / measure[scattered]
+    worst = int(np.argmax(off))
+    return float(off[worst]), float(sure[worst])
 
 
 def run(quick: bool, out: Path) -> Number:

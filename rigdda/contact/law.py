@@ -263,6 +263,8 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
     c[k].lag = c[k].start_shear
     c[k].cohesion = c[k].bond * p.cohesion[surface, c[k].other]
     c[k].tension = c[k].bond * p.tension[surface, c[k].other]
+    if c[k].cohesion == 0.0 and c[k].tension == 0.0:
+        c[k].bond = 0.0
     strike(bodies, c, k, 0.5 * p.dt, pull, p)
     if c[k].lag == 0.0:
         c[k].lag = math.copysign(0.0, -c[k].us)  # the direction of friction once it slips

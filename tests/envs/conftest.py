@@ -1,4 +1,4 @@
-"""A site of its own: ten blocks slide down a ramp, about a fifth of them onto the road."""
+"""A site of its own: ten blocks slide down a ramp, now and then one reaches the road."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from envs import DesignProblem, baseline
 from envs.evaluation import student_interval
 from envs.memory import Memory
 from rigdda import BadInput, Site, Surface, Wall
-from rigdda.site import BarrierZone
+from rigdda.site import BarrierZone, Road
 
 SEEDS = (3, 1, 4, 5)
 LAYOUT = (Wall(18.0, 1.0, 1.0),)
@@ -54,7 +54,9 @@ def test_cost_above_the_limit_is_charged_tenfold_and_simulated(ramp: Site) -> No
     assert dear.objective == pytest.approx(dear.debris + 0.2 * 16.0)
 
 
-def test_intervals_are_student_s(problem: DesignProblem) -> None:
+def test_intervals_are_student_s(ramp: Site) -> None:
+    near = msgspec.structs.replace(ramp, road=Road(23.0, 31.0))
+    problem = DesignProblem(near, 2, ("wall",), risk_weight=2.0, cost_weight=0.5)
     found = problem.evaluate((), SEEDS)
     debris = np.array([outcome.debris_fraction for outcome in found.outcomes])
     assert debris.std() > 0.0

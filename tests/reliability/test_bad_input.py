@@ -97,6 +97,7 @@ CASES = {
     "dt too long for a pebble": (pebble, "dt"),
     "NaN dt": (lambda _: Settings(dt=NAN), "dt"),
     "no iterations": (lambda _: Settings(open_close_iterations=0), "open_close_iterations"),
+    "no sweep tolerance": (lambda _: Settings(sweep_tolerance=0.0), "sweep_tolerance"),
     "wall off the terrain": (lambda _: scene(barriers=(Wall(500.0, 2.0),)), "wall x"),
     "wall in free space": (lambda _: scene(terrain=None, barriers=(Wall(0.0, 2.0),)), "barriers"),
     "negative height": (lambda _: Wall(0.0, -2.0), "wall height"),

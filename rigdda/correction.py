@@ -231,11 +231,11 @@ def is_struck(c: Contacts, work: Work, low: int, high: int) -> bool:
 
 
 @kernel
-def keep_memory(c: Contacts, k: int, struck: bool, weight: float) -> None:
+def keep_memory(c: Contacts, k: int, struck: bool) -> None:
     """Carry the forces of contact k to the next step; an impulse does not last.
 
     In an island that was struck every force may be part of an impulse: what the contact carried
-    before stays, up to `weight` [N], that of its block, a part of a rise counts. In one that was relaxed only part of a rise counts.
+    before stays. In one that was relaxed only part of a rise counts.
     """
     if c[k].state == OPEN:
         c[k].memory_normal = c[k].memory_shear = 0.0
@@ -250,8 +250,4 @@ def keep_memory(c: Contacts, k: int, struck: bool, weight: float) -> None:
         elastic = c[k].stiffness / c[k].kappa if c[k].kind == REST else 1.0
         c[k].memory_normal += elastic * (c[k].normal - c[k].memory_normal)
         c[k].memory_shear += elastic * (c[k].shear - c[k].memory_shear)
-    elif c[k].kind == REST:
-        # where something strikes in every step the load of a block at rest must last, too
-        rise = min(c[k].normal, weight) - c[k].memory_normal
-        c[k].memory_normal += STEADY_RATE * max(rise, 0.0)
     c[k].start_normal, c[k].start_shear = c[k].normal, c[k].shear

@@ -179,7 +179,8 @@ def update_states(
         i = work.slot[c[k].a]
         j = work.slot[c[k].b] if c[k].pair >= 0 else -1
         normal, shear, after = spring_forces(c, k, m, i, j, p.dt)
-        if c[k].state != OPEN and c[k].kind == REST and after < -SHOCK_SPEED:
+        sinking = -after - max(c[k].gap, 0.0) / p.dt  # what closes a gap is not driven in
+        if c[k].state != OPEN and c[k].kind == REST and sinking > SHOCK_SPEED:
             set_shock(bodies, c, k, p)
             moved += 1
             continue

@@ -178,8 +178,7 @@ def move_island(
     low, bad = work.block_start[island], -1
     struck = is_struck(c, work, c0, c1)
     for item in range(c0, c1):
-        k = work.contact_item[item]
-        keep_memory(c, k, struck, bodies[c[k].a].mass * p.gravity)
+        keep_memory(c, work.contact_item[item], struck)
     apply_forces(bodies, c, m, work, island, p)
     account(bodies, c, m, work, island, p, ledger, gauges)
     for place in range(low, work.block_start[island + 1]):

@@ -8,11 +8,11 @@ from rigdda import Site, check
 
 FIDELITIES = ("fast", "full")
 
-COARSER = 2.0
-"""How much larger the mean area of blocks cut by joints is at fidelity "fast"; so their number is
-half."""
+COARSER = 1.5
+"""How much larger the mean area of blocks cut by joints is at fidelity "fast"; so their number
+is two thirds. With twice the area the debris on quick is too high by 5 % of the mass."""
 
-FAST_DT = 1e-2
+FAST_DT = 1.25e-2
 """Time step at fidelity "fast", if the site's is shorter [s]."""
 
 

@@ -8,7 +8,6 @@ import msgspec
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.ops import polygonize
 
 from rigdda import check
 from rigdda.errors import BadInput
@@ -110,7 +109,8 @@ def _cells(
     centre = np.array(source.centroid.coords[0])
     reach = source.length
     around = source.buffer(1e-3 * reach)  # ends beyond the source, so that no cut falls short
-    lines = [source.exterior]
+    shapely.prepare(around)
+    lines: list[shapely.LineString] = [source.exterior]
     for joint in joints:
         dip = math.radians(joint.dip_deg)
         along = np.array([math.cos(dip), -math.sin(dip)])
@@ -121,10 +121,12 @@ def _cells(
         offsets = np.cumsum(steps) - reach - spacing * rng.random()
         mids = centre + offsets[np.abs(offsets) < reach, None] * across
         traces = shapely.linestrings(np.stack([mids - reach * along, mids + reach * along], axis=1))
-        near = shapely.intersection(traces, around)
+        near = shapely.intersection(traces[shapely.intersects(around, traces)], around)
         lines.extend(near[shapely.length(near) > 0.0])
-    pieces = polygonize(shapely.node(shapely.MultiLineString(lines)))
-    return [p for p in pieces if source.contains(p.representative_point())]
+    nodes = shapely.node(shapely.multilinestrings(lines))
+    pieces = shapely.get_parts(shapely.polygonize(shapely.get_parts(nodes)))
+    inside = shapely.contains(source, shapely.point_on_surface(pieces))
+    return list(pieces[inside])
 
 
 def _join_bridges(
@@ -134,7 +136,9 @@ def _join_bridges(
     rng: np.random.Generator,
 ) -> list[shapely.Polygon]:
     """Join cells across rock bridges, then slivers, wherever the union stays convex."""
-    parts: list[shapely.Polygon | None] = [*sorted(cells, key=lambda c: c.centroid.coords[0])]
+    centres = shapely.get_coordinates(shapely.centroid(cells)).tolist()
+    order = sorted(range(len(cells)), key=centres.__getitem__)
+    parts: list[shapely.Polygon | None] = [cells[i] for i in order]
     neighbours = shapely.STRtree(parts).query(parts, predicate="intersects")
     beside: list[list[int]] = [[] for _ in parts]
     for i, j in neighbours.T:
@@ -161,25 +165,24 @@ def _join(
     Or that gives any simple polygon, if not `convex`.
     """
     cell = parts[i]
-    if cell is None:
+    others = [j for j in beside[i] if parts[j] is not None]
+    if cell is None or not others:
         return
-    best, longest, joined = -1, 0.0, cell
+    shapes = np.array([parts[j] for j in others])
+    if not convex:  # where cells were joined, an edge may have lost the node that they share
+        shapes = shapely.snap(shapes, cell, 1e-7 * cell.length)
+    edges = shapely.length(shapely.intersection(cell, shapes)).round(9)
+    for place in np.argsort(-edges, kind="stable"):
+        if edges[place] == 0.0:
+            return
+        joined, best = shapely.union(cell, shapes[place]), others[place]
+        hollow = joined.convex_hull.area - joined.area
+        simple = joined.geom_type == "Polygon" and not joined.interiors
+        if simple and (hollow < 1e-9 * joined.area or not convex):
+            break
+    else:
+        return
+    parts[best], parts[i] = joined.simplify(1e-7 * cell.length), None
+    beside[best] = sorted({*beside[best], *beside[i]} - {best, i})
     for j in beside[i]:
-        other = parts[j]
-        if other is None or j == i:
-            continue
-        if not convex:  # where cells were joined, an edge may have lost the node that they share
-            other = shapely.snap(other, cell, 1e-7 * cell.length)
-        common = shapely.intersection(cell, other).length
-        if common > longest + 1e-9:
-            union = shapely.union(cell, other)
-            hollow = union.convex_hull.area - union.area
-            simple = union.geom_type == "Polygon" and not union.interiors
-            if simple and (hollow < 1e-9 * union.area or not convex):
-                best, longest, joined = j, common, union
-    if best >= 0:
-        parts[best] = joined.simplify(1e-7 * cell.length)
-        beside[best] = sorted({*beside[best], *beside[i]} - {best, i})
-        for j in beside[i]:
-            beside[j] = sorted({*beside[j], best} - {i, j})
-        parts[i] = None
+        beside[j] = sorted({*beside[j], best} - {i, j})

@@ -26,6 +26,13 @@ def test_at_the_default_step(case):
     assert result.verdict == (REFUSES if case.name in REFUSED else HOLDS), result.note
 
 
+@pytest.mark.parametrize("name", ["arch-below-limit", "pebbles-below-boulders", "stairs"])
+def test_what_stands_stands_in_short_steps(name):
+    case = next(case for case in CASES if case.name == name)
+    result = trial(case, 5e-4)
+    assert result.verdict == HOLDS, result.note
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("dt", [1e-3, 1e-2, 5e-2])
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

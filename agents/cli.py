@@ -30,6 +30,12 @@ CASES = 3
 """Layouts that are verified: none, the rule's, the found one."""
 
 
+BAD_PATH = (
+    FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError, PermissionError,
+)  # fmt: skip
+"""Errors of the system that come of a path that was given."""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -45,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Stopped as stop:
         return fail(str(stop), stop.code)
     except OSError as error:
-        return fail(str(error), 2)
+        return fail(str(error), 2 if isinstance(error, BAD_PATH) else 1)
     except Exception as error:
         from rigdda import BadInput, Error
 
@@ -133,8 +139,8 @@ def design(
     """Design the barriers of SITE (a name or a TOML file) and verify them on unseen releases.
 
     Writes layout.toml, evaluations.csv, profile.png, search.png and episode.rrd; the designer
-    pareto front.csv and front.png too. What a killed or former run has simulated is in
-    evaluations.jsonl and is not simulated again.
+    pareto front.csv and front.png too. Layouts that a killed or former run has evaluated are in
+    evaluations.jsonl and are not simulated again.
     """
     from agents import job, tables
     from envs import DesignProblem
@@ -189,12 +195,14 @@ def calibrate(site: str, releases: int, seed: int, out: Path | None) -> None:
 def replay(target: str, layout: str | None, seed: int, out: Path | None) -> None:
     """Open a replay (FILE.rrd, or a run FILE.npz) or make one of a release of a site.
 
-    For a site, writes episode.rrd and prints its path.
+    For a site, writes episode.rrd and prints its path; for a run, FILE.rrd beside it.
     """
     import rigdda
     from rigdda.replay import Marks, open_viewer
 
     file = Path(target)
+    if file.suffix in (".npz", ".rrd") and (layout or seed or out):
+        raise click.UsageError("--layout, --seed and --out are for sites")
     if file.suffix == ".npz":
         run = rigdda.Run.load(file)
         file = file.with_suffix(".rrd")

@@ -79,7 +79,7 @@ def evaluate(
     """Try designers on random sites that no training sees, at fidelity "fast".
 
     Prints means over the sites with 95 % intervals, each designer also against the first; writes
-    scores.csv. What a killed or former run has simulated is not simulated again.
+    scores.csv. Layouts that a killed or former run has evaluated are not simulated again.
     """
     from agents import exam, extra, tables
     from agents.policy import load, using

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from agents.protocol import Ledger
 from agents.seeds import release_seeds
-from rigdda import Simulation, Site
+from rigdda import Fence, Simulation, Site
 from rigdda.geometry import polygon_properties
 
 RELEASES = 16
@@ -100,7 +100,9 @@ def ensemble(site: Site, seeds: Sequence[int]) -> Ensemble:
 def _ensemble(text: bytes, seeds: tuple[int, ...]) -> Ensemble:
     site = msgspec.json.decode(text, type=Site)
     zone = site.barrier_zone
-    stations = np.linspace(zone.start, zone.end - zone.min_thickness, STATIONS)
+    fence = Fence(zone.start, zone.max_height, zone.max_capacity)
+    extent = max(zone.min_thickness, fence.extent)  # whatever is built fits at the last station
+    stations = np.linspace(zone.start, zone.end - extent, STATIONS)
     lines = (*stations.tolist(), site.road.start)
 
     def one(job: tuple[int, int]) -> tuple[NDArray[np.void], float, float]:

@@ -38,6 +38,8 @@ AS_OBSERVED = (
 TOE = 3
 """Index of the toe's chainage among the prices."""
 
+WIDTH = 120
+"""Number of features."""
 RULE = slice(-3, None)
 """Where the rule's fence is among the features."""
 ROUNDNESS = 0.75

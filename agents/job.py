@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import rigdda
 from agents import extra
 from agents.crossings import ensemble, ensemble_seeds
-from agents.pareto import ParetoResult
+from agents.pareto import ParetoResult, front
 from agents.protocol import DesignResult, Entry
 from agents.rule import kind_for, rule
 from agents.store import Store
@@ -35,7 +35,7 @@ class Study:
     problem : DesignProblem
         What was to be designed.
     result : DesignResult
-        What the designer found.
+        What the designer found; a front of cost against debris is verified like the cases.
     cases : tuple of (str, Evaluation)
         No barrier, the engineering rule, the found layout: verified on the same releases, that
         no search has seen.
@@ -109,6 +109,10 @@ def study(
             evaluation = verify(problem, layout, releases, seed, store)
             file.add(Entry(result.simulations, "verification", evaluation))
             cases.append((case, evaluation))
+        if isinstance(result, ParetoResult):
+            tick(simulations + releases * len(cases), "verifying: the front")
+            seen = [verify(problem, e.layout, releases, seed, store) for e in result.front]
+            result = replace(result, front=front(seen))
     return Study(problem, result, tuple(cases)), store
 
 

@@ -37,6 +37,16 @@ class Network:
     layers: Sequence[tuple[Floats, Floats]]
     notes: Mapping[str, str]
 
+    @property
+    def sizes(self) -> list[int]:
+        """Numbers that go into the first layer and that come out of each; [] if they do not fit."""
+        sizes = [len(self.mean)]
+        for weight, bias in self.layers:
+            if weight.shape != (len(bias), sizes[-1]):
+                return []
+            sizes.append(len(bias))
+        return sizes if self.scale.shape == self.mean.shape else []
+
     def __call__(self, features: Floats) -> NDArray[np.float64]:
         """Return the outputs for (F,) features."""
         values = scaled(features, self.mean, self.scale).astype(np.float64)

@@ -1,8 +1,8 @@
 """The front of cost against debris by NSGA-II (Deb et al. 2002, IEEE TEC 6, 182-197; Optuna).
 
-It starts from what one barrier-free ensemble suggests at several weights of cost, see
-`agents.starts`. What nothing dominates in the search is evaluated again on other releases, and what
-nothing dominates there is the front: so no layout is in it because it was lucky in the search.
+It starts from what one barrier-free ensemble suggests, see `agents.starts`. What nothing dominates
+in the search is evaluated again on other releases, and what nothing dominates there is the front:
+so no layout is in it because it was lucky in the search.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents import trials
-from agents.crossings import Ensemble, ensemble_for
+from agents.crossings import ensemble_for
 from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
 from agents.starts import starts
 from agents.store import Store
@@ -24,8 +24,6 @@ FINALISTS = 12
 """Layouts of the search's front that are evaluated again, at most."""
 POPULATION = 16
 """Layouts a generation."""
-CHEAPER = (1.0, 0.3, 3.0)
-"""Factors of the weight of cost at which layouts to start from are sought."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +55,7 @@ def design(
         If the budget is below 2 or the seed below 0; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    first = _starts(problem, ensemble_for(ledger))
+    first = starts(problem, ensemble_for(ledger))
     found = search(ledger, _propose(problem, first, ledger.seed), finalists, FINALISTS)
     ends = found.history.stage("final") or found.history.stage("search")
     best = (found.layout, found.evaluation, found.history, found.simulations)
@@ -81,22 +79,6 @@ def finalists(evaluations: Sequence[Evaluation], n: int) -> list[Evaluation]:
     best = min(range(len(found)), key=lambda i: found[i].objective)
     spread = np.linspace(0, len(found) - 1, n - 1).round().astype(int).tolist()
     return [found[i] for i in sorted({best, *spread})]
-
-
-def _starts(problem: DesignProblem, looked: Ensemble) -> list[Layout]:
-    """Return the different starts at every weight of cost; those of the problem's own first."""
-    found: dict[Layout, None] = {}
-    for factor in CHEAPER:
-        weighed = DesignProblem(
-            problem.site,
-            problem.max_barriers,
-            problem.kinds,
-            problem.risk_weight,
-            factor * problem.cost_weight,
-            problem.cost_limit,
-        )
-        found |= dict.fromkeys(starts(weighed, looked))
-    return list(found)
 
 
 def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:

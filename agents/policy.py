@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.features import RULE, features
+from agents.features import RULE, WIDTH, features
 from agents.network import Network
 from agents.protocol import Designer, DesignResult, Ledger, Progress
 from agents.store import Store
@@ -116,6 +116,11 @@ def load(path: str | os.PathLike[str]) -> Network:
     Raises
     ------
     BadInput
-        If there is no such file or it is not a network.
+        If there is no such file, it is not a network or not one from these features to fences.
     """
-    return Network.load(path)
+    network = Network.load(path)
+    sizes, wanted = network.sizes, (WIDTH, 3 * SLOTS)
+    if not sizes or (sizes[0], sizes[-1]) != wanted:
+        mend = f"name a network of {wanted[0]} features and {wanted[1]} outputs"
+        raise BadInput("policy", str(path), mend)
+    return network

@@ -192,9 +192,11 @@ def learn(model: PPO, episodes: int, checkpoint: Path, tick: Callable[[int], Non
 
 
 def resume(checkpoint: Path, copies: VecEnv) -> PPO:
-    """Return the trainer that was kept in a file."""
+    """Return the trainer that was kept in a file; it goes on with other random numbers."""
     torch.set_num_threads(1)
-    return PPO.load(checkpoint, copies, device="cpu")
+    model = PPO.load(checkpoint, copies, device="cpu")
+    model.set_random_seed((model.seed or 0) + model.num_timesteps)
+    return model
 
 
 class _Keep(BaseCallback):
@@ -209,6 +211,12 @@ class _Keep(BaseCallback):
         return True
 
     def _on_rollout_start(self) -> None:
+        self._save()
+
+    def _on_training_end(self) -> None:
+        self._save()
+
+    def _save(self) -> None:
         with atomic(self.checkpoint) as part, part.open("wb") as file:
             self.model.save(file)
 

@@ -23,8 +23,9 @@ class Entry:
     ----------
     simulations : int
         Releases that the designer has simulated so far, those of this layout included.
-    stage : {"search", "semifinal", "final"}
-        "semifinal", "final": one of the best, evaluated again on other releases.
+    stage : {"search", "semifinal", "final", "verification", "front"}
+        "semifinal", "final": one of the best, evaluated again on other releases; "verification",
+        "front": on releases that no search has seen.
     evaluation : Evaluation
         The layout, its objective, debris and cost.
     """

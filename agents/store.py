@@ -11,9 +11,10 @@ from pathlib import Path
 
 import msgspec
 
+import envs
+import rigdda
 from envs import DesignProblem, Evaluation
 from rigdda import Layout, __version__
-from rigdda.kernel import source_hash
 
 
 class Store:
@@ -27,7 +28,8 @@ class Store:
     ----------
     path : path, optional
         A file of JSON lines, one an evaluation, appended to and flushed at once; a last line that
-        a kill left unfinished is dropped. None: memory only.
+        a kill left unfinished is cut off, other lines that are no evaluation are passed over.
+        None: memory only.
 
     Attributes
     ----------
@@ -39,24 +41,22 @@ class Store:
         self.path = None if path is None else Path(path)
         self.simulated = self.resumed = 0
         self._known: dict[str, Evaluation] = {}
+        self._kept: set[str] = set()
         if self.path is not None and self.path.is_file():
             self._read(self.path)
 
     def _read(self, path: Path) -> None:
-        """Read the whole lines of the file and cut off the rest."""
-        sound = 0
-        with path.open("r+b") as file:
-            for line in file:
-                try:
-                    data = json.loads(line)
-                    evaluation = msgspec.convert(data["evaluation"], Evaluation)
-                except (ValueError, KeyError, TypeError, msgspec.ValidationError):
-                    break
-                if not line.endswith(b"\n"):
-                    break
-                self._known[data["key"]] = evaluation
-                sound += len(line)
-            file.truncate(sound)
+        """Read the whole lines of the file and cut off a last one that is not whole."""
+        text = path.read_bytes()
+        whole = text.rfind(b"\n") + 1
+        for line in text[:whole].splitlines():
+            try:
+                data = json.loads(line)
+                self._known[data["key"]] = msgspec.convert(data["evaluation"], Evaluation)
+            except (ValueError, KeyError, TypeError, msgspec.ValidationError):
+                continue
+        self._kept = set(self._known)
+        os.truncate(path, whole)
 
     def evaluate(self, problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> Evaluation:
         """Return the evaluation of a layout on release seeds, simulated or as it was kept.
@@ -68,7 +68,7 @@ class Store:
         """
         key = _key(problem, layout, seeds)
         if key in self._known:
-            self.resumed += len(seeds)
+            self.resumed += len(seeds) if key in self._kept else 0
             return self._known[key]
         evaluation = problem.evaluate(layout, seeds)
         self.simulated += len(seeds)
@@ -90,5 +90,11 @@ def _key(problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> str:
 
 @cache
 def mechanics() -> str:
-    """Return the hash of the kernels that this process runs."""
-    return source_hash()
+    """Return a hash of all sources that decide on the outcome of a release and its worth."""
+    digest = hashlib.sha256()
+    for name in (rigdda.__file__, envs.__file__):
+        assert name is not None
+        for path in sorted(Path(name).parent.rglob("*.py")):
+            if "validation" not in path.parts:
+                digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

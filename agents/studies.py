@@ -107,7 +107,8 @@ def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
     """Simulate what a CSV file does not hold yet; return how many rows it held.
 
     Every row is appended as soon as it and those before it are done; at the end the rows lie in the
-    order of the study. A row is known again by its key: a hash of all that its release depends on.
+    order of the study, and rows of other layouts and seeds are gone. A row is known again by its
+    key: a hash of all that its release depends on.
 
     Raises
     ------
@@ -160,13 +161,16 @@ def _fields(study: Study) -> list[str]:
 
 
 def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
-    """Return the whole rows of a file with these columns; none if it has others."""
+    """Return the whole rows of a file, those of more or fewer barriers too; none of other files."""
     if not path.is_file():
         return []
     text = path.read_bytes().decode(errors="replace")
     lines = text[: text.rfind("\r\n") + 1].splitlines()
-    found = csv.DictReader(lines)
-    return list(found) if found.fieldnames == fields else []
+    found = csv.DictReader(lines, restval="")
+    needed = {name for name in fields if not name.startswith("barrier_")}
+    if not needed <= set(found.fieldnames or ()):
+        return []
+    return [{name: row.get(name, "") for name in fields} for row in found]
 
 
 def table(study: Study, path: Path) -> Table:

@@ -41,7 +41,7 @@ HIT = {
     "absorbed_energy": ("energy absorbed", "kJ", 1e-3),
     "overtopped": ("blocks that passed", "-", 1.0),
     "caught": ("mass at rest behind or in it", "%", 100.0),
-    "failed": ("failed", "-", 1.0),
+    "failed": ("failed", "%", 100.0),
     "displacement": ("displacement", "m", 1.0),
 }
 """The same of a barrier."""

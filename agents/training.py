@@ -19,6 +19,7 @@ from agents.features import features
 from agents.network import Network
 from agents.policy import KINDS, SLOTS, decide
 from agents.seeds import release_seeds
+from agents.store import mechanics
 from envs import DesignProblem, fidelity
 from envs.observation import observe
 from rigdda import BadInput, __version__, check, sites
@@ -135,7 +136,8 @@ def _notes(terms: Terms) -> dict[str, str]:
 
 def _same(terms: Terms, out: Path) -> None:
     """Write the terms into a folder, or check that they are those of the training in it."""
-    file, asked = out / "training.json", asdict(terms) | {"version": __version__}
+    file = out / "training.json"
+    asked = asdict(terms) | {"version": __version__, "mechanics": mechanics()}
     if file.is_file():
         found = msgspec.json.decode(file.read_bytes())
         if found != asked:

@@ -74,6 +74,7 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         self.observation_space = self._space()
         self._episode = 0
         self._slots = np.zeros(0)  # the numbers of this episode's actions
+        self._asked = self._slots  # and of the one that is being simulated
         self._answer: Answer | None = None  # the last one
         self._stages: list[Evaluation] = []  # without barriers, then after each step
         self.open = False
@@ -118,6 +119,8 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
 
     def ask_reset(self, seed: int | None) -> Ask:
         """Draw a new episode and return what to simulate for it."""
+        if self.open and len(self._stages) > 1:
+            self._end()  # it was truncated
         super().reset(seed=seed)
         if self._random:
             number = int(self.np_random.integers(len(sites.TRAIN_SEEDS)))
@@ -127,7 +130,8 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
 
     def tell_reset(self, answer: Answer) -> tuple[Observation, Info]:
         """Start the episode; return its first observation and info."""
-        self._slots, self._stages, self.open = np.zeros(0), [answer.evaluation], True
+        self._slots = self._asked = np.zeros(0)
+        self._stages, self.open = [answer.evaluation], True
         return self._show(answer)
 
     def ask_step(self, action: Action) -> Ask | None:
@@ -140,7 +144,7 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         numbers = encoding.vector("action", action, self.width)
         slots = np.concatenate([self._slots, numbers])
         layout = self._layout(slots)
-        self._slots = slots
+        self._asked = slots
         if layout == self._stages[-1].layout:
             return None
         return Ask(self.problem, layout, self.seeds, self.looks)
@@ -156,17 +160,22 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         answer = answer or self._answer
         assert answer is not None
         now = answer.evaluation
+        self._slots = self._asked
         self._stages.append(now)
         reward = self._stages[-2].objective - now.objective
         added = self._slots[-self.width :]
         terminated = len(self._slots) == self.problem.size or not self._layout(added)
         seen, info = self._show(answer)
         if terminated:
-            self.open = False
-            if self.recorder and self.recorder.wants(self._episode):
-                self._record(self.recorder)
-            self._episode += 1
+            self._end()
         return seen, reward, terminated, False, info
+
+    def _end(self) -> None:
+        """End the episode; write its replay if that is wanted."""
+        self.open = False
+        if self.recorder and self.recorder.wants(self._episode):
+            self._record(self.recorder)
+        self._episode += 1
 
     def _record(self, recorder: Recorder) -> None:
         """Write the replay of the episode that has ended."""

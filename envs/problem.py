@@ -218,6 +218,8 @@ def _seeds(seeds: Sequence[int]) -> tuple[int, ...]:
 
 
 def _kinds(kinds: Sequence[str]) -> tuple[str, ...]:
+    if not isinstance(kinds, Sequence) or isinstance(kinds, str):
+        raise BadInput("kinds", kinds, "give a sequence of names")
     names = tuple(check.one_of("kinds", kind, ALL_KINDS) for kind in kinds)
     if not names or len(set(names)) < len(names):
         raise BadInput("kinds", kinds, "name each kind once")

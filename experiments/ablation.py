@@ -1,10 +1,10 @@
 """What each part of the mechanics costs: switched off where it helps, present where it is idle.
 
 Rockfalls down the highway slope. Of the parts that are there to save time or to be exact (islands,
-sleep, cut-back, post-correction) each is switched off; of those that a scene may hold (bolts,
-loads, cohesion, motion of the base, barriers) one that does nothing is added. Processor time is
-that over the scene as it is, in the same round; the greatest penetration says what it does to the
-contacts.
+sleep, limit of displacement, post-correction) each is switched off; of those that a scene may hold
+(bolts, loads, cohesion, motion of the base, barriers) one that does nothing is added. Processor
+time is that over the scene as it is, in the same round; the greatest penetration says what it does
+to the contacts.
 
 Judged by the dearest idle part: what a scene lacks costs it nothing, if even what is there and does
 nothing is cheap.
@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 
 from experiments.bench.cases import rockfall_scene
 from experiments.script import BLUE, GREY, RED, Number, draw, main, say, write
-from rigdda import Bolt, Fence, PointLoad, Scene, Settings, Simulation, Surface, Wall
+from rigdda import Bolt, Fence, PointLoad, Scene, Settings, Simulation, Wall
 
 IDLE = 1.25
 """Most that an idle part may cost, over the scene as it is [-]; rounds scatter by some per cent."""
@@ -48,8 +48,8 @@ def _load(scene: Scene) -> Scene:
 
 
 def _cohesion(scene: Scene) -> Scene:
-    bond = Surface(28.0, cohesion=1e4, restitution=0.2)
-    return replace(scene, surfaces={**scene.surfaces, "glue": bond})
+    bonded = {name: replace(s, cohesion=1e-9) for name, s in scene.surfaces.items()}
+    return replace(scene, surfaces=bonded)
 
 
 def _motion(scene: Scene) -> Scene:
@@ -62,7 +62,11 @@ PARTS = (
     AS_IT_IS,
     Part("no islands", "switched off", settings=lambda s: replace(s, islands=False)),
     Part("no sleep", "switched off", settings=lambda s: replace(s, sleeping=False)),
-    Part("no cut-back", "switched off", settings=lambda s: replace(s, displacement_limit=1e6)),
+    Part(
+        "no limit of displacement",
+        "switched off",
+        settings=lambda s: replace(s, displacement_limit=1e6),
+    ),
     Part("no correction", "switched off", settings=lambda s: replace(s, post_correction=False)),
     Part("a bolt", "idle", _bolt),
     Part("a load", "idle", _load),

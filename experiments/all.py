@@ -1,4 +1,4 @@
-"""Every figure, table and study, one after the other."""
+"""Every figure, table and study that is judged by a number, one after the other."""
 
 from __future__ import annotations
 

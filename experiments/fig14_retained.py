@@ -1,9 +1,10 @@
 """Fig. 14: a retaining structure near the toe of the highway site keeps the rock off the road.
 
-The slope above the toe is steeper than the friction angle, so all of the rock comes down, about 250
-m2: half of it would come to rest against the foot of the slope and on top of each other, the rest
-on the road. A structure must find room for all of it between its face and the slope. Its height is
-swept, at the uphill edge of the road, for both contacts of `fig13_deposit`.
+The slope above the toe is steeper than the friction angle, so nearly all of the rock comes down,
+about 250 m2: over half of it would come to rest against the foot of the slope and on top of each
+other, a third on the road and beyond (`fig13_deposit`). A structure must find room for all of it
+between its face and the slope. Its height is swept, at the uphill edge of the road, for both
+contacts.
 
 Judged by the least share of what would reach the road that a structure of the drawn height retains.
 """

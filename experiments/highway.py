@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from msgspec.structs import replace as changed
 
 from envs.picture import draw as draw_frame
+from experiments.bench.cases import RUN_OUT
 from rigdda import Run, Site, release
 from rigdda.barriers import Layout
 from rigdda.errors import SoftContacts
@@ -40,7 +41,9 @@ def variant(contact: str, alpha: float = ALPHA) -> Site:
     """Return the site with this contact and damping coefficient [1/s]."""
     surfaces = {k: replace(s, restitution=CONTACTS[contact]) for k, s in SITE.surfaces.items()}
     motion = changed(SITE.motion, damping=alpha, duration=DURATION)
-    return changed(SITE, surfaces=surfaces, motion=motion)
+    valley = (RUN_OUT, SITE.slope.points[-1][1])  # without damping blocks leave the site's ground
+    slope = changed(SITE.slope, points=(*SITE.slope.points, valley))
+    return changed(SITE, surfaces=surfaces, motion=motion, slope=slope)
 
 
 def releases(site: Site, layout: Layout, seeds: Iterable[int]) -> list[tuple[Run, Outcome]]:

@@ -282,7 +282,7 @@ def relax(
 
 
 @kernel
-def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int, dt: float) -> float:
+def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int) -> float:
     """Return the work of the contact forces of an island in this step [J], supports left out.
 
     Friction that gives energy counts twice: to rebound out of a wedge a block would be pressed
@@ -315,13 +315,10 @@ def island_speed(bodies: Bodies, work: Work, low: int, high: int) -> float:
 
 @kernel
 def is_waiting(bodies: Bodies, work: Work, low: int, high: int) -> bool:
-    """Return whether one of the blocks low:high did not settle a moment ago; counts down."""
+    """Return whether one of the blocks low:high did not settle a moment ago."""
     waiting = False
     for place in range(low, high):
-        i = work.block_item[place]
-        if bodies[i].wait > 0:
-            bodies[i].wait -= 1
-            waiting = True
+        waiting = waiting or bodies[work.block_item[place]].wait > 0
     return waiting
 
 
@@ -371,7 +368,7 @@ def open_close(
                 let_wait(bodies, work, b0, b1)
         if relaxing:
             relax(bodies, c, m, work, island, p, counters, speed)
-        if not bouncing or impact_work(c, m, work, c0, c1, p.dt) <= 0.0:
+        if not bouncing or impact_work(c, m, work, c0, c1) <= 0.0:
             return settled
         for item in range(c0, c1):
             k = work.contact_item[item]

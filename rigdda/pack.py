@@ -335,6 +335,7 @@ def pack_gauges(scene: Scene, stations: NDArray[np.float64], watch: tuple[float,
     start = [polygon_properties(b.vertices)[1][0] for b in scene.blocks]
     ground = scene.ground
     fences = [isinstance(b, Fence) for b in scene.barriers]
+    room = event_room(free_bodies(scene), len(stations), barriers)
     return Gauges(
         stations,
         np.array([_ground(ground, x) for x in stations]),
@@ -347,7 +348,7 @@ def pack_gauges(scene: Scene, stations: NDArray[np.float64], watch: tuple[float,
         np.zeros(barriers),
         np.array(watch, dtype=np.float64),
         np.zeros(blocks),
-        np.zeros(event_room(blocks, len(stations), barriers), dtype=EVENT).view(np.recarray),
+        np.zeros(room, dtype=EVENT).view(np.recarray),
     )
 
 

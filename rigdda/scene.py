@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -21,8 +22,6 @@ from rigdda.supports import FixedPoint, Support
 from rigdda.terrain import Terrain
 
 __all__ = ["Barrier", "Block", "Layout", "Scene", "Surface", "Terrain", "Wall", "simple_polygon"]
-
-RIGHT_ANGLE_DEG = 90.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +144,8 @@ class Scene:
     Raises
     ------
     BadInput
-        If a name has no surface, an index no block, a value is outside its range or a block starts
-        deep in another one.
+        If a name has no surface, an index no block, a value is outside its range, a block starts
+        deep in another one or a barrier stands in another one.
     """
 
     terrain: Terrain | None
@@ -207,6 +206,12 @@ class Scene:
         object.__setattr__(self, "_moved", moved)
         for i in range(len(self.barriers)):
             self.outline(i)
+        upright = sorted(self.bodies, key=lambda i: self.barriers[i].x)
+        for i, j in pairwise(upright):
+            end = self.barriers[i].end
+            if self.barriers[j].x < end - 1e-9 * max(1.0, abs(end)):
+                mend = f"put it downhill of x = {end:g}, where barriers[{i}] ends"
+                raise BadInput(f"barriers[{j}].x", self.barriers[j].x, mend)
 
     def outline(self, barrier: int) -> NDArray[np.float64]:
         """Return the (n, 2) corners of a barrier at the start [m].

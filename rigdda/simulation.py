@@ -81,7 +81,8 @@ class Energy(NamedTuple):
 
     `elastic` is stored in bolts and plain contacts. `friction`, `damping` and `impact` are what
     shear forces, damping and the normal forces of contacts did, less what springs store: negative
-    where they took energy. `external` is the work of loads and of the motion of the ground.
+    where they took energy. The kinetic energy of a block that leaves the site counts as taken by
+    impact. `external` is the work of loads and of the motion of the ground.
     kinetic + potential + elastic grows by the sum of the four.
     """
 

@@ -35,6 +35,9 @@ from rigdda.settings import Settings
 from rigdda.source import NEAR, Point, Source
 from rigdda.terrain import Terrain
 
+STEEPEST_DEG = 85.0
+"""Friction angle up to which scatter may raise that of a surface [deg]."""
+
 
 class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The ground: corners from the crest down to beyond the road, x growing downhill [m].
@@ -264,7 +267,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             blocks=blocks,
             surfaces={
                 name: Surface(
-                    min(max(s.friction_deg + shift, 0.0), 85.0),
+                    min(max(s.friction_deg + shift, 0.0), max(s.friction_deg, STEEPEST_DEG)),
                     s.cohesion,
                     s.tension,
                     s.restitution,

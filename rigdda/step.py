@@ -83,7 +83,7 @@ def candidate_pairs(bodies: Bodies, outlines: Outlines, work: Work, p: Parameter
 @kernel
 def keep_asleep(
     bodies: Bodies, c: Contacts, count: int, old: Contacts, work: Work, a: int, gauges: Gauges,
-    time: float, p: Parameters,
+    time: float,
 ) -> int:  # fmt: skip
     """Keep the contacts of sleeping block a with what is still; returns the new number."""
     for m in range(work.first[a], work.first[a + 1]):
@@ -161,11 +161,21 @@ def detect(
                 add_link(bodies, links, q, c, count, p)
                 count += 1
         elif bodies[a].status == ASLEEP:
-            count = keep_asleep(bodies, c, count, old, work, a, gauges, time, p)
+            count = keep_asleep(bodies, c, count, old, work, a, gauges, time)
         elif bodies[a].status == HELD:
             count = keep_held(c, count, old, work, a)
     lap(counters, NARROW_PHASE, since, p.timing)
     return count
+
+
+@kernel
+def retire(bodies: Bodies, i: int) -> float:
+    """Take a block that has left the site out of the simulation; returns its kinetic energy [J]."""
+    slow = bodies[i].mass * (bodies[i].vx ** 2 + bodies[i].vy ** 2)
+    energy = 0.5 * (slow + bodies[i].inertia * bodies[i].omega ** 2)
+    bodies[i].status = RETIRED
+    bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
+    return energy
 
 
 @stage
@@ -184,11 +194,12 @@ def move_island(
     for place in range(low, work.block_start[island + 1]):
         i = work.block_item[place]
         bodies[i].touching = 0
+        bodies[i].wait = max(bodies[i].wait - 1, 0)
         move_block(bodies, i, m, place - low, p.dt)
         if not top_speed(bodies, i) < SPEED_LIMIT:
             bad = i
         elif bodies[i].y < p.floor:
-            bodies[i].status = RETIRED
+            ledger[1] -= retire(bodies, i)
         if p.post_correction:
             place_corners(bodies, outlines, i)
         else:

@@ -76,6 +76,8 @@ class Case:
         Time from which penetration counts [s].
     settings : mapping
         Settings beside the step.
+    refused : bool
+        Whether it has no answer and must be refused, at any step.
     """
 
     name: str
@@ -89,6 +91,7 @@ class Case:
     frame: float = 0.1
     settled: float = 0.0
     settings: Mapping[str, Any] = field(default_factory=dict)
+    refused: bool = False
 
 
 @dataclass(frozen=True)

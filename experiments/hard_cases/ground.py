@@ -125,7 +125,15 @@ CASES = (
         way_error(30.0, 20.0),
         1e-3,
     ),
-    Case("empty-segment", "refused: it has no direction", empty_segment, 1.0, moved, 0.0),
+    Case(
+        "empty-segment",
+        "refused: it has no direction",
+        empty_segment,
+        1.0,
+        moved,
+        0.0,
+        refused=True,
+    ),
     Case(
         "hopper-1000",
         "weight carried by the ground [-]",

@@ -10,7 +10,7 @@ import shapely
 
 from experiments.bench.penetration import penetration
 from experiments.hard_cases.case import FAILS, REFUSES, Case, Floats, History, Result, judge
-from rigdda import Error, Scene, Settings, Simulation
+from rigdda import BadInput, Scene, Settings, Simulation
 from rigdda.geometry import polygon_properties
 from rigdda.validation.scenes import masses
 
@@ -19,10 +19,10 @@ BELOW = 1e3
 
 
 def trial(case: Case, dt: float) -> Result:
-    """Run a case at a step [s]; an error raised on purpose is a refusal."""
+    """Run a case at a step [s]; bad input is a refusal, any other error a failure."""
     try:
         history, cpu = play(case, dt)
-    except Error as error:
+    except BadInput as error:
         return Result(case.name, dt, REFUSES, note=f"{type(error).__name__}: {error}")
     except Exception as error:  # whatever else it is, it is a fault to report
         return Result(case.name, dt, FAILS, note=f"{type(error).__name__}: {error}")

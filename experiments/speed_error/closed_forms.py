@@ -12,11 +12,11 @@ import numpy as np
 
 from experiments.bench import cases as bench
 from experiments.bench import timing
-from experiments.speed_error import engine
+from experiments.bench.engines import core as engine
 from experiments.speed_error.knobs import DEFAULT, STEP, STEPS, Choice, choices
 from rigdda.errors import Diverged
 from rigdda.scene import Scene
-from rigdda.validation import arches, rolling, slides, toppling
+from rigdda.validation import arches, rolling, slides
 from rigdda.validation.case import Case, Lab, Metered
 from rigdda.validation.scenes import masses
 
@@ -26,7 +26,7 @@ MORE_STEPS = (1e-1, 5e-2, *STEPS, 1e-3)
 PEER_PARTS = (5, 10, 20, 50, 100, 200)
 """Steps of the peers, as parts of the longest."""
 
-ALONE = ("newmark", "16-gon", "arch-stands", "toppling-forces")
+ALONE = ("newmark", "16-gon", "arch-stands")
 """Cases of the accuracy suite that no peer computes, since they have no adapter for it."""
 
 QUICK_ALONE = ("newmark",)
@@ -59,8 +59,14 @@ class TunedLab(Lab):
         super().__init__(choice.settings.get("dt", DEFAULT.dt))
 
     def simulate(self, scene: Scene, dt: float | None = None, **settings: Any) -> Metered:
-        """Return the scene in motion with the settings of the choice."""
-        return super().simulate(scene, dt, **(settings | self._settings))
+        """Return the scene in motion with the settings of the choice.
+
+        Its penetration is in units of the mean block size.
+        """
+        chosen = dict(self._settings)
+        if "penetration" in chosen:
+            chosen["penetration"] *= size(scene)
+        return super().simulate(scene, dt, **(settings | chosen))
 
 
 def size(scene: Scene) -> float:
@@ -125,5 +131,5 @@ def sweep_alone(case: Case) -> Iterator[Point]:
 
 def alone(quick: bool) -> list[Case]:
     """Return the cases of the accuracy suite that are swept without peers."""
-    modules = (slides, rolling, arches, toppling)
+    modules = (slides, rolling, arches)
     return [c for m in modules for c in m.CASES if c.name in (QUICK_ALONE if quick else ALONE)]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.bench.cases import FRAME, RUN_OUT
-from experiments.speed_error import engine
+from experiments.bench.engines import core as engine
 from experiments.speed_error.knobs import DEFAULT, STEP, Choice, choices
 from experiments.speed_error.store import Outcomes, kept
 from rigdda import Scene, Site
@@ -160,7 +160,8 @@ def sample(
         return np.array(outcomes), float(np.mean(cpu))
 
     name = f"{module.NAME}-{choice.knob}-{choice.value:g}".replace(" ", "-")
-    what = (dt, options, releases, area, duration, BARRIER, SITE.road.start)
+    adapter = Path(module.__file__).read_text()
+    what = (dt, options, releases, area, duration, BARRIER, SITE, adapter)
     outcomes, cpu = kept(folder, name, what, compute)
     return Sample(module.NAME, choice.knob, choice.value, choice.default, outcomes, cpu)
 

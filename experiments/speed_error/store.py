@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.store import mechanics
 from rigdda.files import atomic
-from rigdda.kernel import source_hash
 
 Outcomes = tuple[NDArray[np.float64], float]
 """Outcomes of the releases of a sample, (R, 3), and processor time a release [s]."""
@@ -19,9 +19,9 @@ Outcomes = tuple[NDArray[np.float64], float]
 def kept(folder: Path, name: str, what: object, compute: Callable[[], Outcomes]) -> Outcomes:
     """Return what is in `folder` under this name, else what `compute` returns, which is put there.
 
-    Found again only by the same kernels and by the same `what`, told by its repr.
+    Found again only by the same sources of the mechanics and by the same `what`, told by its repr.
     """
-    digest = hashlib.sha256(repr((source_hash(), what)).encode()).hexdigest()[:12]
+    digest = hashlib.sha256(repr((mechanics(), what)).encode()).hexdigest()[:12]
     path = folder / f"{name}-{digest}.npz"
     if path.exists():
         with np.load(path) as found:

@@ -121,3 +121,9 @@ def test_what_it_cannot_build_or_pay_is_refused(site: Site) -> None:
         policy.design(DesignProblem(site, kinds=("wall",)), 40)
     with pytest.raises(BadInput, match="simulations = 4: give at least 5"):
         policy.design(DesignProblem(site), 4)
+
+
+def test_a_network_of_another_shape_is_refused(tmp_path):
+    network(np.zeros(9), 4).save(tmp_path / "small.safetensors")
+    with pytest.raises(BadInput, match="120 features and 9 outputs"):
+        policy.load(tmp_path / "small.safetensors")

@@ -28,6 +28,22 @@ def test_an_evaluation_survives_the_file_to_the_bit(
     assert (store.simulated, store.resumed) == (0, len(seeds))
 
 
+def test_a_line_that_is_no_evaluation_costs_no_other(
+    problem: DesignProblem, tmp_path: Path
+) -> None:
+    file = tmp_path / "store.jsonl"
+    first = Store(file)
+    for seed in (1, 2):
+        first.evaluate(problem, WALLS, (seed,))
+    first.evaluate(problem, WALLS, (2,))
+    assert (first.simulated, first.resumed) == (2, 0)  # nothing comes from a former run
+    file.write_bytes(b"what is this\n" + file.read_bytes())
+    second = Store(file)
+    for seed in (1, 2):
+        second.evaluate(problem, WALLS, (seed,))
+    assert (second.simulated, second.resumed) == (0, 2)
+
+
 def test_another_question_is_simulated(problem: DesignProblem, site: Site, tmp_path: Path) -> None:
     file = tmp_path / "store.jsonl"
     Store(file).evaluate(problem, WALLS, (1, 2))
@@ -61,7 +77,7 @@ def test_a_killed_search_goes_on_where_it_stopped(
     store = Store(file)
     assert design(problem, 48, store=store) == whole
     assert store.resumed > 0 and store.simulated > 0
-    assert file.read_bytes() == b"".join(lines)
+    assert file.read_bytes().replace(b"\x00\x00\n", b"") == b"".join(lines)
     again = Store(file)
     assert design(problem, 48, store=again) == whole
     assert again.simulated == 0

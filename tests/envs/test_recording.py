@@ -56,6 +56,17 @@ def test_an_episode_is_recorded(ramp: Site, tmp_path: Path) -> None:
     assert f"**objective**: {info['objective']:.4f}" in notes
 
 
+def test_a_truncated_episode_is_recorded_when_the_next_begins(ramp: Site, tmp_path: Path) -> None:
+    env = BarrierPlacement(ramp, max_barriers=2, releases=1, record=tmp_path)
+    env.reset(seed=5)
+    _, _, terminated, _, _ = env.step(ACTION)
+    assert not terminated and not os.listdir(tmp_path)
+    env.reset()
+    assert os.listdir(tmp_path) == ["episode-000000.rrd"]
+    env.reset()  # nothing was placed: nothing to show
+    assert os.listdir(tmp_path) == ["episode-000000.rrd"]
+
+
 def test_the_trigger_chooses_episodes(ramp: Site, tmp_path: Path) -> None:
     asked: list[int] = []
 

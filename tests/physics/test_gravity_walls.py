@@ -91,3 +91,10 @@ def test_the_state_at_the_end_is_told(share, at, friction_deg, state):
     push = Push(GravityWall(FACE, 2.0, 1.0), friction_deg, at)
     run = Simulation(push.scene(share * push.limit())).run(5.0)
     assert state_of(run, 0) == state
+
+
+def test_more_walls_than_blocks():
+    walls = tuple(GravityWall(5.0 + 2.0 * i, 1.0) for i in range(4))
+    sim = Simulation(Scene(Terrain(FLAT), (box(0.0, 0.5),), rock(), barriers=walls))
+    sim.step(10)
+    assert sim.time == pytest.approx(10 * sim.settings.dt)

@@ -99,6 +99,10 @@ CASES = {
     "no iterations": (lambda _: Settings(open_close_iterations=0), "open_close_iterations"),
     "no sweep tolerance": (lambda _: Settings(sweep_tolerance=0.0), "sweep_tolerance"),
     "wall off the terrain": (lambda _: scene(barriers=(Wall(500.0, 2.0),)), "wall x"),
+    "wall in a wall": (
+        lambda _: scene(barriers=(Wall(0.0, 2.0), Wall(0.5, 2.0))),
+        "barriers[1].x",
+    ),
     "wall in free space": (lambda _: scene(terrain=None, barriers=(Wall(0.0, 2.0),)), "barriers"),
     "negative height": (lambda _: Wall(0.0, -2.0), "wall height"),
     "NaN wall": (lambda _: Wall(NAN, 2.0), "wall x"),

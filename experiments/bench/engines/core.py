@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import rigdda
@@ -23,10 +25,12 @@ class Engine:
         Step [s].
     sleeping : bool
         Whether blocks at rest may sleep.
+    settings
+        Settings beside these.
     """
 
-    def __init__(self, scene: rigdda.Scene, dt: float, sleeping: bool):
-        self._sim = rigdda.Simulation(scene, rigdda.Settings(dt=dt, sleeping=sleeping))
+    def __init__(self, scene: rigdda.Scene, dt: float, sleeping: bool, **settings: Any):
+        self._sim = rigdda.Simulation(scene, rigdda.Settings(dt=dt, sleeping=sleeping, **settings))
 
     def advance(self, steps: int) -> None:
         """Take steps."""

@@ -24,6 +24,7 @@ SCRIPTS = (
     "fig13_deposit",
     "fig14_retained",
     "ablation",
+    "outcome_step",
     "hard_cases",
     "speed_error",
 )

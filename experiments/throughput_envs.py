@@ -1,29 +1,27 @@
 """Episodes a second of the environments: one copy, and batches as Stable-Baselines3 steps them.
 
-Run with `python -m experiments.throughput_envs [--quick]`; writes
-`experiments/results/throughput_envs.csv`. Every batch plays 64 episodes or more of random actions
-on the site quick, of one release each, at fidelity "fast"; no two batches share a seed, so that
-none finds what another has simulated. Speed-up: episodes a second over those of one copy.
-`cores_busy`: processor time over time, less than what is there if others compute as well.
+Every batch plays 64 episodes or more (8 with --quick) of random actions on the site quick, of one
+release each, at fidelity "fast"; no two batches share a seed, so that none finds what another has
+simulated. Speed-up: episodes a second over those of one copy. `cores_busy`: processor time over
+time, less than what is there if others compute as well. Writes throughput_envs.csv.
 """
 
 from __future__ import annotations
 
-import argparse
-import csv
 import os
 import time
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 
 import envs
 from envs.registration import ENVIRONMENTS
+from experiments.script import folder, options, write
 
 COPIES = (1, 8, 64)
 EPISODES = 64
-RESULTS = Path(__file__).parent / "results" / "throughput_envs.csv"
 
 
 def play(env: Any, episodes: int) -> tuple[int, int]:
@@ -59,26 +57,20 @@ def measure(name: str, copies: int, episodes: int, seed: int) -> dict[str, Any]:
     }
 
 
-def main() -> None:
+@click.command(help=__doc__)
+@options
+def main(quick: bool, out: Path | None) -> None:
     """Measure all batches and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="few episodes")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="the table, a CSV file")
-    options = parser.parse_args()
     measure("rigdda/BarrierPlacement-v0", 2, 4, 0)  # compiles
     rows: list[dict[str, Any]] = []
     for name in ENVIRONMENTS:
         one = None
         for copies in COPIES:
-            row = measure(name, copies, 8 if options.quick else EPISODES, 100 * (len(rows) + 1))
+            row = measure(name, copies, 8 if quick else EPISODES, 100 * (len(rows) + 1))
             one = one or row["episodes_per_second"]
             rows.append(row | {"speed_up": round(row["episodes_per_second"] / one, 3)})
-            print(rows[-1], flush=True)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    with options.out.open("w", newline="") as file:
-        table = csv.DictWriter(file, rows[0])
-        table.writeheader()
-        table.writerows(rows)
+            click.echo(rows[-1])
+    write(folder(quick, out) / "throughput_envs.csv", rows)
 
 
 if __name__ == "__main__":

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import csv
-import sys
 
 import pytest
+from click.testing import CliRunner
 
 from envs.registration import ENVIRONMENTS
 
@@ -15,10 +15,9 @@ def test_every_batch_is_measured(tmp_path, monkeypatch):
     from experiments import throughput_envs
 
     monkeypatch.setattr(throughput_envs, "COPIES", (1, 2))
-    out = tmp_path / "table.csv"
-    monkeypatch.setattr(sys, "argv", ["throughput_envs", "--quick", "--out", str(out)])
-    throughput_envs.main()
-    with out.open() as file:
+    done = CliRunner().invoke(throughput_envs.main, ["--quick", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    with (tmp_path / "throughput_envs.csv").open() as file:
         rows = list(csv.DictReader(file))
     batches = [(row["environment"], row["copies"]) for row in rows]
     assert batches == [(name, copies) for name in ENVIRONMENTS for copies in ("1", "2")]

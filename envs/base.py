@@ -119,8 +119,7 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
 
     def ask_reset(self, seed: int | None) -> Ask:
         """Draw a new episode and return what to simulate for it."""
-        if self.open and len(self._stages) > 1:
-            self._end()  # it was truncated
+        self._cut_off()
         super().reset(seed=seed)
         if self._random:
             number = int(self.np_random.integers(len(sites.TRAIN_SEEDS)))
@@ -176,6 +175,16 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         if self.recorder and self.recorder.wants(self._episode):
             self._record(self.recorder)
         self._episode += 1
+
+    def _cut_off(self) -> None:
+        """End an episode that was truncated on its way, if there is one."""
+        if self.open and len(self._stages) > 1:
+            self._end()
+
+    def close(self) -> None:
+        """End what is open."""
+        self._cut_off()
+        super().close()
 
     def _record(self, recorder: Recorder) -> None:
         """Write the replay of the episode that has ended."""

@@ -137,6 +137,11 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         following = dict(zip(ended, starts, strict=True))
         return [(step, following.get(i)) for i, step in enumerate(steps)]
 
+    def close_extras(self, **_: Any) -> None:
+        """Close every copy."""
+        for copy in self.copies:
+            copy.close()
+
     def render(self) -> tuple[Any, ...]:
         """Return the picture of every copy."""
         return tuple(copy.render() for copy in self.copies)

@@ -65,6 +65,9 @@ def test_a_truncated_episode_is_recorded_when_the_next_begins(ramp: Site, tmp_pa
     assert os.listdir(tmp_path) == ["episode-000000.rrd"]
     env.reset()  # nothing was placed: nothing to show
     assert os.listdir(tmp_path) == ["episode-000000.rrd"]
+    env.step(ACTION)
+    env.close()
+    assert sorted(os.listdir(tmp_path)) == ["episode-000000.rrd", "episode-000001.rrd"]
 
 
 def test_the_trigger_chooses_episodes(ramp: Site, tmp_path: Path) -> None:

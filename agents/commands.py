@@ -63,7 +63,7 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
               help="What to try; repeatable.")  # fmt: skip
 @click.option("--policy", type=click.Path(), help="What `train` wrote; else the shipped policy.")
 @count_option("--simulations", 2, 176, "Releases that each designer may simulate on a site.")
-@count_option("--sites", 1, 20, "Unseen random sites, at most 20.")
+@count_option("--sites", 1, 20, "Unseen random sites; the first 20 are the list of test sites.")
 @count_option("--verify", 2, 32, "Unseen releases that each layout is verified on.")
 @seed_option("Seed of the searches and of their releases.")
 @out_option("evaluate")

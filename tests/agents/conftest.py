@@ -1,27 +1,20 @@
-"""A site of its own: nine blocks slide down a ramp, a good part of them onto the road."""
+"""The ramp of `experiments.outcome_step` for less time: a good part of it slides onto the road."""
 
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 from valley import Valley
 
 from envs import DesignProblem
-from rigdda import Site, Surface
-from rigdda.joints import JointSet
-from rigdda.site import BarrierZone, Costs, Motion, Road, Slope, Source
+from experiments.outcome_step import RAMP
+from rigdda import Site
+from rigdda.site import BarrierZone, Costs, Motion
 
-SITE = Site(
+SITE = replace(
+    RAMP,
     name="chute",
-    description="A plane ramp of 51 degrees, 25 m high, with a road 3 m from its toe.",
-    slope=Slope(points=((-10.0, 25.0), (0.0, 25.0), (20.0, 0.0), (70.0, 0.0)), toe=20.0),
-    source=Source(
-        polygon=((1.0, 23.75), (7.0, 16.25), (9.0, 18.5), (4.0, 24.5)),
-        joints=(JointSet(51.0), JointSet(-39.0)),
-        block_area=2.5,
-    ),
-    road=Road(23.0, 31.0),
     barrier_zone=BarrierZone(10.0, 22.0, max_height=5.0),
-    surfaces={"rock": Surface(22.0)},
     costs=Costs(limit=40.0),
     motion=Motion(damping=0.2, duration=4.0, dt=0.01),
 )

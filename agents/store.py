@@ -15,6 +15,7 @@ import envs
 import rigdda
 from envs import DesignProblem, Evaluation
 from rigdda import Layout, __version__
+from rigdda.kernel import source_hash
 
 
 class Store:
@@ -90,11 +91,12 @@ def _key(problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> str:
 
 @cache
 def mechanics() -> str:
-    """Return a hash of all sources that decide on the outcome of a release and its worth."""
-    digest = hashlib.sha256()
+    """Return a hash of all sources, and numba's version, that an evaluation depends on."""
+    digest = hashlib.sha256(source_hash().encode())
     for name in (rigdda.__file__, envs.__file__):
         assert name is not None
-        for path in sorted(Path(name).parent.rglob("*.py")):
-            if "validation" not in path.parts:
+        folder = Path(name).parent
+        for path in sorted(folder.rglob("*.py")):
+            if "validation" not in path.relative_to(folder).parts:
                 digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

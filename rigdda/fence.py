@@ -174,10 +174,14 @@ def touches(c: Contacts, work: Work, low: int, high: int, fence: int) -> int:
 def limit_fences(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, gauges: Gauges, time: float,
     p: Parameters, counters: NDArray,
-) -> None:  # fmt: skip
-    """Let an island that was settled break the fences that would take more than they can."""
+) -> bool:  # fmt: skip
+    """Let an island that was settled break the fences that would take more than they can.
+
+    Returns whether there are fences that it touches, so that it was settled again.
+    """
     if gauges.fences == 0:
-        return
+        return False
+    touched = False
     low, high = work.contact_start[island], work.contact_start[island + 1]
     for fence in range(p.blocks, len(bodies)):
         barrier = gauges.barrier[fence]
@@ -185,6 +189,7 @@ def limit_fences(
         k = touches(c, work, low, high, fence) if capacity < math.inf else -1
         if k < 0:
             continue
+        touched = True
         set_passing(bodies, c, m, work, island, fence, p, counters)
         left, tolerance = capacity - gauges.absorbed[barrier], BREAK_TOLERANCE * capacity
         taken = work_taken(c, m, work, low, high, fence)
@@ -199,6 +204,7 @@ def limit_fences(
                 )  # fmt: skip
             break_through(bodies, c, m, work, island, fence, left, taken, tolerance, p, counters)
         gauges.absorbed[barrier] += passed_on(c, work, low, high, fence, p.dt)
+    return touched
 
 
 @kernel

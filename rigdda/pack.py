@@ -18,7 +18,9 @@ from rigdda.constants import (
     PENETRATION_RATIO,
     PIN,
     PLAIN_CONTACT,
+    SINKING,
     SLACK_RATIO,
+    STEADY_STEP,
     TERRAIN,
 )
 from rigdda.correction import place_all_corners
@@ -48,9 +50,9 @@ from rigdda.scene import Scene, Terrain
 from rigdda.settings import SOLVERS, Settings
 from rigdda.supports import FixedPoint
 
-LARGEST_FALL = 0.5
-"""Greatest displacement that gravity gives a block in a step, over its size [-]. With more, a small
-block goes through the ground."""
+LARGEST_FALL = 0.25
+"""Greatest displacement that gravity gives a block in a step, over its size [-]. With a third thin
+blocks sink into one another, with more than a half they go through the ground."""
 
 FALL_BELOW = 20.0
 """Depth below the lowest terrain at which a block that left the site is retired [m]."""
@@ -382,6 +384,8 @@ def pack_parameters(
     gx, gy = scene.gravity_vector
     gravity = math.hypot(gx, gy)
     check_step(settings, free[int(np.argmin(area))], math.sqrt(min(area)), gravity)
+    steady = STEADY_STEP * math.sqrt(size / gravity) if gravity > 0.0 else math.inf
+    coarse = settings.dt > steady and settings.mode == "dynamic"
     shaken = scene.base_motion is not None
     static = settings.mode == "static"
     weight = np.mean(bodies["mass"][free]) * (gravity or 9.81)
@@ -406,6 +410,8 @@ def pack_parameters(
         free_bodies(scene),
         settings.dt,
         settings.displacement_limit * size,
+        SINKING * size if coarse else math.inf,
+        min(max(1, math.ceil(math.log2(settings.dt / steady))), CUTS) if coarse else 1,
         gx,
         gy,
         gravity,

@@ -240,6 +240,8 @@ class Parameters(NamedTuple):
     blocks: int  # bodies that may move: the blocks of the scene and its gravity walls
     dt: float
     displacement_limit: float  # of a corner off its straight path, before a cut-back [m]
+    sinking_limit: float  # of a contact in a step, before a cut-back [m]; inf where steps are fine
+    first_cut: int  # least halvings of a step that is cut back
     gravity_x: float  # [m/s2]
     gravity_y: float
     gravity: float  # its magnitude

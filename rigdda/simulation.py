@@ -137,7 +137,7 @@ class Simulation:
     ------
     BadInput
         If stations are not ascending, the watched interval is empty, or the step so long that
-        gravity moves the smallest block by half its size in it.
+        gravity moves the smallest block by a quarter of its size in it.
     """
 
     def __init__(

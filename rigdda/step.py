@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from numpy.typing import NDArray
 
 from rigdda.clock import lap
@@ -12,7 +10,6 @@ from rigdda.constants import (
     AWAKE,
     BAD_STATE,
     CONTACTS_FULL,
-    CUTS,
     DONE,
     EVENTS_FULL,
     HELD,
@@ -37,6 +34,7 @@ from rigdda.correction import (
     move_corners,
     place_corners,
 )
+from rigdda.cut_back import hold_others, level_for, mark_cut, release_all, too_far
 from rigdda.fence import limit_fences, wake_behind
 from rigdda.gauges import barrier_contact, note_hits, note_passage
 from rigdda.islands import find_islands
@@ -183,13 +181,12 @@ def move_island(
     bodies: Bodies, outlines: Outlines, c: Contacts, m: Matrix, work: Work, island: int,
     gauges: Gauges, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
-    """Move the blocks of an island whose forces are known; returns one that went bad, or -1."""
+    """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     low, bad = work.block_start[island], -1
     struck = is_struck(c, work, c0, c1)
     for item in range(c0, c1):
         keep_memory(c, work.contact_item[item], struck)
-    apply_forces(bodies, c, m, work, island, p)
     account(bodies, c, m, work, island, p, ledger, gauges)
     for place in range(low, work.block_start[island + 1]):
         i = work.block_item[place]
@@ -210,21 +207,21 @@ def move_island(
 @stage
 def solve_and_move(
     bodies: Bodies, outlines: Outlines, c: Contacts, count: int, m: Matrix, work: Work,
-    gauges: Gauges, time: float, p: Parameters, limit: float, counters: NDArray,
+    gauges: Gauges, time: float, p: Parameters, cutting: bool, counters: NDArray,
     ledger: NDArray,
 ) -> tuple[int, float]:  # fmt: skip
     """Settle every island, note hits, then move its blocks.
 
-    An island that does not settle, or of which a corner would end farther than `limit` [m] from its
-    straight path, is left where it is, and marked.
+    Where `cutting`, an island that does not settle, or that goes farther than a step should take
+    it, is left where it is, and marked.
 
     Returns
     -------
     bad : int
         A block that went bad, or -1.
     excess : float
-        Greatest departure from a straight path in the islands left, over the limit, at least 1;
-        0 if there are none.
+        How far the islands left went, over what a step should take them, at least 1; 0 if there are
+        none.
     """
     since = lap(counters, MOTION, 0, p.timing)
     islands = find_islands(bodies, c, count, work, p.blocks, p.islands)
@@ -235,14 +232,18 @@ def solve_and_move(
             since = lap(counters, MOTION, since, p.timing)
             settled = open_close(bodies, c, m, work, s, p, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
-            far = greatest_departure(bodies, m, work, s, p.dt) / limit
-            if far > 1.0 or (not settled and limit < math.inf):
+            apply_forces(bodies, c, m, work, s, p)
+            far = too_far(bodies, c, m, work, s, p) if cutting else 0.0
+            if far > 1.0 or (cutting and not settled):
                 excess = max(excess, far, 1.0)
                 counters[CUT_BACKS] += 1
                 mark_cut(bodies, work, s)
                 continue
-            limit_fences(bodies, c, m, work, s, gauges, time, p, counters)
+            if limit_fences(bodies, c, m, work, s, gauges, time, p, counters):
+                apply_forces(bodies, c, m, work, s, p)
             counters[EVENTS] = note_hits(bodies, c, work, c0, c1, gauges, counters[EVENTS], time)
+        else:
+            apply_forces(bodies, c, m, work, s, p)
         bad = max(bad, move_island(bodies, outlines, c, m, work, s, gauges, p, ledger))
     for k in range(count):
         if c[k].state != OPEN:
@@ -257,64 +258,11 @@ def solve_and_move(
 
 
 @kernel
-def mark_cut(bodies: Bodies, work: Work, island: int) -> None:
-    """Mark the blocks of an island that is to be cut back."""
-    for place in range(work.block_start[island], work.block_start[island + 1]):
-        bodies[work.block_item[place]].cut = 1
-
-
-@kernel
-def greatest_departure(bodies: Bodies, m: Matrix, work: Work, island: int, dt: float) -> float:
-    """Return a bound on how far from its straight path any corner of an island ends a step [m]."""
-    most, low = 0.0, work.block_start[island]
-    for place in range(low, work.block_start[island + 1]):
-        d, i = m.d[place - low], work.block_item[place]
-        turn = abs(d[2]) * bodies[i].radius
-        dx, dy = d[0] - dt * bodies[i].vx, d[1] - dt * bodies[i].vy
-        most = max(most, math.hypot(dx, dy) + turn)
-    return most
-
-
-@kernel
 def rest_all(bodies: Bodies) -> None:
     """Take the velocity from every block: static mode."""
     for i in range(len(bodies)):
         if bodies[i].status != HELD:
             bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
-
-
-@kernel
-def hold_others(bodies: Bodies, now: Contacts, count: int, before: Contacts, work: Work,
-    p: Parameters,
-) -> None:  # fmt: skip
-    """Begin a cut-back: all blocks but those of the islands left have taken the step and are held.
-
-    The contacts of the islands left are as they were before the step.
-    """
-    for k in range(count):
-        if bodies[now[k].a].cut == 1:
-            recall(now, k, k + 1, before, work.first, p.slack)
-    for i in range(p.blocks):
-        if bodies[i].status == AWAKE and bodies[i].cut == 0:
-            bodies[i].status = HELD
-        bodies[i].cut = 0
-
-
-@kernel
-def release_all(bodies: Bodies) -> None:
-    """End a cut-back."""
-    for i in range(len(bodies)):
-        if bodies[i].status == HELD:
-            bodies[i].status = AWAKE
-
-
-@kernel
-def level_for(excess: float) -> int:
-    """Return how often to halve a step that went too far by this factor."""
-    level = 1
-    while excess > 2.0**level and level < CUTS:
-        level += 1
-    return level
 
 
 @entry_kernel
@@ -366,15 +314,14 @@ def advance(
         counters[CONTACT_TOTAL] += count
         for k in range(count):
             deepest[0] = max(deepest[0], -now[k].gap)
-        limit = p.displacement_limit if level == 0 else math.inf
         bad, excess = solve_and_move(
-            bodies, outlines, now, count, m, work, gauges, time, p, limit, counters, ledger
+            bodies, outlines, now, count, m, work, gauges, time, p, level == 0, counters, ledger
         )
         yield_bolts(bodies, links)
         part += 1
         if bad < 0 and excess > 0.0:
             hold_others(bodies, now, count, before, work, p)
-            level, part = level_for(excess), 0
+            level, part = level_for(excess, p), 0
         elif bad >= 0 or part == parts:
             release_all(bodies)
             level, part = 0, 0

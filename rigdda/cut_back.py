@@ -1,0 +1,128 @@
+"""Cut-backs: islands that one step would take too far take it in shorter ones.
+
+A step is too long for an island if a corner ends it far from the straight path along which its
+contacts were foreseen, or, in steps that are coarse for the blocks, if a contact sinks in: contacts
+are settled in the linear displacements of the step (equation 2), and what turns far enough ends it
+elsewhere (equation 1).
+"""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.constants import AWAKE, BOLT, CUTS, HELD, PIN, PLAIN
+from rigdda.contact.transfer import recall
+from rigdda.kernel import kernel
+from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
+
+
+@kernel
+def too_far(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters
+) -> float:
+    """Return how far an island goes in this step, over how far a step should take it [-].
+
+    Forces are applied: m.d and m.residual are its displacements.
+    """
+    far = greatest_departure(bodies, m, work, island, p.dt) / p.displacement_limit
+    if p.sinking_limit < math.inf:
+        far = max(far, greatest_sinking(bodies, c, m, work, island) / p.sinking_limit)
+    return far
+
+
+@kernel
+def greatest_departure(bodies: Bodies, m: Matrix, work: Work, island: int, dt: float) -> float:
+    """Return a bound on how far from its straight path any corner of an island ends a step [m]."""
+    most, low = 0.0, work.block_start[island]
+    for place in range(low, work.block_start[island + 1]):
+        d, i = m.d[place - low], work.block_item[place]
+        turn = abs(d[2]) * bodies[i].radius
+        dx, dy = d[0] - dt * bodies[i].vx, d[1] - dt * bodies[i].vy
+        most = max(most, math.hypot(dx, dy) + turn)
+    return most
+
+
+@kernel
+def point_after(
+    bodies: Bodies, m: Matrix, i: int, s: int, x: float, y: float, cos: float, sin: float
+) -> tuple[float, float]:
+    """Return where a point of body i, in slot s, ends the step; it turns by this angle."""
+    x, y = x - bodies[i].x, y - bodies[i].y
+    u, v = m.d[s, 0] + m.residual[s, 0], m.d[s, 1] + m.residual[s, 1]
+    return bodies[i].x + u + cos * x - sin * y, bodies[i].y + v + sin * x + cos * y
+
+
+@kernel
+def gap_after(bodies: Bodies, c: Contacts, k: int, m: Matrix, work: Work) -> float:
+    """Return the gap of contact k at the end of the step, after the post-correction [m]."""
+    nx, ny = c[k].nx, c[k].ny
+    # the corner, and the point of the face that it is over; the normal points to a
+    side = 1.0 if c[k].owner == 1 else 0.0
+    ax, ay = c[k].x + (1.0 - side) * c[k].gap * nx, c[k].y + (1.0 - side) * c[k].gap * ny
+    bx, by = c[k].x - side * c[k].gap * nx, c[k].y - side * c[k].gap * ny
+    a, b, s = c[k].a, c[k].b, work.slot[c[k].a]
+    turn = m.d[s, 2] + m.residual[s, 2]
+    cos, sin = math.cos(turn), math.sin(turn)
+    ax, ay = point_after(bodies, m, a, s, ax, ay, cos, sin)
+    if c[k].owner == 0:  # the face turns with a
+        nx, ny = cos * nx - sin * ny, sin * nx + cos * ny
+    if c[k].pair >= 0:
+        s = work.slot[b]
+        turn = m.d[s, 2] + m.residual[s, 2]
+        cos, sin = math.cos(turn), math.sin(turn)
+        bx, by = point_after(bodies, m, b, s, bx, by, cos, sin)
+        if c[k].owner == 1:
+            nx, ny = cos * nx - sin * ny, sin * nx + cos * ny
+    return nx * (ax - bx) + ny * (ay - by)
+
+
+@kernel
+def greatest_sinking(bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int) -> float:
+    """Return by how much a contact of an island ends the step deeper than it began it [m]."""
+    most = 0.0
+    for item in range(work.contact_start[island], work.contact_start[island + 1]):
+        k = work.contact_item[item]
+        if c[k].kind != BOLT and c[k].kind != PIN and c[k].kind != PLAIN:
+            most = max(most, min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, work))
+    return most
+
+
+@kernel
+def level_for(excess: float, p: Parameters) -> int:
+    """Return how often to halve a step that went too far by this factor."""
+    level = p.first_cut
+    while excess > 2.0**level and level < CUTS:
+        level += 1
+    return level
+
+
+@kernel
+def mark_cut(bodies: Bodies, work: Work, island: int) -> None:
+    """Mark the blocks of an island that is to be cut back."""
+    for place in range(work.block_start[island], work.block_start[island + 1]):
+        bodies[work.block_item[place]].cut = 1
+
+
+@kernel
+def hold_others(bodies: Bodies, now: Contacts, count: int, before: Contacts, work: Work,
+    p: Parameters,
+) -> None:  # fmt: skip
+    """Begin a cut-back: all blocks but those of the islands left have taken the step and are held.
+
+    The contacts of the islands left are as they were before the step.
+    """
+    for k in range(count):
+        if bodies[now[k].a].cut == 1:
+            recall(now, k, k + 1, before, work.first, p.slack)
+    for i in range(p.blocks):
+        if bodies[i].status == AWAKE and bodies[i].cut == 0:
+            bodies[i].status = HELD
+        bodies[i].cut = 0
+
+
+@kernel
+def release_all(bodies: Bodies) -> None:
+    """End a cut-back."""
+    for i in range(len(bodies)):
+        if bodies[i].status == HELD:
+            bodies[i].status = AWAKE

@@ -56,6 +56,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from envs import encoding
 from envs.envelope import BINS, STATIONS, Envelope, envelope
+from envs.memory import Memory, fingerprint
 from envs.problem import DesignProblem
 from rigdda import Barrier, Site
 
@@ -103,6 +104,10 @@ PLACEMENT_FIELDS: dict[str, tuple[int, float, float]] = FIELDS | {
 """The same for barriers that are placed one by one."""
 
 
+memory: Memory[tuple[bytes, float, float, float], Observation] = Memory(4096)
+"""What lasts of observations, by site, cost limit and weights, about 1 kB each."""
+
+
 def space(problem: DesignProblem) -> spaces.Dict:
     """Return the space of a problem's observations."""
     return _space(problem, FIELDS)
@@ -135,16 +140,29 @@ def observe(problem: DesignProblem, layout: Sequence[Barrier]) -> Observation:
     Diverged
         If a simulation diverges.
     """
-    site = problem.site
-    values = {
-        **_slope(site),
-        **_rock(site),
-        **_barriers(problem),
-        **_passing(envelope(site)),
+    values: dict[str, ArrayLike] = {
         "layout": problem.encode(layout),
-        "cost_left": [1.0 - site.cost(layout) / problem.cost_limit],
+        "cost_left": [1.0 - problem.site.cost(layout) / problem.cost_limit],
     }
-    return _within(values, FIELDS)
+    lasting = {name: array.copy() for name, array in _lasting(problem).items()}
+    return lasting | _within(values)
+
+
+def _lasting(problem: DesignProblem) -> Observation:
+    """Return what is the same with any layout in place; computed once a process and problem."""
+    site = problem.site
+    key = fingerprint(site), problem.cost_limit, problem.risk_weight, problem.cost_weight
+    known = memory.recall([key])
+    if key not in known:
+        values = {
+            **_slope(site),
+            **_rock(site),
+            **_barriers(problem),
+            **_passing(envelope(site)),
+        }
+        known[key] = _within(values)
+        memory.remember(known)
+    return known[key]
 
 
 def observe_placement(
@@ -167,17 +185,15 @@ def observe_placement(
     seen = {f"{name}_now": values for name, values in _passing(now).items()} | {
         "slots_left": [left]
     }
-    more = {name: PLACEMENT_FIELDS[name] for name in seen}
-    return observe(problem, layout) | _within(seen, more)
+    return observe(problem, layout) | _within(seen)
 
 
-def _within(
-    values: dict[str, ArrayLike], fields: dict[str, tuple[int, float, float]]
-) -> Observation:
+def _within(values: dict[str, ArrayLike]) -> Observation:
     """Return values as float32 arrays of their own, clipped to their bounds."""
     return {
         name: np.clip(np.array(values[name], dtype=np.float32), np.float32(low), np.float32(high))
-        for name, (_, low, high) in fields.items()
+        for name, (_, low, high) in PLACEMENT_FIELDS.items()
+        if name in values
     }
 
 

@@ -23,7 +23,7 @@ def polygon_properties(
     """
     origin = vertices[0]
     p = vertices - origin
-    q = np.roll(p, -1, axis=0)
+    q = np.concatenate([p[1:], p[:1]])
     cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
     area = 0.5 * cross.sum()
     centre = ((p + q) * cross[:, None]).sum(axis=0) / (6.0 * area)
@@ -39,16 +39,21 @@ def overlap(a: shapely.Polygon, b: shapely.Polygon) -> float:
     return float(shapely.intersection(a, b, grid_size=GRID).area)
 
 
+def edges(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the edge that starts at each of the (n, 2) corners, (n, 2) [m]."""
+    return np.concatenate([vertices[1:], vertices[:1]]) - vertices
+
+
 def turns(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the cross product of the two edges at each corner [m2], negative where concave."""
-    edge = np.roll(vertices, -1, axis=0) - vertices
-    before = np.roll(edge, 1, axis=0)
+    edge = edges(vertices)
+    before = np.concatenate([edge[-1:], edge[:-1]])
     return before[:, 0] * edge[:, 1] - before[:, 1] * edge[:, 0]
 
 
 def is_convex(vertices: NDArray[np.float64]) -> bool:
     """Return whether an anticlockwise simple polygon is convex but for rounding."""
-    perimeter = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T).sum()
+    perimeter = np.hypot(*edges(vertices).T).sum()
     return bool(turns(vertices).min() >= -FLAT * perimeter**2)
 
 

@@ -139,21 +139,20 @@ def _join_bridges(
     centres = shapely.get_coordinates(shapely.centroid(cells)).tolist()
     order = sorted(range(len(cells)), key=centres.__getitem__)
     parts: list[shapely.Polygon | None] = [cells[i] for i in order]
-    neighbours = shapely.STRtree(parts).query(parts, predicate="intersects")
-    beside: list[list[int]] = [[] for _ in parts]
-    for i, j in neighbours.T:
-        if i != j:
-            beside[i].append(int(j))
+    first, second = shapely.STRtree(parts).query(parts, predicate="intersects")
+    other = first != second
+    ends = np.cumsum(np.bincount(first[other], minlength=len(parts)))
+    beside = [near.tolist() for near in np.split(second[other], ends[:-1])]
     bridge = 1.0 - min(j.persistence for j in joints)
     for i in np.flatnonzero(rng.random(len(parts)) < bridge):
         _join(parts, beside, int(i))
-    for i in np.argsort([math.inf if c is None else c.area for c in parts], kind="stable"):
-        cell = parts[i]
-        if cell is not None and cell.area < SLIVER * block_area:
+    size = shapely.area(parts)  # not a number where a part is gone
+    for i in np.argsort(np.where(size > 0.0, size, math.inf), kind="stable"):
+        if 0.0 < shapely.area(parts[i]) < SLIVER * block_area:
             _join(parts, beside, int(i))
-    for i, cell in enumerate(parts):
-        if cell is not None and cell.area < CHIP * block_area:
-            _join(parts, beside, i, convex=False)
+    for i in np.flatnonzero(shapely.area(parts) < CHIP * block_area):
+        if 0.0 < shapely.area(parts[i]) < CHIP * block_area:
+            _join(parts, beside, int(i), convex=False)
     return [c for c in parts if c is not None]
 
 

@@ -51,7 +51,7 @@ from rigdda.settings import SOLVERS, Settings
 from rigdda.supports import FixedPoint
 
 LARGEST_FALL = 0.25
-"""Greatest displacement that gravity gives a block in a step, over its size [-]. With a third thin
+"""Greatest displacement that gravity gives a block in a step, over its size [-]. With 0.31 thin
 blocks sink into one another, with more than a half they go through the ground."""
 
 FALL_BELOW = 20.0
@@ -108,7 +108,7 @@ def pack(
         empty_contacts(room),
         empty_matrix(blocks, room),
         empty_work(len(bodies), room),
-        pack_gauges(scene, stations, watch),
+        pack_gauges(scene, bodies, stations, watch),
         tuple(parameters._replace(dt=settings.dt / 2**level) for level in range(CUTS + 1)),
     )
 
@@ -124,10 +124,11 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
     The surface of fences comes after the named ones.
     """
     polygons = [b.vertices for b in scene.blocks] + [scene.outline(i) for i in scene.bodies]
-    bodies = np.zeros(len(polygons), dtype=BODY).view(np.recarray)
-    outlines = pack_outlines(polygons, bodies)
+    bodies = np.zeros(len(polygons), dtype=BODY)  # its columns are quicker to set than a recarray's
+    properties = [polygon_properties(polygon) for polygon in polygons]
+    outlines = pack_outlines(polygons, [centre for _, centre, _ in properties], bodies)
     for i, polygon in enumerate(polygons):
-        area, centre, second = polygon_properties(polygon)
+        area, centre, second = properties[i]
         block = scene.blocks[i] if i < len(scene.blocks) else None
         barrier = None if block else scene.barriers[scene.bodies[i - len(scene.blocks)]]
         heavy = block or (barrier if isinstance(barrier, GravityWall) else None)
@@ -144,6 +145,7 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
         for load in scene.loads:
             if load.block == i:
                 _add_load(bodies, i, *load.resultant(area, centre))
+    bodies = bodies.view(np.recarray)
     place_all_corners(bodies, outlines)
     return bodies, outlines
 
@@ -197,7 +199,7 @@ def cumulative(t: Floats, a: Floats) -> Floats:
     return np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))
 
 
-def pack_outlines(polygons: list[NDArray[np.float64]], bodies: Bodies) -> Outlines:
+def pack_outlines(polygons: list[Floats], centres: list[Floats], bodies: Bodies) -> Outlines:
     """Return the outlines and convex parts of bodies, and set where each body's parts are."""
     rows = [(i, list(range(len(p)))) for i, p in enumerate(polygons)]
     for i, polygon in enumerate(polygons):
@@ -206,24 +208,24 @@ def pack_outlines(polygons: list[NDArray[np.float64]], bodies: Bodies) -> Outlin
         bodies["part"][i] = i if len(parts) == 1 else len(rows)
         rows += [(i, part) for part in parts if len(parts) > 1]
     shape = (len(rows), max(len(corner) for _, corner in rows))
-    outlines = Outlines(
+    outlined, corners = np.zeros(len(rows), dtype=POLYGON), np.zeros(shape, dtype=CORNER)
+    for row, (i, number) in enumerate(rows):
+        polygon, corner = polygons[i], corners[row, : len(number)]
+        outlined["count"][row], outlined["body"][row] = len(number), i
+        corner["x"], corner["y"] = (polygon - centres[i])[number].T
+        corner["number"] = number
+        following = [*number[1:], number[0]]
+        corner["inner"] = np.subtract(following, number) % len(polygon) != 1
+        if bodies["parts"][i] > 1:
+            corner["reentrant"] = turns(polygon)[number] < 0.0
+    return Outlines(
         world_x=np.zeros(shape),
         world_y=np.zeros(shape),
         normal_x=np.zeros(shape),
         normal_y=np.zeros(shape),
-        polygon=np.zeros(len(rows), dtype=POLYGON).view(np.recarray),
-        corner=np.zeros(shape, dtype=CORNER).view(np.recarray),
+        polygon=outlined.view(np.recarray),
+        corner=corners.view(np.recarray),
     )
-    for row, (i, number) in enumerate(rows):
-        polygon, corner = polygons[i], outlines.corner[row, : len(number)]
-        about = polygon - polygon_properties(polygon)[1]
-        outlines.polygon["count"][row], outlines.polygon["body"][row] = len(number), i
-        corner["x"], corner["y"] = about[number].T
-        corner["number"] = number
-        corner["inner"] = (np.roll(number, -1) - number) % len(polygon) != 1
-        if bodies["parts"][i] > 1:
-            corner["reentrant"] = turns(polygon)[number] < 0.0
-    return outlines
 
 
 def pack_ground(scene: Scene, names: list[str]) -> Ground:
@@ -331,10 +333,12 @@ def empty_work(bodies: int, room: int) -> Work:
     )
 
 
-def pack_gauges(scene: Scene, stations: NDArray[np.float64], watch: tuple[float, float]) -> Gauges:
+def pack_gauges(
+    scene: Scene, bodies: Bodies, stations: NDArray[np.float64], watch: tuple[float, float]
+) -> Gauges:
     """Return the gauges, with no station passed that a block starts beyond."""
     blocks, barriers = len(scene.blocks), len(scene.barriers)
-    start = [polygon_properties(b.vertices)[1][0] for b in scene.blocks]
+    start = bodies["x"][:blocks]
     ground = scene.ground
     fences = [isinstance(b, Fence) for b in scene.barriers]
     room = event_room(free_bodies(scene), len(stations), barriers)

@@ -16,7 +16,7 @@ from rigdda import check
 from rigdda.apart import check_apart
 from rigdda.barriers import Barrier, Earthwork, GravityWall, Layout, Wall, earthworks
 from rigdda.errors import BadInput
-from rigdda.geometry import is_convex
+from rigdda.geometry import edges, is_convex
 from rigdda.loads import Load
 from rigdda.supports import FixedPoint, Support
 from rigdda.terrain import Terrain
@@ -329,7 +329,7 @@ def simple_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:
     size = polygon.length
     if polygon.area < 1e-9 * size**2:
         raise BadInput(where, corners.tolist(), "give it an area")
-    short = np.flatnonzero(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T) < 1e-9 * size)
+    short = np.flatnonzero(np.hypot(*edges(corners).T) < 1e-9 * size)
     if short.size:
         raise BadInput(
             f"{where}[{short[0]}]", corners[short[0]].tolist(), "remove it: the next one repeats it"

@@ -177,6 +177,21 @@ def test_cards_touch_at_their_corners():
     assert trial(next(c for c in CASES if c.name == "house-of-cards"), 0.005).verdict == HOLDS
 
 
+def test_only_beyond_the_default_step_may_what_has_an_answer_be_refused():
+    right = [
+        Result("dominoes", 0.005, HOLDS),
+        Result("dominoes", 0.1, REFUSES),
+        Result("empty-segment", 1e-4, REFUSES),
+    ]
+    assert study.wrong(right) == []
+    amiss = [
+        Result("dominoes", 1e-4, REFUSES),
+        Result("dominoes", 0.1, DEGRADES),
+        Result("empty-segment", 0.1, HOLDS),
+    ]
+    assert study.wrong(amiss) == amiss
+
+
 def test_table_and_picture(tmp_path):
     results = [
         Result("stack-50", 0.005, HOLDS, 1e-6, 0.02, 1e-8),
@@ -187,7 +202,10 @@ def test_table_and_picture(tmp_path):
     lines = study.table(results).splitlines()
     assert lines[2].endswith("| holds | fails |")
     assert lines[3].endswith("| degrades | refuses |")
-    assert study.report(results).splitlines()[-1] == "dominoes degrades: error 2, bar 0"
+    assert study.report(results).splitlines()[-2:] == [
+        "stack-50 100 ms fails: 2 blocks lost",
+        "dominoes 5 ms degrades: error 2, bar 0",
+    ]
     figure = Figure()
     verdicts(figure, results)
     figure.savefig(tmp_path / "verdicts.png")

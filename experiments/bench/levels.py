@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from experiments.bench.cases import Case
+from experiments.front import front
 
 CORE = "rigdda"
 
@@ -54,13 +55,9 @@ class Level:
     aim: bool
 
 
-def front(rows: Iterable[Row]) -> list[Row]:
+def on_front(rows: Iterable[Row]) -> list[Row]:
     """Return the rows that none beats in both error and time, from the cheapest on."""
-    best: list[Row] = []
-    for row in sorted(rows, key=lambda r: (r.cpu_us_per_simulated_s, r.error)):
-        if math.isfinite(row.error) and (not best or row.error < best[-1].error):
-            best.append(row)
-    return best
+    return front(rows, lambda r: (r.cpu_us_per_simulated_s, r.error))
 
 
 def cheapest(rows: Iterable[Row], error: float) -> Row | None:

@@ -13,7 +13,7 @@ from matplotlib.ticker import NullFormatter
 
 from experiments.bench.cases import Case
 from experiments.bench.growth import FITTED, Growth, exponent
-from experiments.bench.levels import Row, front
+from experiments.bench.levels import Row, on_front
 
 COLOURS = {"rigdda": "#c0392b", "pymunk": "#2980b9", "box2d": "#27ae60", "mujoco": "#8e44ad"}
 LEAST = 1e-8
@@ -30,7 +30,7 @@ def fronts(path: Path, cases: Sequence[Case], rows: Sequence[Row]) -> None:
         for engine, colour in COLOURS.items():
             here = [r for r in rows if r.case == case.name and r.engine == engine]
             here = [r for r in here if math.isfinite(r.error)]
-            for style, points in ((".", here), ("-o", front(here))):
+            for style, points in ((".", here), ("-o", on_front(here))):
                 ax.plot(
                     [r.cpu_us_per_simulated_s for r in points],
                     [max(r.error, LEAST) for r in points],

@@ -10,9 +10,9 @@ import shapely
 
 from experiments.bench.penetration import penetration
 from experiments.hard_cases.case import FAILS, REFUSES, Case, Floats, History, Result, judge
-from rigdda import BadInput, Scene, Settings, Simulation
+from rigdda import BadInput, Settings, Simulation
 from rigdda.geometry import polygon_properties
-from rigdda.validation.scenes import masses
+from rigdda.validation.scenes import block_size, masses
 
 BELOW = 1e3
 """How far down the ground is drawn to tell what is in it [m]."""
@@ -29,7 +29,7 @@ def trial(case: Case, dt: float) -> Result:
     if not (np.isfinite(history.poses).all() and np.isfinite(history.velocities).all()):
         return Result(case.name, dt, FAILS, note="not a number")
     late = history.times >= case.settled
-    depth = float(penetration(history.scene, history.poses[late]).max()) / size(history.scene)
+    depth = float(penetration(history.scene, history.poses[late]).max()) / block_size(history.scene)
     missed, gain = float(case.error(history)), growth(history)
     verdict, note = judge(case, missed, depth, gain, lost(history))
     per_second = 1e3 * cpu / case.duration
@@ -58,11 +58,6 @@ def _frame(sim: Simulation) -> tuple[float, Floats, Floats, float]:
     return sim.time, sim.poses, sim.velocities, e.kinetic + e.potential + e.elastic - e.external
 
 
-def size(scene: Scene) -> float:
-    """Return the mean block size: the root of the mean area [m]."""
-    return math.sqrt(float(np.mean([polygon_properties(b.vertices)[0] for b in scene.blocks])))
-
-
 def growth(history: History) -> float:
     """Return the greatest growth of energy over its least so far [-].
 
@@ -71,7 +66,7 @@ def growth(history: History) -> float:
     energy, scene = history.energy, history.scene
     free = ~np.array([b.fixed for b in scene.blocks])
     weight = float(masses(scene)[0][free].sum()) * math.hypot(*scene.gravity_vector)
-    scale = weight * size(scene) + float(energy[0] - energy.min())
+    scale = weight * block_size(scene) + float(energy[0] - energy.min())
     return float((energy - np.minimum.accumulate(energy)).max()) / scale
 
 

@@ -18,7 +18,7 @@ from rigdda.errors import Diverged
 from rigdda.scene import Scene
 from rigdda.validation import arches, rolling, slides
 from rigdda.validation.case import Case, Lab, Metered
-from rigdda.validation.scenes import masses
+from rigdda.validation.scenes import block_size
 
 MORE_STEPS = (1e-1, 5e-2, *STEPS, 1e-3)
 """Longer and shorter steps, which closed forms stand [s]."""
@@ -65,14 +65,8 @@ class TunedLab(Lab):
         """
         chosen = dict(self._settings)
         if "penetration" in chosen:
-            chosen["penetration"] *= size(scene)
+            chosen["penetration"] *= block_size(scene)
         return super().simulate(scene, dt, **(settings | chosen))
-
-
-def size(scene: Scene) -> float:
-    """Return the mean block size: the root of the mean area [m]."""
-    density = np.array([b.density for b in scene.blocks])
-    return math.sqrt(float(np.mean(masses(scene)[0] / density)))
 
 
 def with_peers(quick: bool) -> list[bench.Case]:
@@ -83,7 +77,7 @@ def with_peers(quick: bool) -> list[bench.Case]:
 
 def sweep(case: bench.Case) -> Iterator[Point]:
     """Yield a point for each choice on a case of the bench."""
-    for choice in choices(size(case.scenes[0]), MORE_STEPS):
+    for choice in choices(block_size(case.scenes[0]), MORE_STEPS):
         settings = dict(choice.settings)
         dt = settings.pop("dt", DEFAULT.dt)
         done = timing.Setting(engine, dt, settings)

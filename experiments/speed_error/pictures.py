@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from experiments.bench.pictures import COLOURS, LEAST
+from experiments.front import front
 from experiments.speed_error.closed_forms import Point
 from experiments.speed_error.highway import OUTCOMES, Sample
 from experiments.speed_error.knobs import ITERATIONS, STEP, STIFFNESS, SWEEPS, TOLERANCE
@@ -28,15 +29,6 @@ SHADES = {
 """Colour of each knob."""
 
 COLUMNS = 4
-
-
-def front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return the points (cost, error) that none beats in both, from the cheapest on."""
-    best: list[tuple[float, float]] = []
-    for cost, error in sorted(points):
-        if math.isfinite(error) and (not best or error < best[-1][1]):
-            best.append((cost, error))
-    return best
 
 
 def closed_forms(figure: Figure, points: Sequence[Point]) -> None:
@@ -59,7 +51,7 @@ def _panel(ax: Axes, points: Sequence[Point]) -> None:
     for engine, colour in COLOURS.items():
         here = [(p.cpu_us_per_simulated_s, max(p.error, LEAST))
                 for p in points if p.engine == engine]  # fmt: skip
-        if best := front(here):
+        if best := front(here, lambda p: p):
             ax.plot(*zip(*best, strict=True), "-", color=colour, linewidth=1.2, label=engine)
     for p in points:
         if p.engine != "rigdda" or not math.isfinite(p.error):
@@ -127,7 +119,7 @@ def _totals(ax: Axes, samples: Sequence[Sample], reference: Sample, k: int) -> N
         if own:
             ax.annotate(f"{1e3 * s.value:g} ms", (cost[-1], error[-1]), fontsize=7)
         points += zip(cost, error, strict=True)
-    ax.plot(*zip(*front(points), strict=True), color="0.8", linewidth=4.0, zorder=0)
+    ax.plot(*zip(*front(points, lambda p: p), strict=True), color="0.8", linewidth=4.0, zorder=0)
     ax.set(xscale="log", yscale="log")
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set_xlabel(f"CPU s of {', '.join(map(str, RELEASES))} releases")

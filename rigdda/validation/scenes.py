@@ -84,6 +84,11 @@ def masses(scene: Scene) -> tuple[Floats, Floats]:
     return density * np.array(area), density * np.array(second)
 
 
+def block_size(scene: Scene) -> float:
+    """Return the mean block size: the root of the mean area [m]."""
+    return math.sqrt(float(np.mean([polygon_properties(b.vertices)[0] for b in scene.blocks])))
+
+
 def kinetic_energy(velocity: Floats, mass: Floats, inertia: Floats) -> float:
     """Return the kinetic energy [J] of blocks with velocities (N, 3)."""
     speed = (velocity[:, :2] ** 2).sum(axis=1)

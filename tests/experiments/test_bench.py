@@ -92,7 +92,7 @@ def row(engine: str, error: float, cpu: float) -> Row:
 
 def test_front_keeps_what_nothing_beats() -> None:
     rows = [row("a", 1e-2, 1.0), row("a", 1e-3, 3.0), row("a", 1e-3, 2.0), row("a", 2e-3, 5.0)]
-    assert levels.front([*rows, row("a", math.inf, 0.1)]) == [rows[0], rows[2]]
+    assert levels.on_front([*rows, row("a", math.inf, 0.1)]) == [rows[0], rows[2]]
 
 
 def test_levels_compare_the_cheapest_that_is_good_enough() -> None:

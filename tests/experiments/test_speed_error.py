@@ -9,9 +9,9 @@ import pytest
 
 from experiments.bench.cases import FRAME, single
 from experiments.bench.penetration import centroids
+from experiments.front import front
 from experiments.speed_error import closed_forms, highway, knobs, study
 from experiments.speed_error.highway import Budget, Sample
-from experiments.speed_error.pictures import front
 from experiments.speed_error.tables import bias, closed_table, total_error
 from rigdda import Block, Scene, Settings, Terrain
 from rigdda.validation.scenes import FLAT, box, rock
@@ -75,7 +75,8 @@ def test_the_number_is_the_bias_over_the_interval_of_100_releases():
 
 
 def test_front():
-    assert front([(1.0, 5.0), (2.0, 6.0), (3.0, 1.0), (4.0, math.inf)]) == [(1.0, 5.0), (3.0, 1.0)]
+    points = [(1.0, 5.0), (2.0, 6.0), (3.0, 1.0), (4.0, math.inf)]
+    assert front(points, lambda p: p) == [(1.0, 5.0), (3.0, 1.0)]
 
 
 def test_a_tuned_lab_sets_what_was_chosen():

@@ -1,0 +1,22 @@
+"""The front of points that are to be small in both: cost and error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+Item = TypeVar("Item")
+
+
+def front(items: Iterable[Item], point: Callable[[Item], tuple[float, float]]) -> list[Item]:
+    """Return the items that none beats in both cost and error, from the cheapest on.
+
+    `point` gives cost and error of an item; one without a finite error is not on the front.
+    """
+    best: list[Item] = []
+    for item in sorted(items, key=point):
+        error = point(item)[1]
+        if math.isfinite(error) and (not best or error < point(best[-1])[1]):
+            best.append(item)
+    return best

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -24,6 +25,9 @@ nothing can break, a wall, makes sizes trivial."""
 
 OVERRUN = 10.0
 """How many times the cost above the limit is charged. Soft, so that a search sees a way back."""
+
+LEAST, MOST = 1e-12, 1e12
+"""Bounds of prices, weights and the limit: between them no objective, nor its square, overflows."""
 
 
 @dataclass(frozen=True, slots=True, init=False)
@@ -75,9 +79,9 @@ class DesignProblem:
             "site": where,
             "max_barriers": check.integer("max_barriers", max_barriers, 1),
             "kinds": names,
-            "risk_weight": check.number("risk_weight", risk_weight, 0.0),
-            "cost_weight": check.number("cost_weight", cost_weight, 0.0),
-            "cost_limit": check.number("cost_limit", limit, 0.0, open_low=True),
+            "risk_weight": check.number("risk_weight", risk_weight, 0.0, MOST),
+            "cost_weight": check.number("cost_weight", cost_weight, 0.0, MOST),
+            "cost_limit": check.number("cost_limit", limit, LEAST, MOST, open_low=True),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -194,6 +198,8 @@ def _site(site: object) -> Site:
     if not {"concrete", "rock"} & site.surfaces.keys():
         mend = "define concrete, of which barriers are, or rock instead"
         raise BadInput("surfaces", sorted(site.surfaces), mend)
+    for name, price in msgspec.structs.asdict(site.costs).items():
+        check.number(f"costs.{name}", price, 0.0, MOST)
     return site
 
 

@@ -18,7 +18,7 @@ from envs import DesignProblem, baseline
 from envs.evaluation import student_interval
 from envs.memory import Memory
 from rigdda import BadInput, Site, Surface, Wall
-from rigdda.site import BarrierZone, Road
+from rigdda.site import BarrierZone, Costs, Road
 
 SEEDS = (3, 1, 4, 5)
 LAYOUT = (Wall(18.0, 1.0, 1.0),)
@@ -152,13 +152,23 @@ def test_bounds_and_vectors(problem: DesignProblem) -> None:
         ({"kinds": ("wall", "wall")}, "kinds = .*: name each kind once"),
         ({"risk_weight": -1.0}, "risk_weight = -1.0"),
         ({"cost_weight": math.nan}, "cost_weight = nan: give a finite number"),
-        ({"cost_limit": 0.0}, "cost_limit = 0.0: give a number above 0"),
+        ({"cost_limit": 0.0}, "cost_limit = 0.0: give a number above 1e-12"),
+        ({"cost_limit": 1e-308}, "cost_limit = 1e-308: give a number above 1e-12"),
+        ({"risk_weight": 1e308}, "risk_weight = .*at most 1e\\+12"),
+        ({"cost_weight": 1e308}, "cost_weight = .*at most 1e\\+12"),
     ],
 )
 def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:
     with pytest.raises(BadInput, match=message) as caught:
         DesignProblem(**{"site": "quick", **keywords})
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", [field.name for field in msgspec.structs.fields(Costs)])
+def test_a_price_that_makes_no_objective_is_refused(name: str, ramp: Site) -> None:
+    costs = msgspec.structs.replace(ramp.costs, **{name: 1e308})
+    with pytest.raises(BadInput, match=rf"costs\.{name} = 1e\+308: .*at most 1e\+12"):
+        DesignProblem(msgspec.structs.replace(ramp, costs=costs))
 
 
 def test_sites_without_room_or_matter_for_barriers_are_refused(ramp: Site) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Sequence
 from functools import cache
@@ -14,8 +15,11 @@ import msgspec
 import envs
 import rigdda
 from envs import DesignProblem, Evaluation
-from rigdda import Layout, __version__
+from rigdda import Barrier, Layout, __version__
 from rigdda.kernel import source_hash
+
+INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
+"""Constants of JSON lines: intervals of one release have no ends. Nothing that is kept is NaN."""
 
 
 class Store:
@@ -29,8 +33,8 @@ class Store:
     ----------
     path : path, optional
         A file of JSON lines, one an evaluation, appended to and flushed at once; a last line that
-        a kill left unfinished is cut off, other lines that are no evaluation are passed over.
-        None: memory only.
+        a kill left unfinished is cut off, other lines that are no evaluation are passed over, and
+        so is an evaluation that is not what its outcomes are worth. None: memory only.
 
     Attributes
     ----------
@@ -52,9 +56,9 @@ class Store:
         whole = text.rfind(b"\n") + 1
         for line in text[:whole].splitlines():
             try:
-                data = json.loads(line)
+                data = json.loads(line, parse_constant=INFINITE.__getitem__)
                 self._known[data["key"]] = msgspec.convert(data["evaluation"], Evaluation)
-            except (ValueError, KeyError, TypeError, msgspec.ValidationError):
+            except (ValueError, KeyError, TypeError, RecursionError, msgspec.ValidationError):
                 continue
         self._kept = set(self._known)
         os.truncate(path, whole)
@@ -68,6 +72,9 @@ class Store:
             As `DesignProblem.evaluate` does.
         """
         key = _key(problem, layout, seeds)
+        if key in self._kept and not _sound(self._known[key], problem, layout, seeds):
+            self._kept.remove(key)
+            del self._known[key]
         if key in self._known:
             self.resumed += len(seeds) if key in self._kept else 0
             return self._known[key]
@@ -76,9 +83,19 @@ class Store:
         self._known[key] = evaluation
         if self.path is not None:
             line = json.dumps({"key": key, "evaluation": msgspec.to_builtins(evaluation)})
-            with self.path.open("a") as file:
+            with self.path.open("a", encoding="utf-8") as file:
                 file.write(line + "\n")
         return evaluation
+
+
+def _sound(
+    kept: Evaluation, problem: DesignProblem, layout: Sequence[Barrier], seeds: Sequence[int]
+) -> bool:
+    """Return whether a kept evaluation is of these releases and what their outcomes are worth."""
+    barriers = [len(outcome.barriers) for outcome in kept.outcomes]
+    if barriers != [len(layout)] * len(seeds):
+        return False
+    return kept == problem.judge(tuple(layout), tuple(seeds), kept.outcomes)
 
 
 def _key(problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> str:

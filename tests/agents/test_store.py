@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from pathlib import Path
 
 import msgspec
@@ -37,11 +39,43 @@ def test_a_line_that_is_no_evaluation_costs_no_other(
         first.evaluate(problem, WALLS, (seed,))
     first.evaluate(problem, WALLS, (2,))
     assert (first.simulated, first.resumed) == (2, 0)  # nothing comes from a former run
-    file.write_bytes(b"what is this\n" + file.read_bytes())
+    noise = b"what is this\n" + 100_000 * b"[" + b"\n\xff\xfe\n"
+    file.write_bytes(noise + file.read_bytes())
     second = Store(file)
     for seed in (1, 2):
         second.evaluate(problem, WALLS, (seed,))
     assert (second.simulated, second.resumed) == (0, 2)
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        ("objective", math.nan),
+        ("objective", 0.5),
+        ("debris", math.inf),
+        ("seeds", [1, 3]),
+        ("layout", []),
+        ("outcomes", []),
+        ("outcomes", [{}, {}]),
+    ],
+)
+def test_an_evaluation_that_is_not_what_its_outcomes_are_worth_is_simulated_again(
+    name: str, value: object, problem: DesignProblem, tmp_path: Path
+) -> None:
+    file = tmp_path / "store.jsonl"
+    written = Store(file).evaluate(problem, WALLS, (1, 2))
+    line = json.loads(file.read_text())
+    if value == [{}, {}]:  # of the right number, but one is damaged
+        value = line["evaluation"]["outcomes"]
+        value[1]["max_energy_on_road"] = math.nan
+    line["evaluation"][name] = value
+    file.write_text(json.dumps(line) + "\n")
+    store = Store(file)
+    assert store.evaluate(problem, WALLS, (1, 2)) == written
+    assert (store.simulated, store.resumed) == (2, 0)
+    again = Store(file)
+    again.evaluate(problem, WALLS, (1, 2))
+    assert (again.simulated, again.resumed) == (0, 2)
 
 
 def test_another_question_is_simulated(problem: DesignProblem, site: Site, tmp_path: Path) -> None:

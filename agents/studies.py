@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import io
+import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -15,6 +17,7 @@ import msgspec
 import numpy as np
 
 import rigdda
+from agents import limits
 from agents.store import mechanics
 from agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from envs.evaluation import student_interval
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 Tick = Callable[[int, str], None]
+
+_NUMBERS = ("released_mass", *OUTCOME, "run_out_50", "run_out_95", "run_out_100")
+"""Columns of an outcome, without what each barrier took."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +84,7 @@ def load(path: str | os.PathLike[str]) -> Study:
         data = msgspec.toml.decode(file.read_bytes(), type=_StudyFile)
     except msgspec.ValidationError as error:
         raise BadInput("study", str(path), str(error)) from None
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise BadInput("study", str(path), f"mend its TOML: {error}") from None
     near = file.parent / data.site
     site = Site.load(near if near.suffix == ".toml" else data.site)
@@ -88,9 +94,11 @@ def load(path: str | os.PathLike[str]) -> Study:
             raise BadInput(f"layouts[{i}].name", table.name, "give each layout a name of its own")
         layouts[table.name] = _layout(f"layouts[{i}]", table, file.parent)
         site.realise(layouts[table.name])  # what cannot be built is said before all
+        check.number(f"cost of layouts[{i}]", site.cost(layouts[table.name]))
     if not layouts:
         raise BadInput("layouts", 0, "give at least one table [[layouts]]")
-    return Study(site, check.integer("releases", data.releases, 1), layouts)
+    releases = limits.whole("releases", data.releases, 1, limits.RELEASES // len(layouts))
+    return Study(site, releases, layouts)
 
 
 def _layout(field: str, table: _LayoutTable, folder: Path) -> Layout:
@@ -112,16 +120,19 @@ def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
 
     Raises
     ------
+    BadInput
+        If the file is not that of a study.
     Diverged
         If a simulation diverges.
     """
     jobs = {_key(study, name, s): (name, s) for name, s in _jobs(study, seed)}
     fields = _fields(study)
-    rows = {row["key"]: row for row in _read(path, fields) if row["key"] in jobs}
+    found = {row["key"]: row for row in _read(path, fields)}
+    rows = {key: row for key, row in found.items() if key in jobs and _sound(row, study, jobs[key])}
     known = len(rows)
     write_rows(path, list(rows.values()), fields)
     todo = {key: job for key, job in jobs.items() if key not in rows}
-    with path.open("a", newline="") as file, ThreadPoolExecutor() as pool:
+    with path.open("a", newline="", encoding="utf-8") as file, ThreadPoolExecutor() as pool:
         table = csv.DictWriter(file, fields, restval="")
         outcomes = pool.map(lambda job: _release(study, *job), todo.values())
         for (key, (name, s)), outcome in zip(todo.items(), outcomes, strict=True):
@@ -156,21 +167,62 @@ def _fields(study: Study) -> list[str]:
     """Return the columns: those of the layout with most barriers."""
     most = max(map(len, study.layouts.values()))
     barriers = [f"barrier_{i}_{name}" for i in range(most) for name in HIT]
-    run_out = ("run_out_50", "run_out_95", "run_out_100")
-    return ["layout", "seed", "cost", "released_mass", *OUTCOME, *run_out, *barriers, "key"]
+    return ["layout", "seed", "cost", *_NUMBERS, *barriers, "key"]
 
 
 def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
-    """Return the whole rows of a file, those of more or fewer barriers too; none of other files."""
-    if not path.is_file():
+    """Return the whole rows of a file, those of more or fewer barriers too.
+
+    Raises
+    ------
+    BadInput
+        If the file is not that of a study.
+    """
+    text = path.read_bytes().decode(errors="replace") if path.is_file() else ""
+    if not text:
         return []
-    text = path.read_bytes().decode(errors="replace")
-    lines = text[: text.rfind("\r\n") + 1].splitlines()
-    found = csv.DictReader(lines, restval="")
-    needed = {name for name in fields if not name.startswith("barrier_")}
-    if not needed <= set(found.fieldnames or ()):
-        return []
+    head, *rows = [*_lines(text)] or [[]]
+    if not {name for name in fields if not name.startswith("barrier_")} <= set(head):
+        mend = "this is no study of this version: move it away or name another folder with --out"
+        raise BadInput("study table", str(path), mend)
+    if not text.endswith("\n"):  # a kill has left the last row unfinished
+        rows = rows[:-1]
+    found = (dict(zip(head, row, strict=False)) for row in rows)
     return [{name: row.get(name, "") for name in fields} for row in found]
+
+
+def _lines(text: str) -> Iterator[list[str]]:
+    """Yield the rows of a CSV file; one that cannot be read is passed over."""
+    rows = csv.reader(io.StringIO(text, newline=""))
+    while True:
+        try:
+            yield next(rows)
+        except csv.Error:
+            continue
+        except StopIteration:
+            return
+
+
+def _sound(row: dict[str, Any], study: Study, job: tuple[str, int]) -> bool:
+    """Return whether a row is of this layout and seed, with a number wherever one belongs."""
+    name, seed = job
+    layout = study.layouts[name]
+    if (row["layout"], row["seed"]) != (name, str(seed)):
+        return False
+    if _number(row["cost"]) != study.site.cost(layout):
+        return False
+    mine = {f"barrier_{i}_{hit}" for i in range(len(layout)) for hit in HIT}
+    said = {field for field, text in row.items() if field.startswith("barrier_") and text}
+    numbers = [text for field, text in row.items() if field in mine or field in _NUMBERS]
+    return said == mine and all(math.isfinite(_number(text)) for text in numbers)
+
+
+def _number(text: str) -> float:
+    """Return the number that stands in a cell, 1 and 0 for True and False; NaN if there is none."""
+    try:
+        return float({"True": "1", "False": "0"}.get(text, text))
+    except ValueError:
+        return math.nan
 
 
 def table(study: Study, path: Path) -> Table:

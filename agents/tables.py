@@ -62,7 +62,7 @@ class EvaluationsFile:
     )  # fmt: skip
 
     def __init__(self, path: str | os.PathLike[str]):
-        self._file = Path(path).open("w", newline="")
+        self._file = Path(path).open("w", newline="", encoding="utf-8")
         self._rows = csv.writer(self._file)
         self._rows.writerow(self.FIELDS)
 
@@ -110,7 +110,7 @@ def write_rows(
 
     `fields` are the columns, by default the keys of the first row; a row may lack some.
     """
-    with atomic(path) as part, part.open("w", newline="") as file:
+    with atomic(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, rows[0] if fields is None else fields, restval="")
         table.writeheader()
         table.writerows(rows)

@@ -14,6 +14,7 @@ from test_command_line import refused, rig, rows, run
 
 import rigdda
 from agents import studies
+from agents.tables import write_rows
 from rigdda import Site
 
 EXAMPLES = Path(rigdda.__file__).parents[1] / "examples"
@@ -91,8 +92,55 @@ def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> N
 
 
 @pytest.mark.parametrize(
+    "column, value",
+    [
+        ("layout", "other"),
+        ("seed", "7"),
+        ("cost", "inf"),
+        ("debris_fraction", "nan"),
+        ("debris_fraction", "abc"),
+        ("debris_fraction", ""),
+        ("debris_fraction", 200_000 * "1"),
+        ("barrier_0_failed", "perhaps"),
+        ("barrier_1_hits", "1"),
+    ],
+)
+def test_a_damaged_row_is_simulated_again(column: str, value: str, folder: Path) -> None:
+    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
+    studies.run(asked, 0, file, lambda *_: None)
+    whole, table = file.read_bytes(), rows(file)
+    table[6][column] = value  # the first of the layout with one barrier
+    write_rows(file, table)
+    assert studies.run(asked, 0, file, lambda *_: None) == asked.size - 1
+    assert file.read_bytes() == whole
+    studies.table(asked, file)
+
+
+def test_a_file_that_an_editor_has_saved_keeps_its_rows(folder: Path) -> None:
+    text = STUDY.replace('"one"', '"line\\nbreak, \\"größer\\"\\r"')
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
+    assert studies.run(asked, 0, file, lambda *_: None) == 0
+    whole = file.read_bytes()
+    studies.table(asked, file)
+    assert studies.run(asked, 0, file, lambda *_: None) == asked.size
+    file.write_bytes(whole.replace(b"\r\n", b"\n"))
+    assert studies.run(asked, 0, file, lambda *_: None) == asked.size
+    assert file.read_bytes() == whole
+
+
+@pytest.mark.parametrize("content", [b"my,own,data", b"my,own,data\n1,2,3\n", 200_000 * b"x"])
+def test_a_file_of_somebody_else_is_left_alone(content: bytes, folder: Path) -> None:
+    (folder / "study.csv").write_bytes(content)
+    line = refused("study", "study.toml", "--out", ".", folder=folder)
+    assert "study.csv" in line and "another folder" in line
+    assert (folder / "study.csv").read_bytes() == content
+
+
+@pytest.mark.parametrize(
     "change, named",
     [
+        (("releases = 6", "releases = 1000000000000"), ("releases", "at most")),
         (("releases = 6", "releases = 0"), ("releases", "0")),
         (("releases = 6", "relases = 6"), ("relases",)),
         (('name = "one"', 'name = "nothing"'), ("layouts[1].name", "nothing")),
@@ -111,6 +159,11 @@ def test_a_bad_study_is_one_line(
     line = refused("study", "study.toml", folder=folder)
     assert all(word in line for word in named), line
     assert set(folder.iterdir()) == before
+
+
+def test_a_study_that_is_not_text_is_one_line(folder: Path) -> None:
+    (folder / "study.toml").write_bytes(b'site = "\xff"')
+    assert "mend its TOML" in refused("study", "study.toml", folder=folder)
 
 
 def example(name: str) -> ModuleType:

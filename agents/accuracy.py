@@ -34,7 +34,7 @@ def choose(only: Sequence[str], slow: bool) -> tuple[Case, ...]:
         If no name begins so.
     """
     for start in only:
-        if not any(case.name.startswith(start) for case in CASES):
+        if not start or not any(case.name.startswith(start) for case in CASES):
             names = ", ".join(case.name for case in CASES)
             raise BadInput("--only", start, f"use the beginning of one of {names}")
     if only:

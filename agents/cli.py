@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from agents.commands import evaluate, study, train, validate
+from agents.limits import SEED
 from agents.names import DESIGNERS
 from agents.options import count_option, out_option, seed_option
 from agents.terminal import Stopped, fail, folder_for, kept, progress, show
@@ -131,7 +132,7 @@ def simulate(site: str, layout: str | None, releases: int, seed: int, out: Path 
               help="How to search.")  # fmt: skip
 @count_option("--simulations", 2, SIMULATIONS, "Releases that the search may simulate.")
 @count_option("--verify", 2, RELEASES, "Unseen releases that each layout is verified on.")
-@seed_option("Seed of the search and of its releases.")
+@seed_option("Seed of the search and of its releases.", SEED)
 @out_option("design-SITE")
 def design(
     site: str, designer: str, simulations: int, verify: int, seed: int, out: Path | None

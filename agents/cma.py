@@ -41,7 +41,7 @@ def design(
     Raises
     ------
     BadInput, Diverged
-        If the budget is below 2 or the seed below 0; if a simulation diverges.
+        If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
     first = starts(problem, ensemble_for(ledger))
@@ -60,8 +60,8 @@ def warm_started(
     Raises
     ------
     BadInput, Diverged
-        If the budget is below 6 or the seed below 0; if fences are not among the kinds; if a
-        simulation diverges.
+        If the budget is below 6 or the seed out of range; if fences are not among the kinds;
+        if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
     check.integer("simulations", simulations, len(SEEDS) + 2)

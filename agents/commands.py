@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from agents.limits import SEED
 from agents.names import DESIGNERS
 from agents.options import count_option, out_option, seed_option
 from agents.terminal import Stopped, folder_for, kept, progress, show
@@ -36,7 +37,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 @click.command()
 @count_option("--sites", 2, 128, "Random sites to train on.")
 @count_option("--episodes", 0, 16384, "Episodes, of one release each.")
-@seed_option("Seed of all that is random.")
+@seed_option("Seed of all that is random.", SEED)
 @out_option("train")
 def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
     """Train a policy that designs fences for a site from what it sees of it, without a search.
@@ -65,7 +66,7 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
 @count_option("--simulations", 2, 176, "Releases that each designer may simulate on a site.")
 @count_option("--sites", 1, 20, "Unseen random sites; the first 20 are the list of test sites.")
 @count_option("--verify", 2, 32, "Unseen releases that each layout is verified on.")
-@seed_option("Seed of the searches and of their releases.")
+@seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("evaluate")
 def evaluate(
     names: tuple[str, ...],

@@ -49,8 +49,8 @@ def design(
     Raises
     ------
     BadInput, Diverged
-        If the budget is below 2, the seed below 0 or neither fences nor walls are among the kinds;
-        if a simulation diverges.
+        If the budget is below 2, the seed out of range or neither fences nor walls are among the
+        kinds; if a simulation diverges.
     """
     kind = kind_for(problem)
     ledger = Ledger(problem, simulations, seed, progress, store)

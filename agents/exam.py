@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from agents import limits
 from agents.protocol import Designer
 from agents.store import Store
 from agents.tables import empty_table
 from agents.verify import verify
 from envs import DesignProblem, Evaluation, fidelity
 from envs.evaluation import Interval, student_interval
-from rigdda import check, sites
+from rigdda import sites
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -74,10 +75,10 @@ def unseen(count: int) -> list[DesignProblem]:
     Raises
     ------
     BadInput
-        If the number is below 1.
+        If the number is below 1 or above `limits.SITES`.
     """
     first = sites.TEST_SEEDS.start
-    seeds = range(first, first + check.integer("sites", count, 1))
+    seeds = range(first, first + limits.whole("sites", count, 1, limits.SITES))
     return [DesignProblem(fidelity.at(sites.random(seed), "fast")) for seed in seeds]
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from agents.limits import RELEASES
+
 
 def out_option(default: str) -> Callable[..., Any]:
     """Return the option --out, into runs/ by default."""
@@ -18,13 +20,13 @@ def out_option(default: str) -> Callable[..., Any]:
     )
 
 
-def seed_option(words: str) -> Callable[..., Any]:
-    """Return the option --seed with its help."""
-    return click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help=words)
+def seed_option(words: str, most: int | None = None) -> Callable[..., Any]:
+    """Return the option --seed with its help; searches and trainings take at most `limits.SEED`."""
+    kind = click.IntRange(0, most)
+    return click.option("--seed", type=kind, default=0, show_default=True, help=words)
 
 
 def count_option(name: str, least: int, default: int, words: str) -> Callable[..., Any]:
     """Return an option that counts, releases for example."""
-    return click.option(
-        name, type=click.IntRange(least), default=default, show_default=True, help=words
-    )
+    kind = click.IntRange(least, RELEASES)
+    return click.option(name, type=kind, default=default, show_default=True, help=words)

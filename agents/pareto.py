@@ -52,7 +52,7 @@ def design(
     Raises
     ------
     BadInput, Diverged
-        If the budget is below 2 or the seed below 0; if a simulation diverges.
+        If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
     first = starts(problem, ensemble_for(ledger))

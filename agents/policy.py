@@ -48,7 +48,7 @@ def design(
     Raises
     ------
     BadInput, Diverged
-        If the budget is below 5, the seed below 0 or fences are not among the kinds; if a
+        If the budget is below 5, the seed out of range or fences are not among the kinds; if a
         simulation diverges.
     """
     return using(load(SHIPPED))(problem, simulations, seed, progress, store)

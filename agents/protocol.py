@@ -9,10 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from agents import limits
 from agents.seeds import release_seeds
 from agents.store import Store
 from envs import DesignProblem, Evaluation
-from rigdda import Layout, check
+from rigdda import Layout
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +145,8 @@ class Ledger:
         store: Store | None,
     ):
         self.problem = problem
-        self.budget = check.integer("simulations", simulations, 2)
-        self.seed = check.integer("seed", seed, 0)
+        self.budget = limits.whole("simulations", simulations, 2, limits.RELEASES)
+        self.seed = limits.whole("seed", seed, 0, limits.SEED)
         self.used = 0
         self._progress = progress
         self._store = store or Store()

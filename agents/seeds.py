@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from agents import limits
 from rigdda import check
 
 STREAMS = ("search", "semifinal", "final", "ensemble", "verification")
@@ -29,9 +30,10 @@ def release_seeds(stream: str, seed: int, n: int) -> tuple[int, ...]:
     Raises
     ------
     BadInput
-        If the stream is unknown or a number is not whole or too small.
+        If the stream is unknown or a number is not whole or outside its range.
     """
     tag = STREAMS.index(check.one_of("stream", stream, STREAMS))
     entropy = [check.integer("seed", seed, 0), tag]
-    words = np.random.SeedSequence(entropy).generate_state(check.integer("releases", n, 0))
+    count = limits.whole("releases", n, 0, limits.RELEASES)
+    words = np.random.SeedSequence(entropy).generate_state(count)
     return tuple(int(word) * len(STREAMS) + tag for word in words)

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import extra
+from agents import extra, limits
 from agents.features import features
 from agents.network import Network
 from agents.policy import KINDS, SLOTS, decide
@@ -22,7 +22,7 @@ from agents.seeds import release_seeds
 from agents.store import mechanics
 from envs import DesignProblem, fidelity
 from envs.observation import observe
-from rigdda import BadInput, __version__, check, sites
+from rigdda import BadInput, __version__, sites
 from rigdda.files import atomic
 
 Tick = Callable[[int], None]
@@ -50,12 +50,9 @@ class Terms:
     seed: int
 
     def __post_init__(self) -> None:
-        check.integer("sites", self.sites, 2)
-        if self.sites > len(sites.TRAIN_SEEDS) // 2:
-            mend = f"give a whole number of at most {len(sites.TRAIN_SEEDS) // 2}"
-            raise BadInput("sites", self.sites, mend)
-        check.integer("episodes", self.episodes, 0)
-        check.integer("seed", self.seed, 0)
+        limits.whole("sites", self.sites, 2, len(sites.TRAIN_SEEDS) // 2)
+        limits.whole("episodes", self.episodes, 0, limits.RELEASES)
+        limits.whole("seed", self.seed, 0, limits.SEED)
 
     @property
     def beside(self) -> int:

@@ -251,6 +251,13 @@ def test_a_bad_layout_file_is_one_line(
         (("design", "quick", "--simulations", "1"), ("--simulations", "1", "2")),
         (("simulate", "quick", "--releases", "many"), ("--releases", "many")),
         (("simulate", "quick", "--seed", "-1"), ("--seed", "-1")),
+        (("simulate", "quick", "--releases", 10**9), ("--releases", "1000000000")),
+        (("design", "quick", "--simulations", 10**9), ("--simulations", "1000000000")),
+        (("design", "quick", "--seed", 2**32), ("--seed", "4294967296", "4294967295")),
+        (("train", "--seed", 10**22), ("--seed",)),
+        (("evaluate", "--seed", 2**32), ("--seed", "4294967296")),
+        (("evaluate", "--sites", 10**5), ("sites", "100000", "at most 10000")),
+        (("validate", "--only", ""), ("--only", "''", "free-fall")),
         (("simulate", "quick", "--layout", "none.toml"), ("layout", "none.toml", "existing")),
         (("replay", "none.rrd"), ("none.rrd", "existing")),
         (("replay", "none.npz"), ("none.npz", "existing")),
@@ -261,7 +268,7 @@ def test_a_bad_layout_file_is_one_line(
     ],
 )
 def test_bad_arguments_are_one_line(
-    arguments: tuple[str, ...], named: tuple[str, ...], tmp_path: Path
+    arguments: tuple[object, ...], named: tuple[str, ...], tmp_path: Path
 ) -> None:
     line = refused(*arguments, folder=tmp_path)
     assert all(word in line for word in named), line

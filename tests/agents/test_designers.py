@@ -158,7 +158,9 @@ def test_the_best_so_far_never_rises(valley: Valley) -> None:
 
 
 @pytest.mark.parametrize("name", DESIGNERS)
-@pytest.mark.parametrize("simulations, seed", [(1, 0), (0, 0), (2.5, 0), (8, -1), (8, 0.5)])
+@pytest.mark.parametrize(
+    "simulations, seed", [(1, 0), (2.5, 0), (10**9, 0), (8, -1), (8, 0.5), (8, 2**32)]
+)
 def test_an_unsound_budget_or_seed_is_refused(
     name: str, simulations: float, seed: float, problem: DesignProblem
 ) -> None:

@@ -40,12 +40,18 @@ class Network:
     @property
     def sizes(self) -> list[int]:
         """Numbers that go into the first layer and that come out of each; [] if they do not fit."""
-        sizes = [len(self.mean)]
+        sizes = [self.mean.size]
         for weight, bias in self.layers:
-            if weight.shape != (len(bias), sizes[-1]):
+            if bias.shape != (bias.size,) or weight.shape != (bias.size, sizes[-1]):
                 return []
-            sizes.append(len(bias))
-        return sizes if self.scale.shape == self.mean.shape else []
+            sizes.append(bias.size)
+        return sizes if self.scale.shape == self.mean.shape == (self.mean.size,) else []
+
+    @property
+    def finite(self) -> bool:
+        """Whether all numbers are finite and every feature has a scale above 0."""
+        arrays = [self.mean, self.scale, *(array for layer in self.layers for array in layer)]
+        return all(np.isfinite(array).all() for array in arrays) and bool((self.scale > 0).all())
 
     def __call__(self, features: Floats) -> NDArray[np.float64]:
         """Return the outputs for (F,) features."""
@@ -78,10 +84,14 @@ class Network:
                 count = sum(key.startswith("weight") for key in file.keys())
                 get = file.get_tensor
                 layers = [(get(f"weight {i}"), get(f"bias {i}")) for i in range(count)]
-                return cls(get("mean"), get("scale"), layers, file.metadata() or {})
+                network = cls(get("mean"), get("scale"), layers, file.metadata() or {})
         except (OSError, SafetensorError) as error:
             mend = f"name a file that `rigdda train` wrote ({error})"
             raise BadInput("policy", str(path), mend) from None
+        if not network.finite:
+            mend = "name a file of finite numbers with scales above 0, as `rigdda train` writes"
+            raise BadInput("policy", str(path), mend)
+        return network
 
 
 def scaled(features: Floats, mean: Floats, scale: Floats) -> Floats:

@@ -84,7 +84,7 @@ def load(path: str | os.PathLike[str]) -> Study:
         data = msgspec.toml.decode(file.read_bytes(), type=_StudyFile)
     except msgspec.ValidationError as error:
         raise BadInput("study", str(path), str(error)) from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise BadInput("study", str(path), f"mend its TOML: {error}") from None
     near = file.parent / data.site
     site = Site.load(near if near.suffix == ".toml" else data.site)

@@ -6,6 +6,8 @@ What is made lands in one folder and is taken up again from there: `training.jso
 
 from __future__ import annotations
 
+import zipfile
+import zlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -29,6 +31,9 @@ Tick = Callable[[int], None]
 
 RELEASES = 8
 """Releases of each site on which the policy is compared with the one that it started from."""
+
+ANEW = "this is damaged: remove the training in its folder, or name another folder with --out"
+"""What to do with a training that cannot go on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +83,7 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     Raises
     ------
     BadInput
-        If the folder holds a training on other terms, or torch is not installed.
+        If the folder holds a damaged training or one on other terms, or torch is not installed.
     Diverged
         If a simulation diverges.
     """
@@ -132,14 +137,33 @@ def _notes(terms: Terms) -> dict[str, str]:
 
 
 def _same(terms: Terms, out: Path) -> None:
-    """Write the terms into a folder, or check that they are those of the training in it."""
+    """Write the terms into a folder, or check that a sound training on them is in it."""
     file = out / "training.json"
     asked = asdict(terms) | {"version": __version__, "mechanics": mechanics()}
+    _whole(out / "checkpoint.zip")
     if file.is_file():
-        found = msgspec.json.decode(file.read_bytes())
+        try:
+            found = msgspec.json.decode(file.read_bytes())
+        except (msgspec.DecodeError, RecursionError) as error:
+            raise BadInput("terms", str(file), f"{ANEW} ({error})") from None
         if found != asked:
             mend = f"give the terms of the training in {out} ({found}), or another folder"
             raise BadInput("terms", asked, mend)
         return
     with atomic(file) as part:
         part.write_bytes(msgspec.json.encode(asked))
+
+
+def _whole(checkpoint: Path) -> None:
+    """Check that a trainer's file, if there is one, is not damaged."""
+    try:
+        with zipfile.ZipFile(checkpoint) as archive:
+            lost = archive.testzip() or min(
+                {"data", "policy.pth"} - {*archive.namelist()}, default=""
+            )
+    except FileNotFoundError:
+        return
+    except (OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise BadInput("checkpoint", str(checkpoint), f"{ANEW} ({error})") from None
+    if lost:
+        raise BadInput("checkpoint", str(checkpoint), f"{ANEW} ({lost} in it is damaged)")

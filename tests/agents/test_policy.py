@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors.numpy import save_file
 
 from agents import policy
 from agents.crossings import ensemble
-from agents.features import features, rule_slot
+from agents.features import WIDTH, features, rule_slot
 from agents.network import Network
 from agents.policy import SHIPPED, anchor, decide
 from agents.rule import rule
@@ -127,3 +128,25 @@ def test_a_network_of_another_shape_is_refused(tmp_path):
     network(np.zeros(9), 4).save(tmp_path / "small.safetensors")
     with pytest.raises(BadInput, match="120 features and 9 outputs"):
         policy.load(tmp_path / "small.safetensors")
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"mean": np.float32(0.0)}, "120 features and 9 outputs"),
+        ({"bias": np.float32(0.0)}, "120 features and 9 outputs"),
+        ({"bias": np.full(9, np.nan)}, "finite numbers"),
+        ({"weight": np.full((9, WIDTH), np.inf)}, "finite numbers"),
+        ({"scale": np.zeros(WIDTH)}, "scales above 0"),
+    ],
+)
+def test_a_damaged_network_is_refused(
+    change: dict[str, np.ndarray], words: str, tmp_path: Path
+) -> None:
+    whole = {"mean": np.zeros(WIDTH), "scale": np.ones(WIDTH)}
+    whole |= {"weight": np.zeros((9, WIDTH)), "bias": np.zeros(9)} | change
+    names = {"weight": "weight 0", "bias": "bias 0"}
+    file = tmp_path / "damaged.safetensors"
+    save_file({names.get(k, k): np.array(v, np.float32) for k, v in whole.items()}, file)
+    with pytest.raises(BadInput, match=f"policy = .*damaged.*{words}"):
+        policy.load(file)

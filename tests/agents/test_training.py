@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,36 @@ def test_bad_terms_are_one_line(tmp_path: Path) -> None:
     line = refused("evaluate", "--sites", 0, folder=tmp_path)
     assert "sites" in line and "0" in line
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "name, content",
+    [
+        ("training.json", b"{"),
+        ("training.json", b"\xff"),
+        ("checkpoint.zip", b"no archive"),
+        ("checkpoint.zip", None),
+    ],
+)
+def test_a_damaged_training_is_one_line(name: str, content: bytes | None, tmp_path: Path) -> None:
+    file = tmp_path / name
+    if content is None:  # sound, but of something else
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("data", "x")
+    else:
+        file.write_bytes(content)
+    line = refused("train", *SMALL, "--out", ".", folder=tmp_path)
+    assert name in line and "another folder" in line
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_checkpoint_cut_off_is_one_line(trained: tuple[Path, str], tmp_path: Path) -> None:
+    for name in ("training.json", "checkpoint.zip"):
+        (tmp_path / name).write_bytes((trained[0] / name).read_bytes())
+    file = tmp_path / "checkpoint.zip"
+    file.write_bytes(file.read_bytes()[:-1000])
+    line = refused("train", *SMALL, "--out", ".", folder=tmp_path)
+    assert "checkpoint.zip" in line and "another folder" in line
 
 
 class Toy(ppo.VecEnv):

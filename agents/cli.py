@@ -5,6 +5,7 @@ Start-up imports click only; a command imports what it needs.
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -43,6 +44,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     0: done. 2: bad input. 1: it failed on the way. 130: interrupted. Each but 0 comes with one
     line on standard error.
     """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # names may have letters that the locale lacks
     try:
         return cli.main(argv, prog_name="rigdda", standalone_mode=False) or 0
     except click.Abort:
@@ -114,7 +117,7 @@ def simulate(site: str, layout: str | None, releases: int, seed: int, out: Path 
     where, walls = rigdda.Site.load(site), _layout(layout)
     seeds = range(seed, seed + releases)
     where.realise(walls, seed)  # what cannot be built is said before a folder is made
-    folder = folder_for(out, "simulate", where.name)
+    folder = folder_for(out, f"simulate-{where.name}", "outcomes.csv", "run.npz", "profile.png")
     with kept(folder), progress(releases) as tick:
         run, outcomes = job.simulate(where, walls, seeds, tick)
     tables.write_outcomes(folder / "outcomes.csv", seeds, outcomes)
@@ -148,7 +151,7 @@ def design(
     from rigdda.barriers import describe
 
     problem = DesignProblem(site)
-    folder = folder_for(out, "design", problem.site.name)
+    folder = folder_for(out, f"design-{problem.site.name}", *job.files(designer))
     with kept(folder):
         with progress(simulations + CASES * verify) as tick:
             done, store = job.study(problem, designer, simulations, seed, verify, folder, tick)
@@ -180,7 +183,7 @@ def calibrate(site: str, releases: int, seed: int, out: Path | None) -> None:
 
     where = rigdda.Site.load(site)
     total = 2 * releases * len(job.layouts(where))
-    folder = folder_for(out, "calibrate", where.name)
+    folder = folder_for(out, f"calibrate-{where.name}", "calibrate.csv")
     with kept(folder), progress(total) as tick:
         found = job.calibrate(where, releases, seed, tick)
     job.write(folder / "calibrate.csv", where, found)
@@ -214,7 +217,7 @@ def replay(target: str, layout: str | None, seed: int, out: Path | None) -> None
     where = rigdda.Site.load(target)
     walls = _layout(layout)
     where.realise(walls, seed)
-    folder = folder_for(out, "replay", where.name)
+    folder = folder_for(out, f"replay-{where.name}", "episode.rrd")
     with kept(folder):
         run, outcome = rigdda.release(where, walls, seed, progress=sys.stderr.isatty())
     notes = {"seed": str(seed), "past the road's edge": f"{outcome.debris_fraction:.1%}"}

@@ -26,7 +26,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
     from agents import studies
 
     asked = studies.load(file)
-    folder = folder_for(out, "study", Path(file).stem)
+    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
     with kept(folder), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
     show(studies.table(asked, folder / "study.csv"))
@@ -48,8 +48,7 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
     from agents import training
 
     terms = training.Terms(sites, episodes, seed)
-    folder = out or Path("runs/train")
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = folder_for(out, "train", *training.FILES)
     with kept(folder), progress(terms.episodes) as tick:
         trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
     click.echo(
@@ -90,8 +89,7 @@ def evaluate(
     if policy is not None:
         designers["policy"] = using(load(policy))
     posed = exam.unseen(sites)
-    folder = out or Path("runs/evaluate")
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = folder_for(out, "evaluate", "evaluations.jsonl", "scores.csv")
     store = Store(folder / "evaluations.jsonl")
     with kept(folder), progress(len(posed) * len(designers)) as tick:
         scores = exam.sit(posed, designers, simulations, verify, seed, store, tick)
@@ -107,10 +105,8 @@ def evaluate(
               help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
 @click.option("--slow", is_flag=True, help="Run the cases that take long as well.")
 @seed_option("Seed of the random shapes, speeds and offsets.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path),
-              default=Path("runs/validate"), show_default=True,
-              help="Folder to write into.")  # fmt: skip
-def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path) -> None:
+@out_option("validate")
+def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path | None) -> None:
     """Compare computed motions with closed forms, and the observed order of convergence.
 
     Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
@@ -119,13 +115,13 @@ def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path) -> None:
     from agents import accuracy
 
     cases = accuracy.choose(only, slow)
-    out.mkdir(parents=True, exist_ok=True)
-    with kept(out), progress(accuracy.runs(cases)) as tick:
-        results, studies = accuracy.validate(cases, seed, out, tick)
+    folder = folder_for(out, "validate", "validate.csv", "convergence.csv")
+    with kept(folder), progress(accuracy.runs(cases)) as tick:
+        results, studies = accuracy.validate(cases, seed, folder, tick)
     show(accuracy.table(results))
     if studies:
         show(accuracy.convergence_table(studies))
     missed = [f"{r.case} ({r.check.quantity})" for r in results if not r.passed]
     if missed:
         raise Stopped(f"{len(missed)} of {len(results)} miss their bars: {', '.join(missed)}", 1)
-    click.echo(f"{len(results)} figures within their bars; the tables are in {out}")
+    click.echo(f"{len(results)} figures within their bars; the tables are in {folder}")

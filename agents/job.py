@@ -116,6 +116,13 @@ def study(
     return Study(problem, result, tuple(cases)), store
 
 
+def files(name: str) -> tuple[str, ...]:
+    """Return the names of what `study` and `write` leave for a designer."""
+    found = ("evaluations.csv", "evaluations.jsonl", "layout.toml", "profile.png", "search.png")
+    front = ("front.csv", "front.png") if name == "pareto" else ()
+    return (*found, "episode.rrd", *front)
+
+
 def _cases(
     problem: DesignProblem, name: str, result: DesignResult, simulations: int, seed: int
 ) -> list[tuple[str, Layout]]:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
+import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +15,12 @@ import click
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
+"""What cannot be in the name of a folder on some system."""
+
+LONGEST = 200
+"""Bytes of the name of a folder; systems take 255."""
 
 
 class Stopped(Exception):
@@ -27,26 +37,58 @@ def fail(message: str, code: int) -> int:
     return code
 
 
-def folder_for(out: Path | None, command: str, site: str) -> Path:
-    """Return the folder to write into, which exists."""
-    folder = out or Path("runs") / f"{command}-{site}"
-    folder.mkdir(parents=True, exist_ok=True)
+def folder_for(out: Path | None, name: str, *files: str) -> Path:
+    """Return the folder to write files into, which exists: `out`, or the one in runs/ of a name.
+
+    Raises
+    ------
+    BadInput
+        If it cannot be made or written into, or something is in the way of a file.
+    """
+    from rigdda import BadInput
+
+    folder = out or Path("runs") / _part(name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        mend = f"name a folder that can be made and written into ({error.strerror})"
+        raise BadInput("--out", str(folder), mend) from None
+    for file in (folder / name for name in files):
+        if file.exists() and not (file.is_file() and os.access(file, os.W_OK)):
+            mend = "no file can be written there: move it away or name another folder"
+            raise BadInput("--out", str(file), mend)
     return folder
+
+
+def _part(name: str) -> str:
+    """Return a name, of a site for example, as one part of a path: no separators, not too long."""
+    coding = sys.getfilesystemencoding()
+    known = name.encode(coding, "replace").decode(coding)
+    return FORBIDDEN.sub("-", known).encode(coding)[:LONGEST].decode(coding, "ignore")
 
 
 @contextmanager
 def kept(folder: Path) -> Iterator[None]:
-    """Say what is left in the folder if a simulation diverges or the user interrupts."""
+    """Say what this run leaves in the folder if a simulation diverges or the user interrupts."""
     from rigdda import Diverged
 
+    before = _stamps(folder)
     try:
         yield
     except (Diverged, KeyboardInterrupt) as error:
         if isinstance(error, Diverged) and error.run is not None:
             error.run.save(folder / "diverged.npz")
-        names = ", ".join(sorted(file.name for file in folder.iterdir())) or "nothing"
+        written = {name for name, _ in _stamps(folder) - before}
         reason, code = ("interrupted", 130) if isinstance(error, KeyboardInterrupt) else (error, 1)
+        names = ", ".join(sorted(written)) or "nothing"
         raise Stopped(f"{reason}; kept in {folder}: {names}", code) from None
+
+
+def _stamps(folder: Path) -> set[tuple[str, tuple[int, int, int]]]:
+    """Return the names in a folder, each with what changes when it is written."""
+    found = ((file.name, file.lstat()) for file in folder.iterdir())
+    return {(name, (s.st_ino, s.st_size, s.st_mtime_ns)) for name, s in found}
 
 
 @contextmanager

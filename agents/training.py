@@ -32,6 +32,9 @@ Tick = Callable[[int], None]
 RELEASES = 8
 """Releases of each site on which the policy is compared with the one that it started from."""
 
+FILES = ("training.json", "checkpoint.zip", "policy.safetensors")
+"""What a training leaves in its folder, beside the logs."""
+
 ANEW = "this is damaged: remove the training in its folder, or name another folder with --out"
 """What to do with a training that cannot go on."""
 

@@ -9,7 +9,9 @@ import pytest
 
 import rigdda
 from agents import cli
+from agents.terminal import Stopped, folder_for, kept
 from rigdda import Diverged, Run, Site
+from rigdda.files import atomic
 
 
 @pytest.fixture
@@ -77,12 +79,75 @@ def test_a_fault_of_the_programme_is_not_called_bad_input(
         cli.main(["simulate", str(chute), "--layout", "x"])
 
 
+@pytest.mark.parametrize("out", ["chute.toml/o", "/proc/nowhere/o", "long" * 100])
 def test_a_folder_that_cannot_be_written_is_one_line(
-    chute: Path, capsys: pytest.CaptureFixture[str]
+    out: str, chute: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["simulate", str(chute), "--out", "chute.toml/o"]) == 2
+    assert cli.main(["simulate", str(chute), "--out", out]) == 2
     err = capsys.readouterr().err
-    assert err.count("\n") == 1 and "chute.toml" in err
+    assert err.count("\n") == 1 and "--out = " in err and "name a folder" in err
+
+
+@pytest.mark.parametrize(
+    "command, file",
+    [
+        (("simulate", "chute.toml"), "outcomes.csv"),
+        (("simulate", "chute.toml"), "run.npz"),
+        (("design", "chute.toml"), "layout.toml"),
+        (("design", "chute.toml", "--designer", "pareto"), "front.csv"),
+        (("calibrate", "chute.toml"), "calibrate.csv"),
+        (("replay", "chute.toml"), "episode.rrd"),
+        (("study", "study.toml"), "study.csv"),
+        (("train",), "policy.safetensors"),
+        (("evaluate",), "evaluations.jsonl"),
+        (("validate",), "validate.csv"),
+    ],
+)
+def test_what_is_in_the_way_of_a_file_is_said_before_any_computing(
+    command: tuple[str, ...],
+    file: str,
+    chute: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("study.toml").write_text('site = "chute.toml"\n[[layouts]]\nname = "nothing"\n')
+    (Path("o") / file).mkdir(parents=True)
+    for name in ("release", "release_outcome", "release_many"):
+        monkeypatch.delattr(rigdda, name)
+    assert cli.main([*command, "--out", "o"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and f"--out = 'o/{file}'" in err and "another folder" in err
+    assert [path.name for path in Path("o").iterdir()] == [file]
+
+
+@pytest.mark.parametrize(
+    "name, folder",
+    [
+        ("a plain one-2 (größer)", "replay-a plain one-2 (größer)"),
+        ("../../evil/x", "replay-..-..-evil-x"),
+        ("a\0b\nc\\d", "replay-a-b-c-d"),
+        (300 * "ö", "replay-" + 96 * "ö"),
+    ],
+)
+def test_the_folder_of_a_site_is_in_runs_whatever_its_name(
+    name: str, folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert folder_for(None, f"replay-{name}") == Path("runs") / folder
+    assert [path.name for path in Path("runs").iterdir()] == [folder]
+
+
+def test_only_what_a_run_has_written_is_said_to_be_kept(tmp_path: Path) -> None:
+    for name in ("outcomes.csv", "evaluations.jsonl", "same.csv"):
+        (tmp_path / name).write_text("former\n")
+    with pytest.raises(Stopped, match=r"kept in .*: evaluations\.jsonl, new\.csv, same\.csv$"):
+        with kept(tmp_path):
+            (tmp_path / "new.csv").touch()
+            with (tmp_path / "evaluations.jsonl").open("a") as file:
+                file.write("more\n")
+            with atomic(tmp_path / "same.csv") as part:
+                part.write_text("former\n")
+            raise KeyboardInterrupt
 
 
 def test_replay_opens_recordings_and_converts_runs(

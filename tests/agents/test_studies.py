@@ -60,6 +60,17 @@ def test_a_study_is_one_row_a_layout_and_release(folder: Path, site: Site) -> No
     assert all(name in words for name in names)
 
 
+def test_names_are_written_whatever_the_locale(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = STUDY.replace('"one"', '"größer"').replace("releases = 6", "releases = 1")
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    for name, value in {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}.items():
+        monkeypatch.setenv(name, value)
+    assert "gr??er" in run("study", "study.toml", "--out", "o", folder=folder)
+    assert "größer,0" in (folder / "o/study.csv").read_text(encoding="utf-8")
+
+
 def test_a_killed_study_goes_on_and_ends_the_same(folder: Path) -> None:
     whole = run("study", "study.toml", "--out", "o", folder=folder)
     text = (folder / "study.toml").read_text()

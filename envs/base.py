@@ -78,6 +78,7 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         self._answer: Answer | None = None  # the last one
         self._stages: list[Evaluation] = []  # without barriers, then after each step
         self.open = False
+        self._wanted: bool | None = None  # whether the episode is to be recorded, once asked
         self._shown: Run | None = None
 
     def _pose(self, site: str | os.PathLike[str] | Site) -> DesignProblem:
@@ -130,7 +131,7 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
     def tell_reset(self, answer: Answer) -> tuple[Observation, Info]:
         """Start the episode; return its first observation and info."""
         self._slots = self._asked = np.zeros(0)
-        self._stages, self.open = [answer.evaluation], True
+        self._stages, self.open, self._wanted = [answer.evaluation], True, None
         return self._show(answer)
 
     def ask_step(self, action: Action) -> Ask | None:
@@ -143,6 +144,8 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         numbers = encoding.vector("action", action, self.width)
         slots = np.concatenate([self._slots, numbers])
         layout = self._layout(slots)
+        if self.recorder and self._wanted is None:  # if that raises, nothing is lost
+            self._wanted = self.recorder.wants(self._episode)
         self._asked = slots
         if layout == self._stages[-1].layout:
             return None
@@ -170,10 +173,16 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         return seen, reward, terminated, False, info
 
     def _end(self) -> None:
-        """End the episode; write its replay if that is wanted."""
+        """End the episode; write its replay if that is wanted.
+
+        A replay that cannot be written, to a full disk for example, does not cost the step.
+        """
         self.open = False
-        if self.recorder and self.recorder.wants(self._episode):
-            self._record(self.recorder)
+        if self.recorder and self._wanted:
+            try:
+                self._record(self.recorder)
+            except OSError as error:
+                gymnasium.logger.warn(f"no replay of episode {self._episode}: {error}")
         self._episode += 1
 
     def _cut_off(self) -> None:

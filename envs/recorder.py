@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,7 @@ class Recorder:
     Raises
     ------
     BadInput
-        If the folder is a file or the trigger cannot be called.
+        If the folder is a file or cannot be made, or the trigger cannot be called.
     """
 
     folder: Path
@@ -39,8 +40,7 @@ class Recorder:
     def __init__(self, folder: str | os.PathLike[str], trigger: Trigger | None = None):
         if not isinstance(folder, str | os.PathLike):
             raise BadInput("record", folder, "name a folder or give None")
-        if Path(folder).exists() and not Path(folder).is_dir():
-            raise BadInput("record", str(folder), "name a folder, not a file")
+        _check_room(Path(folder))
         if trigger is not None and not callable(trigger):
             raise BadInput("record_trigger", trigger, "give a function of the episode's number")
         object.__setattr__(self, "folder", Path(folder))
@@ -110,6 +110,16 @@ class Recorder:
 
     def _path(self, episode: int) -> Path:
         return self.folder / f"episode-{episode:06d}.rrd"
+
+
+def _check_room(folder: Path) -> None:
+    """Check that a folder can be made and written into; it is made when it is needed."""
+    try:
+        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        tempfile.TemporaryDirectory(dir=there).cleanup()
+    except OSError as error:
+        mend = f"name a folder that can be made and written into ({error.strerror})"
+        raise BadInput("record", str(folder), mend) from None
 
 
 def _seed(end: Evaluation) -> str:

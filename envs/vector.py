@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,6 +17,7 @@ from envs.base import BarrierEnv, Info, Step
 from envs.design import BarrierDesign
 from envs.observation import Observation
 from envs.placement import BarrierPlacement
+from envs.recorder import Recorder
 from envs.trial import simulate
 from rigdda import BadInput, check
 
@@ -65,7 +65,8 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         if max_episode_steps is not None:
             check.integer("max_episode_steps", max_episode_steps, 1)
         self.limit = max_episode_steps
-        folders = [None if record is None else Path(record) / f"copy-{i}" for i in range(num_envs)]
+        folder = None if record is None else Recorder(record).folder
+        folders = [folder and folder / f"copy-{i}" for i in range(num_envs)]
         self.copies = [self.single(record=folder, **keywords) for folder in folders]
         first = self.copies[0]
         self.render_mode = first.render_mode
@@ -107,21 +108,33 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
 
     def start(self, seed: int | Sequence[int | None] | None = None) -> list[Start]:
         """Start an episode in every copy; return what each says."""
-        seeds = [seed] * self.num_envs if seed is None else seed
-        if isinstance(seeds, int | np.integer):
-            seeds = [int(seeds) + i for i in range(self.num_envs)]
-        if len(seeds) != self.num_envs:
-            raise BadInput("seed", seed, f"give one number, or {self.num_envs}, one a copy")
+        seeds = self._seeds(seed)
         self._elapsed[:] = 0
         return _restart(self.copies, seeds)
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        """Return the seed of every copy, None for one that goes on with its random numbers."""
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            first = check.integer("seed", seed, 0)
+            return [first + i for i in range(self.num_envs)]
+        if _rows(seed) != self.num_envs:
+            raise BadInput("seed", seed, f"give one number, or {self.num_envs}, one a copy")
+        return [
+            None if one is None else check.integer(f"seed[{i}]", one, 0)
+            for i, one in enumerate(seed)
+        ]
 
     def advance(self, actions: NDArray[np.float32]) -> list[tuple[Step, Start | None]]:
         """Take a step in every copy; return what each says, and the start of its next episode.
 
         The second is None where the episode goes on.
         """
-        if len(actions) != self.num_envs:
-            raise BadInput("actions", f"{len(actions)} rows", f"give {self.num_envs}, one a copy")
+        given = _rows(actions)
+        if given != self.num_envs:
+            found = actions if given is None else f"{given} rows"
+            raise BadInput("actions", found, f"give {self.num_envs} rows, one a copy")
         if not all(copy.open for copy in self.copies):
             raise ResetNeeded("call reset() before the first step")
         width = self.copies[0].width
@@ -157,6 +170,14 @@ class BarrierPlacementVector(BarrierVector):
     """Copies of `BarrierPlacement`."""
 
     single = BarrierPlacement
+
+
+def _rows(values: Any) -> int | None:
+    """Return the length of what should have one entry a copy, None if it has none."""
+    try:
+        return len(values)
+    except TypeError:
+        return None
 
 
 def _restart(copies: Sequence[BarrierEnv], seeds: Sequence[int | None]) -> list[Start]:

@@ -75,9 +75,19 @@ def test_bad_input_is_refused_and_changes_nothing(ramp: Site) -> None:
     actions = np.zeros((COPIES, 3), np.float32)
     with pytest.raises(ResetNeeded):
         env.step(actions)
-    with pytest.raises(BadInput, match=r"seed = \[1, 2\]: give one number, or 3"):
-        env.reset(seed=[1, 2])
-    env.reset(seed=[4, 5, 6])
+    for seed in ([1, 2], 1.5, (x for x in "abc"), np.array(1.5), "ab"):
+        with pytest.raises(BadInput, match=r"seed = .*: give one number, or 3"):
+            env.reset(seed=seed)
+    for seed in (-1, True, [4, 5, -1], "abc", [4, 5, 0.5]):
+        with pytest.raises(BadInput, match=r"seed(\[\d\])? = .*: give a whole number"):
+            env.reset(seed=seed)
+    env.reset(seed=np.array([4, 5, 6]))
+    for nothing in (None, 5, np.float32(0.0), (row for row in actions)):
+        with pytest.raises(BadInput, match=r"actions = .*: give 3 rows"):
+            env.step(nothing)
+    for unsound in ("abc", {0: 0, 1: 1, 2: 2}, [[0.0] * 3, [0.0], None]):
+        with pytest.raises(BadInput, match=r"actions\[\d\]"):
+            env.step(unsound)
     with pytest.raises(BadInput, match=r"shape of actions\[0\] = \(2,\)"):
         env.step(actions[:, :2])
     with pytest.raises(BadInput, match="actions = '2 rows': give 3"):
@@ -103,6 +113,16 @@ def test_every_copy_has_a_folder_for_its_replays(ramp: Site, tmp_path: Any) -> N
     env.step(np.zeros(env.action_space.shape, np.float32))
     found = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.rrd"))
     assert found == [f"copy-{i}/episode-000000.rrd" for i in range(COPIES)]
+
+
+@pytest.mark.parametrize("record", [5, "file", "file/deeper"])
+def test_a_folder_for_replays_that_cannot_be_made_is_refused(
+    record: Any, ramp: Site, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    with pytest.raises(BadInput, match=r"record = .*: name a folder"):
+        batch("rigdda/BarrierDesign-v0", ramp, record=record)
 
 
 def test_the_bridge_says_what_the_batch_says(ramp: Site) -> None:

@@ -13,7 +13,7 @@ import rigdda
 from envs import DesignProblem
 from envs.design import BarrierDesign
 from envs.placement import BarrierPlacement
-from rigdda import Site
+from rigdda import BadInput, Site
 from rigdda.barriers import describe
 
 ACTION = np.array([0.2, -0.4, -0.3], dtype=np.float32)
@@ -84,6 +84,44 @@ def test_the_trigger_chooses_episodes(ramp: Site, tmp_path: Path) -> None:
         env.step(ACTION)
     assert asked == [0, 1, 2, 3]
     assert sorted(os.listdir(tmp_path)) == ["episode-000001.rrd", "episode-000003.rrd"]
+
+
+def test_a_trigger_that_raises_costs_no_step(ramp: Site, tmp_path: Path) -> None:
+    left = ["soon"]
+
+    def trigger(episode: int) -> bool:
+        if left:
+            raise RuntimeError(left.pop())
+        return episode == 0
+
+    terms = {"max_barriers": 1, "releases": 1}
+    env = BarrierDesign(ramp, **terms, record=tmp_path, record_trigger=trigger)
+    plain = BarrierDesign(ramp, **terms)
+    env.reset(seed=3), plain.reset(seed=3)
+    with pytest.raises(RuntimeError, match="soon"):
+        env.step(ACTION)
+    assert env.step(ACTION)[1:] == plain.step(ACTION)[1:]
+    assert os.listdir(tmp_path) == ["episode-000000.rrd"]
+
+
+def test_a_replay_that_cannot_be_written_costs_no_step(ramp: Site, tmp_path: Path) -> None:
+    env = BarrierDesign(ramp, max_barriers=1, releases=1, record=tmp_path / "replays")
+    plain = BarrierDesign(ramp, max_barriers=1, releases=1)
+    env.reset(seed=3), plain.reset(seed=3)
+    (tmp_path / "replays").touch()
+    with pytest.warns(UserWarning, match="no replay of episode 0"):
+        found = env.step(ACTION)
+    assert found[1:] == plain.step(ACTION)[1:]
+    (tmp_path / "replays").unlink()
+    env.reset()
+    env.step(ACTION)
+    assert os.listdir(tmp_path / "replays") == ["episode-000001.rrd"]
+
+
+@pytest.mark.parametrize("folder", ["/proc/nowhere/o", __file__, f"{__file__}/o"])
+def test_a_folder_that_cannot_be_made_is_refused(folder: str, ramp: Site) -> None:
+    with pytest.raises(BadInput, match=r"record = .*: name a folder"):
+        BarrierDesign(ramp, record=folder)
 
 
 def test_an_episode_without_barriers_is_recorded(ramp: Site, tmp_path: Path) -> None:

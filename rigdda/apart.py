@@ -1,8 +1,9 @@
-"""Blocks that start deep in one another: refused, since no way out of it is the right one."""
+"""Blocks that start deep in one another or in the ground: refused, no way out is the right one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -13,7 +14,15 @@ from rigdda.geometry import overlap
 
 MOST_SHARED = 0.01
 """Share of the smaller of two blocks that may be in the other one at the start [-]: that is pushed
-out; blocks deeper in one another may stay wedged so, or part where no one expects it."""
+out; blocks deeper in one another may stay wedged so, or part where no one expects it. The same of a
+block in the ground or in a barrier."""
+
+
+class Sunk(NamedTuple):
+    """The place of a block in a list, and its area that is in something else [m2]."""
+
+    block: int
+    shared: float
 
 
 def check_apart(outlines: Sequence[NDArray[np.float64]], fixed: Sequence[bool]) -> None:
@@ -47,3 +56,25 @@ def check_apart(outlines: Sequence[NDArray[np.float64]], fixed: Sequence[bool]) 
                 outlines[j[k]].tolist(),
                 f"move it: {shared:.3g} m2 of it are in block {i[k]}",
             )
+
+
+def deepest(solid: shapely.Polygon, outlines: Sequence[NDArray[np.float64]]) -> Sunk | None:
+    """Return the first block of which more than a hundredth is in a solid, None if none is.
+
+    Parameters
+    ----------
+    solid : shapely.Polygon
+        The ground or a barrier.
+    outlines : sequence of (n, 2) arrays
+        Corners of the blocks [m].
+    """
+    polygons = shapely.polygons([shapely.linearrings(corners) for corners in outlines])
+    near = np.flatnonzero(shapely.intersects(solid, polygons))
+    most = MOST_SHARED * shapely.area(polygons)
+    shared = shapely.area(shapely.intersection(solid, polygons[near]))
+    # as above: what the quick way finds is looked at again
+    for k in near[shared > most[near]]:
+        sure = overlap(solid, polygons[k])
+        if sure > most[k]:
+            return Sunk(int(k), sure)
+    return None

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigdda.errors import BadInput
+
+LARGEST = 1e15
+"""Greatest size of a number that is taken for meant: no quantity in SI units of a slope comes near
+it, and products of such numbers stay finite."""
 
 
 def number(
@@ -20,27 +25,117 @@ def number(
     *,
     open_low: bool = False,
 ) -> float:
-    """Return `value` as a finite float in [low, high], or (low, high] with `open_low`.
+    """Return `value` as a float in [low, high], or (low, high] with `open_low`.
 
     Raises
     ------
     BadInput
-        If it is not a number, not finite or outside the interval.
+        If it is not a number, not finite, beyond `LARGEST` or outside the interval.
     """
     try:
         out = float(value)
     except (TypeError, ValueError):
         raise BadInput(field, value, "give a number") from None
+    except OverflowError:
+        out = math.inf
     if isinstance(value, str | bytes):
         raise BadInput(field, value, "give a number, not a text")
     if not math.isfinite(out):
         raise BadInput(field, value, "give a finite number")
+    if abs(out) > LARGEST:
+        raise BadInput(field, value, f"give a number of at most {LARGEST:g} in size")
     if out < low or out > high or (open_low and out == low):
         bounds = f"above {low:g}" if open_low else f"of at least {low:g}"
         if math.isfinite(high):
             bounds += f" and at most {high:g}"
         raise BadInput(field, value, f"give a number {bounds}")
     return out
+
+
+def set_number(
+    record: object,
+    name: str,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    open_low: bool = False,
+    field: str = "",
+) -> None:
+    """Set a field of a frozen dataclass or struct to its value as a float, see `number`.
+
+    `field` is what an error calls it, `name` by default. A whole number or one of numpy's in its
+    place would be another type to the kernels, which would be compiled again, and to files.
+    """
+    value = number(field or name, getattr(record, name), low, high, open_low=open_low)
+    _set(record, name, value)
+
+
+def _set(record: object, name: str, value: Any) -> None:
+    if isinstance(record, msgspec.Struct):
+        msgspec.structs.force_setattr(record, name, value)
+    else:
+        object.__setattr__(record, name, value)
+
+
+def set_booleans(record: object, *names: str) -> None:
+    """Set fields of a frozen dataclass, each to its value as a bool.
+
+    Raises
+    ------
+    BadInput
+        If one is neither True nor False.
+    """
+    for name in names:
+        value = getattr(record, name)
+        if not isinstance(value, bool | np.bool_):
+            raise BadInput(name, value, "give True or False")
+        _set(record, name, bool(value))
+
+
+def set_integers(what: str, record: object, *names: str) -> None:
+    """Set fields of a frozen dataclass, each to its value as a whole number of at least 0.
+
+    Raises
+    ------
+    BadInput
+        If one is not such a number.
+    """
+    for name in names:
+        _set(record, name, integer(f"{what}: {name}", getattr(record, name), 0))
+
+
+def sequence(field: str, value: Any, kind: Any, what: str) -> tuple[Any, ...]:
+    """Return `value` as a tuple of members of a class or union of classes, `what` in words.
+
+    Raises
+    ------
+    BadInput
+        If it cannot be walked through, or a member is something else.
+    """
+    try:
+        members = tuple(value)
+    except TypeError:
+        raise BadInput(field, value, f"give a sequence of {what}") from None
+    for i, member in enumerate(members):
+        if not isinstance(member, kind):
+            raise BadInput(f"{field}[{i}]", member, f"give {what} only")
+    return members
+
+
+def mapping(field: str, value: Any, kind: type, what: str) -> dict[Any, Any]:
+    """Return `value` as a dict to members of a class, `what` in words.
+
+    Raises
+    ------
+    BadInput
+        If it is no mapping, or a member is something else.
+    """
+    if not isinstance(value, Mapping):
+        raise BadInput(field, value, f"give a mapping of names to {what}")
+    for name, member in value.items():
+        if not isinstance(member, kind):
+            raise BadInput(f"{field}[{name!r}]", member, f"give {what} only")
+    return dict(value)
 
 
 def integer(field: str, value: Any, low: int) -> int:
@@ -93,7 +188,7 @@ def points(field: str, value: ArrayLike, least: int) -> NDArray[np.float64]:
     """
     try:
         array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise BadInput(field, value, "give a list of (x, y) pairs") from None
     if array.ndim != 2 or array.shape[1] != 2:
         raise BadInput(field, array.shape, "give a list of (x, y) pairs, shape (n, 2)")
@@ -102,6 +197,10 @@ def points(field: str, value: ArrayLike, least: int) -> NDArray[np.float64]:
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if bad.size:
         raise BadInput(f"{field}[{bad[0]}]", array[bad[0]].tolist(), "give finite coordinates")
+    far = np.flatnonzero((np.abs(array) > LARGEST).any(axis=1))
+    if far.size:
+        mend = f"give coordinates of at most {LARGEST:g} in size"
+        raise BadInput(f"{field}[{far[0]}]", array[far[0]].tolist(), mend)
     array.setflags(write=False)
     return array
 

@@ -53,7 +53,7 @@ class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         check.number("joint set: dip_deg", self.dip_deg, -90.0, 90.0)
-        check.number("joint set: spacing", self.spacing, 0.0, open_low=True)
+        check.number("joint set: spacing", self.spacing, 1e-3, 1e3)
         check.number("joint set: scatter", self.scatter, 0.0, 0.4)
         check.number("joint set: persistence", self.persistence, 0.0, 1.0, open_low=True)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.errors import BadInput
@@ -34,7 +34,7 @@ class Toppling(NamedTuple):
 
 
 def toppling(
-    heights: ArrayLike,
+    heights: Sequence[float],
     width: float,
     step: float,
     dip_deg: float,
@@ -57,7 +57,7 @@ def toppling(
 
     Parameters
     ----------
-    heights : (N,) array_like
+    heights : sequence of float
         Heights of the columns from the toe upwards [m].
     width : float
         Width of each column along the base [m].
@@ -75,11 +75,12 @@ def toppling(
     BadInput
         If a value is outside its range.
     """
-    y = np.asarray(heights, dtype=np.float64)
-    if y.ndim != 1 or not len(y) or not (y > step).all():
-        raise BadInput("heights", y.tolist(), "give one height a column, each above the step")
-    check.number("width", width, 0.0, open_low=True)
     check.number("step", step, 0.0)
+    given = check.sequence("heights", heights, object, "numbers")
+    y = np.array([check.number("heights", height, step, open_low=True) for height in given])
+    if not len(y):
+        raise BadInput("heights", heights, "give one height a column, each above the step")
+    check.number("width", width, 0.0, open_low=True)
     check.number("dip_deg", dip_deg, 0.0, 89.9)
     check.number("friction_deg", friction_deg, 0.0, 44.9)
     check.number("unit_weight", unit_weight, 0.0, open_low=True)
@@ -106,25 +107,6 @@ def _mode(topple: float, slide: float) -> str:
     if max(topple, slide) <= 0.0:
         return "stable"
     return "toppling" if topple > slide else "sliding"
-
-
-def bolt_force(state: Toppling, friction_deg: float, angle_deg: float) -> float:
-    """Return the tension of a bolt in the toe block [N] that holds a slope against sliding.
-
-    T = P_0 (1 - tan^2 phi)/(cos d + tan phi sin d) for a bolt that dips by d into the base
-    (Goodman and Bray 1976); a horizontal bolt has d = alpha.
-
-    Parameters
-    ----------
-    state : Toppling
-        The slope without the bolt.
-    friction_deg : float
-        Friction angle phi [deg].
-    angle_deg : float
-        Angle d between the bolt and the base [deg].
-    """
-    tan, angle = math.tan(math.radians(friction_deg)), math.radians(angle_deg)
-    return float(state.force[0] * (1.0 - tan * tan) / (math.cos(angle) + tan * math.sin(angle)))
 
 
 def columns(crest: int, above: int, rise: float, fall: float, step: float) -> list[float]:

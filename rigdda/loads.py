@@ -36,7 +36,7 @@ class PointLoad:
     force: tuple[float, float]
 
     def __post_init__(self) -> None:
-        check.integer("point load: block", self.block, 0)
+        check.set_integers("point load", self, "block")
         check.set_vectors("point load", self, "point", "force")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
@@ -69,7 +69,7 @@ class LineLoad:
     force_per_length: tuple[float, float]
 
     def __post_init__(self) -> None:
-        check.integer("line load: block", self.block, 0)
+        check.set_integers("line load", self, "block")
         check.set_vectors("line load", self, "start", "end", "force_per_length")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
@@ -100,7 +100,7 @@ class BodyForce:
     force_per_area: tuple[float, float]
 
     def __post_init__(self) -> None:
-        check.integer("body force: block", self.block, 0)
+        check.set_integers("body force", self, "block")
         check.set_vectors("body force", self, "force_per_area")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:

@@ -56,5 +56,6 @@ def _simulate(
     site: Site, layout: Sequence[Barrier], seed: int, every: float, progress: bool = False
 ) -> Run:
     scene = site.realise(layout, seed)
-    simulation = Simulation(scene, site.settings(), stations(site, layout), watch(site))
+    lines = stations(site, scene.barriers)  # not of `layout`, which may be walked through once only
+    simulation = Simulation(scene, site.settings(), lines, watch(site))
     return simulation.run(site.motion.duration, every, progress)

@@ -78,6 +78,28 @@ class Run:
     watch_energy: NDArray[np.float64]
     barrier_poses: NDArray[np.float64]
 
+    def _check(self) -> None:
+        """Check that every array is of its shape and finite, and that times rise."""
+        t, n, b = self.times.size, len(self.scene.blocks), len(self.scene.barriers)
+        shapes = {
+            "times": (t,),
+            "poses": (t, n, 3),
+            "velocities": (t, n, 3),
+            "events": self.events.shape[:1],
+            "absorbed": (b,),
+            "watch_energy": (n,),
+            "barrier_poses": (t, b, 3),
+        }
+        for name, shape in shapes.items():
+            array = getattr(self, name)
+            if array.shape != shape:
+                raise BadInput(f"run file: {name}", array.shape, f"give an array of shape {shape}")
+            wanted = EVENT if name == "events" else np.dtype(float)
+            if array.dtype != wanted or (name != "events" and not np.isfinite(array).all()):
+                raise BadInput(f"run file: {name}", str(array.dtype), "give finite numbers")
+        if t == 0 or (np.diff(self.times) <= 0.0).any():
+            raise BadInput("run file: times", f"{t} frames", "give times that rise")
+
     def hits(self, barrier: int) -> NDArray[np.void]:
         """Return the events in which a block hits `barrier`."""
         return self._of(HIT, barrier)
@@ -131,12 +153,15 @@ class Run:
             with np.load(path) as stored:
                 data = {name: stored[name] for name in stored.files}
             scene = scene_from_json(data.pop("scene").tobytes())
-            return cls(scene=scene, **data)
+            run = cls(scene=scene, **data)
         except (
-            KeyError, ValueError, TypeError, EOFError, OSError, zlib.error,
-            zipfile.BadZipFile, msgspec.MsgspecError,
+            KeyError, ValueError, TypeError, AttributeError, EOFError, OSError,
+            NotImplementedError, RecursionError, zlib.error, zipfile.BadZipFile,
+            msgspec.MsgspecError,
         ):  # fmt: skip
             raise BadInput("run file", str(path), "name a .npz file that Run.save wrote") from None
+        run._check()
+        return run
 
     def to_rerun(self, path: str | os.PathLike[str], marks: Marks | None = None) -> None:
         """Write the run as a rerun recording (.rrd): geometry once, poses and scalars by column.

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.validation import explain_validity
 
 from rigdda import check
-from rigdda.apart import check_apart
+from rigdda.apart import check_apart, deepest
 from rigdda.barriers import Barrier, Earthwork, GravityWall, Layout, Wall, earthworks
 from rigdda.errors import BadInput
 from rigdda.geometry import edges, is_convex
@@ -51,11 +51,11 @@ class Surface:
     restitution: float | None = 0.0
 
     def __post_init__(self) -> None:
-        check.number("friction_deg", self.friction_deg, 0.0, 89.9)
-        check.number("cohesion", self.cohesion, 0.0)
-        check.number("tension", self.tension, 0.0)
+        check.set_number(self, "friction_deg", 0.0, 89.9)
+        check.set_number(self, "cohesion", 0.0)
+        check.set_number(self, "tension", 0.0)
         if self.restitution is not None:
-            check.number("restitution", self.restitution, 0.0, 1.0)
+            check.set_number(self, "restitution", 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,16 +95,29 @@ class Block:
         velocity: Sequence[float] = (0.0, 0.0, 0.0),
         fixed: bool = False,
     ):
-        if len(velocity) != 3:
-            raise BadInput("block velocity", velocity, "give (vx, vy, omega)")
-        vx, vy, omega = (check.number("block velocity", v) for v in velocity)
+        try:
+            vx, vy, omega = velocity
+        except (TypeError, ValueError):
+            raise BadInput("block velocity", velocity, "give (vx, vy, omega)") from None
+        vx, vy, omega = (check.number("block velocity", v) for v in (vx, vy, omega))
+        if not isinstance(surface, str):
+            raise BadInput("block surface", surface, "name a surface of the scene")
         object.__setattr__(self, "vertices", simple_polygon("block vertices", vertices))
         object.__setattr__(
             self, "density", check.number("block density", density, 0.0, open_low=True)
         )
-        object.__setattr__(self, "surface", surface)
+        object.__setattr__(self, "surface", str(surface))
         object.__setattr__(self, "velocity", (vx, vy, omega))
         object.__setattr__(self, "fixed", bool(fixed))
+
+
+MEMBERS = (
+    ("blocks", Block, "rigdda.Block"),
+    ("barriers", Barrier, "barriers: rigdda.Wall, GravityWall, Fence, Ditch or Embankment"),
+    ("loads", Load, "loads: rigdda.PointLoad, LineLoad or BodyForce"),
+    ("supports", Support, "supports: rigdda.FixedPoint or Bolt"),
+)
+"""Fields of a scene that are sequences, the class of their members, and that in words."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,7 +158,7 @@ class Scene:
     ------
     BadInput
         If a name has no surface, an index no block, a value is outside its range, a block starts
-        deep in another one or a barrier stands in another one.
+        deep in another one, in the ground or in a barrier, or a barrier stands in another one.
     """
 
     terrain: Terrain | None
@@ -167,15 +180,12 @@ class Scene:
     _moved: Mapping[Barrier, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("blocks", "barriers", "loads", "supports"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-        object.__setattr__(self, "surfaces", dict(self.surfaces))
-        object.__setattr__(self, "interfaces", dict(self.interfaces))
-        if isinstance(self.gravity, Sequence):
+        self._check_members()
+        if isinstance(self.gravity, Sequence | np.ndarray):
             object.__setattr__(self, "gravity", check.vector("gravity", self.gravity))
         else:
-            check.number("gravity", self.gravity, 0.0)
-        check.number("damping", self.damping, 0.0)
+            check.set_number(self, "gravity", 0.0)
+        check.set_number(self, "damping", 0.0)
         check.one_of("damping_when", self.damping_when, ("always", "contact"))
         if not any(not b.fixed for b in self.blocks):
             raise BadInput("blocks", f"{len(self.blocks)} blocks", "give at least one free block")
@@ -183,17 +193,36 @@ class Scene:
         self._check_loads()
         if self.base_motion is not None:
             object.__setattr__(self, "base_motion", _history(self.base_motion))
+        self._check_names()
+        object.__setattr__(self, "ground", self.terrain)
+        object.__setattr__(self, "_moved", {})
+        if self.barriers:
+            self._build()
+        if self.ground is not None:
+            self._check_clear(self.ground)
+
+    def _check_members(self) -> None:
+        """Check what the scene is made of, and set sequences to tuples and mappings to dicts."""
+        if not isinstance(self.terrain, Terrain | None):
+            raise BadInput("terrain", self.terrain, "give a rigdda.Terrain or None")
+        for name, kind, what in MEMBERS:
+            members = check.sequence(name, getattr(self, name), kind, what)
+            object.__setattr__(self, name, members)
+        for name in ("surfaces", "interfaces"):
+            named = check.mapping(name, getattr(self, name), Surface, "rigdda.Surface")
+            object.__setattr__(self, name, named)
+
+    def _check_names(self) -> None:
+        """Check that every surface that is named is there."""
         for i, block in enumerate(self.blocks):
             self._known(f"block {i}: surface", block.surface)
         for i, name in enumerate(self.terrain.surfaces if self.terrain else ()):
             self._known(f"terrain surfaces[{i}]", name)
         for pair in self.interfaces:
+            if not isinstance(pair, tuple) or len(pair) != 2:
+                raise BadInput("interfaces", pair, "name two surfaces (first, second)")
             for name in pair:
                 self._known(f"interfaces {pair}", name)
-        object.__setattr__(self, "ground", self.terrain)
-        object.__setattr__(self, "_moved", {})
-        if self.barriers:
-            self._build()
 
     def _build(self) -> None:
         """Set the ground with its earthworks and check that every barrier stands on it."""
@@ -211,6 +240,21 @@ class Scene:
             end = self.barriers[i].end
             if self.barriers[j].x < end - 1e-9 * max(1.0, abs(end)):
                 mend = f"put it downhill of x = {end:g}, where barriers[{i}] ends"
+                raise BadInput(f"barriers[{j}].x", self.barriers[j].x, mend)
+
+    def _check_clear(self, ground: Terrain) -> None:
+        """Check that no free block starts deep in the ground or in what stands on it."""
+        free = {i: block.vertices for i, block in enumerate(self.blocks) if not block.fixed}
+        found = deepest(ground.solid, list(free.values()))
+        if found is not None:
+            i = list(free)[found.block]
+            mend = f"raise it: {found.shared:.3g} m2 of it are in the ground"
+            raise BadInput(f"blocks[{i}]", self.blocks[i].vertices.tolist(), mend)
+        for j in self.bodies:
+            found = deepest(shapely.Polygon(self.outline(j)), list(free.values()))
+            if found is not None:
+                i = list(free)[found.block]
+                mend = f"move it: {found.shared:.3g} m2 of block {i} are in it"
                 raise BadInput(f"barriers[{j}].x", self.barriers[j].x, mend)
 
     def outline(self, barrier: int) -> NDArray[np.float64]:

@@ -10,6 +10,9 @@ from rigdda.constants import RELAXATION_SPEED
 LARGEST_DT = 0.1
 """Largest step [s]: in it a block at rest falls by 5 cm; more was hardly meant in seconds."""
 
+SHORTEST_DT = 1e-6
+"""Shortest step [s]: a thousandth of what the accuracy of an outcome needs, days of computing."""
+
 SOLVERS = ("auto", "pcg", "block-pcg", "sor", "direct")
 
 
@@ -20,7 +23,7 @@ class Settings:
     Parameters
     ----------
     dt : float
-        Time step [s], at most 0.1. 5 ms keeps a 20 m/s block within 0.1 m a step and the outcome
+        Time step [s], 1e-6 to 0.1. 5 ms keeps a 20 m/s block within 0.1 m a step and the outcome
         of a rockfall within the scatter of its releases. Beyond 0.055 sqrt(size / g), 18 ms for
         blocks of 1 m, clusters of which a contact would sink in take shorter steps: they stay
         accurate, and cost more than they would with a shorter dt. A scene whose smallest block is
@@ -87,13 +90,15 @@ class Settings:
     timing: bool = False
 
     def __post_init__(self) -> None:
-        check.number("dt", self.dt, 0.0, LARGEST_DT, open_low=True)
+        check.set_number(self, "dt", SHORTEST_DT, LARGEST_DT)
         if self.penetration is not None:
-            check.number("penetration", self.penetration, 0.0, open_low=True)
-        check.number("tolerance", self.tolerance, 0.0, 1e-2, open_low=True)
-        check.number("sweep_tolerance", self.sweep_tolerance, 0.0, open_low=True)
-        check.integer("open_close_iterations", self.open_close_iterations, 1)
-        check.number("displacement_limit", self.displacement_limit, 0.0, open_low=True)
+            check.set_number(self, "penetration", 0.0, open_low=True)
+        check.set_number(self, "tolerance", 0.0, 1e-2, open_low=True)
+        check.set_number(self, "sweep_tolerance", 0.0, open_low=True)
+        iterations = check.integer("open_close_iterations", self.open_close_iterations, 1)
+        object.__setattr__(self, "open_close_iterations", iterations)
+        check.set_number(self, "displacement_limit", 0.0, open_low=True)
         check.one_of("mode", self.mode, ("dynamic", "static"))
         check.one_of("solver", self.solver, SOLVERS)
-        check.number("relaxation", self.relaxation, 0.0, 1.99, open_low=True)
+        check.set_number(self, "relaxation", 0.0, 1.99, open_low=True)
+        check.set_booleans(self, "post_correction", "islands", "sleeping", "timing")

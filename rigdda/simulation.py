@@ -95,6 +95,10 @@ class Energy(NamedTuple):
     external: float
 
 
+MOST_STEPS = 1e9
+"""Most steps of a run: a day or more of computing for a single block."""
+
+
 class Diagnostics(NamedTuple):
     """What the computation took so far.
 
@@ -147,14 +151,17 @@ class Simulation:
         stations: Sequence[float] = (),
         watch: tuple[float, float] | None = None,
     ):
-        lines = np.array([check.number("stations", x) for x in stations], dtype=np.float64)
-        if (np.diff(lines) <= 0.0).any():
-            raise BadInput("stations", list(stations), "give them in ascending order")
-        if watch is not None and not watch[0] < watch[1]:
+        if not isinstance(scene, Scene):
+            raise BadInput("scene", scene, "give a rigdda.Scene")
+        if not isinstance(settings, Settings | None):
+            raise BadInput("settings", settings, "give rigdda.Settings or None")
+        lines = chainages(stations)
+        low, high = (math.inf, -math.inf) if watch is None else check.vector("watch", watch)
+        if watch is not None and not low < high:
             raise BadInput("watch", watch, "give an interval (low, high)")
         self.scene = scene
         self.settings = settings or Settings()
-        self._arrays = pack(scene, self.settings, lines, watch or (math.inf, -math.inf))
+        self._arrays = pack(scene, self.settings, lines, (low, high))
         self._now, self._before = self._arrays.now, self._arrays.before
         self._counters = np.zeros(COUNTERS, dtype=np.int64)
         self._ledger = np.zeros(len(LEDGER))
@@ -360,7 +367,7 @@ class Simulation:
         Raises
         ------
         BadInput
-            If a time is not positive.
+            If a time is not positive, or the duration of more than 1e9 steps.
         Diverged
             If the simulation diverges; its `run` keeps the frames up to then.
 
@@ -370,7 +377,8 @@ class Simulation:
             If contacts at rest in the end are too soft for their load, by `Settings.penetration`
             or by the one stiffness of plain contacts.
         """
-        check.number("duration", duration, 0.0, open_low=True)
+        most = MOST_STEPS * self.settings.dt
+        check.number("duration", duration, 0.0, most, open_low=True)
         check.number("every", every, 0.0, open_low=True)
         stride = max(1, round(every / self.settings.dt))
         steps = max(1, round(duration / self.settings.dt))
@@ -449,12 +457,31 @@ def simulate_many(
     BadInput, Diverged
         As `Simulation` and `Simulation.run` do.
     """
+    lines = tuple(chainages(stations))
 
     def one(scene: Scene) -> Run:
-        return Simulation(scene, settings, stations, watch).run(duration, every)
+        return Simulation(scene, settings, lines, watch).run(duration, every)
 
+    each = check.sequence("scenes", scenes, Scene, "rigdda.Scene")
     with ThreadPoolExecutor() as pool:
-        return list(pool.map(one, scenes))
+        return list(pool.map(one, each))
+
+
+def chainages(stations: Sequence[float]) -> NDArray[np.float64]:
+    """Return stations as an array.
+
+    Raises
+    ------
+    BadInput
+        If they are not finite numbers in ascending order.
+    """
+    try:
+        lines = np.array([check.number("stations", x) for x in stations], dtype=np.float64)
+    except TypeError:
+        raise BadInput("stations", stations, "give a sequence of chainages") from None
+    if (np.diff(lines) <= 0.0).any():
+        raise BadInput("stations", lines.tolist(), "give them in ascending order")
+    return lines
 
 
 def _track(marks: list[int], progress: bool) -> Iterable[int]:

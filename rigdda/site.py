@@ -22,13 +22,14 @@ from rigdda.barriers import (
     Fence,
     GravityWall,
     Layout,
+    check_layout,
     earthworks,
     from_table,
     section,
     to_tables,
 )
 from rigdda.errors import BadInput
-from rigdda.files import atomic
+from rigdda.files import atomic, read
 from rigdda.geometry import overlap
 from rigdda.scene import Block, Scene, Surface
 from rigdda.settings import Settings
@@ -210,6 +211,16 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         check.number("barrier_zone.max_depth", zone.max_depth, 0.5, open_low=True)
         check.number("barrier_zone.min_width", zone.min_width, 0.0, open_low=True)
         check.number("barrier_zone.max_width", zone.max_width, zone.min_width)
+        ground, corners = self.profile, {float(x) for x, _ in self.slope.points}
+        x = sorted({zone.start, zone.end} | {at for at in corners if zone.start < at < zone.end})
+        foot = [(at, ground.height(at)) for at in x]
+        over = [(at, y + zone.max_height) for at, y in reversed(foot)]
+        room = shapely.Polygon([*foot, *over])
+        for where, piece in self.source.pieces():
+            taken = shapely.intersection(room, shapely.Polygon(piece))
+            if taken.area > NEAR * taken.length:
+                mend = f"put it beyond {taken.bounds[2]:g}: {where} is where barriers may stand"
+                raise BadInput("barrier_zone.start", zone.start, mend)
 
     @classmethod
     def load(cls, source: str | os.PathLike[str]) -> Site:
@@ -220,11 +231,13 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         BadInput
             If there is no such file or name, or the file is not a sound site.
         """
+        if not isinstance(source, str | os.PathLike):
+            raise BadInput("site", source, "name a TOML file or a built-in site")
         path = Path(source)
         if path.suffix == ".toml" or path.is_file():
             if not path.is_file():
                 raise BadInput("site", str(source), "name an existing TOML file")
-            text = path.read_bytes()
+            text = read("site file", path)
         else:
             text = sites.text(check.one_of("site", str(source), sites.names()))
         try:
@@ -233,13 +246,13 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if isinstance(error.__cause__, BadInput):
                 raise error.__cause__ from None
             raise BadInput("site file", str(source), str(error)) from None
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, RecursionError) as error:
             raise BadInput("site file", str(source), f"mend its TOML: {error}") from None
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the site as TOML; `load` gives it back."""
         with atomic(path) as part:
-            part.write_text(tomli_w.dumps(msgspec.to_builtins(self)))
+            part.write_text(tomli_w.dumps(msgspec.to_builtins(self)), encoding="utf-8")
 
     @property
     def profile(self) -> Terrain:
@@ -274,7 +287,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 )
                 for name, s in self.surfaces.items()
             },
-            barriers=tuple(layout),
+            barriers=check_layout(layout),
             damping=self.motion.damping,
             damping_when=self.motion.damping_when,
         )
@@ -287,13 +300,14 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         BadInput
             If a ditch or an embankment does not fit.
         """
-        _, moved = earthworks(self.profile, layout, self.slope.surface)
+        standing = check_layout(layout)
+        _, moved = earthworks(self.profile, standing, self.slope.surface)
         off_toe = self.costs.off_toe
         return float(
             sum(
                 self._price(b, section(moved[b]) if isinstance(b, Earthwork) else 0.0)
                 * (off_toe if b.x < self.slope.toe else 1.0)
-                for b in layout
+                for b in standing
             )
         )
 
@@ -341,22 +355,22 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
         raise BadInput("layout", str(path), "name an existing TOML or JSON file")
     decode = msgspec.json.decode if file.suffix == ".json" else msgspec.toml.decode
     try:
-        tables = decode(file.read_bytes(), type=_LayoutFile).barriers
+        tables = decode(read("layout", file), type=_LayoutFile).barriers
         return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))
     except msgspec.ValidationError as error:
         raise BadInput("layout", str(path), str(error)) from None
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, RecursionError) as error:
         raise BadInput("layout", str(path), f"mend the file: {error}") from None
 
 
 def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None:
     """Write a layout as TOML, or as JSON if the path ends in .json."""
-    data = {"barriers": to_tables(layout)}
+    data = {"barriers": to_tables(check_layout(layout))}
     with atomic(path) as part:
         if str(path).endswith(".json"):
             part.write_bytes(msgspec.json.format(msgspec.json.encode(data)))
         else:
-            part.write_text(tomli_w.dumps(data))
+            part.write_text(tomli_w.dumps(data), encoding="utf-8")
 
 
 class _LayoutFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

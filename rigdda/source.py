@@ -19,6 +19,12 @@ Floats = NDArray[np.float64]
 NEAR = 1e-6
 """Depth to which rock may reach into other rock or the ground at the start [m]: rounding."""
 
+DENSEST = 1e5
+"""Greatest density [kg/m3], far above any metal's."""
+
+MOST_BLOCKS = 1e5
+"""Most blocks that a mass may be cut into: more would take days to simulate."""
+
 
 class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The rock that comes down: a jointed mass, or blocks that are the same in every release.
@@ -50,11 +56,16 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         check.number("source.block_area", self.block_area, 0.0, open_low=True)
-        check.number("source.density", self.density, 0.0, open_low=True)
+        check.number("source.density", self.density, 0.0, DENSEST, open_low=True)
         if self.blocks:
             self._check_blocks()
             return
         convex_polygon("source.polygon", self.polygon)
+        rock = self.area
+        least = rock / MOST_BLOCKS
+        if not least <= self.block_area <= rock:
+            mend = f"give {least:g} to {rock:g} m2: the mass has {rock:g} m2"
+            raise BadInput("source.block_area", self.block_area, mend)
         if len({j.dip_deg for j in self.joints}) < 2:
             raise BadInput("source.joints", self.joints, "give at least two sets of different dip")
 

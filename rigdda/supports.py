@@ -30,7 +30,7 @@ class FixedPoint:
     point: tuple[float, float]
 
     def __post_init__(self) -> None:
-        check.integer("fixed point: block", self.block, 0)
+        check.set_integers("fixed point", self, "block")
         check.set_vectors("fixed point", self, "point")
 
 
@@ -66,18 +66,18 @@ class Bolt:
     yield_force: float | None = None
 
     def __post_init__(self) -> None:
-        check.integer("bolt: block_a", self.block_a, 0)
+        check.set_integers("bolt", self, "block_a")
         if self.block_b is not None:
-            check.integer("bolt: block_b", self.block_b, 0)
+            check.set_integers("bolt", self, "block_b")
             if self.block_b == self.block_a:
                 raise BadInput("bolt: block_b", self.block_b, "give another block than block_a")
         check.set_vectors("bolt", self, "point_a", "point_b")
         if math.dist(self.point_a, self.point_b) < 1e-6:
             raise BadInput("bolt: point_b", self.point_b, "put it apart from point_a")
-        check.number("bolt: stiffness", self.stiffness, 0.0, open_low=True)
-        check.number("bolt: prestress", self.prestress, 0.0)
+        check.set_number(self, "stiffness", 0.0, open_low=True, field="bolt: stiffness")
+        check.set_number(self, "prestress", 0.0, field="bolt: prestress")
         if self.yield_force is not None:
-            check.number("bolt: yield_force", self.yield_force, self.prestress)
+            check.set_number(self, "yield_force", self.prestress, field="bolt: yield_force")
 
 
 Support = FixedPoint | Bolt

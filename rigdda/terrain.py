@@ -47,7 +47,9 @@ class Terrain:
             )
         if not shapely.LineString(chain).is_simple:
             raise BadInput("terrain points", "chain", "untangle it: the chain crosses itself")
-        names = ("rock",) * (len(chain) - 1) if surfaces is None else tuple(surfaces)
+        if surfaces is None:
+            surfaces = ("rock",) * (len(chain) - 1)
+        names = check.sequence("terrain surfaces", surfaces, str, "names")
         if len(names) != len(chain) - 1:
             raise BadInput(
                 "terrain surfaces",
@@ -56,6 +58,26 @@ class Terrain:
             )
         object.__setattr__(self, "points", chain)
         object.__setattr__(self, "surfaces", names)
+
+    @property
+    def solid(self) -> shapely.Polygon:
+        """The ground as a polygon, as far out as the chain is long; empty where it has no inside.
+
+        That is where a chain that does not end at its outermost points would cross its own frame.
+        """
+        first, last = self.points[0], self.points[-1]
+        if np.hypot(*(last - first)) < 1e-9:
+            closed = shapely.Polygon(self.points)
+            return closed if not closed.exterior.is_ccw else shapely.Polygon()
+        (left, low), (right, high) = self.points.min(axis=0), self.points.max(axis=0)
+        far = 1.0 + right - left + high - low
+        # the ground is on the right: below a chain from left to right, above one from right to left
+        down = last[0] > first[0]
+        near, away = (right + far, left - far) if down else (left - far, right + far)
+        deep = low - far if down else high + far
+        frame = [(near, last[1]), (near, deep), (away, deep), (away, first[1])]
+        solid = shapely.Polygon([*self.points, *frame])
+        return solid if solid.is_valid else shapely.Polygon()
 
     def height(self, x: float) -> float:
         """Return the elevation of the highest ground at chainage `x` [m].

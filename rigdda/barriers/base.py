@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,10 @@ from numpy.typing import NDArray
 from rigdda import check
 
 Floats = NDArray[np.float64]
+
+THINNEST, LARGEST = 1e-3, 1e3
+"""Least and greatest length of a barrier [m]: beyond them it is a slip of the pen, and a face that
+thin is lost in rounding."""
 
 
 class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fields=True):
@@ -21,10 +27,15 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
         """Name of the kind, as in layout files."""
         return str(type(self).__struct_config__.tag)
 
-    def _check(self, *positive: str) -> None:
-        check.number(f"{self.words} x", self.x)
-        for name in positive:
-            check.number(f"{self.words} {name}", getattr(self, name), 0.0, open_low=True)
+    def _check(self, *lengths: str) -> None:
+        """Check and set where it is and its lengths."""
+        check.set_number(self, "x", field=f"{self.words} x")
+        for name in lengths:
+            self._check_number(name, THINNEST, LARGEST)
+
+    def _check_number(self, name: str, low: float, high: float = math.inf) -> None:
+        """Check and set a field."""
+        check.set_number(self, name, low, high, open_low=low == 0.0, field=f"{self.words} {name}")
 
     @property
     def words(self) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigdda import check
 from rigdda.barriers.base import BarrierBase, Floats
 from rigdda.barriers.grading import regrade, span
 from rigdda.errors import BadInput
@@ -40,7 +39,7 @@ class Ditch(BarrierBase, frozen=True, tag="ditch"):
 
     def __post_init__(self) -> None:
         self._check("depth", "width")
-        check.number("ditch side_slope", self.side_slope, LEAST_SLOPE, FLATTEST_SLOPE)
+        self._check_number("side_slope", LEAST_SLOPE, FLATTEST_SLOPE)
 
     @property
     def end(self) -> float:
@@ -107,7 +106,7 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
 
     def __post_init__(self) -> None:
         self._check("height", "width")
-        check.number("embankment side_slope", self.side_slope, LEAST_SLOPE, FLATTEST_SLOPE)
+        self._check_number("side_slope", LEAST_SLOPE, FLATTEST_SLOPE)
 
     @property
     def end(self) -> float:

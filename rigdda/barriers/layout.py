@@ -60,6 +60,18 @@ def earthworks(
     return terrain, outlines
 
 
+def check_layout(layout: Any) -> Layout:
+    """Return a layout as a tuple.
+
+    Raises
+    ------
+    BadInput
+        If it is not a sequence of barriers.
+    """
+    what = "barriers: rigdda.Wall, GravityWall, Fence, Ditch or Embankment"
+    return check.sequence("layout", layout, Barrier, what)
+
+
 def section(outline: Floats) -> float:
     """Return the area of an outline [m2], in whichever direction it is walked."""
     return abs(polygon_properties(outline)[0])

@@ -69,7 +69,7 @@ class Wall(Standing, frozen=True, tag="wall"):
     Raises
     ------
     BadInput
-        If a value is not finite or not above zero.
+        If a value is not finite or outside its range.
     """
 
     thickness: float = 1.0
@@ -99,14 +99,15 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     Raises
     ------
     BadInput
-        If a value is not finite or not above zero.
+        If a value is not finite or outside its range.
     """
 
     thickness: float = 1.0
     density: float = 2400.0
 
     def __post_init__(self) -> None:
-        self._check("height", "thickness", "density")
+        self._check("height", "thickness")
+        self._check_number("density", 0.0)
 
     def outline(self, ground: Terrain) -> Floats:
         """Return the (4, 2) corners at the start, on `ground`.
@@ -155,11 +156,12 @@ class Fence(Standing, frozen=True, tag="fence"):
     Raises
     ------
     BadInput
-        If a value is not finite or not above zero.
+        If a value is not finite or outside its range.
     """
 
     capacity: float
     thickness: float = 0.2
 
     def __post_init__(self) -> None:
-        self._check("height", "capacity", "thickness")
+        self._check("height", "thickness")
+        self._check_number("capacity", 0.0)

@@ -22,9 +22,9 @@ def names() -> list[str]:
     return sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml"))
 
 
-def text(name: str) -> bytes:
+def text(name: str) -> str:
     """Return the TOML text of a built-in site."""
-    return (resources.files("rigdda.sites") / f"{name}.toml").read_bytes()
+    return (resources.files("rigdda.sites") / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def random(seed: int) -> Site:

@@ -11,6 +11,7 @@ from physics.helpers import FLAT, box, rock
 from rigdda import (
     BadInput,
     Block,
+    Embankment,
     Error,
     Run,
     Scene,
@@ -21,6 +22,8 @@ from rigdda import (
     Terrain,
     Wall,
     load_layout,
+    save_layout,
+    simulate_many,
     sites,
 )
 
@@ -39,7 +42,6 @@ def site(old: str, new: str) -> Callable[[], Site]:
 
     def load(folder) -> Site:
         text = sites.text("quick")
-        text = text.decode() if isinstance(text, bytes) else text
         assert old in text
         path = folder / "site.toml"
         path.write_text(text.replace(old, new, 1))
@@ -66,6 +68,18 @@ def layout(text: str) -> Callable[[], tuple[Wall, ...]]:
 def empty(path):
     """Make an empty file."""
     path.touch()
+    return path
+
+
+def latin(path):
+    """Write a text that is not UTF-8."""
+    path.write_bytes("name = 'Fürth'".encode("latin-1"))
+    return path
+
+
+def nested(path):
+    """Write brackets in brackets, far deeper than any file needs."""
+    path.write_text("a = " + "[" * 100_000)
     return path
 
 
@@ -134,6 +148,45 @@ CASES = {
     "NaN in a site": (site("toe = 29.8", "toe = nan"), "slope.toe"),
     "site friction 95": (site("friction_deg = 28.0", "friction_deg = 95.0"), "friction_deg"),
     "site duration": (site("duration = 10.0", "duration = 0.0"), "motion.duration"),
+    "in the ground": (lambda _: scene(blocks=(box(0.0, -3.0),)), "blocks[0]"),
+    "half in the ground": (lambda _: scene(blocks=(box(0.0, 0.3),)), "blocks[0]"),
+    "ground turned over": (lambda _: scene(terrain=Terrain([(9, 0), (-9, 0)])), "blocks[0]"),
+    "block in a wall": (lambda _: scene(barriers=(Wall(0.2, 3.0),)), "barriers[0].x"),
+    "block in an embankment": (
+        lambda _: scene(barriers=(Embankment(-4.0, 2.0, 9.0),)),
+        "blocks[0]",
+    ),
+    "no sequence": (lambda _: scene(blocks=None), "blocks"),
+    "no block": (lambda _: scene(blocks=(5,)), "blocks[0]"),
+    "one barrier": (lambda _: scene(barriers=Wall(5.0, 3.0)), "barriers"),
+    "no mapping": (lambda _: scene(surfaces=None), "surfaces"),
+    "no surface": (lambda _: scene(surfaces={"rock": {}}), "surfaces['rock']"),
+    "no pair": (lambda _: scene(interfaces={"rock": Surface()}), "interfaces"),
+    "no terrain": (lambda _: scene(terrain=[(0, 0), (1, 0)]), "terrain"),
+    "no velocity": (lambda _: Block(UNIT, velocity=None), "block velocity"),
+    "surface of a block": (lambda _: Block(UNIT, surface=["rock"]), "block surface"),
+    "10^400": (lambda _: Wall(10**400, 2.0), "wall x"),
+    "1e300": (lambda _: Surface(cohesion=1e300), "cohesion"),
+    "tower": (lambda _: Wall(0.0, 1e4), "wall height"),
+    "film": (lambda _: Wall(0.0, 2.0, 1e-9), "wall thickness"),
+    "dt of 1 ns": (lambda _: Settings(dt=1e-9), "dt"),
+    "word for a switch": (lambda _: Settings(post_correction="no"), "post_correction"),
+    "scene": (lambda _: Simulation(None), "scene"),
+    "settings": (lambda _: Simulation(scene(), {}), "settings"),
+    "one station": (lambda _: Simulation(scene(), stations=5.0), "stations"),
+    "half an interval": (lambda _: Simulation(scene(), watch=(1.0,)), "watch"),
+    "scenes": (lambda _: simulate_many([None]), "scenes[0]"),
+    "for ever": (lambda _: Simulation(scene()).run(1e14), "duration"),
+    "no site": (lambda _: Site.load(None), "site"),
+    "price of numbers": (lambda _: Site.load("quick").cost([5]), "layout[0]"),
+    "layout of numbers": (lambda folder: save_layout([5], folder / "l.toml"), "layout[0]"),
+    "dust": (site("block_area = ", "block_area = 1e-9 # "), "source.block_area"),
+    "one block": (site("block_area = ", "block_area = 1e9 # "), "source.block_area"),
+    "spacing": (site("spacing = 1.4", "spacing = 1e-300"), "joint set: spacing"),
+    "rock in the zone": (site("start = 11.3", "start = 2.0"), "barrier_zone.start"),
+    "latin-1": (lambda folder: Site.load(latin(folder / "site.toml")), "site file"),
+    "latin-1 layout": (lambda folder: load_layout(latin(folder / "layout.toml")), "layout"),
+    "deep nesting": (lambda folder: Site.load(nested(folder / "site.toml")), "site file"),
     "one joint set": (
         site("{ dip_deg = -45.0, spacing = 1.4, scatter = 0.15 },", ""),
         "source.joints",

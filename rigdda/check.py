@@ -138,16 +138,18 @@ def mapping(field: str, value: Any, kind: type, what: str) -> dict[Any, Any]:
     return dict(value)
 
 
-def integer(field: str, value: Any, low: int) -> int:
-    """Return `value` as an integer of at least `low`.
+def integer(field: str, value: Any, low: int, high: float = math.inf) -> int:
+    """Return `value` as an integer in [low, high].
 
     Raises
     ------
     BadInput
-        If it is not a whole number or too small.
+        If it is not a whole number or outside the interval.
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
-        raise BadInput(field, value, f"give a whole number of at least {low}")
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < low or value > high:
+        bounds = f"of at least {low}" + (f" and at most {high}" if high < math.inf else "")
+        raise BadInput(field, value, f"give a whole number {bounds}")
     return int(value)
 
 

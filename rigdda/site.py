@@ -257,7 +257,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def profile(self) -> Terrain:
         """The ground as a terrain."""
-        return Terrain(self.slope.points, (self.slope.surface,) * (len(self.slope.points) - 1))
+        return _ground(tuple(map(tuple, self.slope.points)), self.slope.surface)
 
     def settings(self) -> Settings:
         """Return the numerical settings of this site's releases."""
@@ -324,6 +324,12 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             case Embankment():
                 return c.base + c.embankment * area
         return (c.base + c.square * barrier.height**2) * (1.0 + barrier.thickness) / 2.0
+
+
+@lru_cache(maxsize=256)
+def _ground(points: tuple[Point, ...], surface: str) -> Terrain:
+    """Return the terrain of a slope; it is asked for several times in every episode."""
+    return Terrain(points, (surface,) * (len(points) - 1))
 
 
 @lru_cache(maxsize=4096)

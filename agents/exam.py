@@ -15,7 +15,7 @@ from agents.tables import empty_table
 from agents.verify import verify
 from envs import DesignProblem, Evaluation, fidelity
 from envs.evaluation import Interval, student_interval
-from rigdda import sites
+from rigdda import check, sites
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -78,7 +78,7 @@ def unseen(count: int) -> list[DesignProblem]:
         If the number is below 1 or above `limits.SITES`.
     """
     first = sites.TEST_SEEDS.start
-    seeds = range(first, first + limits.whole("sites", count, 1, limits.SITES))
+    seeds = range(first, first + check.integer("sites", count, 1, limits.SITES))
     return [DesignProblem(fidelity.at(sites.random(seed), "fast")) for seed in seeds]
 
 

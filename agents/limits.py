@@ -12,19 +12,3 @@ SITES = 10_000
 SEED = 2**32 - 1
 """Seed of a search or a training: numpy's and torch's generators, in other packages, take no more.
 Seeds of single releases may be larger."""
-
-
-def whole(field: str, value: object, low: int, high: int) -> int:
-    """Return `value` as an integer in [low, high].
-
-    Raises
-    ------
-    BadInput
-        If it is not a whole number or outside the interval.
-    """
-    from rigdda import BadInput, check
-
-    number = check.integer(field, value, low)
-    if number > high:
-        raise BadInput(field, value, f"give a whole number of at most {high}")
-    return number

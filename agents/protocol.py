@@ -13,7 +13,7 @@ from agents import limits
 from agents.seeds import release_seeds
 from agents.store import Store
 from envs import DesignProblem, Evaluation
-from rigdda import Layout
+from rigdda import Layout, check
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +145,8 @@ class Ledger:
         store: Store | None,
     ):
         self.problem = problem
-        self.budget = limits.whole("simulations", simulations, 2, limits.RELEASES)
-        self.seed = limits.whole("seed", seed, 0, limits.SEED)
+        self.budget = check.integer("simulations", simulations, 2, limits.RELEASES)
+        self.seed = check.integer("seed", seed, 0, limits.SEED)
         self.used = 0
         self._progress = progress
         self._store = store or Store()

@@ -34,6 +34,6 @@ def release_seeds(stream: str, seed: int, n: int) -> tuple[int, ...]:
     """
     tag = STREAMS.index(check.one_of("stream", stream, STREAMS))
     entropy = [check.integer("seed", seed, 0), tag]
-    count = limits.whole("releases", n, 0, limits.RELEASES)
+    count = check.integer("releases", n, 0, limits.RELEASES)
     words = np.random.SeedSequence(entropy).generate_state(count)
     return tuple(int(word) * len(STREAMS) + tag for word in words)

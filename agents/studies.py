@@ -23,6 +23,7 @@ from agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from envs.evaluation import student_interval
 from rigdda import BadInput, Layout, Outcome, Site, check
 from rigdda.barriers import from_table
+from rigdda.files import read
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -81,10 +82,10 @@ def load(path: str | os.PathLike[str]) -> Study:
     if not file.is_file():
         raise BadInput("study", str(path), "name an existing TOML file")
     try:
-        data = msgspec.toml.decode(file.read_bytes(), type=_StudyFile)
+        data = msgspec.toml.decode(read("study", file), type=_StudyFile)
     except msgspec.ValidationError as error:
         raise BadInput("study", str(path), str(error)) from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, RecursionError) as error:
         raise BadInput("study", str(path), f"mend its TOML: {error}") from None
     near = file.parent / data.site
     site = Site.load(near if near.suffix == ".toml" else data.site)
@@ -97,7 +98,7 @@ def load(path: str | os.PathLike[str]) -> Study:
         check.number(f"cost of layouts[{i}]", site.cost(layouts[table.name]))
     if not layouts:
         raise BadInput("layouts", 0, "give at least one table [[layouts]]")
-    releases = limits.whole("releases", data.releases, 1, limits.RELEASES // len(layouts))
+    releases = check.integer("releases", data.releases, 1, limits.RELEASES // len(layouts))
     return Study(site, releases, layouts)
 
 

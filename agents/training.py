@@ -24,7 +24,7 @@ from agents.seeds import release_seeds
 from agents.store import mechanics
 from envs import DesignProblem, fidelity
 from envs.observation import observe
-from rigdda import BadInput, __version__, sites
+from rigdda import BadInput, __version__, check, sites
 from rigdda.files import atomic
 
 Tick = Callable[[int], None]
@@ -58,9 +58,9 @@ class Terms:
     seed: int
 
     def __post_init__(self) -> None:
-        limits.whole("sites", self.sites, 2, len(sites.TRAIN_SEEDS) // 2)
-        limits.whole("episodes", self.episodes, 0, limits.RELEASES)
-        limits.whole("seed", self.seed, 0, limits.SEED)
+        check.integer("sites", self.sites, 2, len(sites.TRAIN_SEEDS) // 2)
+        check.integer("episodes", self.episodes, 0, limits.RELEASES)
+        check.integer("seed", self.seed, 0, limits.SEED)
 
     @property
     def beside(self) -> int:

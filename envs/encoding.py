@@ -175,12 +175,13 @@ def encode(
 
 def _check_rest(i: int, barrier: Barrier, decision: Decision) -> None:
     """Check that what is not decided has its default."""
-    for field in msgspec.structs.fields(barrier):
-        if field.name in ("x", decision.height, decision.size):
+    defaults = barrier.__struct_defaults__  # of the last fields
+    for name, default in zip(barrier.__struct_fields__[-len(defaults) :], defaults, strict=True):
+        if name in ("x", decision.height, decision.size):
             continue
-        value = getattr(barrier, field.name)
-        if value != field.default:
-            raise BadInput(f"layout[{i}].{field.name}", value, f"leave it at {field.default:g}")
+        value = getattr(barrier, name)
+        if value != default:
+            raise BadInput(f"layout[{i}].{name}", value, f"leave it at {default:g}")
 
 
 def check_layout(zone: BarrierZone, layout: Sequence[Barrier]) -> Layout:

@@ -174,7 +174,7 @@ def test_a_bad_study_is_one_line(
 
 def test_a_study_that_is_not_text_is_one_line(folder: Path) -> None:
     (folder / "study.toml").write_bytes(b'site = "\xff"')
-    assert "mend its TOML" in refused("study", "study.toml", folder=folder)
+    assert "UTF-8" in refused("study", "study.toml", folder=folder)
 
 
 def example(name: str) -> ModuleType:

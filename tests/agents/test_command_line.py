@@ -224,7 +224,7 @@ def test_a_bad_site_file_is_one_line(
 @pytest.mark.parametrize(
     "table, named",
     [
-        ("x = 20.0\nheight = -2.0", ("height", "-2", "above 0")),
+        ("x = 20.0\nheight = -2.0", ("height", "-2", "at least 0.001")),
         ("x = nan\nheight = 2.0", ("x", "nan", "finite")),
         ("x = 20.0\nheight = 2.0\ncolour = 3", ("colour",)),
         ("x = 400.0\nheight = 2.0", ("wall x", "400", "stay on the terrain")),

@@ -154,8 +154,8 @@ def test_bounds_and_vectors(problem: DesignProblem) -> None:
         ({"cost_weight": math.nan}, "cost_weight = nan: give a finite number"),
         ({"cost_limit": 0.0}, "cost_limit = 0.0: give a number above 1e-12"),
         ({"cost_limit": 1e-308}, "cost_limit = 1e-308: give a number above 1e-12"),
-        ({"risk_weight": 1e308}, "risk_weight = .*at most 1e\\+12"),
-        ({"cost_weight": 1e308}, "cost_weight = .*at most 1e\\+12"),
+        ({"risk_weight": 1e14}, "risk_weight = .*at most 1e\\+12"),
+        ({"cost_weight": 1e14}, "cost_weight = .*at most 1e\\+12"),
     ],
 )
 def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:
@@ -166,8 +166,8 @@ def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:
 
 @pytest.mark.parametrize("name", [field.name for field in msgspec.structs.fields(Costs)])
 def test_a_price_that_makes_no_objective_is_refused(name: str, ramp: Site) -> None:
-    costs = msgspec.structs.replace(ramp.costs, **{name: 1e308})
-    with pytest.raises(BadInput, match=rf"costs\.{name} = 1e\+308: .*at most 1e\+12"):
+    costs = msgspec.structs.replace(ramp.costs, **{name: 1e14})
+    with pytest.raises(BadInput, match=rf"costs\.{name} = .*at most 1e\+12"):
         DesignProblem(msgspec.structs.replace(ramp, costs=costs))
 
 

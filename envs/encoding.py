@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import isotonic_regression
 
 from rigdda import BadInput, Barrier, Layout, check
-from rigdda.barriers import KINDS
+from rigdda.barriers import KINDS, as_layout
 from rigdda.site import BarrierZone
 
 Floats = NDArray[np.float64]
@@ -192,15 +192,8 @@ def check_layout(zone: BarrierZone, layout: Sequence[Barrier]) -> Layout:
     BadInput
         If one is not.
     """
-    try:
-        barriers = tuple(layout)
-    except TypeError:
-        raise BadInput(
-            "layout", layout, "give a sequence of rigdda.Wall or other barriers"
-        ) from None
+    barriers = as_layout(layout)
     for i, barrier in enumerate(barriers):
-        if not isinstance(barrier, Barrier):
-            raise BadInput(f"layout[{i}]", barrier, "give a rigdda.Wall or another barrier")
         decision = DECISIONS[barrier.kind]
         limits = {
             "x": (zone.start, zone.end - barrier.extent),

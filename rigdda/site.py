@@ -22,7 +22,7 @@ from rigdda.barriers import (
     Fence,
     GravityWall,
     Layout,
-    check_layout,
+    as_layout,
     earthworks,
     from_table,
     section,
@@ -287,7 +287,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 )
                 for name, s in self.surfaces.items()
             },
-            barriers=check_layout(layout),
+            barriers=as_layout(layout),
             damping=self.motion.damping,
             damping_when=self.motion.damping_when,
         )
@@ -300,7 +300,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         BadInput
             If a ditch or an embankment does not fit.
         """
-        standing = check_layout(layout)
+        standing = as_layout(layout)
         _, moved = earthworks(self.profile, standing, self.slope.surface)
         off_toe = self.costs.off_toe
         return float(
@@ -371,7 +371,7 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
 
 def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None:
     """Write a layout as TOML, or as JSON if the path ends in .json."""
-    data = {"barriers": to_tables(check_layout(layout))}
+    data = {"barriers": to_tables(as_layout(layout))}
     with atomic(path) as part:
         if str(path).endswith(".json"):
             part.write_bytes(msgspec.json.format(msgspec.json.encode(data)))

@@ -60,7 +60,7 @@ def earthworks(
     return terrain, outlines
 
 
-def check_layout(layout: Any) -> Layout:
+def as_layout(layout: Any) -> Layout:
     """Return a layout as a tuple.
 
     Raises

@@ -120,7 +120,7 @@ def test_the_lowest_wall_is_dropped_where_there_is_no_room() -> None:
         ([Wall(12.0, 0.4)], r"layout\[0\]\.height = 0\.4: give a number of at least 0\.5"),
         ([Wall(12.0, 1.0), Wall(14.5, 1.0)], r"layout\[1\]\.x = 14\.5: put it 2 m downhill"),
         ([Wall(x, 1.0) for x in (11, 15, 19, 23)], "layout = '4 barriers': give at most 3"),
-        ([(12.0, 1.0, 1.0)], r"layout\[0\] = \(12\.0, 1\.0, 1\.0\): give a rigdda\.Wall"),
+        ([(12.0, 1.0, 1.0)], r"layout\[0\] = \(12\.0, 1\.0, 1\.0\): give barriers: rigdda\.Wall"),
         (Wall(12.0, 1.0), "layout = Wall.*: give a sequence"),
     ],
 )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rigdda.assembly.island import assemble_blocks, load_moment
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, REST, SHOCK, SHOCK_SPEED, STEADY_RATE
+from rigdda.contact.narrow_phase import over_edge
 from rigdda.gauges import barrier_contact
 from rigdda.islands import root
 from rigdda.kernel import entry_kernel, kernel
@@ -29,7 +30,7 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
             x, y = outlines.corner[row, k].x, outlines.corner[row, k].y
             outlines.world_x[row, k] = bodies[i].x + cos * x - sin * y
             outlines.world_y[row, k] = bodies[i].y + sin * x + cos * y
-        place_normals(outlines, row)
+        place_edges(outlines, row)
 
 
 @entry_kernel
@@ -37,6 +38,11 @@ def place_all_corners(bodies: Bodies, outlines: Outlines) -> None:
     """Set the corners and edge normals of all bodies, when a scene is packed."""
     for i in range(len(bodies)):
         place_corners(bodies, outlines, i)
+    for row in range(len(outlines.polygon)):
+        inside = math.inf
+        for edge in range(outlines.polygon[row].count):
+            inside = min(inside, -over_edge(outlines, row, edge, row))
+        outlines.polygon[row].inside = (1.0 - 1e-9) * inside  # rounding is to leave out nothing
 
 
 @kernel
@@ -52,16 +58,19 @@ def polygon_row(bodies: Bodies, i: int, place: int) -> int:
 
 
 @kernel
-def place_normals(outlines: Outlines, row: int) -> None:
-    """Set the edge normals of a polygon from its corners."""
-    n = outlines.polygon[row].count
+def place_edges(outlines: Outlines, row: int) -> None:
+    """Set the edge normals and the middle of a polygon from its corners."""
+    n, sum_x, sum_y = outlines.polygon[row].count, 0.0, 0.0
     for k in range(n):
+        sum_x += outlines.world_x[row, k]
+        sum_y += outlines.world_y[row, k]
         end = k + 1 if k + 1 < n else 0
         ex = outlines.world_x[row, end] - outlines.world_x[row, k]
         ey = outlines.world_y[row, end] - outlines.world_y[row, k]
         length = math.sqrt(ex * ex + ey * ey)
         outlines.normal_x[row, k] = ey / length
         outlines.normal_y[row, k] = -ex / length
+    outlines.middle_x[row], outlines.middle_y[row] = sum_x / n, sum_y / n
 
 
 @kernel
@@ -81,7 +90,7 @@ def move_corners(bodies: Bodies, outlines: Outlines, i: int, m: Matrix, s: int) 
             outlines.world_x[row, k] += u - y * r
             outlines.world_y[row, k] += v + x * r
             bodies[i].radius = max(bodies[i].radius, math.hypot(x - y * r, y + x * r))
-        place_normals(outlines, row)
+        place_edges(outlines, row)
 
 
 @kernel

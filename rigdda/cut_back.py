@@ -38,7 +38,7 @@ def greatest_departure(bodies: Bodies, m: Matrix, work: Work, island: int, dt: f
         d, i = m.d[place - low], work.block_item[place]
         turn = abs(d[2]) * bodies[i].radius
         dx, dy = d[0] - dt * bodies[i].vx, d[1] - dt * bodies[i].vy
-        most = max(most, math.hypot(dx, dy) + turn)
+        most = max(most, math.sqrt(dx * dx + dy * dy) + turn)
     return most
 
 

@@ -12,7 +12,7 @@ from rigdda.records import Bodies
 def top_speed(bodies: Bodies, i: int) -> float:
     """Return a bound on the speed of any point of body i [m/s]."""
     spin = abs(bodies[i].omega) * bodies[i].radius
-    return math.hypot(bodies[i].vx, bodies[i].vy) + spin
+    return math.sqrt(bodies[i].vx ** 2 + bodies[i].vy ** 2) + spin
 
 
 @kernel

@@ -223,6 +223,8 @@ def pack_outlines(polygons: list[Floats], centres: list[Floats], bodies: Bodies)
         world_y=np.zeros(shape),
         normal_x=np.zeros(shape),
         normal_y=np.zeros(shape),
+        middle_x=np.zeros(len(rows)),
+        middle_y=np.zeros(len(rows)),
         polygon=outlined.view(np.recarray),
         corner=corners.view(np.recarray),
     )
@@ -308,6 +310,7 @@ def empty_work(bodies: int, room: int) -> Work:
         return np.zeros(n, dtype=np.int64)
 
     return Work(
+        np.zeros(bodies),
         np.zeros(bodies),
         np.zeros(bodies),
         np.zeros(bodies),

@@ -114,6 +114,7 @@ Links = NDArray[np.void]
 
 
 POLYGON = _record(
+    inside=float,  # radius of the circle about its middle that touches the nearest edge [m]
     count=int,  # corners
     body=int,
 )
@@ -139,6 +140,8 @@ class Outlines(NamedTuple):
     world_y: Floats
     normal_x: Floats  # (R, P) outward unit normal of the edge that starts at the corner
     normal_y: Floats
+    middle_x: Floats  # (R,) mean of the corners now [m]
+    middle_y: Floats
     polygon: NDArray[np.void]  # (R,) of POLYGON
     corner: NDArray[np.void]  # (R, P) of CORNER
 
@@ -187,6 +190,7 @@ class Work(NamedTuple):
     high_x: Floats
     low_y: Floats
     high_y: Floats
+    path: Floats  # (M,) longest way of any point of an awake body in this step, undeflected [m]
     sorted: Ints  # (M,) bodies by low_x, kept over steps
     pairs: Ints  # (2 C,) candidate pairs of bodies
     partner_start: Ints  # (M + 1,) second bodies of the pairs by their first one

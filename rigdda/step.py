@@ -122,7 +122,7 @@ def collide_block(
     for q in range(work.partner_start[a], work.partner_start[a + 1]):
         if count < 0 or count > room:
             return -1
-        count = collide_pair(bodies, outlines, c, count, a, work.partner[q], p)
+        count = collide_pair(bodies, outlines, work, c, count, a, work.partner[q], p)
     if count < 0 or count > room:
         return -1
     recall(c, first, count, old, work.first, p.slack)

@@ -11,11 +11,9 @@ leads through a neighbouring part, and that one has the contact.
 
 from __future__ import annotations
 
-import math
-
 from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
+from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters, Work
 
 
 @kernel
@@ -32,6 +30,25 @@ def axis_gap(
 
 
 @kernel
+def over_edge(outlines: Outlines, i: int, edge: int, j: int) -> float:
+    """Return the gap of the middle of polygon j above an edge of polygon i [m]."""
+    dx = outlines.middle_x[j] - outlines.world_x[i, edge]
+    dy = outlines.middle_y[j] - outlines.world_y[i, edge]
+    return outlines.normal_x[i, edge] * dx + outlines.normal_y[i, edge] * dy
+
+
+@kernel
+def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
+    """Return the edge of polygon i that the middle of polygon j is farthest over."""
+    facing, most = 0, -1e300
+    for edge in range(edges):
+        gap = over_edge(outlines, i, edge, j)
+        if gap > most:
+            facing, most = edge, gap
+    return facing
+
+
+@kernel
 def face_of_contact(
     outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
     spread: float, slack: float, sunk: float,
@@ -42,11 +59,20 @@ def face_of_contact(
     how far any of their points may come nearer, whatever does.
     The best edge comes with its rank: time of entry, and its gap for the shallow ones. Edges
     inside the body count as deeper by `sunk`, so that on a tie the real one is best.
+
+    The edge that the middle of j is farthest over comes first: most often it is the best one, or
+    one that separates them. Others are looked at only as far as the circle in j may be over them.
     """
     time, depth, best, nearest = -1.0, -1e300, -1, -1
     corner_x, corner_y = outlines.world_x, outlines.world_y
-    for edge in range(edges):
+    facing = facing_edge(outlines, i, edges, j)
+    for visit in range(-1, edges):
+        edge = facing if visit < 0 else visit
         nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+        if visit >= 0:
+            most = over_edge(outlines, i, edge, j) - outlines.polygon[j].inside
+            if edge == facing or (most <= slack and (time > 0.0 or most < depth)):
+                continue
         gap, corner = axis_gap(
             nx, ny, corner_x[i, edge], corner_y[i, edge], corner_x, corner_y, j, corners
         )
@@ -58,7 +84,8 @@ def face_of_contact(
         entry = 0.0
         if gap > slack:
             entry = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
-        if entry > time or (entry == time and gap > depth):
+        later = entry > time or (entry == time and gap > depth)
+        if later or (entry == time and gap == depth and edge < best):
             time, depth, best, nearest = entry, gap, edge, corner
     return True, time, depth, edge_over_corner(outlines, i, best, edges, j, nearest)
 
@@ -178,22 +205,19 @@ def add_corner(
 
 @kernel
 def collide_pair(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, p: Parameters
-) -> int:
+    bodies: Bodies, outlines: Outlines, work: Work, c: Contacts, k: int, a: int, b: int,
+    p: Parameters,
+) -> int:  # fmt: skip
     """Add the contacts of bodies a and b to `c` from entry k; returns the new number, or -1."""
     dt = p.dt
-    ax, ay, aw = bodies[a].vx, bodies[a].vy, abs(bodies[a].omega) * bodies[a].radius
-    dx, dy, spin = -ax * dt, -ay * dt, aw * dt
-    path = math.hypot(ax, ay) * dt
-    fall = p.gravity * dt * dt
+    dx, dy = -bodies[a].vx * dt, -bodies[a].vy * dt
+    path, fall = work.path[a], p.gravity * dt * dt
     if bodies[b].status == AWAKE:
-        bx, by = bodies[b].vx, bodies[b].vy
-        dx += bx * dt
-        dy += by * dt
-        spin += abs(bodies[b].omega) * bodies[b].radius * dt
-        path += math.hypot(bx, by) * dt
+        dx += bodies[b].vx * dt
+        dy += bodies[b].vy * dt
+        path += work.path[b]
         fall = 0.0
-    spread = path + spin + fall + p.slack
+    spread = path + fall + p.slack
     if bodies[a].parts == 1 and bodies[b].parts == 1:
         return collide_parts(bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0)
     first = k

@@ -126,6 +126,7 @@ def corners_on_segment(
     bodies: Bodies,
     outlines: Outlines,
     ground: Ground,
+    work: Work,
     c: Contacts,
     k: int,
     first: int,
@@ -135,10 +136,7 @@ def corners_on_segment(
 ) -> int:
     """Add contacts of the corners of block a with segment s; returns the new number."""
     nx, ny = ground.normal_x[s], ground.normal_y[s]
-    dt = p.dt
-    spin = abs(bodies[a].omega) * bodies[a].radius * dt
-    speed = math.hypot(bodies[a].vx, bodies[a].vy) * dt
-    reach = speed + spin + p.gravity * dt * dt + p.slack
+    reach = work.path[a] + p.gravity * p.dt * p.dt + p.slack
     concave = bodies[a].parts > 1
     lowest = below_segment(ground, s, bodies[a].x, bodies[a].y) - bodies[a].radius
     if lowest > reach:
@@ -189,6 +187,7 @@ def edge_on_ridge(
     bodies: Bodies,
     outlines: Outlines,
     ground: Ground,
+    work: Work,
     c: Contacts,
     k: int,
     a: int,
@@ -205,8 +204,7 @@ def edge_on_ridge(
     dt, n = p.dt, outlines.polygon[part].count
     dx = -(bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
     dy = -(bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
-    reach = math.hypot(dx, dy) + p.gravity * dt * dt + p.slack
-    if math.hypot(x - bodies[a].x, y - bodies[a].y) > bodies[a].radius + reach:
+    if not (work.low_x[a] <= x <= work.high_x[a] and work.low_y[a] <= y <= work.high_y[a]):
         return k
     left, right, concave = corner - 1, corner, part != a
     best, best_time, best_gap = -1, -1.0, -1e300
@@ -290,9 +288,9 @@ def collide_terrain(
                 continue
             if k + outlines.world_x.shape[1] + bodies[a].parts + 2 > len(c):
                 return -1
-            k = corners_on_segment(bodies, outlines, ground, c, k, first, a, s, p)
+            k = corners_on_segment(bodies, outlines, ground, work, c, k, first, a, s, p)
             if ground.turn[s] < 0.0:
                 for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):
-                    found = edge_on_ridge(bodies, outlines, ground, c, k, a, part, s, p)
+                    found = edge_on_ridge(bodies, outlines, ground, work, c, k, a, part, s, p)
                     k = keep_nearest(c, first, k, k) if found > k and part != a else found
     return k

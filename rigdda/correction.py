@@ -12,11 +12,11 @@ from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, REST, SHOCK, SHOCK
 from rigdda.contact.narrow_phase import over_edge
 from rigdda.gauges import barrier_contact
 from rigdda.islands import root
-from rigdda.kernel import entry_kernel, kernel
+from rigdda.kernel import entry_kernel, inlined, kernel
 from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
 
 
-@kernel
+@inlined
 def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
     """Set the corners and edge normals of body i and of its parts from its centroid and angle.
 
@@ -57,7 +57,7 @@ def polygon_row(bodies: Bodies, i: int, place: int) -> int:
     return i if place == 0 else bodies[i].part + place - 1
 
 
-@kernel
+@inlined
 def place_edges(outlines: Outlines, row: int) -> None:
     """Set the edge normals and the middle of a polygon from its corners."""
     n, sum_x, sum_y = outlines.polygon[row].count, 0.0, 0.0
@@ -93,7 +93,7 @@ def move_corners(bodies: Bodies, outlines: Outlines, i: int, m: Matrix, s: int) 
         place_edges(outlines, row)
 
 
-@kernel
+@inlined
 def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> None:
     """Add the force of contact k to slot i; m.direction holds the greatest share of its impacts.
 
@@ -106,7 +106,7 @@ def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> Non
         add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
 
 
-@kernel
+@inlined
 def pass_on_shares(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, dt: float
 ) -> None:
@@ -134,7 +134,7 @@ def pass_on_shares(
         share[s, 0] = share[root(work.parent, s), 0]
 
 
-@kernel
+@inlined
 def apply_forces(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters
 ) -> None:
@@ -167,7 +167,7 @@ def apply_forces(
         m.residual[s, 2] *= late / bodies[i].inertia
 
 
-@kernel
+@inlined
 def account(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters,
     ledger: NDArray, gauges: Gauges,
@@ -218,7 +218,7 @@ def damping_of_step(m: Matrix, s: int, mass: float, p: Parameters) -> float:
     return (m.diagonal[s, 0, 0] - 2.0 * mass / (p.dt * p.dt)) * p.dt / mass
 
 
-@kernel
+@inlined
 def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
     """Move block i by its displacement; the velocity is that of constant acceleration."""
     bodies[i].vx = 2.0 * m.d[s, 0] / dt - bodies[i].vx
@@ -229,7 +229,7 @@ def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
     bodies[i].theta += m.d[s, 2] + m.residual[s, 2]
 
 
-@kernel
+@inlined
 def is_struck(c: Contacts, work: Work, low: int, high: int) -> bool:
     """Return whether an impact acted on the island with contacts low:high in this step."""
     for item in range(low, high):
@@ -239,7 +239,7 @@ def is_struck(c: Contacts, work: Work, low: int, high: int) -> bool:
     return False
 
 
-@kernel
+@inlined
 def keep_memory(c: Contacts, k: int, struck: bool) -> None:
     """Carry the forces of contact k to the next step; an impulse does not last.
 

@@ -12,11 +12,11 @@ import math
 
 from rigdda.constants import AWAKE, BOLT, CUTS, HELD, PIN, PLAIN
 from rigdda.contact.transfer import recall
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
 
 
-@kernel
+@inlined
 def too_far(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters
 ) -> float:
@@ -30,7 +30,7 @@ def too_far(
     return far
 
 
-@kernel
+@inlined
 def greatest_departure(bodies: Bodies, m: Matrix, work: Work, island: int, dt: float) -> float:
     """Return a bound on how far from its straight path any corner of an island ends a step [m]."""
     most, low = 0.0, work.block_start[island]

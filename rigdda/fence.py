@@ -31,7 +31,7 @@ from rigdda.constants import (
     STICK,
 )
 from rigdda.gauges import FAILED, write_event
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.open_close import open_close
 from rigdda.records import EVENTS, Bodies, Contacts, Gauges, Matrix, Parameters, Work
 from rigdda.sleep import wake_island
@@ -170,7 +170,7 @@ def touches(c: Contacts, work: Work, low: int, high: int, fence: int) -> int:
     return -1
 
 
-@kernel
+@inlined
 def limit_fences(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, gauges: Gauges, time: float,
     p: Parameters, counters: NDArray,

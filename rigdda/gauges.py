@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rigdda.constants import NEW_HIT_TIME, OPEN
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.motion import kinetic_energy
 from rigdda.records import Bodies, Contacts, Gauges, Work
 
@@ -44,7 +44,7 @@ def barrier_contact(gauges: Gauges, a: int, b: int) -> tuple[int, int]:
     return a, -1
 
 
-@kernel
+@inlined
 def note_hits(
     bodies: Bodies, c: Contacts, work: Work, low: int, high: int, gauges: Gauges, events: int,
     time: float,

@@ -60,6 +60,15 @@ def kernel(function: Callable[..., Any]) -> Any:
     return numba.njit(**INSIDE)(function)
 
 
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a kernel into all that call it: for what is called for every block or contact.
+
+    A call hands over every array of a named tuple in seven words or nine, 66 for `Outlines` and 163
+    for `Work`: with calls a step takes 1.5 to 2 times as long.
+    """
+    return numba.njit(forceinline=True, **INSIDE)(function)
+
+
 def arithmetic_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel in which a product and a sum may be one operation, rounded once.
 

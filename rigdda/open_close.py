@@ -42,7 +42,7 @@ from rigdda.constants import (
 from rigdda.contact.joint import break_joint
 from rigdda.contact.law import set_shock
 from rigdda.islands import pair_blocks
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.linear.direct import solve_block, solve_two_blocks
 from rigdda.linear.pcg import solve_pcg
 from rigdda.linear.psor import relax_forces
@@ -65,7 +65,7 @@ from rigdda.records import (
 NONE, MOVED, LOCKED = 0, 1, 2
 
 
-@kernel
+@inlined
 def spring_forces(
     c: Contacts, k: int, m: Matrix, i: int, j: int, dt: float
 ) -> tuple[float, float, float]:
@@ -135,7 +135,7 @@ def next_friction(c: Contacts, k: int, shear: float, tension: float, coupled: bo
     return MOVED if change > FRICTION_TOLERANCE * (limit - tension) else NONE
 
 
-@kernel
+@inlined
 def next_state(
     c: Contacts, k: int, normal: float, shear: float, weight: float, coupled: bool
 ) -> int:
@@ -164,7 +164,7 @@ def next_state(
     return next_friction(c, k, shear, tension, coupled)
 
 
-@kernel
+@inlined
 def update_states(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, coupled: bool,
     one: bool, p: Parameters,

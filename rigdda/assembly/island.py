@@ -7,7 +7,7 @@ import math
 from rigdda.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.assembly.springs import add_block, add_force, normal_row, shear_row
 from rigdda.constants import BOLT, OPEN, SLIP, SMALL_ISLAND, STICK
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
 
 
@@ -28,7 +28,7 @@ def load_moment(bodies: Bodies, i: int) -> float:
     return bodies[i].moment_cos * math.cos(theta) + bodies[i].moment_sin * math.sin(theta)
 
 
-@kernel
+@inlined
 def assemble_blocks(
     bodies: Bodies, m: Matrix, work: Work, low: int, high: int, p: Parameters
 ) -> None:
@@ -51,7 +51,7 @@ def assemble_blocks(
         m.rhs[s, 2] += load_moment(bodies, i)
 
 
-@kernel
+@inlined
 def assemble_contact(
     c: Contacts, k: int, m: Matrix, i: int, j: int, dt: float, coupled: bool
 ) -> None:
@@ -107,7 +107,7 @@ def assemble_contact(
         add_force(m.rhs[j], c[k].lag, fs)
 
 
-@kernel
+@inlined
 def assemble_island(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, pairs: int, p: Parameters
 ) -> None:

@@ -56,7 +56,7 @@ from rigdda.constants import (
     TOUCHING,
     UNLOADED,
 )
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Parameters, Work
 
 
@@ -209,7 +209,7 @@ def set_plain(c: Contacts, k: int, p: Parameters) -> None:
         c[k].state = STICK
 
 
-@kernel
+@inlined
 def strike(bodies: Bodies, c: Contacts, k: int, time: float, pull: float, p: Parameters) -> float:
     """Set arms and velocities of contact k at `time` in the step; returns the closing speed."""
     set_arms(bodies, c, k, time)
@@ -218,7 +218,7 @@ def strike(bodies: Bodies, c: Contacts, k: int, time: float, pull: float, p: Par
     return -c[k].un + pull * time
 
 
-@kernel
+@inlined
 def strike_at_once(bodies: Bodies, c: Contacts, low: int, high: int, p: Parameters) -> None:
     """Let all contacts of two blocks that collide act at the time of the first impact.
 
@@ -241,7 +241,7 @@ def strike_at_once(bodies: Bodies, c: Contacts, low: int, high: int, p: Paramete
         first = k + 1
 
 
-@kernel
+@inlined
 def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Parameters) -> None:
     """Set the law of contact k from its geometry and memory; `start` is the very first step."""
     a, b = c[k].a, c[k].b

@@ -12,7 +12,7 @@ leads through a neighbouring part, and that one has the contact.
 from __future__ import annotations
 
 from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters, Work
 
 
@@ -48,7 +48,7 @@ def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
     return facing
 
 
-@kernel
+@inlined
 def face_of_contact(
     outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
     spread: float, slack: float, sunk: float,
@@ -132,7 +132,7 @@ def add_contact(
     c[k].x, c[k].y, c[k].nx, c[k].ny, c[k].gap = x, y, nx, ny, gap
 
 
-@kernel
+@inlined
 def clip_contacts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, edge: int,
     j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float,
@@ -183,7 +183,7 @@ def clip_contacts(
     return k
 
 
-@kernel
+@inlined
 def add_corner(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, owner: int,
     corner: int, i: int, edge: int, gap: float,
@@ -203,7 +203,7 @@ def add_corner(
     return k + 1
 
 
-@kernel
+@inlined
 def collide_pair(
     bodies: Bodies, outlines: Outlines, work: Work, c: Contacts, k: int, a: int, b: int,
     p: Parameters,
@@ -267,7 +267,7 @@ def keep_nearest(c: Contacts, first: int, k: int, new: int) -> int:
     return max(k, place + 1)
 
 
-@kernel
+@inlined
 def collide_parts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, j: int,
     dx: float, dy: float, spread: float, slack: float, sunk: float,

@@ -11,7 +11,7 @@ import math
 
 from rigdda.constants import SAME_FACE, TERRAIN
 from rigdda.contact.narrow_phase import add_contact, keep_nearest
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Ground, Outlines, Parameters, Work
 
 
@@ -121,7 +121,7 @@ def place_of_hit(
     return x + time * dx, y + time * dy
 
 
-@kernel
+@inlined
 def corners_on_segment(
     bodies: Bodies,
     outlines: Outlines,
@@ -182,7 +182,7 @@ def bridges(
     return left >= least and below_segment(ground, corner, x[end], y[end]) >= least
 
 
-@kernel
+@inlined
 def edge_on_ridge(
     bodies: Bodies,
     outlines: Outlines,
@@ -252,7 +252,7 @@ def edge_on_ridge(
     return k + 1
 
 
-@kernel
+@inlined
 def collide_terrain(
     bodies: Bodies,
     outlines: Outlines,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from numpy.typing import NDArray
 
 from rigdda.constants import NEW, OPEN, SAME_FACE, SAME_NORMAL, TERRAIN
-from rigdda.kernel import kernel
+from rigdda.kernel import inlined, kernel
 from rigdda.records import Contacts
 
 
@@ -37,7 +37,7 @@ def fits_another(
     return False
 
 
-@kernel
+@inlined
 def recall_from(
     c: Contacts, k: int, new_low: int, new_high: int, old: Contacts, low: int, high: int, b: int,
     sign: float,
@@ -61,7 +61,7 @@ def recall_from(
     return False
 
 
-@kernel
+@inlined
 def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray, slack: float) -> None:
     """Give each new contact in low:high its memory; without one it starts OPEN.
 

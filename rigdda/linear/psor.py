@@ -26,7 +26,7 @@ from rigdda.constants import (
     RELAXATION_STIFFNESS,
     RELAXATION_SWEEPS,
 )
-from rigdda.kernel import arithmetic_kernel, kernel
+from rigdda.kernel import arithmetic_kernel, inlined, kernel
 from rigdda.records import Contacts, Floats, Ints, Matrix, Parameters, Work
 
 # columns of work.row: normal (x, y); moments of a unit force along normal and shear about a and b,
@@ -44,7 +44,7 @@ def flexibility(inverse: Floats, i: int, e: tuple[float, float, float]) -> float
     return (e[0] * e[0] + e[1] * e[1]) * inverse[i, 0] + e[2] * e[2] * inverse[i, 2]
 
 
-@kernel
+@inlined
 def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, dt: float) -> None:
     """Write contact k as row `place` and add its starting force to the displacements.
 

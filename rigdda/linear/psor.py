@@ -34,8 +34,8 @@ from rigdda.records import Contacts, Floats, Ints, Matrix, Parameters, Work
 # that it bears beside [N]
 NORMAL, TURN_A, TURN_B = 0, 2, 4
 GAIN, FREE, SOFT, FORCE = 6, 8, 10, 12
-FRICTION, COHESION, TENSION = 14, 15, 16
-COLUMNS = 17
+FRICTION, COHESION, TENSION, CROSS = 14, 15, 16, 17
+COLUMNS = 18
 
 
 @kernel
@@ -73,6 +73,7 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, dt:
     row[place, FREE + 1] = old.memory_shear / kappa + dt * old.us
     row[place, FORCE], row[place, FORCE + 1] = old.start_normal, old.start_shear
     row[place, FRICTION], row[place, TENSION] = old.friction, old.tension
+    row[place, CROSS] = en[2] * es[2] * m.scaled[i, 2] + fn[2] * fs[2] * m.scaled[j, 2]
     row[place, COHESION] = math.inf if old.kind == PIN else old.cohesion
     push(m.d, m.scaled, i, en, old.start_normal)
     push(m.d, m.scaled, i, es, old.start_shear)
@@ -107,9 +108,12 @@ def sweep(
         if moved_in[i] < number - 1 and moved_in[j] < number - 1:
             continue
         r = row[place]
-        nx, ny, turn_i, turn_j = r[NORMAL], r[NORMAL + 1], r[TURN_A], r[TURN_B]
+        nx, ny = r[NORMAL], r[NORMAL + 1]
+        turn_i, turn_j, roll_i, roll_j = r[TURN_A], r[TURN_B], r[TURN_A + 1], r[TURN_B + 1]
         u, v, w, u2, v2, w2 = d[i, 0], d[i, 1], d[i, 2], d[j, 0], d[j, 1], d[j, 2]
-        moved = (nx * (u - u2) + ny * (v - v2)) + (turn_i * w + turn_j * w2)
+        apart_x, apart_y = u - u2, v - v2
+        moved = (nx * apart_x + ny * apart_y) + (turn_i * w + turn_j * w2)
+        slid = (nx * apart_y - ny * apart_x) + (roll_i * w + roll_j * w2)
         force, before = r[FORCE], r[FORCE + 1]
         normal = force + r[GAIN] * ((r[FREE] - force * r[SOFT]) - 2.0 * moved)
         normal = max(normal, -r[TENSION])
@@ -117,24 +121,24 @@ def sweep(
         limit = r[COHESION] + r[FRICTION] * max(normal, 0.0)
         if push == 0.0 and limit == 0.0 and before == 0.0:
             continue
+        shear = before + r[GAIN + 1] * (
+            (r[FREE + 1] - before * r[SOFT + 1]) - 2.0 * (slid + r[CROSS] * push)
+        )
+        shear = min(max(shear, -limit), limit)
+        drag = shear - before
         change = abs(push) * r[SOFT]
         worst = max(worst, change)
         light_i, slow_i = inverse[i, 0], inverse[i, 2]
         light_j, slow_j = inverse[j, 0], inverse[j, 2]
-        u, v, w = u + push * light_i * nx, v + push * light_i * ny, w + push * slow_i * turn_i
-        u2, v2, w2 = u2 - push * light_j * nx, v2 - push * light_j * ny, w2 + push * slow_j * turn_j
-        turn_i, turn_j = r[TURN_A + 1], r[TURN_B + 1]
-        moved = (nx * (v - v2) - ny * (u - u2)) + (turn_i * w + turn_j * w2)
-        shear = before + r[GAIN + 1] * ((r[FREE + 1] - before * r[SOFT + 1]) - 2.0 * moved)
-        shear = min(max(shear, -limit), limit)
-        push = shear - before
-        if change + abs(push) * r[SOFT + 1] > quiet:
+        if change + abs(drag) * r[SOFT + 1] > quiet:
             moved_in[i] = number
             if light_j > 0.0:
                 moved_in[j] = number
-        d[i, 0], d[i, 1] = u - push * light_i * ny, v + push * light_i * nx
-        d[j, 0], d[j, 1] = u2 + push * light_j * ny, v2 - push * light_j * nx
-        d[i, 2], d[j, 2] = w + push * slow_i * turn_i, w2 + push * slow_j * turn_j
+        x, y = push * nx - drag * ny, push * ny + drag * nx
+        d[i, 0], d[i, 1] = u + light_i * x, v + light_i * y
+        d[j, 0], d[j, 1] = u2 - light_j * x, v2 - light_j * y
+        d[i, 2] = w + slow_i * (push * turn_i + drag * roll_i)
+        d[j, 2] = w2 + slow_j * (push * turn_j + drag * roll_j)
         r[FORCE], r[FORCE + 1] = normal, shear
     return worst
 

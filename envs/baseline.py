@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 
 import rigdda
+from envs.crew import Job
 from envs.memory import Memory, fingerprint
-from rigdda import Layout, Outcome, Site
-
-Job = tuple[Site, Layout, int]
-"""A site, what stands on it and the seed of a release."""
+from rigdda import Layout, Outcome
 
 Key = tuple[bytes, Layout, int]
 
@@ -40,7 +38,7 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> list[Outc
     if executor is None:
         found = rigdda.release_many(list(new.values()))
     else:
-        found = list(executor.map(_outcome, new.values()))
+        found = list(executor.map(_outcome, list(new.values())))
     fresh = dict(zip(new, found, strict=True))
     memory.remember({key: outcome for key, outcome in fresh.items() if not key[1]})
     known |= fresh

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from envs.crew import Job
 from envs.memory import Memory, fingerprint
 from rigdda import Layout, Run, Simulation, Site
 from rigdda.geometry import polygon_properties
@@ -83,8 +85,10 @@ def envelope(site: Site) -> Envelope:
     return barrier_free([site])[0]
 
 
-def barrier_free(sites: Sequence[Site]) -> list[Envelope]:
+def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> list[Envelope]:
     """Return the barrier-free envelope of every site; the unknown ones are simulated together.
+
+    In threads over all cores, or in `executor`.
 
     Raises
     ------
@@ -94,15 +98,19 @@ def barrier_free(sites: Sequence[Site]) -> list[Envelope]:
     keys = [fingerprint(site) for site in sites]
     known = memory.recall(keys)
     new = {key: site for key, site in zip(keys, sites, strict=True) if key not in known}
-    found = standing([(site, (), SEEDS) for site in new.values()])
+    found = standing([(site, (), SEEDS) for site in new.values()], executor)
     fresh = dict(zip(new, found, strict=True))
     memory.remember(fresh)
     known |= fresh
     return [known[key] for key in keys]
 
 
-def standing(cases: Sequence[tuple[Site, Layout, Sequence[int]]]) -> list[Envelope]:
-    """Return the envelope of every case (site, layout, seeds), simulated in threads over all cores.
+def standing(
+    cases: Sequence[tuple[Site, Layout, Sequence[int]]], executor: Executor | None = None
+) -> list[Envelope]:
+    """Return the envelope of every case (site, layout, seeds).
+
+    Simulated in threads over all cores, or in `executor`.
 
     Raises
     ------
@@ -110,13 +118,14 @@ def standing(cases: Sequence[tuple[Site, Layout, Sequence[int]]]) -> list[Envelo
         As `rigdda.release` does.
     """
     jobs = [(site, layout, seed) for site, layout, seeds in cases for seed in seeds]
-    with ThreadPoolExecutor() as pool:
-        transits = pool.map(lambda job: _transit(*job), jobs)
+    with nullcontext(executor) if executor else ThreadPoolExecutor() as pool:
+        transits = pool.map(_transit, jobs)
         return [_summary(list(islice(transits, len(seeds)))) for _, _, seeds in cases]
 
 
-def _transit(site: Site, layout: Layout, seed: int) -> Transit:
+def _transit(job: Job) -> Transit:
     """Simulate a release and return what passed."""
+    site, layout, seed = job
     lines = stations(site).tolist()
     simulation = Simulation(site.realise(layout, seed), site.settings(), lines)
     run = simulation.run(site.motion.duration, site.motion.duration)

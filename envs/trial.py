@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from typing import NamedTuple
 
 from envs.baseline import outcomes
@@ -32,8 +33,8 @@ class Answer(NamedTuple):
     envelope: Envelope | None
 
 
-def simulate(asks: Sequence[Ask | None]) -> list[Answer | None]:
-    """Simulate every ask, their releases together in threads over all cores.
+def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> list[Answer | None]:
+    """Simulate every ask, their releases together in threads over all cores, or in `executor`.
 
     Raises
     ------
@@ -42,7 +43,7 @@ def simulate(asks: Sequence[Ask | None]) -> list[Answer | None]:
     """
     real = [ask for ask in asks if ask is not None]
     jobs = [(ask.problem.site, ask.layout, seed) for ask in real for seed in ask.seeds]
-    found, looked = iter(outcomes(jobs)), iter(_envelopes([ask for ask in real if ask.looks]))
+    found, looked = iter(outcomes(jobs, executor)), iter(_envelopes(real, executor))
     answers: list[Answer | None] = []
     for ask in asks:
         if ask is None:
@@ -54,9 +55,10 @@ def simulate(asks: Sequence[Ask | None]) -> list[Answer | None]:
     return answers
 
 
-def _envelopes(asks: Sequence[Ask]) -> list[Envelope]:
-    """Return the envelope of every ask, in order."""
-    free = iter(barrier_free([ask.problem.site for ask in asks if not ask.layout]))
+def _envelopes(asks: Sequence[Ask], executor: Executor | None) -> list[Envelope]:
+    """Return the envelope of every ask that looks, in order."""
+    asks = [ask for ask in asks if ask.looks]
+    free = iter(barrier_free([ask.problem.site for ask in asks if not ask.layout], executor))
     cases = [(a.problem.site, a.layout, SEEDS[: len(a.seeds)]) for a in asks if a.layout]
-    with_barriers = iter(standing(cases))
+    with_barriers = iter(standing(cases, executor))
     return [next(with_barriers if ask.layout else free) for ask in asks]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from envs import encoding
 from envs.base import BarrierEnv, Info, Step
+from envs.crew import Crew
 from envs.design import BarrierDesign
 from envs.observation import Observation
 from envs.placement import BarrierPlacement
@@ -28,7 +29,7 @@ Batch = tuple[
 
 
 class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
-    """Copies of one environment that step together, in threads over all cores.
+    """Copies of one environment that step together, in threads over all cores or in processes.
 
     Each copy gives exactly what it would give alone: copy i of `reset(seed=s)` is the environment
     after `reset(seed=s + i)`. A copy whose episode ends starts the next in the same step; the last
@@ -40,6 +41,10 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         Number of copies.
     max_episode_steps : int, optional
         Steps after which an episode is truncated, as by a TimeLimit.
+    processes : int, optional
+        Processes that simulate instead of threads, which share one interpreter's lock: one a core
+        pays from some 8 copies on. A script that asks for them guards its main part with
+        `if __name__ == "__main__"`.
     record : path, optional
         Folder for replays; copy i writes into its folder `copy-i`.
     **keywords
@@ -58,6 +63,7 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         self,
         num_envs: int = 1,
         max_episode_steps: int | None = None,
+        processes: int | None = None,
         record: str | os.PathLike[str] | None = None,
         **keywords: Any,
     ):
@@ -65,6 +71,7 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         if max_episode_steps is not None:
             check.integer("max_episode_steps", max_episode_steps, 1)
         self.limit = max_episode_steps
+        self._crew = None if processes is None else Crew(processes)
         folder = None if record is None else Recorder(record).folder
         folders = [folder and folder / f"copy-{i}" for i in range(num_envs)]
         self.copies = [self.single(record=folder, **keywords) for folder in folders]
@@ -110,7 +117,7 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         """Start an episode in every copy; return what each says."""
         seeds = self._seeds(seed)
         self._elapsed[:] = 0
-        return _restart(self.copies, seeds)
+        return self._restart(self.copies, seeds)
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         """Return the seed of every copy, None for one that goes on with its random numbers."""
@@ -140,18 +147,32 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         width = self.copies[0].width
         rows = [encoding.vector(f"actions[{i}]", row, width) for i, row in enumerate(actions)]
         asks = [copy.ask_step(row) for copy, row in zip(self.copies, rows, strict=True)]
-        told = [copy.tell_step(a) for copy, a in zip(self.copies, simulate(asks), strict=True)]
+        told = [
+            copy.tell_step(a)
+            for copy, a in zip(self.copies, simulate(asks, self._crew), strict=True)
+        ]
         self._elapsed += 1
         cut = self._elapsed == self.limit
         steps = [(*step[:3], bool(late), step[4]) for step, late in zip(told, cut, strict=True)]
         ended = [i for i, step in enumerate(steps) if step[2] or step[3]]
         self._elapsed[ended] = 0
-        starts = _restart([self.copies[i] for i in ended], [None] * len(ended))
+        starts = self._restart([self.copies[i] for i in ended], [None] * len(ended))
         following = dict(zip(ended, starts, strict=True))
         return [(step, following.get(i)) for i, step in enumerate(steps)]
 
+    def _restart(self, copies: Sequence[BarrierEnv], seeds: Sequence[int | None]) -> list[Start]:
+        """Start an episode in some copies; return what each says."""
+        asks = [copy.ask_reset(seed) for copy, seed in zip(copies, seeds, strict=True)]
+        starts = []
+        for copy, answer in zip(copies, simulate(asks, self._crew), strict=True):
+            assert answer is not None
+            starts.append(copy.tell_reset(answer))
+        return starts
+
     def close_extras(self, **_: Any) -> None:
-        """Close every copy."""
+        """Close every copy, and end the processes."""
+        if self._crew is not None:
+            self._crew.shutdown()
         for copy in self.copies:
             copy.close()
 
@@ -178,16 +199,6 @@ def _rows(values: Any) -> int | None:
         return len(values)
     except TypeError:
         return None
-
-
-def _restart(copies: Sequence[BarrierEnv], seeds: Sequence[int | None]) -> list[Start]:
-    """Start an episode in some copies; return what each says."""
-    asks = [copy.ask_reset(seed) for copy, seed in zip(copies, seeds, strict=True)]
-    starts = []
-    for copy, answer in zip(copies, simulate(asks), strict=True):
-        assert answer is not None
-        starts.append(copy.tell_reset(answer))
-    return starts
 
 
 def stack(seen: Sequence[Observation]) -> Observation:

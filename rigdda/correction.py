@@ -38,11 +38,6 @@ def place_all_corners(bodies: Bodies, outlines: Outlines) -> None:
     """Set the corners and edge normals of all bodies, when a scene is packed."""
     for i in range(len(bodies)):
         place_corners(bodies, outlines, i)
-    for row in range(len(outlines.polygon)):
-        inside = math.inf
-        for edge in range(outlines.polygon[row].count):
-            inside = min(inside, -over_edge(outlines, row, edge, row))
-        outlines.polygon[row].inside = (1.0 - 1e-9) * inside  # rounding is to leave out nothing
 
 
 @kernel
@@ -59,7 +54,7 @@ def polygon_row(bodies: Bodies, i: int, place: int) -> int:
 
 @inlined
 def place_edges(outlines: Outlines, row: int) -> None:
-    """Set the edge normals and the middle of a polygon from its corners."""
+    """Set the edge normals of a polygon, its middle and the circle in it, from its corners."""
     n, sum_x, sum_y = outlines.polygon[row].count, 0.0, 0.0
     for k in range(n):
         sum_x += outlines.world_x[row, k]
@@ -71,6 +66,10 @@ def place_edges(outlines: Outlines, row: int) -> None:
         outlines.normal_x[row, k] = ey / length
         outlines.normal_y[row, k] = -ex / length
     outlines.middle_x[row], outlines.middle_y[row] = sum_x / n, sum_y / n
+    inside = math.inf
+    for k in range(n):
+        inside = min(inside, -over_edge(outlines, row, k, row))
+    outlines.inside[row] = (1.0 - 1e-9) * inside  # rounding is to leave out no face of contact
 
 
 @kernel

@@ -225,6 +225,7 @@ def pack_outlines(polygons: list[Floats], centres: list[Floats], bodies: Bodies)
         normal_y=np.zeros(shape),
         middle_x=np.zeros(len(rows)),
         middle_y=np.zeros(len(rows)),
+        inside=np.zeros(len(rows)),
         polygon=outlined.view(np.recarray),
         corner=corners.view(np.recarray),
     )

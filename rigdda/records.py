@@ -114,7 +114,6 @@ Links = NDArray[np.void]
 
 
 POLYGON = _record(
-    inside=float,  # radius of the circle about its middle that touches the nearest edge [m]
     count=int,  # corners
     body=int,
 )
@@ -142,6 +141,7 @@ class Outlines(NamedTuple):
     normal_y: Floats
     middle_x: Floats  # (R,) mean of the corners now [m]
     middle_y: Floats
+    inside: Floats  # (R,) radius of the circle about it that touches the nearest edge [m]
     polygon: NDArray[np.void]  # (R,) of POLYGON
     corner: NDArray[np.void]  # (R, P) of CORNER
 

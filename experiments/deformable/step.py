@@ -10,7 +10,7 @@ from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
 from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
-from rigdda.correction import keep_memory, place_normals
+from rigdda.correction import keep_memory, place_edges
 from rigdda.islands import find_islands, pair_blocks
 from rigdda.kernel import kernel
 from rigdda.records import (
@@ -75,7 +75,7 @@ def move_block(bodies: Bodies, outlines: Outlines, s: Solid, i: int, dt: float) 
         outlines.world_x[i, k] = bodies[i].x + u + moved_x
         outlines.world_y[i, k] = bodies[i].y + v + moved_y
         radius = max(radius, math.hypot(moved_x, moved_y))
-    place_normals(outlines, i)
+    place_edges(outlines, i)
     bodies[i].radius = radius
     bodies[i].x += u
     bodies[i].y += v

@@ -70,7 +70,7 @@ def face_of_contact(
         edge = facing if visit < 0 else visit
         nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
         if visit >= 0:
-            most = over_edge(outlines, i, edge, j) - outlines.polygon[j].inside
+            most = over_edge(outlines, i, edge, j) - outlines.inside[j]
             if edge == facing or (most <= slack and (time > 0.0 or most < depth)):
                 continue
         gap, corner = axis_gap(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 import pickle
 from typing import Any
 
@@ -14,6 +15,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import envs
+from envs.crew import Crew
 from envs.registration import ENVIRONMENTS
 from rigdda import BadInput, Site
 
@@ -59,6 +61,44 @@ def test_copies_give_what_singles_give(
 
 
 @every
+def test_processes_give_what_threads_give(name: str, ramp: Site) -> None:
+    """Two episodes bit for bit, and a copy of the environment has processes of its own."""
+    threads, processes = batch(name, ramp), batch(name, ramp, processes=2)
+    assert data_equivalence(threads.reset(seed=3), processes.reset(seed=3), exact=True)
+    threads.action_space.seed(1)
+    ended = np.zeros(COPIES, int)
+    while ended.min() < 2:
+        actions = threads.action_space.sample()
+        one, other = threads.step(actions), processes.step(actions)
+        assert data_equivalence(list(one), list(other), exact=True)
+        ended += one[2]
+    clone = pickle.loads(pickle.dumps(processes))
+    actions = threads.action_space.sample()
+    one, other = processes.step(actions), clone.step(actions)
+    assert data_equivalence(list(one), list(other), exact=True)
+    for env in (processes, clone):
+        env.close()
+
+
+def test_a_crew_shares_jobs_out_evenly_and_keeps_them_at_home(ramp: Site) -> None:
+    crew = Crew(2)
+    try:
+        jobs = [(ramp, (), seed) for seed in (5, 6, 7, 8)]
+        first = list(crew.map(worker, jobs))
+        assert len(set(first)) == 2 and sorted(map(first.count, set(first))) == [2, 2]
+        assert list(crew.map(worker, jobs)) == first
+        one = list(crew.map(worker, [(ramp, (), 5)] * 4))
+        assert sorted(map(one.count, set(one))) == [2, 2]
+    finally:
+        crew.shutdown()
+
+
+def worker(job: object) -> int:
+    """Return the process that a job is in."""
+    return os.getpid()
+
+
+@every
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
 def test_a_copy_goes_on_like_the_original(name: str, ramp: Site, clone: Any) -> None:
     env = batch(name, ramp)
@@ -95,8 +135,8 @@ def test_bad_input_is_refused_and_changes_nothing(ramp: Site) -> None:
     other = batch("rigdda/BarrierPlacement-v0", ramp)
     other.reset(seed=4)
     assert data_equivalence(list(env.step(actions)), list(other.step(actions)), exact=True)
-    for keywords in ({"num_envs": 0}, {"num_envs": 1, "max_episode_steps": 0}):
-        with pytest.raises(BadInput, match=r"= 0: give a whole number of at least 1"):
+    for keywords in ({"num_envs": 0}, {"max_episode_steps": 0}, {"processes": 0}):
+        with pytest.raises(BadInput, match=r"= 0: give a whole number"):
             gymnasium.make_vec("rigdda/BarrierDesign-v0", site=ramp, **keywords)
 
 

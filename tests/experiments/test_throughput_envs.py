@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 
 import pytest
 from click.testing import CliRunner
@@ -14,12 +15,13 @@ def test_every_batch_is_measured(tmp_path, monkeypatch):
     pytest.importorskip("stable_baselines3")
     from experiments import throughput_envs
 
-    monkeypatch.setattr(throughput_envs, "COPIES", (1, 2))
+    monkeypatch.setattr(throughput_envs, "BATCHES", ((1, False), (2, True)))
     done = CliRunner().invoke(throughput_envs.main, ["--quick", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     with (tmp_path / "throughput_envs.csv").open() as file:
         rows = list(csv.DictReader(file))
-    batches = [(row["environment"], row["copies"]) for row in rows]
-    assert batches == [(name, copies) for name in ENVIRONMENTS for copies in ("1", "2")]
+    played = [("1", "0"), ("2", str(os.cpu_count()))]
+    batches = [(row["environment"], row["copies"], row["processes"]) for row in rows]
+    assert batches == [(name, *each) for name in ENVIRONMENTS for each in played]
     assert all(int(row["episodes"]) >= 8 for row in rows)
     assert all(float(row["episodes_per_second"]) > 0.0 for row in rows)

@@ -19,7 +19,7 @@ MOST = 256
 """Most processes."""
 
 KEPT = 4096
-"""Seeds of which it is known where they were simulated; the rock of fewer is kept there."""
+"""Seeds of which it is known where they were simulated: as many as a process keeps the rock of."""
 
 
 class Crew(Executor):

@@ -23,13 +23,16 @@ LONGEST = 0.1
 FRAME = 0.02
 """Interval of the frames of a rockfall, and its longest step [s]."""
 
-PARTS = (1, 2, 5, 10, 15, 20, 25, 40, 50, 100)
+RELEASE = 25.0
+"""Simulated time of a rockfall [s]."""
+
+PARTS = (1, 2, 5, 6, 10, 15, 20, 25, 40, 50, 100)
 """Steps of all engines, as parts of the longest one: 0.1 s to 1e-3 s."""
 
 FINE = (*PARTS, 200, 400, 800, 1600)
 """Steps where closed forms are approached, down to 6.25e-5 s."""
 
-QUICK_PARTS = (1, 2, 5, 10, 15, 20, 50, 200, 800)
+QUICK_PARTS = (1, 2, 5, 6, 10, 15, 20, 50, 200, 800)
 """Steps of the quick run."""
 
 SETTLED = 2.0
@@ -173,7 +176,7 @@ def rockfall(count: int, seeds: int, must: float, aim: float) -> Case:
         f"rockfall-{count}",
         "greatest penetration [m]",
         tuple(rockfall_scene(count, seed) for seed in range(1, seeds + 1)),
-        25.0,
+        RELEASE,
         FRAME,
         deepest,
         tuple(part for part in PARTS if LONGEST / part <= FRAME),
@@ -230,10 +233,16 @@ def all_cases() -> tuple[Case, ...]:
 
 
 def quick_cases() -> tuple[Case, ...]:
-    """Return all cases but the largest, with one scene, fewer steps and fewer options each."""
+    """Return all cases but the largest, with fewer steps and fewer options each.
+
+    And with one scene, but for rockfalls, whose greatest penetration is another one in each.
+    """
     return tuple(
         replace(
-            c, scenes=c.scenes[:1], parts=tuple(p for p in c.parts if p in QUICK_PARTS), options=2
+            c,
+            scenes=c.scenes if c.duration == RELEASE else c.scenes[:1],
+            parts=tuple(p for p in c.parts if p in QUICK_PARTS),
+            options=2,
         )
         for c in all_cases()[:-1]
     )

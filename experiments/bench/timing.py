@@ -34,8 +34,8 @@ LONG = 0.5
 class Effort:
     """How much is spent on a case.
 
-    Processor time [s] after which no finer step is tried with the same options, and of all repeated
-    runs together; most and fewest runs of a setting that may decide a level.
+    Processor time of a scene [s] after which no finer step is tried with the same options, and of
+    all repeated runs together; most and fewest runs of a setting that may decide a level.
     """
 
     patience: float
@@ -157,7 +157,7 @@ def _refine(
         first_run(setting, case)
         yield setting
         enough = setting.error < ENOUGH * min(case.levels)
-        if setting.cpu[0] > effort.patience * (ENOUGH if enough else 1.0):
+        if setting.cpu[0] > len(case.scenes) * effort.patience * (ENOUGH if enough else 1.0):
             return
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 
 import rigdda
-from envs.crew import Job
+from envs.crew import Job, Workers
 from envs.memory import Memory, fingerprint
 from rigdda import Layout, Outcome
 
@@ -16,14 +15,14 @@ memory: Memory[Key, Outcome] = Memory(4096)
 """Outcomes without barriers by site and seed, about 1 kB each."""
 
 
-def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> list[Outcome]:
+def outcomes(jobs: Sequence[Job], workers: Workers | None = None) -> list[Outcome]:
     """Return the outcome of every job; equal jobs are simulated once.
 
     Parameters
     ----------
     jobs : sequence of (Site, Layout, int)
         Releases.
-    executor : Executor, optional
+    workers : Workers, optional
         Where to simulate; None: in threads over all cores.
 
     Raises
@@ -35,10 +34,10 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> list[Outc
     keys = [(prints[id(site)], layout, seed) for site, layout, seed in jobs]
     known = memory.recall(key for key in keys if not key[1])
     new = {key: job for key, job in zip(keys, jobs, strict=True) if key not in known}
-    if executor is None:
+    if workers is None:
         found = rigdda.release_many(list(new.values()))
     else:
-        found = list(executor.map(_outcome, list(new.values())))
+        found = list(workers.map(_outcome, list(new.values())))
     fresh = dict(zip(new, found, strict=True))
     memory.remember({key: outcome for key, outcome in fresh.items() if not key[1]})
     known |= fresh

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from rigdda import Layout, Site, check
 
@@ -22,8 +22,15 @@ KEPT = 4096
 """Seeds of which it is known where they were simulated: as many as a process keeps the rock of."""
 
 
-class Crew(Executor):
-    """Processes that start with the first job and end with `shutdown`.
+class Workers(Protocol):
+    """Where releases are simulated: a `Crew`, or an Executor of the standard library."""
+
+    def map(self, fn: Callable[[Job], Result], jobs: Sequence[Job], /) -> Iterator[Result]:
+        """Return an iterator over the results of a function of every job, in order."""
+
+
+class Crew:
+    """Processes that start with the first job and end with `close`.
 
     The rock of a release takes as long to cut as its fall to simulate, and a process keeps what it
     has cut: so the jobs of a seed go to the process that had the first, as far as each then gets
@@ -49,9 +56,7 @@ class Crew(Executor):
         """Return what makes a crew of as many: a copy of an environment has its own."""
         return Crew, (len(self._pools),)
 
-    def map(  # type: ignore[override]
-        self, fn: Callable[[Job], Result], jobs: Sequence[Job], /
-    ) -> Iterator[Result]:
+    def map(self, fn: Callable[[Job], Result], jobs: Sequence[Job], /) -> Iterator[Result]:
         """Start all jobs and return an iterator over the results of a function, in order.
 
         The function is at module level, for the processes to find it.
@@ -74,7 +79,7 @@ class Crew(Executor):
         if len(self._home) > KEPT:
             del self._home[next(iter(self._home))]
 
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+    def close(self) -> None:
         """End the processes."""
         for pool in self._pools:
-            pool.shutdown(wait, cancel_futures=cancel_futures)
+            pool.shutdown()

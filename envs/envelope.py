@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import islice
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from envs.crew import Job
+from envs.crew import Job, Workers
 from envs.memory import Memory, fingerprint
 from rigdda import Layout, Run, Simulation, Site
 from rigdda.geometry import polygon_properties
@@ -85,10 +85,10 @@ def envelope(site: Site) -> Envelope:
     return barrier_free([site])[0]
 
 
-def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> list[Envelope]:
+def barrier_free(sites: Sequence[Site], workers: Workers | None = None) -> list[Envelope]:
     """Return the barrier-free envelope of every site; the unknown ones are simulated together.
 
-    In threads over all cores, or in `executor`.
+    In threads over all cores, or in `workers`.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
     keys = [fingerprint(site) for site in sites]
     known = memory.recall(keys)
     new = {key: site for key, site in zip(keys, sites, strict=True) if key not in known}
-    found = standing([(site, (), SEEDS) for site in new.values()], executor)
+    found = standing([(site, (), SEEDS) for site in new.values()], workers)
     fresh = dict(zip(new, found, strict=True))
     memory.remember(fresh)
     known |= fresh
@@ -106,11 +106,11 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
 
 
 def standing(
-    cases: Sequence[tuple[Site, Layout, Sequence[int]]], executor: Executor | None = None
+    cases: Sequence[tuple[Site, Layout, Sequence[int]]], workers: Workers | None = None
 ) -> list[Envelope]:
     """Return the envelope of every case (site, layout, seeds).
 
-    Simulated in threads over all cores, or in `executor`.
+    Simulated in threads over all cores, or in `workers`.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def standing(
         As `rigdda.release` does.
     """
     jobs = [(site, layout, seed) for site, layout, seeds in cases for seed in seeds]
-    with nullcontext(executor) if executor else ThreadPoolExecutor() as pool:
+    with nullcontext(workers) if workers else ThreadPoolExecutor() as pool:
         transits = pool.map(_transit, jobs)
         return [_summary(list(islice(transits, len(seeds)))) for _, _, seeds in cases]
 

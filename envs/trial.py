@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from typing import NamedTuple
 
 from envs.baseline import outcomes
+from envs.crew import Workers
 from envs.envelope import SEEDS, Envelope, barrier_free, standing
 from envs.evaluation import Evaluation
 from envs.problem import DesignProblem
@@ -33,8 +33,8 @@ class Answer(NamedTuple):
     envelope: Envelope | None
 
 
-def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> list[Answer | None]:
-    """Simulate every ask, their releases together in threads over all cores, or in `executor`.
+def simulate(asks: Sequence[Ask | None], workers: Workers | None = None) -> list[Answer | None]:
+    """Simulate every ask, their releases together in threads over all cores, or in `workers`.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> li
     """
     real = [ask for ask in asks if ask is not None]
     jobs = [(ask.problem.site, ask.layout, seed) for ask in real for seed in ask.seeds]
-    found, looked = iter(outcomes(jobs, executor)), iter(_envelopes(real, executor))
+    found, looked = iter(outcomes(jobs, workers)), iter(_envelopes(real, workers))
     answers: list[Answer | None] = []
     for ask in asks:
         if ask is None:
@@ -55,10 +55,10 @@ def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> li
     return answers
 
 
-def _envelopes(asks: Sequence[Ask], executor: Executor | None) -> list[Envelope]:
+def _envelopes(asks: Sequence[Ask], workers: Workers | None) -> list[Envelope]:
     """Return the envelope of every ask that looks, in order."""
     asks = [ask for ask in asks if ask.looks]
-    free = iter(barrier_free([ask.problem.site for ask in asks if not ask.layout], executor))
+    free = iter(barrier_free([ask.problem.site for ask in asks if not ask.layout], workers))
     cases = [(a.problem.site, a.layout, SEEDS[: len(a.seeds)]) for a in asks if a.layout]
-    with_barriers = iter(standing(cases, executor))
+    with_barriers = iter(standing(cases, workers))
     return [next(with_barriers if ask.layout else free) for ask in asks]

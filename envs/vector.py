@@ -172,7 +172,7 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
     def close_extras(self, **_: Any) -> None:
         """Close every copy, and end the processes."""
         if self._crew is not None:
-            self._crew.shutdown()
+            self._crew.close()
         for copy in self.copies:
             copy.close()
 

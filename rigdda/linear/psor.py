@@ -31,7 +31,7 @@ from rigdda.records import Contacts, Floats, Ints, Matrix, Parameters, Work
 
 # columns of work.row: normal (x, y); moments of a unit force along normal and shear about a and b,
 # by direction gain [N/m], free displacement [m], softness [m/N], force [N]; friction, and forces
-# that it bears beside [N]
+# that it bears beside [N]; displacement along shear per normal force [m/N]
 NORMAL, TURN_A, TURN_B = 0, 2, 4
 GAIN, FREE, SOFT, FORCE = 6, 8, 10, 12
 FRICTION, COHESION, TENSION, CROSS = 14, 15, 16, 17
@@ -98,8 +98,9 @@ def sweep(
     But not where neither body has moved by more than `quiet` [m] in this or the last sweep:
     moved_in[s] is the number of the last sweep in which slot s did.
 
-    A body without unknowns has a slot of its own that nothing moves. Displacements of a visit are
-    held in local variables, and unsigned indices spare numba's test for negative ones.
+    A body without unknowns has a slot of its own that nothing moves. A visit reads the bodies once:
+    what the normal force changes along the shear direction is added to what was read. Unsigned
+    indices spare numba's test for negative ones.
     """
     worst = 0.0
     for visit in range(count):

@@ -90,7 +90,7 @@ def test_a_crew_shares_jobs_out_evenly_and_keeps_them_at_home(ramp: Site) -> Non
         one = list(crew.map(worker, [(ramp, (), 5)] * 4))
         assert sorted(map(one.count, set(one))) == [2, 2]
     finally:
-        crew.shutdown()
+        crew.close()
 
 
 def worker(job: object) -> int:
@@ -136,7 +136,7 @@ def test_bad_input_is_refused_and_changes_nothing(ramp: Site) -> None:
     other.reset(seed=4)
     assert data_equivalence(list(env.step(actions)), list(other.step(actions)), exact=True)
     for keywords in ({"num_envs": 0}, {"max_episode_steps": 0}, {"processes": 0}):
-        with pytest.raises(BadInput, match=r"= 0: give a whole number"):
+        with pytest.raises(BadInput, match=r"= 0: give a whole number of at least 1"):
             gymnasium.make_vec("rigdda/BarrierDesign-v0", site=ramp, **keywords)
 
 

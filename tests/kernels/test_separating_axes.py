@@ -1,0 +1,80 @@
+"""Separating axes: those that are left out would never have been the face of contact."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigdda import Block, Scene, Settings
+from rigdda.contact.narrow_phase import face_of_contact
+from rigdda.correction import place_all_corners
+from rigdda.kernel import from_python
+from rigdda.pack import Arrays, pack
+from rigdda.validation.scenes import rock
+
+SLACK = 0.01
+face = from_python(face_of_contact)
+
+
+def two_polygons(rng: np.random.Generator) -> Arrays:
+    """Return two convex polygons of 3 to 8 corners, apart, touching or in one another."""
+    blocks = []
+    for centre in (0.0, 10.0):
+        corners = int(rng.integers(3, 9))
+        angles = 2.0 * math.pi * (np.arange(corners) + 0.8 * rng.random(corners)) / corners
+        x, y = rng.uniform(0.3, 2.0) * np.cos(angles), rng.uniform(0.3, 2.0) * np.sin(angles)
+        blocks.append(Block(np.stack([centre + x, y], axis=1)))
+    arrays = pack(Scene(None, tuple(blocks), rock()), Settings(), np.zeros(0), (0.0, 0.0))
+    way, angle = rng.uniform(0.2, 4.0), rng.uniform(0.0, 2.0 * math.pi)
+    bodies = arrays.bodies
+    bodies.x[1], bodies.y[1] = bodies.x[0] + way * math.cos(angle), way * math.sin(angle)
+    bodies.theta[:] = rng.uniform(-4.0, 4.0, 2)
+    place_all_corners(bodies, arrays.outlines)
+    return arrays
+
+
+def over_all_edges(
+    arrays: Arrays, i: int, j: int, way: np.ndarray, spread: float
+) -> tuple[bool, float, float]:
+    """Return what `face_of_contact` does, over every edge of i and corner of j."""
+    out, count = arrays.outlines, arrays.outlines.polygon.count
+    corners = np.stack([out.world_x[j, : count[j]], out.world_y[j, : count[j]]], axis=1)
+    ranks = []
+    for edge in range(count[i]):
+        normal = np.array([out.normal_x[i, edge], out.normal_y[i, edge]])
+        gap = ((corners - (out.world_x[i, edge], out.world_y[i, edge])) @ normal).min()
+        if gap > spread:
+            return False, 0.0, 0.0
+        approach = -way @ normal
+        late = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
+        ranks.append((late if gap > SLACK else 0.0, gap))
+    return True, *max(ranks)
+
+
+@given(st.integers(0, 10**6))
+def test_the_face_of_contact_is_that_of_all_edges(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arrays = two_polygons(rng)
+    for i, j in ((0, 1), (1, 0)):
+        for reach in (0.0, 0.5, 3.0):
+            way = rng.uniform(-reach, reach, 2)
+            spread = math.hypot(*way) + SLACK
+            wanted = over_all_edges(arrays, i, j, way, spread)
+            count = arrays.outlines.polygon.count
+            possible, time, depth, _ = face(
+                arrays.outlines, i, count[i], j, count[j], *way, spread, SLACK, 0.0
+            )
+            assert possible == wanted[0]
+            if possible:
+                np.testing.assert_allclose((time, depth), wanted[1:], rtol=1e-9, atol=1e-12)
+
+
+def test_the_circle_in_a_square_touches_its_edges() -> None:
+    corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 2.0), (0.0, 2.0)]
+    scene = Scene(None, (Block(corners),), rock())
+    outlines = pack(scene, Settings(), np.zeros(0), (0.0, 0.0)).outlines
+    assert math.isclose(outlines.inside[0], 1.0, rel_tol=1e-8) and outlines.inside[0] < 1.0
+    assert (outlines.middle_x[0], outlines.middle_y[0]) == (2.0, 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import click
@@ -35,11 +36,13 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
 
 @click.command()
-@count_option("--sites", 2, 128, "Random sites to train on.")
-@count_option("--episodes", 0, 16384, "Episodes, of one release each.")
+@count_option("--sites", 2, 512, "Random sites to train on.")
+@count_option("--episodes", 0, 49152, "Episodes, of one release each.")
 @seed_option("Seed of all that is random.", SEED)
+@click.option("--processes", type=click.IntRange(1), default=os.cpu_count(),
+              help="Processes that simulate.  [default: one a core]")  # fmt: skip
 @out_option("train")
-def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
+def train(sites: int, episodes: int, seed: int, processes: int, out: Path | None) -> None:
     """Train a policy that designs fences for a site from what it sees of it, without a search.
 
     Writes policy.safetensors, which `rigdda evaluate --policy` takes, and logs for TensorBoard.
@@ -50,7 +53,7 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
     terms = training.Terms(sites, episodes, seed)
     folder = folder_for(out, "train", *training.FILES)
     with kept(folder), progress(terms.episodes) as tick:
-        trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
+        trained = training.train(terms, folder, processes, lambda done: tick(done, "PPO"))
     click.echo(
         f"fall of the objective on {terms.beside} sites beside the training sites: before "
         f"{trained.before:.3f}, after {trained.after:.3f}; policy.safetensors is in {folder}"

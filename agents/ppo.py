@@ -152,15 +152,16 @@ class Featured(VecEnvWrapper):
         return np.stack([scaled(one, self.mean, self.scale) for one in plain])
 
 
-def pool(problems: Sequence[DesignProblem]) -> VecEnv:
+def pool(problems: Sequence[DesignProblem], processes: int | None = None) -> VecEnv:
     """Return one copy of `BarrierDesign` for each problem, of one release an episode.
 
-    Every copy keeps its site, so that what is seen of it is simulated once.
+    Every copy keeps its site, so that what is seen of it is simulated once. Releases are simulated
+    in threads over all cores, or in so many processes.
     """
     first = problems[0]
     copies = sb3_vec_env(
         "rigdda/BarrierDesign-v0", len(problems), site=first.site, kinds=first.kinds,
-        max_barriers=first.max_barriers, releases=1,
+        max_barriers=first.max_barriers, releases=1, processes=processes,
     )  # fmt: skip
     for i, posed in enumerate(problems):
         copies.set_attr("problem", posed, i)
@@ -168,13 +169,18 @@ def pool(problems: Sequence[DesignProblem]) -> VecEnv:
 
 
 def learner(copies: VecEnv, seed: int, logs: Path) -> PPO:
-    """Return an untrained policy and its trainer, one mini-batch a step of all copies."""
+    """Return an untrained policy and its trainer, with steps that shrink to nothing."""
     torch.set_num_threads(1)
     return PPO(
-        "MlpPolicy", copies, n_steps=4, batch_size=copies.num_envs, n_epochs=4,
-        learning_rate=3e-4, target_kl=0.02, seed=seed, tensorboard_log=str(logs),
+        "MlpPolicy", copies, n_steps=2, batch_size=max(2, copies.num_envs // 4), n_epochs=4,
+        learning_rate=_shrinking, target_kl=0.02, seed=seed, tensorboard_log=str(logs),
         policy_kwargs={"net_arch": HIDDEN, "log_std_init": EXPLORATION}, **COMMON,
     )  # fmt: skip
+
+
+def _shrinking(left: float) -> float:
+    """Return the learning rate when such a share of the episodes is left."""
+    return 4e-4 * left
 
 
 def _net(model: PPO) -> ActorCriticPolicy:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import zipfile
 import zlib
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from agents.policy import KINDS, SLOTS, decide
 from agents.seeds import release_seeds
 from agents.store import mechanics
 from envs import DesignProblem, fidelity
+from envs.crew import Crew
+from envs.envelope import barrier_free
 from envs.observation import observe
 from rigdda import BadInput, __version__, check, sites
 from rigdda.files import atomic
@@ -80,8 +83,8 @@ class Trained:
     after: float
 
 
-def train(terms: Terms, out: Path, tick: Tick) -> Trained:
-    """Train a policy, or go on with a training that was stopped.
+def train(terms: Terms, out: Path, processes: int, tick: Tick) -> Trained:
+    """Train a policy in so many processes, or go on with a training that was stopped.
 
     Raises
     ------
@@ -93,8 +96,10 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     ppo = extra.module("ppo")
     _same(terms, out)
     pool = [problem(site) for site in sites.TRAIN_SEEDS[: terms.sites]]
+    with closing(Crew(processes)) as crew:
+        barrier_free([posed.site for posed in pool], crew)
     mean, scale = scaling(np.stack([features(observe(posed, ())) for posed in pool]))
-    copies = ppo.Featured(ppo.pool(pool), mean, scale)
+    copies = ppo.Featured(ppo.pool(pool, processes), mean, scale)
     model = ppo.learner(copies, terms.seed, out)
     notes = _notes(terms)
     start = ppo.export(model, mean, scale, notes)
@@ -103,6 +108,7 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     ppo.learn(model, terms.episodes, out / "checkpoint.zip", tick)
     network = ppo.export(model, mean, scale, notes)
     network.save(out / "policy.safetensors")
+    copies.close()
     beside = sites.TRAIN_SEEDS[terms.sites : terms.sites + terms.beside]
     posed = [problem(site) for site in beside]
     return Trained(network, examine(start, posed), examine(network, posed))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import Protocol, TypeVar
 
 from rigdda import Layout, Site, check
@@ -49,7 +51,9 @@ class Crew:
 
     def __init__(self, processes: int):
         number = check.integer("processes", processes, 1, MOST)
-        self._pools = [ProcessPoolExecutor(1, get_context("spawn")) for _ in range(number)]
+        self._pools = [
+            ProcessPoolExecutor(1, get_context("spawn"), _end_with_parent) for _ in range(number)
+        ]
         self._home: dict[int, int] = {}
 
     def __reduce__(self) -> tuple[type[Crew], tuple[int]]:
@@ -83,3 +87,15 @@ class Crew:
         """End the processes."""
         for pool in self._pools:
             pool.shutdown()
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as the one that started it has, even if that was killed."""
+    Thread(target=_wait_for_parent, daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

@@ -29,6 +29,7 @@ from rigdda.constants import (
 )
 from rigdda.contact.links import bolt_energy
 from rigdda.errors import BadInput, Diverged, SoftContacts
+from rigdda.frames import frame_of, no_frames, pieces
 from rigdda.geometry import polygon_properties
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
 from rigdda.records import (
@@ -310,7 +311,12 @@ class Simulation:
         Diverged
             If a block's velocity is no longer finite or beyond any rockfall.
         """
-        target = self._counters[STEPS] + check.integer("n", n, 0)
+        self._advance(check.integer("n", n, 0), no_frames(self._arrays.bodies))
+
+    def _advance(self, steps: int, frames: NDArray[np.float64]) -> None:
+        """Take steps, as many from each of the frames to be kept to the next."""
+        target = self._counters[STEPS] + steps
+        stride = steps // max(len(frames), 1)
         while self._counters[STEPS] < target:
             a, before = self._arrays, time.thread_time()
             reason, block, swapped = advance(
@@ -329,6 +335,8 @@ class Simulation:
                 self._ledger,
                 self._deepest,
                 target - self._counters[STEPS],
+                frames,
+                stride,
             )
             self._seconds += time.thread_time() - before
             if swapped:
@@ -382,17 +390,17 @@ class Simulation:
         check.number("every", every, 0.0, open_low=True)
         stride = max(1, round(every / self.settings.dt))
         steps = max(1, round(duration / self.settings.dt))
-        marks = [*range(stride, steps, stride), steps]
-        frames = [self._frame()]
-        done = 0
-        for mark in _track(marks, progress):
+        start, bodies = self._counters[STEPS], self._arrays.bodies
+        kept, at = [frame_of(bodies)[None]], [0]
+        for count, apart in _track(pieces(steps, stride), progress):
+            kept.append(np.empty((count, len(bodies), 6)))
+            at += range(at[-1] + apart, at[-1] + (count + 1) * apart, apart)
             try:
-                self.step(mark - done)
+                self._advance(count * apart, kept[-1])
             except Diverged as error:
-                error.run = self._record(frames)
+                at = [mark for mark in at if start + mark < self._counters[STEPS]]
+                error.run = self._record(kept, start + np.array(at))
                 raise
-            done = mark
-            frames.append(self._frame())
         # what follows from the load by default is as stiff as it should be
         contacts = self._now[: self._counters[CONTACTS]]
         chosen = self.settings.penetration is not None or bool((contacts["kind"] == PLAIN).any())
@@ -403,21 +411,21 @@ class Simulation:
                 SoftContacts,
                 stacklevel=2,
             )
-        return self._record(frames)
+        return self._record(kept, start + np.array(at))
 
-    def _frame(self) -> tuple[float, NDArray, NDArray, NDArray]:
-        return self.time, self.poses, self.velocities, self.barrier_poses
-
-    def _record(self, frames: list[tuple[float, NDArray, NDArray, NDArray]]) -> Run:
+    def _record(self, kept: list[NDArray], steps: NDArray) -> Run:
+        """Return a run of the first frames that were kept, which were reached in such steps."""
         self._drain_events()
-        times, poses, velocities, barrier_poses = map(np.array, zip(*frames, strict=True))
+        frames, n = np.concatenate(kept)[: len(steps)], len(self.scene.blocks)
+        barrier_poses = np.repeat(self._barrier_start[None], len(steps), axis=0)
+        barrier_poses[:, list(self.scene.bodies)] = frames[:, n:, :3]
         events = np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
         gauges = self._arrays.gauges
         return Run(
             self.scene,
-            times,
-            poses,
-            velocities,
+            steps * self.settings.dt,
+            frames[:, :n, :3].copy(),
+            frames[:, :n, 3:].copy(),
             events,
             gauges.absorbed.copy(),
             gauges.watch_energy.copy(),
@@ -484,9 +492,9 @@ def chainages(stations: Sequence[float]) -> NDArray[np.float64]:
     return lines
 
 
-def _track(marks: list[int], progress: bool) -> Iterable[int]:
+def _track(parts: list[tuple[int, int]], progress: bool) -> Iterable[tuple[int, int]]:
     if not progress:
-        return marks
+        return parts
     from rich.progress import track
 
-    return track(marks, description="simulating")
+    return track(parts, description="simulating")

@@ -36,6 +36,7 @@ from rigdda.correction import (
 )
 from rigdda.cut_back import hold_others, level_for, mark_cut, release_all, too_far
 from rigdda.fence import limit_fences, wake_behind
+from rigdda.frames import keep_frame
 from rigdda.gauges import barrier_contact, note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel, stage
@@ -270,9 +271,9 @@ def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
     now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges,
     levels: tuple[Parameters, ...], counters: NDArray, ledger: NDArray, deepest: NDArray,
-    steps: int,
+    steps: int, frames: NDArray, stride: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Take up to `steps` steps.
+    """Take up to `steps` steps, and keep a frame whenever a multiple of `stride` is left.
 
     Parameters
     ----------
@@ -280,6 +281,8 @@ def advance(
         Of the step, then of its halves, quarters, ..., which are for islands that are cut back.
     counters, ledger, deepest : arrays
         See `records.COUNTERS`, `records.LEDGER`; deepest[0] is the greatest penetration [m].
+    frames : (F, M, 6) array
+        The last is for the state in the end; see `frames.keep_frame`.
 
     Returns
     -------
@@ -330,6 +333,8 @@ def advance(
                 bodies, gauges, counters[EVENTS], counters[STEPS] * levels[0].dt
             )
             steps -= 1
+            if bad < 0 and len(frames) > 0 and steps % stride == 0:
+                keep_frame(bodies, frames[len(frames) - 1 - steps // stride])
         if bad >= 0:
             return BAD_STATE, bad, swapped
     return DONE, -1, swapped

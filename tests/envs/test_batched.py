@@ -5,6 +5,10 @@ from __future__ import annotations
 import copy
 import os
 import pickle
+import subprocess
+import sys
+import time
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -91,6 +95,44 @@ def test_a_crew_shares_jobs_out_evenly_and_keeps_them_at_home(ramp: Site) -> Non
         assert sorted(map(one.count, set(one))) == [2, 2]
     finally:
         crew.close()
+
+
+LEFT_ALONE = """
+from envs.crew import Crew
+from test_batched import worker
+
+if __name__ == "__main__":
+    print(*Crew(2).map(worker, [(None, (), 1), (None, (), 2)]), flush=True)
+    input()
+"""
+
+
+def test_a_crew_ends_with_what_started_it(tmp_path: Path) -> None:
+    """Even where that is killed and cannot close it."""
+    script = tmp_path / "script.py"
+    script.write_text(LEFT_ALONE)
+    folders = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    parent = subprocess.Popen(
+        [sys.executable, script], env=os.environ | {"PYTHONPATH": folders}, **pipes
+    )
+    workers = [int(word) for word in parent.stdout.readline().split()]
+    assert len(set(workers)) == 2 and all(map(runs, workers))
+    parent.kill()
+    parent.communicate()
+    until = time.monotonic() + 30.0
+    while any(map(runs, workers)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(map(runs, workers))
+
+
+def runs(process: int) -> bool:
+    """Return whether a process of that number runs."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def worker(job: object) -> int:

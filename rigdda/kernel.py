@@ -96,6 +96,26 @@ def entry_kernel(function: Callable[..., Any]) -> Any:
         config.CACHE_DIR = before
 
 
+class Direct:
+    """An entry kernel that is called with arguments of always the same types.
+
+    numba looks at the type of every array in every call, to choose among what it has compiled; for
+    `step.advance` that takes ten times as long as the call itself. Here the first call chooses.
+    """
+
+    def __init__(self, entry: Any):
+        self._entry, self._chosen = entry, None
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the kernel."""
+        if self._chosen is not None:
+            return self._chosen(*arguments)
+        result = self._entry(*arguments)
+        for compiled in getattr(self._entry, "overloads", {}).values():  # none where JIT is off
+            self._chosen = compiled.entry_point
+        return result
+
+
 def from_python(inner: Any) -> Any:
     """Compile a kernel once more, for Python to call: for tests."""
     return numba.njit(error_model="numpy", _nrt=False)(inner.py_func)

@@ -31,6 +31,7 @@ from rigdda.contact.links import bolt_energy
 from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.frames import frame_of, no_frames, pieces
 from rigdda.geometry import polygon_properties
+from rigdda.kernel import Direct
 from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
 from rigdda.records import (
     BROAD_PHASE,
@@ -95,6 +96,8 @@ class Energy(NamedTuple):
     impact: float
     external: float
 
+
+advance_directly = Direct(advance)
 
 MOST_STEPS = 1e9
 """Most steps of a run: a day or more of computing for a single block."""
@@ -319,7 +322,7 @@ class Simulation:
         stride = steps // max(len(frames), 1)
         while self._counters[STEPS] < target:
             a, before = self._arrays, time.thread_time()
-            reason, block, swapped = advance(
+            reason, block, swapped = advance_directly(
                 a.bodies,
                 a.outlines,
                 a.ground,

@@ -160,6 +160,18 @@ WHIP = 3.0
 """Speed of a corner after another one was hit, over the speed of the hit, up to which contacts are
 foreseen [-]: an eccentric impact makes the far end of a long block more than twice as fast."""
 
+LATELY = 0.7
+"""Share of a body's greatest speed of late that counts on in the next step [-]. In a pile blocks
+are stopped and driven on step by step: the path of one that stands for a moment is not nothing."""
+
+DEFLECTED = 0.03
+"""How much farther than foreseen a corner may go in a step, over the block size [-], before its
+island is cut back: it may meet what was no candidate for a contact."""
+
+LEAN = 0.05
+"""Angle by which an edge may lean beyond the sides of a ridge that it rests on [rad], besides what
+it turns by in the step: along a side, rounding and the next blow decide which way it leans."""
+
 SLACK_RATIO = 5e-3
 """Distance over block size within which contacts are candidates even at rest [-]."""
 

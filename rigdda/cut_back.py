@@ -1,9 +1,9 @@
 """Cut-backs: islands that one step would take too far take it in shorter ones.
 
 A step is too long for an island if a corner ends it far from the straight path along which its
-contacts were foreseen, or, in steps that are coarse for the blocks, if a contact sinks in: contacts
-are settled in the linear displacements of the step (equation 2), and what turns far enough ends it
-elsewhere (equation 1).
+contacts were foreseen, or goes farther than in any direction they were; or, in steps that are
+coarse for the blocks, if a contact sinks in: contacts are settled in the linear displacements of
+the step (equation 2), and what turns far enough ends it elsewhere (equation 1).
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ def too_far(
     Forces are applied: m.d and m.residual are its displacements.
     """
     far = greatest_departure(bodies, m, work, island, p.dt) / p.displacement_limit
+    far = max(far, greatest_deflection(bodies, m, work, island, p) / p.deflection_limit)
     if p.sinking_limit < math.inf:
         far = max(far, greatest_sinking(bodies, c, m, work, island) / p.sinking_limit)
     return far
@@ -40,6 +41,17 @@ def greatest_departure(bodies: Bodies, m: Matrix, work: Work, island: int, dt: f
         dx, dy = d[0] - dt * bodies[i].vx, d[1] - dt * bodies[i].vy
         most = max(most, math.sqrt(dx * dx + dy * dy) + turn)
     return most
+
+
+@inlined
+def greatest_deflection(bodies: Bodies, m: Matrix, work: Work, island: int, p: Parameters) -> float:
+    """Return how much farther than foreseen any corner of an island goes in a step [m]."""
+    most, low = 0.0, work.block_start[island]
+    for place in range(low, work.block_start[island + 1]):
+        d, i = m.d[place - low], work.block_item[place]
+        way = math.sqrt(d[0] * d[0] + d[1] * d[1]) + abs(d[2]) * bodies[i].radius
+        most = max(most, way - work.path[i])
+    return most - p.gravity * p.dt * p.dt
 
 
 @kernel

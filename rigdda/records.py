@@ -32,6 +32,7 @@ BODY = _record(
     inertia=float,  # about the centroid [kg m2]
     radius=float,  # of the circumscribed circle about the centroid [m]
     quiet=float,  # time it has been quiet [s]
+    lately=float,  # greatest speed of a point of it of late, see broad_phase [m/s]
     count=int,  # corners
     part=int,  # first polygon of its convex parts: itself where it is convex
     parts=int,  # number of them
@@ -244,6 +245,7 @@ class Parameters(NamedTuple):
     blocks: int  # bodies that may move: the blocks of the scene and its gravity walls
     dt: float
     displacement_limit: float  # of a corner off its straight path, before a cut-back [m]
+    deflection_limit: float  # of the way of a corner over its path, before a cut-back [m]
     sinking_limit: float  # of a contact in a step, before a cut-back [m]; inf where steps are fine
     first_cut: int  # least halvings of a step that is cut back
     gravity_x: float  # [m/s2]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigdda.constants import AWAKE, HELD, RETIRED
+from rigdda.constants import AWAKE, HELD, LATELY, RETIRED
 from rigdda.kernel import kernel
 from rigdda.motion import top_speed
 from rigdda.records import Bodies, Outlines, Parameters, Work
@@ -22,7 +22,8 @@ def sweep_boxes(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -
             high_y = max(high_y, outlines.world_y[i, k])
         grow = p.slack
         if bodies[i].status == AWAKE:
-            work.path[i] = top_speed(bodies, i) * p.dt
+            bodies[i].lately = max(top_speed(bodies, i), LATELY * bodies[i].lately)
+            work.path[i] = bodies[i].lately * p.dt
             grow += work.path[i] + p.gravity * p.dt * p.dt
         work.low_x[i], work.high_x[i] = low_x - grow, high_x + grow
         work.low_y[i], work.high_y[i] = low_y - grow, high_y + grow

@@ -291,7 +291,8 @@ def collide_parts(
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
     reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(gap_i, gap_j) <= slack
-    # corner beside corner, the better face may miss the other body where the second one does not
+    # corner beside corner, the better face may miss the other body where the second one does not;
+    # and what is beside it at the time of entry may be driven into it from where it is now
     for _ in range(2):
         face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
         facing = incident_edge(outlines, face, edge, other, outlines.polygon[other].count)
@@ -302,9 +303,12 @@ def collide_parts(
             bodies, outlines, c, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
             reach, slack,
         )  # fmt: skip
-        if found > k or not touching:
+        if found > k or (shift == 0.0 and not touching):
             return found
-        of_j = not of_j
+        if touching:
+            of_j = not of_j
+        else:
+            time_i = time_j = 0.0
     face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
     return deepest_corner(bodies, outlines, c, k, a, b, face, edge, other)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.constants import SAME_FACE, TERRAIN
+from rigdda.constants import LEAN, SAME_FACE, TERRAIN
 from rigdda.contact.narrow_phase import add_contact, keep_nearest
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Ground, Outlines, Parameters, Work
@@ -106,9 +106,10 @@ def place_of_hit(
 ) -> tuple[float, float]:
     """Return where in the step a corner of block a meets the line of segment s.
 
-    Or (x, y) if it never does. It may slide there along a neighbour, into a concave corner.
+    Or (x, y) if it never does, or touches already. It may slide there along a neighbour, into a
+    concave corner.
     """
-    if gap <= 0.0:
+    if gap <= p.slack:
         return x, y
     dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * p.dt
     dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * p.dt
@@ -150,7 +151,7 @@ def corners_on_segment(
         if concave and outlines.corner[a, vertex].reentrant:
             continue
         hit_x, hit_y = place_of_hit(bodies, ground, s, a, x, y, gap, p)
-        if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0)):
+        if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0) + reach):
             continue
         if shadowed(ground, s, hit_x, hit_y, gap):
             continue
@@ -198,7 +199,7 @@ def edge_on_ridge(
     """Add the contact of a convex terrain corner with an edge of a part of block a, if it has one.
 
     The edge is the last to separate the corner from the block, or about as deep; its normal must
-    lie between those of the two segments, or a corner of the block is in contact instead.
+    lie about between those of the two segments, or a corner of the block is in contact instead.
     """
     x, y = ground.x[corner], ground.y[corner]
     dt, n = p.dt, outlines.polygon[part].count
@@ -207,6 +208,7 @@ def edge_on_ridge(
     if not (work.low_x[a] <= x <= work.high_x[a] and work.low_y[a] <= y <= work.high_y[a]):
         return k
     left, right, concave = corner - 1, corner, part != a
+    lean = LEAN + abs(bodies[a].omega) * dt
     best, best_time, best_gap = -1, -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
@@ -222,9 +224,10 @@ def edge_on_ridge(
         if gap > p.slack:
             time = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
         # the normal out of the ground is opposite to that of the edge
-        after_left = ground.normal_x[left] * -ny - ground.normal_y[left] * -nx <= 1e-9
-        before_right = -nx * ground.normal_y[right] + ny * ground.normal_x[right] <= 1e-9
-        fits = after_left and before_right and not inner
+        after_left = ground.normal_x[left] * -ny - ground.normal_y[left] * -nx <= lean
+        before_right = -nx * ground.normal_y[right] + ny * ground.normal_x[right] <= lean
+        outward = nx * ground.normal_x[left] + ny * ground.normal_y[left] < 0.0
+        fits = after_left and before_right and outward and not inner
         if fits and (time > best_time or (time == best_time and gap > best_gap)):
             best, best_time, best_gap = edge, time, gap
         if time > last or (time == last and gap > depth):

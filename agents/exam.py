@@ -116,7 +116,7 @@ def gains(scores: Sequence[Score], designer: str) -> list[float]:
 
 
 def debris(scores: Sequence[Score], designer: str) -> NDArray[np.float64]:
-    """Return the debris fraction of every release behind a designer's layouts, (sites, releases)."""
+    """Return the debris fractions behind a designer's layouts, (sites, releases)."""
     own = [score.built.outcomes for score in scores if score.designer == designer]
     return np.array([[outcome.debris_fraction for outcome in outcomes] for outcomes in own])
 

@@ -135,13 +135,13 @@ def add_contact(
 @inlined
 def clip_contacts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, edge: int,
-    j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float,
+    j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float, beside: float,
 ) -> int:  # fmt: skip
     """Add up to two contacts of bodies a and b where the incident edge lies over the face.
 
     The face of contact is edge `edge` of polygon i, the incident edge is edge `other` of polygon j;
-    (shift_x, shift_y) moves j to where it is at the time of entry. Returns the new number of
-    contacts.
+    (shift_x, shift_y) moves j to where it is at the time of entry, but for its turning: a corner
+    within `beside` of the face may come over it. Returns the new number of contacts.
     """
     nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
     tx, ty = -ny, nx
@@ -156,8 +156,8 @@ def clip_contacts(
     s2 = tx * (x2 + shift_x - x0) + ty * (y2 + shift_y - y0)
     g1, g2 = nx * (x1 - x0) + ny * (y1 - y0), nx * (x2 - x0) + ny * (y2 - y0)
     # a corner of j that touches the next edge of a notch, too, may be a little beyond the face
-    start = -slack if outlines.corner[i, edge].reentrant else 0.0
-    stop = length + slack if outlines.corner[i, end].reentrant else length
+    start = -slack if outlines.corner[i, edge].reentrant else -beside
+    stop = length + slack if outlines.corner[i, end].reentrant else length + beside
     low = s1 if s1 >= start else 0.0
     high = s2 if s2 <= stop else length
     if high < low:
@@ -218,21 +218,25 @@ def collide_pair(
         path += work.path[b]
         fall = 0.0
     spread = path + fall + p.slack
+    turning = abs(bodies[a].omega) * bodies[a].radius + abs(bodies[b].omega) * bodies[b].radius
+    beside = 0.5 * dt * turning
     if bodies[a].parts == 1 and bodies[b].parts == 1:
-        return collide_parts(bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0)
+        return collide_parts(
+            bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0, beside
+        )
     first = k
     k = collide_all_parts(
-        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack
+        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack, beside
     )
     if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
-        k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300)
+        k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0)
     return k
 
 
 @kernel
 def collide_all_parts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, dx: float,
-    dy: float, spread: float, slack: float, sunk: float,
+    dy: float, spread: float, slack: float, sunk: float, beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
     first = k
@@ -240,7 +244,9 @@ def collide_all_parts(
         for j in range(bodies[b].part, bodies[b].part + bodies[b].parts):
             if k + 2 > len(c):
                 return -1
-            found = collide_parts(bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk)
+            found = collide_parts(
+                bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk, beside
+            )
             for new in range(k, found):
                 k = keep_nearest(c, first, k, new)
     return k
@@ -270,11 +276,12 @@ def keep_nearest(c: Contacts, first: int, k: int, new: int) -> int:
 @inlined
 def collide_parts(
     bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, j: int,
-    dx: float, dy: float, spread: float, slack: float, sunk: float,
+    dx: float, dy: float, spread: float, slack: float, sunk: float, beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
 
-    (dx, dy) is the displacement of b relative to a over the step; see `face_of_contact`.
+    (dx, dy) is the displacement of b relative to a over the step, see `face_of_contact`, and
+    `beside` half of how far both may turn in it.
     """
     ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
     possible, time_i, gap_i, edge_i = face_of_contact(
@@ -291,6 +298,7 @@ def collide_parts(
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
     reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(gap_i, gap_j) <= slack
+    beside = 0.0 if touching else beside
     # corner beside corner, the better face may miss the other body where the second one does not;
     # and what is beside it at the time of entry may be driven into it from where it is now
     for _ in range(2):
@@ -301,7 +309,7 @@ def collide_parts(
         shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
         found = clip_contacts(
             bodies, outlines, c, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
-            reach, slack,
+            reach, slack, beside,
         )  # fmt: skip
         if found > k or (shift == 0.0 and not touching):
             return found

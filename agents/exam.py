@@ -157,4 +157,5 @@ def table(scores: Sequence[Score]) -> Table:
 
 def _words(mean: float, interval: Interval) -> str:
     low, high = interval
-    return f"{mean:.3f} ({low:.3f} to {high:.3f})" if np.isfinite(high - low) else f"{mean:.3f}"
+    half = 0.5 * (high - low)
+    return f"{mean:.3f} ± {half:.3f}" if np.isfinite(half) else f"{mean:.3f}"

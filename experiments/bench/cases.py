@@ -26,13 +26,13 @@ FRAME = 0.02
 RELEASE = 25.0
 """Simulated time of a rockfall [s]."""
 
-PARTS = (1, 2, 5, 6, 10, 15, 20, 25, 40, 50, 100)
+PARTS = (1, 2, 5, 6, 8, 10, 12, 15, 20, 25, 40, 50, 100)
 """Steps of all engines, as parts of the longest one: 0.1 s to 1e-3 s."""
 
 FINE = (*PARTS, 200, 400, 800, 1600)
 """Steps where closed forms are approached, down to 6.25e-5 s."""
 
-QUICK_PARTS = (1, 2, 5, 6, 10, 15, 20, 50, 200, 800)
+QUICK_PARTS = (1, 2, 5, 6, 8, 10, 12, 15, 20, 50, 200, 800)
 """Steps of the quick run."""
 
 SETTLED = 2.0
@@ -227,8 +227,8 @@ def all_cases() -> tuple[Case, ...]:
         standing("stack-30", stacks.tower(rng(), 30)),
         standing("mass-1-100", stacks.heavy_on_light(rng(), 100.0)),
         rockfall(20, 5, 1.0, 0.5),
-        rockfall(120, 3, 0.75, 0.45),
-        rockfall(480, 1, 0.7, 0.35),
+        rockfall(120, 7, 0.75, 0.45),
+        rockfall(480, 3, 0.7, 0.35),
     )
 
 

@@ -1,4 +1,4 @@
-"""What a blow drives a block into within a step is no deeper in it in long steps than in short ones."""
+"""What a blow drives a block into in long steps is no deeper than in short ones."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from physics.helpers import rock
 
+from physics.helpers import rock
 from rigdda import Block, Scene, Settings, Simulation, Terrain
 from rigdda.constants import DEFLECTED
 

@@ -30,7 +30,8 @@ class Settings:
         so small that gravity moves it by a quarter of its size in a step is refused.
     displacement_limit : float
         Greatest displacement of a corner in a step off the straight path at its first velocity,
-        over the mean block size (the root of its area). An island that would exceed it, or one of
+        over the mean block size (the root of its area). An island that would exceed it, or of which
+        a blow drives a corner 0.03 of that size farther than foreseen in any direction, or one of
         one or two blocks whose contacts do not settle, takes the step in up to 32 shorter ones.
         Contacts are foreseen along straight paths, and blows leave blocks spinning: with 0.25
         nothing passes a wall 0.2 m thick at 100 m/s in steps of up to 0.08 s, without it a block

@@ -159,6 +159,8 @@ def _same(terms: Terms, out: Path) -> None:
             mend = f"give the terms of the training in {out} ({found}), or another folder"
             raise BadInput("terms", asked, mend)
         return
+    if (out / "checkpoint.zip").is_file():
+        raise BadInput("terms", str(file), f"{ANEW} (it is missing beside checkpoint.zip)")
     with atomic(file) as part:
         part.write_bytes(msgspec.json.encode(asked))
 

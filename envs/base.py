@@ -33,6 +33,9 @@ Step = tuple[Observation, float, bool, bool, Info]
 SCORED_SEEDS = 2**31
 """Episodes draw the seeds of their releases below this; envelopes use others."""
 
+MOST_RELEASES = 100_000
+"""Most releases of an episode, all of which are simulated in a step."""
+
 RANDOM = "random"
 """Name of a site that is another random one in every episode."""
 
@@ -63,7 +66,7 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         self._random = isinstance(site, str) and site == RANDOM
         self._terms = (max_barriers, kinds, risk_weight, cost_weight, cost_limit)
         self.problem = self._pose(sites.random(sites.TRAIN_SEEDS[0]) if self._random else site)
-        self.releases = check.integer("releases", releases, 1)
+        self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
         if record is None and record_trigger is not None:
             raise BadInput("record_trigger", record_trigger, "name a folder in `record` as well")
         self.recorder = None if record is None else Recorder(record, record_trigger)

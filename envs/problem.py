@@ -26,6 +26,9 @@ nothing can break, a wall, makes sizes trivial."""
 OVERRUN = 10.0
 """How many times the cost above the limit is charged. Soft, so that a search sees a way back."""
 
+MOST_BARRIERS = 100
+"""Most slots of a layout; a site has room for a few."""
+
 LEAST, MOST = 1e-12, 1e12
 """Bounds of prices, weights and the limit: between them no objective, nor its square, overflows."""
 
@@ -77,7 +80,7 @@ class DesignProblem:
         limit = where.costs.limit if cost_limit is None else cost_limit
         values = {
             "site": where,
-            "max_barriers": check.integer("max_barriers", max_barriers, 1),
+            "max_barriers": check.integer("max_barriers", max_barriers, 1, MOST_BARRIERS),
             "kinds": names,
             "risk_weight": check.number("risk_weight", risk_weight, 0.0, MOST),
             "cost_weight": check.number("cost_weight", cost_weight, 0.0, MOST),

@@ -22,6 +22,9 @@ from envs.recorder import Recorder
 from envs.trial import simulate
 from rigdda import BadInput, check
 
+MOST_COPIES = 100_000
+"""Most copies; each takes some kB."""
+
 Start = tuple[Observation, Info]
 Batch = tuple[
     Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
@@ -67,7 +70,7 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         record: str | os.PathLike[str] | None = None,
         **keywords: Any,
     ):
-        self.num_envs = check.integer("num_envs", num_envs, 1)
+        self.num_envs = check.integer("num_envs", num_envs, 1, MOST_COPIES)
         if max_episode_steps is not None:
             check.integer("max_episode_steps", max_episode_steps, 1)
         self.limit = max_episode_steps

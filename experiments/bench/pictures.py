@@ -65,6 +65,8 @@ def growth(path: Path, rows: Sequence[Growth]) -> None:
         ax.plot(blocks[large], line, color="0.4", label=f"blocks^{power:.2f}")
         ax.legend()
     ax.set(xscale="log", yscale="log", xlabel="blocks", ylabel="CPU us per simulated s")
+    ax.set_xticks(blocks, [f"{n:,.0f}" for n in blocks])
+    ax.minorticks_off()
     _save(figure, path)
 
 

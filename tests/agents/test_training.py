@@ -98,6 +98,14 @@ def test_a_damaged_training_is_one_line(name: str, content: bytes | None, tmp_pa
     assert list(tmp_path.iterdir()) == [file]
 
 
+def test_a_checkpoint_without_its_terms_is_one_line(
+    trained: tuple[Path, str], tmp_path: Path
+) -> None:
+    (tmp_path / "checkpoint.zip").write_bytes((trained[0] / "checkpoint.zip").read_bytes())
+    line = refused("train", *SMALL, "--out", ".", folder=tmp_path)
+    assert "training.json" in line and "missing" in line and "another folder" in line
+
+
 def test_a_checkpoint_cut_off_is_one_line(trained: tuple[Path, str], tmp_path: Path) -> None:
     for name in ("training.json", "checkpoint.zip"):
         (tmp_path / name).write_bytes((trained[0] / name).read_bytes())

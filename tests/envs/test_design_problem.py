@@ -147,6 +147,7 @@ def test_bounds_and_vectors(problem: DesignProblem) -> None:
         ({"site": 5}, "site = 5: give a name"),
         ({"max_barriers": 0}, "max_barriers = 0: give a whole number"),
         ({"max_barriers": 2.0}, "max_barriers = 2.0"),
+        ({"max_barriers": 10**6}, "max_barriers = 1000000"),
         ({"kinds": ("moat",)}, "kinds = 'moat': choose one of ditch, .*, wall"),
         ({"kinds": ()}, "kinds = .*: name each kind once"),
         ({"kinds": ("wall", "wall")}, "kinds = .*: name each kind once"),

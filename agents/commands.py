@@ -39,7 +39,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 @count_option("--sites", 2, 512, "Random sites to train on.")
 @count_option("--episodes", 0, 49152, "Episodes, of one release each.")
 @seed_option("Seed of all that is random.", SEED)
-@click.option("--processes", type=click.IntRange(1), default=os.cpu_count(),
+@click.option("--processes", type=click.IntRange(1, 64), default=min(os.cpu_count() or 1, 64),
               help="Processes that simulate.  [default: one a core]")  # fmt: skip
 @out_option("train")
 def train(sites: int, episodes: int, seed: int, processes: int, out: Path | None) -> None:

@@ -100,15 +100,15 @@ def train(terms: Terms, out: Path, processes: int, tick: Tick) -> Trained:
         barrier_free([posed.site for posed in pool], crew)
     mean, scale = scaling(np.stack([features(observe(posed, ())) for posed in pool]))
     copies = ppo.Featured(ppo.pool(pool, processes), mean, scale)
-    model = ppo.learner(copies, terms.seed, out)
-    notes = _notes(terms)
-    start = ppo.export(model, mean, scale, notes)
-    if (out / "checkpoint.zip").is_file():
-        model = ppo.resume(out / "checkpoint.zip", copies)
-    ppo.learn(model, terms.episodes, out / "checkpoint.zip", tick)
+    with closing(copies):
+        model = ppo.learner(copies, terms.seed, out)
+        notes = _notes(terms)
+        start = ppo.export(model, mean, scale, notes)
+        if (out / "checkpoint.zip").is_file():
+            model = ppo.resume(out / "checkpoint.zip", copies)
+        ppo.learn(model, terms.episodes, out / "checkpoint.zip", tick)
     network = ppo.export(model, mean, scale, notes)
     network.save(out / "policy.safetensors")
-    copies.close()
     beside = sites.TRAIN_SEEDS[terms.sites : terms.sites + terms.beside]
     posed = [problem(site) for site in beside]
     return Trained(network, examine(start, posed), examine(network, posed))

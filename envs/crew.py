@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context, parent_process
@@ -84,13 +85,17 @@ class Crew:
             del self._home[next(iter(self._home))]
 
     def close(self) -> None:
-        """End the processes."""
+        """End the processes; jobs that have not begun are dropped."""
         for pool in self._pools:
-            pool.shutdown()
+            pool.shutdown(cancel_futures=True)
 
 
 def _end_with_parent() -> None:
-    """End this process as soon as the one that started it has, even if that was killed."""
+    """End this process with the one that started it, even if that was killed, and not before.
+
+    An interrupt from the keyboard reaches both: it is for the parent to say what follows.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_wait_for_parent, daemon=True).start()
 
 

@@ -14,6 +14,9 @@ from rigdda.contact.narrow_phase import add_contact, keep_nearest
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Ground, Outlines, Parameters, Work
 
+NEVER = 2.0
+"""Time of entry, over the step, of what does not come nearer or not soon."""
+
 
 @kernel
 def below_segment(ground: Ground, s: int, x: float, y: float) -> float:
@@ -209,20 +212,21 @@ def edge_on_ridge(
         return k
     left, right, concave = corner - 1, corner, part != a
     lean = LEAN + abs(bodies[a].omega) * dt
+    reach = work.path[a] + p.gravity * dt * dt + p.slack
     best, best_time, best_gap = -1, -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
         nx, ny = outlines.normal_x[part, edge], outlines.normal_y[part, edge]
         gap = nx * (x - outlines.world_x[part, edge]) + ny * (y - outlines.world_y[part, edge])
         approach = -(nx * dx + ny * dy)
-        if gap > max(approach, 0.0) + p.gravity * dt * dt + p.slack:
+        if gap > reach:
             return k
         inner = concave and outlines.corner[part, edge].inner
         if inner and gap <= 0.0:
             continue  # a corner inside the part is pushed out of the block, not into the next part
         time = 0.0
         if gap > p.slack:
-            time = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
+            time = NEVER if approach <= 0.0 else min(gap / approach, NEVER)
         # the normal out of the ground is opposite to that of the edge
         after_left = ground.normal_x[left] * -ny - ground.normal_y[left] * -nx <= lean
         before_right = -nx * ground.normal_y[right] + ny * ground.normal_x[right] <= lean
@@ -241,7 +245,7 @@ def edge_on_ridge(
         return k
     nx, ny = outlines.normal_x[part, best], outlines.normal_y[part, best]
     gap = nx * (x - outlines.world_x[part, best]) + ny * (y - outlines.world_y[part, best])
-    time = min(best_time, 1.0) if gap > 0.0 else 0.0
+    time = min(best_time, 1.0) if 0.0 < best_time < NEVER else 0.0
     end = best + 1 if best + 1 < n else 0
     ex = outlines.world_x[part, end] - outlines.world_x[part, best]
     ey = outlines.world_y[part, end] - outlines.world_y[part, best]

@@ -23,7 +23,7 @@ from envs.trial import simulate
 from rigdda import BadInput, check
 
 MOST_COPIES = 100_000
-"""Most copies; each takes some kB."""
+"""Most copies; what is above is taken for a slip of the pen."""
 
 Start = tuple[Observation, Info]
 Batch = tuple[

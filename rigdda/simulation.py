@@ -98,6 +98,7 @@ class Energy(NamedTuple):
 
 
 advance_directly = Direct(advance)
+"""The step loop; the types of its arrays are the same for every scene."""
 
 MOST_STEPS = 1e9
 """Most steps of a run: a day or more of computing for a single block."""

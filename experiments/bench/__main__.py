@@ -57,7 +57,7 @@ def alone(console: Console, out: Path, quick: bool, say: Callable[[str], None]) 
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="Two minutes: fewer steps, releases and blocks.")
+@click.option("--quick", is_flag=True, help="Ten minutes: fewer steps, releases and blocks.")
 @click.option(
     "--out", type=click.Path(path_type=Path), help=f"Folder of CSV and pictures: {RESULTS}."
 )

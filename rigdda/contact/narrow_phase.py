@@ -15,6 +15,9 @@ from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters, Work
 
+NEVER = 2.0
+"""Time of entry, over the step, of what does not come nearer or not soon."""
+
 
 @kernel
 def axis_gap(
@@ -83,7 +86,7 @@ def face_of_contact(
             gap -= sunk
         entry = 0.0
         if gap > slack:
-            entry = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
+            entry = NEVER if approach <= 0.0 else min(gap / approach, NEVER)
         later = entry > time or (entry == time and gap > depth)
         if later or (entry == time and gap == depth and edge < best):
             time, depth, best, nearest = entry, gap, edge, corner

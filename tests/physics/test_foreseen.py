@@ -9,7 +9,6 @@ import pytest
 
 from physics.helpers import rock
 from rigdda import Block, Scene, Settings, Simulation, Terrain
-from rigdda.constants import DEFLECTED
 
 BLOW = 8.0
 """Speed of the block that falls [m/s]: 0.16 m in a step of 20 ms."""
@@ -54,10 +53,9 @@ def deepest(scene: Scene, dt: float) -> float:
 def test_a_block_at_rest_is_not_driven_into_its_neighbour(
     blocks: int, gap: float, speed: float
 ) -> None:
-    """No deeper than what may go unforeseen, a few hundredths of a block."""
+    """No deeper than a few hundredths of a block, whatever the speed of the blow."""
     scene = struck_row(blocks, gap, speed)
-    size = math.sqrt((4.0 + blocks) / (1.0 + blocks))
-    assert deepest(scene, 0.02) < DEFLECTED * size
+    assert deepest(scene, 0.02) < 0.04
 
 
 @pytest.mark.parametrize("lean", [0.0, 0.003, 0.01, 0.03])

@@ -1,14 +1,16 @@
 """The front of cost against debris by NSGA-II (Deb et al. 2002, IEEE TEC 6, 182-197; Optuna).
 
-It starts from what one barrier-free ensemble suggests, see `agents.starts`. What nothing dominates
-in the search is evaluated again on other releases, and what nothing dominates there is the front:
-so no layout is in it because it was lucky in the search.
+It starts from what one barrier-free ensemble suggests, see `agents.starts`, or from layouts that
+other designers found. What nothing dominates in the search is evaluated again on other releases,
+and what nothing dominates there is the front: so no layout is in it because it was lucky in the
+search.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
 from agents.starts import starts
 from agents.store import Store
 from envs import DesignProblem, Evaluation
-from rigdda import Layout
+from rigdda import Layout, check
 
 FINALISTS = 12
 """Layouts of the search's front that are evaluated again, at most."""
@@ -55,8 +57,36 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    first = starts(problem, ensemble_for(ledger))
-    found = search(ledger, _propose(problem, first, ledger.seed), finalists, FINALISTS)
+    return _search(ledger, starts(problem, ensemble_for(ledger)), 0)
+
+
+def warm_started(
+    problem: DesignProblem,
+    layouts: Sequence[Layout],
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> ParetoResult:
+    """Return the same from layouts that other designers found, instead of an ensemble.
+
+    They are evaluated again on other releases whatever the few of the search say of them.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 2 or the seed out of range; if there are no layouts, or half as many
+        as `FINALISTS` or more; if a simulation diverges.
+    """
+    different = list(dict.fromkeys(layouts))
+    check.integer("number of different layouts", len(different), 1, FINALISTS // 2 - 1)
+    return _search(Ledger(problem, simulations, seed, progress, store), different, len(different))
+
+
+def _search(ledger: Ledger, first: list[Layout], known: int) -> ParetoResult:
+    """Return what the search from some layouts finds, of which the first few are in the finals."""
+    choose = partial(finalists, known=known)
+    found = search(ledger, _propose(ledger.problem, first, ledger.seed), choose, FINALISTS)
     ends = found.history.stage("final") or found.history.stage("search")
     best = (found.layout, found.evaluation, found.history, found.simulations)
     return ParetoResult(*best, front=front(entry.evaluation for entry in ends))
@@ -71,14 +101,16 @@ def front(evaluations: Iterable[Evaluation]) -> tuple[Evaluation, ...]:
     return tuple(kept)
 
 
-def finalists(evaluations: Sequence[Evaluation], n: int) -> list[Evaluation]:
-    """Return at most `n` of the front: the best objective, the others evenly spread."""
-    found = front(evaluations)
-    if len(found) <= n:
-        return list(found)
-    best = min(range(len(found)), key=lambda i: found[i].objective)
-    spread = np.linspace(0, len(found) - 1, n - 1).round().astype(int).tolist()
-    return [found[i] for i in sorted({best, *spread})]
+def finalists(evaluations: Sequence[Evaluation], n: int, known: int = 0) -> list[Evaluation]:
+    """Return at most `n`: the first `known`, of the front the best objective and an even spread."""
+    kept = list(evaluations[: min(known, n)])
+    seen, room = {e.layout for e in kept}, n - len(kept)
+    found = [e for e in front(evaluations) if e.layout not in seen]
+    if len(found) > room:
+        best = min(range(len(found)), key=lambda i: found[i].objective)
+        spread = np.linspace(0, len(found) - 1, max(0, room - 1)).round().astype(int).tolist()
+        found = [found[i] for i in sorted({best, *spread})[:room]]
+    return kept + found
 
 
 def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:

@@ -431,7 +431,7 @@ def pack_parameters(
         settings.penetration or PENETRATION_RATIO * size,
         SLACK_RATIO * size,
         settings.tolerance,
-        settings.sweep_tolerance,
+        settings.sweep_tolerance or 0.0,
         settings.open_close_iterations,
         static,
         settings.post_correction,

@@ -257,7 +257,7 @@ class Parameters(NamedTuple):
     penetration: float
     slack: float
     tolerance: float
-    sweep_tolerance: float  # [m/s]
+    sweep_tolerance: float  # [m/s]; 0: that of the step
     iterations: int
     static: bool
     post_correction: bool

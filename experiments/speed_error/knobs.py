@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigdda import Settings
-from rigdda.constants import PENETRATION_RATIO
+from rigdda.constants import PENETRATION_RATIO, RELAXATION_SPEED
 
 DEFAULT = Settings()
 
@@ -54,7 +54,7 @@ def choices(size: float, steps: Sequence[float] = STEPS) -> Iterator[Choice]:
         if tolerance != DEFAULT.tolerance:
             yield Choice(TOLERANCE, tolerance, {"tolerance": tolerance})
     for change in SWEEP_TOLERANCES:
-        if change != DEFAULT.sweep_tolerance:
+        if change != RELAXATION_SPEED:
             yield Choice(SWEEPS, change, {"sweep_tolerance": change})
     for most in OPEN_CLOSE:
         if most != DEFAULT.open_close_iterations:

@@ -21,6 +21,7 @@ from rigdda.constants import (
     PIN,
     PLAIN,
     QUIET_SWEEPS,
+    RELAXATION_FALL,
     RELAXATION_SHARE,
     RELAXATION_SPEED,
     RELAXATION_STIFFNESS,
@@ -29,19 +30,49 @@ from rigdda.constants import (
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 from rigdda.records import Contacts, Floats, Ints, Matrix, Parameters, Work
 
-# columns of work.row: normal (x, y); moments of a unit force along normal and shear about a and b,
-# by direction gain [N/m], free displacement [m], softness [m/N], force [N]; friction, and forces
-# that it bears beside [N]; displacement along shear per normal force [m/N]
-NORMAL, TURN_A, TURN_B = 0, 2, 4
-GAIN, FREE, SOFT, FORCE = 6, 8, 10, 12
-FRICTION, COHESION, TENSION, CROSS = 14, 15, 16, 17
-COLUMNS = 18
+# columns of work.row, by direction: rows of the contact for a and b, over the roots of the inertia
+# [kg^-1/2, as displacements]; force [N]; what of it is kept in a visit [-], what pulls it [N], and
+# what a displacement takes from it [N/m]; softness [m/N]. Shear per normal force [-]; friction, and
+# forces that it bears beside [N]
+NORMAL, SHEAR = 0, 6
+FORCE, KEEP, PULL, GAIN, SOFT = 12, 14, 16, 18, 20
+CROSS, FRICTION, COHESION, TENSION = 22, 23, 24, 25
+COLUMNS = 26
 
 
 @kernel
-def flexibility(inverse: Floats, i: int, e: tuple[float, float, float]) -> float:
-    """Return the displacement along e of slot i per force along e [m/N]."""
-    return (e[0] * e[0] + e[1] * e[1]) * inverse[i, 0] + e[2] * e[2] * inverse[i, 2]
+def write_row(row: Floats, first: int, e: tuple[float, float, float], scale: Floats) -> None:
+    """Write a row over the roots of the inertia of its body."""
+    row[first], row[first + 1], row[first + 2] = e[0] * scale[0], e[1] * scale[1], e[2] * scale[2]
+
+
+@kernel
+def product(row: Floats, first: int, second: int) -> float:
+    """Return the displacement along one direction of a contact per force along one [m/N]."""
+    total = 0.0
+    for q in range(6):
+        total += row[first + q] * row[second + q]
+    return total
+
+
+@kernel
+def push(row: Floats, first: int, d: Floats, i: int, j: int, force: float) -> None:
+    """Move slots i and j by what a force along one direction of a contact displaces them."""
+    for q in range(3):
+        d[i, q] += force * row[first + q]
+        d[j, q] += force * row[first + 3 + q]
+
+
+@kernel
+def set_spring(row: Floats, direction: int, flexible: float, kappa: float, free: float) -> None:
+    """Write what a visit needs of a spring, which is free at a displacement [m].
+
+    Its force is kappa (free - 2 d), at the velocity that ends the step; of the displacement d its
+    own part, `flexible` times the force, is solved for.
+    """
+    gain = kappa / (1.0 + 2.0 * kappa * flexible)
+    row[KEEP + direction], row[PULL + direction] = 2.0 * gain * flexible, gain * free
+    row[GAIN + direction], row[SOFT + direction] = 2.0 * gain, 1.0 / kappa
 
 
 @inlined
@@ -50,57 +81,44 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, dt:
 
     Slot n stands for bodies without unknowns.
     """
-    row, old = work.row, c[k]
+    row, old = work.row[place], c[k]
     i = work.slot[old.a]
     j = work.slot[old.b] if old.pair >= 0 else n
     work.row_i[place], work.row_j[place] = i, j
-    en, es = normal_row(c, k, True), shear_row(c, k, True)
-    fn, fs = normal_row(c, k, False), shear_row(c, k, False)
-    row[place, NORMAL], row[place, NORMAL + 1] = en[0], en[1]
-    row[place, TURN_A], row[place, TURN_A + 1] = en[2], es[2]
-    row[place, TURN_B], row[place, TURN_B + 1] = fn[2], fs[2]
-    soft_n = flexibility(m.scaled, i, en) + flexibility(m.scaled, j, fn)
-    soft_s = flexibility(m.scaled, i, es) + flexibility(m.scaled, j, fs)
+    write_row(row, NORMAL, normal_row(c, k, True), m.scaled[i])
+    write_row(row, NORMAL + 3, normal_row(c, k, False), m.scaled[j])
+    write_row(row, SHEAR, shear_row(c, k, True), m.scaled[i])
+    write_row(row, SHEAR + 3, shear_row(c, k, False), m.scaled[j])
+    flexible, rolling = product(row, NORMAL, NORMAL), product(row, SHEAR, SHEAR)
     own = old.kind == PLAIN or old.kind == BOLT or old.kind == PIN
     # stiff against the inertia of the blocks
-    kappa = old.kappa if own else RELAXATION_STIFFNESS / soft_n
-    row[place, GAIN], row[place, SOFT] = kappa / (1.0 + 2.0 * kappa * soft_n), 1.0 / kappa
-    row[place, FREE] = old.bias + dt * old.un
+    kappa = old.kappa if own else RELAXATION_STIFFNESS / flexible
+    free = old.bias + dt * old.un
     if not own:
-        row[place, FREE] += old.memory_normal * (1.0 / kappa - 1.0 / old.kappa)
-    kappa = old.kappa if own else RELAXATION_STIFFNESS / soft_s
-    row[place, GAIN + 1], row[place, SOFT + 1] = kappa / (1.0 + 2.0 * kappa * soft_s), 1.0 / kappa
-    row[place, FREE + 1] = old.memory_shear / kappa + dt * old.us
-    row[place, FORCE], row[place, FORCE + 1] = old.start_normal, old.start_shear
-    row[place, FRICTION], row[place, TENSION] = old.friction, old.tension
-    row[place, CROSS] = en[2] * es[2] * m.scaled[i, 2] + fn[2] * fs[2] * m.scaled[j, 2]
-    row[place, COHESION] = math.inf if old.kind == PIN else old.cohesion
-    push(m.d, m.scaled, i, en, old.start_normal)
-    push(m.d, m.scaled, i, es, old.start_shear)
-    push(m.d, m.scaled, j, fn, old.start_normal)
-    push(m.d, m.scaled, j, fs, old.start_shear)
-
-
-@kernel
-def push(d: Floats, inverse: Floats, i: int, e: tuple[float, float, float], force: float) -> None:
-    """Move slot i by what a force along e displaces it alone."""
-    for q in range(3):
-        d[i, q] += force * inverse[i, q] * e[q]
+        free += old.memory_normal * (1.0 / kappa - 1.0 / old.kappa)
+    set_spring(row, 0, flexible, kappa, free)
+    kappa = old.kappa if own else RELAXATION_STIFFNESS / rolling
+    set_spring(row, 1, rolling, kappa, old.memory_shear / kappa + dt * old.us)
+    row[CROSS] = row[GAIN + 1] * product(row, NORMAL, SHEAR)
+    row[FRICTION], row[TENSION] = old.friction, old.tension
+    row[COHESION] = math.inf if old.kind == PIN else old.cohesion
+    row[FORCE], row[FORCE + 1] = old.start_normal, old.start_shear
+    push(row, NORMAL, m.d, i, j, old.start_normal)
+    push(row, SHEAR, m.d, i, j, old.start_shear)
 
 
 @arithmetic_kernel
 def sweep(
-    row: Floats, row_i: Ints, row_j: Ints, d: Floats, inverse: Floats, count: int, number: int,
+    row: Floats, row_i: Ints, row_j: Ints, d: Floats, still: int, count: int, number: int,
     moved_in: Ints, quiet: float,
 ) -> float:  # fmt: skip
     """Visit every contact once; returns the greatest displacement that a visit changed [m].
 
     But not where neither body has moved by more than `quiet` [m] in this or the last sweep:
-    moved_in[s] is the number of the last sweep in which slot s did.
+    moved_in[s] is the number of the last sweep in which slot s did. Slot `still` never does.
 
-    A body without unknowns has a slot of its own that nothing moves. A visit reads the bodies once:
-    what the normal force changes along the shear direction is added to what was read. Unsigned
-    indices spare numba's test for negative ones.
+    A visit reads the bodies once: what the normal force changes along the shear direction is added
+    to what was read. Unsigned indices spare numba's test for negative ones.
     """
     worst = 0.0
     for visit in range(count):
@@ -109,37 +127,30 @@ def sweep(
         if moved_in[i] < number - 1 and moved_in[j] < number - 1:
             continue
         r = row[place]
-        nx, ny = r[NORMAL], r[NORMAL + 1]
-        turn_i, turn_j, roll_i, roll_j = r[TURN_A], r[TURN_B], r[TURN_A + 1], r[TURN_B + 1]
+        n0, n1, n2, n3, n4, n5 = r[0], r[1], r[2], r[3], r[4], r[5]
+        s0, s1, s2, s3, s4, s5 = r[6], r[7], r[8], r[9], r[10], r[11]
         u, v, w, u2, v2, w2 = d[i, 0], d[i, 1], d[i, 2], d[j, 0], d[j, 1], d[j, 2]
-        apart_x, apart_y = u - u2, v - v2
-        moved = (nx * apart_x + ny * apart_y) + (turn_i * w + turn_j * w2)
-        slid = (nx * apart_y - ny * apart_x) + (roll_i * w + roll_j * w2)
+        moved = (n0 * u + n1 * v + n2 * w) + (n3 * u2 + n4 * v2 + n5 * w2)
+        slid = (s0 * u + s1 * v + s2 * w) + (s3 * u2 + s4 * v2 + s5 * w2)
         force, before = r[FORCE], r[FORCE + 1]
-        normal = force + r[GAIN] * ((r[FREE] - force * r[SOFT]) - 2.0 * moved)
+        normal = (r[KEEP] * force + r[PULL]) - r[GAIN] * moved
         normal = max(normal, -r[TENSION])
         push = normal - force
         limit = r[COHESION] + r[FRICTION] * max(normal, 0.0)
         if push == 0.0 and limit == 0.0 and before == 0.0:
             continue
-        shear = before + r[GAIN + 1] * (
-            (r[FREE + 1] - before * r[SOFT + 1]) - 2.0 * (slid + r[CROSS] * push)
-        )
+        shear = (r[KEEP + 1] * before + r[PULL + 1]) - r[GAIN + 1] * slid - r[CROSS] * push
         shear = min(max(shear, -limit), limit)
         drag = shear - before
         change = abs(push) * r[SOFT]
         worst = max(worst, change)
-        light_i, slow_i = inverse[i, 0], inverse[i, 2]
-        light_j, slow_j = inverse[j, 0], inverse[j, 2]
         if change + abs(drag) * r[SOFT + 1] > quiet:
             moved_in[i] = number
-            if light_j > 0.0:
+            if j != np.uintp(still):
                 moved_in[j] = number
-        x, y = push * nx - drag * ny, push * ny + drag * nx
-        d[i, 0], d[i, 1] = u + light_i * x, v + light_i * y
-        d[j, 0], d[j, 1] = u2 - light_j * x, v2 - light_j * y
-        d[i, 2] = w + slow_i * (push * turn_i + drag * roll_i)
-        d[j, 2] = w2 + slow_j * (push * turn_j + drag * roll_j)
+        d[i, 0], d[i, 1] = (u + push * n0) + drag * s0, (v + push * n1) + drag * s1
+        d[j, 0], d[j, 1] = (u2 + push * n3) + drag * s3, (v2 + push * n4) + drag * s4
+        d[i, 2], d[j, 2] = (w + push * n2) + drag * s2, (w2 + push * n5) + drag * s5
         r[FORCE], r[FORCE + 1] = normal, shear
     return worst
 
@@ -176,12 +187,13 @@ def relax_forces(
 ) -> int:
     """Sweep to and fro over the contacts low:high until their forces settle; returns the sweeps.
 
-    The matrix holds inertia and weight only; m.d is set to the displacements. `speed` is the
-    greatest of the island [m/s].
+    The matrix holds inertia and weight only; m.d is set to the displacements. They are times the
+    root of the inertia while forces are sought: a row then tells both what moves a contact and what
+    its force moves. `speed` is the greatest of the island [m/s].
     """
     for s in range(n):
         for q in range(3):
-            m.scaled[s, q] = 1.0 / m.diagonal[s, q, q]
+            m.scaled[s, q] = 1.0 / math.sqrt(m.diagonal[s, q, q])
             m.d[s, q] = m.rhs[s, q] * m.scaled[s, q]
     for q in range(3):
         m.scaled[n, q] = m.d[n, q] = 0.0
@@ -193,15 +205,17 @@ def relax_forces(
         pack_row(c, work.contact_item[low + place], m, work, place, n, p.dt)
     scale = p.dt / (2.0 * RELAXATION_STIFFNESS)
     share = max(RELAXATION_SHARE * speed, LEAST_RELAXATION * p.gravity * p.dt)
-    tolerance = min(share, p.sweep_tolerance)
+    usual = max(RELAXATION_SPEED, RELAXATION_FALL * p.gravity * p.dt)
+    tolerance = min(share, p.sweep_tolerance if p.sweep_tolerance > 0.0 else usual)
     most = QUIET_SWEEPS if tolerance < RELAXATION_SPEED else RELAXATION_SWEEPS
     limit, far = tolerance * scale, FAR_SPEED * scale
     sweeps, worst = 0, 1e300
     while (sweeps < most and worst > limit) or (sweeps < LAST_SWEEPS and worst > far):
-        worst = sweep(
-            work.row, work.row_i, work.row_j, m.d, m.scaled, count, sweeps, work.moved_in, limit
-        )
+        worst = sweep(work.row, work.row_i, work.row_j, m.d, n, count, sweeps, work.moved_in, limit)
         sweeps += 1
+    for s in range(n):
+        for q in range(3):
+            m.d[s, q] *= m.scaled[s, q]
     for place in range(count):
         k = work.contact_item[low + place]
         c[k].normal, c[k].shear = work.row[place, FORCE], work.row[place, FORCE + 1]

@@ -12,7 +12,7 @@ from agents import pareto
 from agents.pareto import front
 from agents.protocol import Ledger
 from envs import DesignProblem, Evaluation
-from rigdda import Barrier, Site, Wall
+from rigdda import BadInput, Barrier, Site, Wall
 
 
 def point(cost: float, debris: float) -> Evaluation:
@@ -44,6 +44,21 @@ def test_the_finalists_spread_over_the_front_and_hold_its_best(site: Site) -> No
     assert [e.cost for e in chosen] == sorted(e.cost for e in chosen)
     assert {0.0, 29.0} <= {e.cost for e in chosen}
     assert min(tried, key=lambda e: e.objective) in chosen
+
+
+def test_layouts_that_others_found_are_in_the_finals(site: Site) -> None:
+    problem = DesignProblem(site, kinds=("wall",))
+    others = [(Wall(16.0, 2.0),), (Wall(17.0, 3.0),), (Wall(16.0, 2.0),)]
+    result = pareto.warm_started(problem, others, 160)
+    searched = [entry.evaluation.layout for entry in result.history.stage("search")]
+    finals = [entry.evaluation.layout for entry in result.history.stage("final")]
+    assert finals[:2] == searched[:2]
+    for found, other in zip(searched[:2], others[:2], strict=True):
+        assert found[0].x == pytest.approx(other[0].x, abs=1e-6)
+        assert found[0].height == pytest.approx(other[0].height, abs=1e-6)
+    for layouts in ([], [(Wall(16.0, 2.0 + i),) for i in range(6)]):
+        with pytest.raises(BadInput, match="number of different layouts"):
+            pareto.warm_started(problem, layouts, 160)
 
 
 @pytest.mark.parametrize("simulations", [8, 160])

@@ -2,7 +2,7 @@
 
 `python -m experiments.designers_front [--quick] [--site NAME] [--out DIR]`, at fidelity "fast".
 Each searches with the same budget, NSGA-II after the others. Whatever is shown was verified on the
-same releases, that no designer has seen.
+same releases, that no designer has seen; the front is what nothing dominates there of the finalists.
 
 Writes front.csv and front.png and says whether another designer's layout dominates the front:
 cheaper than one of its points and, intervals apart, safer. Goes on where it was stopped.
@@ -42,7 +42,7 @@ def dominated(front: Sequence[Evaluation], points: dict[str, Evaluation]) -> lis
 @click.option("--quick", is_flag=True, help="Minutes: 120 simulations, 8 to verify.")
 @click.option("--site", default="shu-hwa", show_default=True, help="A name or a TOML file.")
 @click.option("--simulations", default=800, show_default=True, help="Releases of a search.")
-@click.option("--verify", "unseen", default=64, show_default=True, help="Unseen releases.")
+@click.option("--verify", "unseen", default=256, show_default=True, help="Unseen releases.")
 @click.option("--out", type=click.Path(path_type=Path), help=f"Folder to write into: {RESULTS}.")
 def main(quick: bool, site: str, simulations: int, unseen: int, out: Path | None) -> None:
     """Draw the front, see the module."""
@@ -61,7 +61,8 @@ def main(quick: bool, site: str, simulations: int, unseen: int, out: Path | None
         tick(len(OTHERS), "pareto")
         known = [e.layout for e in points.values()]
         found = pareto.warm_started(posed, known, simulations, 0, None, store)
-        front = pareto.front(verify(posed, e.layout, unseen, 0, store) for e in found.front)
+        ends = [entry.evaluation.layout for entry in found.history.stage("final")]
+        front = pareto.front(verify(posed, layout, unseen, 0, store) for layout in ends)
     rows = [("front", e) for e in front] + list(points.items())
     write_rows(folder / "front.csv", [
         {"designer": name, "cost": e.cost, "debris": e.debris, "debris_low": e.debris_ci[0],

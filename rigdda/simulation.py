@@ -172,6 +172,7 @@ class Simulation:
         self._ledger = np.zeros(len(LEDGER))
         self._deepest = np.zeros(1)
         self._seconds = 0.0
+        self._no_frames = no_frames(self._arrays.bodies)
         self._elastic_at_start = self._elastic()
         centres = [polygon_properties(scene.outline(i))[1] for i in range(len(scene.barriers))]
         self._barrier_start = np.array([[*centre, 0.0] for centre in centres]).reshape(-1, 3)
@@ -315,14 +316,14 @@ class Simulation:
         Diverged
             If a block's velocity is no longer finite or beyond any rockfall.
         """
-        self._advance(check.integer("n", n, 0), no_frames(self._arrays.bodies))
+        self._advance(check.integer("n", n, 0), self._no_frames)
 
     def _advance(self, steps: int, frames: NDArray[np.float64]) -> None:
         """Take steps, as many from each of the frames to be kept to the next."""
-        target = self._counters[STEPS] + steps
+        target, timing = self._counters[STEPS] + steps, self.settings.timing
         stride = steps // max(len(frames), 1)
         while self._counters[STEPS] < target:
-            a, before = self._arrays, time.thread_time()
+            a, before = self._arrays, time.thread_time() if timing else 0.0
             reason, block, swapped = advance_directly(
                 a.bodies,
                 a.outlines,
@@ -342,7 +343,8 @@ class Simulation:
                 frames,
                 stride,
             )
-            self._seconds += time.thread_time() - before
+            if timing:
+                self._seconds += time.thread_time() - before
             if swapped:
                 self._now, self._before = self._before, self._now
             if reason == EVENTS_FULL:

@@ -2,7 +2,7 @@
 
 `python -m experiments.designers_front [--quick] [--site NAME] [--out DIR]`, at fidelity "fast".
 Each searches with the same budget, NSGA-II after the others. Whatever is shown was verified on the
-same releases, that no designer has seen; the front is what nothing dominates there of the finalists.
+same releases, that no designer has seen; of its finalists the front is what none there dominates.
 
 Writes front.csv and front.png and says whether another designer's layout dominates the front:
 cheaper than one of its points and, intervals apart, safer. Goes on where it was stopped.

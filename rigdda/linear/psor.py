@@ -30,10 +30,10 @@ from rigdda.constants import (
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 from rigdda.records import Contacts, Floats, Ints, Matrix, Parameters, Work
 
-# columns of work.row, by direction: rows of the contact for a and b, over the roots of the inertia
-# [kg^-1/2, as displacements]; force [N]; what of it is kept in a visit [-], what pulls it [N], and
-# what a displacement takes from it [N/m]; softness [m/N]. Shear per normal force [-]; friction, and
-# forces that it bears beside [N]
+# columns of work.row, by direction: the rows of the contact for a and b, over the roots of their
+# inertia, 2 M / dt^2 [(m/N)^1/2]; force [N]; the share of it that a visit keeps [-], what the
+# spring adds [N], and what a displacement takes [N/m]; softness [m/N]. What a normal force takes
+# from the shear force [-]; friction; shear and tension that it bears besides [N]
 NORMAL, SHEAR = 0, 6
 FORCE, KEEP, PULL, GAIN, SOFT = 12, 14, 16, 18, 20
 CROSS, FRICTION, COHESION, TENSION = 22, 23, 24, 25
@@ -48,7 +48,7 @@ def write_row(row: Floats, first: int, e: tuple[float, float, float], scale: Flo
 
 @kernel
 def product(row: Floats, first: int, second: int) -> float:
-    """Return the displacement along one direction of a contact per force along one [m/N]."""
+    """Return the displacement along one direction of a contact per force along another [m/N]."""
     total = 0.0
     for q in range(6):
         total += row[first + q] * row[second + q]

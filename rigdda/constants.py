@@ -90,10 +90,12 @@ RELAXATION_SPEED = 0.05
 """Greatest change of a contact's velocity in a sweep at which sweeps stop, fast islands [m/s],"""
 
 RELAXATION_FALL = 0.5
-"""or so much of what gravity gives in a step, g dt, if that is more [-],"""
+"""or so much of what gravity gives in a step, g dt, if that is more [-]. At 20 ms, where it is
+twice the above, steps of 120 blocks take a tenth less and contacts sink as deep; at four times it,
+a fifth deeper. And"""
 
 RELAXATION_SHARE = 1.0 / 60.0
-"""and in a slower one, over its speed [-]. With a half, a pile of 480 blocks simmers at 0.1 m/s for
+"""in a slower one, over its speed [-]. With a half, a pile of 480 blocks simmers at 0.1 m/s for
 ever; with a twentieth it is at rest after 24 to 30 s, with this after 6 to 12 s. In proportion to
 the speed alone an error of one sign would let the speed grow from nothing, so"""
 

@@ -56,7 +56,7 @@ def product(row: Floats, first: int, second: int) -> float:
 
 
 @kernel
-def push(row: Floats, first: int, d: Floats, i: int, j: int, force: float) -> None:
+def displace(row: Floats, first: int, d: Floats, i: int, j: int, force: float) -> None:
     """Move slots i and j by what a force along one direction of a contact displaces them."""
     for q in range(3):
         d[i, q] += force * row[first + q]
@@ -103,8 +103,8 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, dt:
     row[FRICTION], row[TENSION] = old.friction, old.tension
     row[COHESION] = math.inf if old.kind == PIN else old.cohesion
     row[FORCE], row[FORCE + 1] = old.start_normal, old.start_shear
-    push(row, NORMAL, m.d, i, j, old.start_normal)
-    push(row, SHEAR, m.d, i, j, old.start_shear)
+    displace(row, NORMAL, m.d, i, j, old.start_normal)
+    displace(row, SHEAR, m.d, i, j, old.start_shear)
 
 
 @arithmetic_kernel
@@ -127,11 +127,10 @@ def sweep(
         if moved_in[i] < number - 1 and moved_in[j] < number - 1:
             continue
         r = row[place]
-        n0, n1, n2, n3, n4, n5 = r[0], r[1], r[2], r[3], r[4], r[5]
-        s0, s1, s2, s3, s4, s5 = r[6], r[7], r[8], r[9], r[10], r[11]
+        n, s = r[NORMAL : NORMAL + 6], r[SHEAR : SHEAR + 6]
         u, v, w, u2, v2, w2 = d[i, 0], d[i, 1], d[i, 2], d[j, 0], d[j, 1], d[j, 2]
-        moved = (n0 * u + n1 * v + n2 * w) + (n3 * u2 + n4 * v2 + n5 * w2)
-        slid = (s0 * u + s1 * v + s2 * w) + (s3 * u2 + s4 * v2 + s5 * w2)
+        moved = (n[0] * u + n[1] * v + n[2] * w) + (n[3] * u2 + n[4] * v2 + n[5] * w2)
+        slid = (s[0] * u + s[1] * v + s[2] * w) + (s[3] * u2 + s[4] * v2 + s[5] * w2)
         force, before = r[FORCE], r[FORCE + 1]
         normal = (r[KEEP] * force + r[PULL]) - r[GAIN] * moved
         normal = max(normal, -r[TENSION])
@@ -148,9 +147,9 @@ def sweep(
             moved_in[i] = number
             if j != np.uintp(still):
                 moved_in[j] = number
-        d[i, 0], d[i, 1] = (u + push * n0) + drag * s0, (v + push * n1) + drag * s1
-        d[j, 0], d[j, 1] = (u2 + push * n3) + drag * s3, (v2 + push * n4) + drag * s4
-        d[i, 2], d[j, 2] = (w + push * n2) + drag * s2, (w2 + push * n5) + drag * s5
+        d[i, 0], d[i, 1] = (u + push * n[0]) + drag * s[0], (v + push * n[1]) + drag * s[1]
+        d[j, 0], d[j, 1] = (u2 + push * n[3]) + drag * s[3], (v2 + push * n[4]) + drag * s[4]
+        d[i, 2], d[j, 2] = (w + push * n[2]) + drag * s[2], (w2 + push * n[5]) + drag * s[5]
         r[FORCE], r[FORCE + 1] = normal, shear
     return worst
 

@@ -46,6 +46,14 @@ def test_the_finalists_spread_over_the_front_and_hold_its_best(site: Site) -> No
     assert min(tried, key=lambda e: e.objective) in chosen
 
 
+def test_known_layouts_are_finalists_though_dominated() -> None:
+    tried = [point(9.0, 0.9), point(8.0, 0.8), *(point(float(c), 0.5 - 0.02 * c) for c in range(8))]
+    assert not {tried[0], tried[1]} & set(pareto.finalists(tried, 6))
+    chosen = pareto.finalists(tried, 6, known=2)
+    assert chosen[:2] == tried[:2] and set(chosen[2:]) < set(tried[2:]) and len(chosen) <= 6
+    assert pareto.finalists(tried, 1, known=2) == tried[:1]
+
+
 def test_layouts_that_others_found_are_in_the_finals(site: Site) -> None:
     problem = DesignProblem(site, kinds=("wall",))
     others = [(Wall(16.0, 2.0),), (Wall(17.0, 3.0),), (Wall(16.0, 2.0),)]

@@ -83,39 +83,43 @@ FLIPS = 3
 """A contact that changed between stick and slip, or open and closed, this often in one step keeps
 its state. Nearly every step that does not converge has one such contact."""
 
-RELAXATION_SWEEPS = 25
-"""Most sweeps over the forces of an island in motion in a step."""
+SUBSTEP = 2e-3
+"""Longest substep in the relaxation of an island in motion [s]: a blow goes on from contact to
+contact in each. In steps of 20 ms of 480 blocks contacts sink half as deep with it as with 2.5 ms,
+and a step costs 3 % more."""
 
-RELAXATION_SPEED = 0.05
-"""Greatest change of a contact's velocity in a sweep at which sweeps stop, fast islands [m/s],"""
+LEAST_SUBSTEPS = 3
+"""Least substeps of a step."""
 
-RELAXATION_FALL = 0.5
-"""or so much of what gravity gives in a step, g dt, if that is more [-]. At 20 ms, where it is
-twice the above, steps of 120 blocks take a tenth less and contacts sink as deep; at four times it,
-a fifth deeper. And"""
+MOST_SWEEPS = 100
+"""Most sweeps over the contacts of an island in a substep, where they change by more than the
+tolerance: `Settings.sweep_tolerance`,"""
 
-RELAXATION_SHARE = 1.0 / 60.0
-"""in a slower one, over its speed [-]. With a half, a pile of 480 blocks simmers at 0.1 m/s for
-ever; with a twentieth it is at rest after 24 to 30 s, with this after 6 to 12 s. In proportion to
+LARGE_ISLAND = 128
+"""in an island of so many blocks or more, and less in proportion in smaller ones. Where a train of
+ten blocks hits the ground it is the difference between one blow and ten: with 1 m/s instead of 0.1
+a seventh more of it reached a road. In an avalanche of 120 blocks it made none, but took twice the
+time."""
+
+RELAXATION_SHARE = 0.2
+"""In a slow island it is not more than this, over its speed [-]."""
+
+SLOW_SWEEPS = 100
+"""Most sweeps over an island that is relaxed since it did not settle as a whole,"""
+
+SLOW_SHARE = 1.0 / 60.0
+"""and the change of a contact's velocity at which they stop, over its speed [-]. In proportion to
 the speed alone an error of one sign would let the speed grow from nothing, so"""
 
 LEAST_RELAXATION = 1e-3
 """of an island at rest it is this share of what gravity gives in a step, g dt [-]."""
 
-QUIET_SWEEPS = 100
-"""Most sweeps in a step over an island that is relaxed more closely than RELAXATION_SPEED."""
+RELAXATION_STIFFNESS = 6e3
+"""Stiffness of a contact in a single substep times its flexibility there [-]."""
 
-FAR_SPEED = 0.2
-"""Greatest change of a contact's velocity in a sweep above which sweeps go on to the last [m/s]:
-a light block between heavy ones, whose forces grow by little in each."""
-
-LAST_SWEEPS = 200
-"""Most sweeps of an island whose forces are still that far from settled."""
-
-RELAXATION_STIFFNESS = 3e3
-"""Stiffness of a contact in relaxation times its flexibility [-]. A blow on the foot of a train of
-blocks leaves them closing at the blow over this: with 30 they stopped within three steps instead of
-one, and the outcome depended on the step."""
+REACH = 1.0
+"""Speed at which an open contact may begin to close, over the greatest of its island [-]: one that
+cannot close at that is not visited. With a quarter of it contacts sink twice as deep."""
 
 LAYERS = 64
 """Layers in which the contacts of an island are ordered by height for relaxation."""

@@ -135,7 +135,7 @@ def pass_on_shares(
 
 @inlined
 def apply_forces(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, relaxed: bool, p: Parameters
 ) -> None:
     """Set m.d and m.residual of an island to the displacement and its impact correction.
 
@@ -143,6 +143,7 @@ def apply_forces(
     rounding whatever the residual of the solver. A constant force over the step displaces a block
     by dt^2 F / 2M; an impulse that acts for the share s of the step displaces it by s dt^2 F / M.
     The first impact sets the share of all, or the corner that hits first would go on until then.
+    Relaxation in substeps has found the correction: m.late.
     """
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
@@ -154,16 +155,16 @@ def apply_forces(
         add_contact_force(c, k, m, work.slot[c[k].a], True)
         if c[k].pair >= 0:
             add_contact_force(c, k, m, work.slot[c[k].b], False)
-    pass_on_shares(bodies, c, m, work, island, p.dt)
+    if not relaxed:
+        pass_on_shares(bodies, c, m, work, island, p.dt)
     for s in range(b1 - b0):
         i = work.block_item[b0 + s]
         share = m.direction[s, 0]
         late = (share - 0.5) * p.dt * p.dt if share > 0.0 else 0.0
         for j in range(3):
             m.d[s, j] = (m.rhs[s, j] + m.residual[s, j]) / m.diagonal[s, j, j]
-        m.residual[s, 0] *= late / bodies[i].mass
-        m.residual[s, 1] *= late / bodies[i].mass
-        m.residual[s, 2] *= late / bodies[i].inertia
+            inertia = bodies[i].inertia if j == 2 else bodies[i].mass
+            m.residual[s, j] = m.late[s, j] if relaxed else m.residual[s, j] * late / inertia
 
 
 @inlined
@@ -239,11 +240,12 @@ def is_struck(c: Contacts, work: Work, low: int, high: int) -> bool:
 
 
 @inlined
-def keep_memory(c: Contacts, k: int, struck: bool) -> None:
+def keep_memory(c: Contacts, k: int, struck: bool, relaxed: bool) -> None:
     """Carry the forces of contact k to the next step; an impulse does not last.
 
     In an island that was struck every force may be part of an impulse: what the contact carried
-    before stays. In one that was relaxed only part of a rise counts.
+    before stays. Of a contact that moves only part of a rise counts. Relaxation has set the forces
+    from which the next step is to start.
     """
     if c[k].state == OPEN:
         c[k].memory_normal = c[k].memory_shear = 0.0
@@ -258,4 +260,5 @@ def keep_memory(c: Contacts, k: int, struck: bool) -> None:
         elastic = c[k].stiffness / c[k].kappa if c[k].kind == REST else 1.0
         c[k].memory_normal += elastic * (c[k].normal - c[k].memory_normal)
         c[k].memory_shear += elastic * (c[k].shear - c[k].memory_shear)
-    c[k].start_normal, c[k].start_shear = c[k].normal, c[k].shear
+    if not relaxed:
+        c[k].start_normal, c[k].start_shear = c[k].normal, c[k].shear

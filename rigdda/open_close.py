@@ -41,11 +41,11 @@ from rigdda.constants import (
 )
 from rigdda.contact.joint import break_joint
 from rigdda.contact.law import set_shock
-from rigdda.islands import pair_blocks
+from rigdda.islands import joins, pair_blocks
 from rigdda.kernel import inlined, kernel
 from rigdda.linear.direct import solve_block, solve_two_blocks
 from rigdda.linear.pcg import solve_pcg
-from rigdda.linear.psor import relax_forces
+from rigdda.linear.relaxation import relax_forces
 from rigdda.linear.skyline import profile, solve_skyline
 from rigdda.linear.sor import solve_sor
 from rigdda.motion import top_speed
@@ -256,13 +256,14 @@ def relax(
     p: Parameters,
     counters: NDArray,
     speed: float,
+    fast: bool,
 ) -> None:
-    """Find the forces of an island by projected relaxation, from those of the last step."""
+    """Find the forces of an island by relaxation, from those of the last step."""
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
     counters[RELAXED] += 1
-    counters[SWEEPS] += relax_forces(c, m, work, c0, c1, b1 - b0, speed, p)
+    counters[SWEEPS] += relax_forces(bodies, c, m, work, c0, c1, b0, b1 - b0, speed, fast, p)
     for item in range(c0, c1):
         k = work.contact_item[item]
         limit = c[k].cohesion + c[k].friction * max(c[k].normal, 0.0)
@@ -350,16 +351,18 @@ def open_close(
         Whether they settled; a large island that did not is taken as it is.
     """
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
-    bouncing = False
+    bouncing = grounded = False
     for item in range(c0, c1):
         k = work.contact_item[item]
         bouncing = bouncing or (c[k].kind == IMPACT and c[k].bias > 0.0)
+        grounded = grounded or not joins(bodies, c, k)
     pairs = pair_blocks(bodies, c, m, work, c0, c1)
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     speed = island_speed(bodies, work, b0, b1)
     waiting = is_waiting(bodies, work, b0, b1)
     small, settled = b1 - b0 <= SMALL_ISLAND, True
-    relaxing = not small and (waiting or speed > QUIET_SPEED)
+    fast = not small and speed > QUIET_SPEED
+    relaxing = fast or (waiting and not small)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
             relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)
@@ -367,7 +370,9 @@ def open_close(
             if relaxing and not small:
                 let_wait(bodies, work, b0, b1)
         if relaxing:
-            relax(bodies, c, m, work, island, p, counters, speed)
+            relax(bodies, c, m, work, island, p, counters, speed, fast)
+        # a cluster in flight keeps its angular momentum: its impulses act at one time
+        work.relaxed[0] = int(fast and grounded)
         if not bouncing or impact_work(c, m, work, c0, c1) <= 0.0:
             return settled
         for item in range(c0, c1):

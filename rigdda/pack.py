@@ -27,7 +27,7 @@ from rigdda.constants import (
 from rigdda.correction import place_all_corners
 from rigdda.errors import BadInput
 from rigdda.geometry import convex_parts, polygon_properties, turns
-from rigdda.linear.psor import COLUMNS
+from rigdda.linear.relaxation import COLUMNS
 from rigdda.records import (
     BODY,
     CONTACT,
@@ -293,6 +293,8 @@ def empty_matrix(blocks: int, room: int) -> Matrix:
         np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
         np.zeros((blocks + 1, 3)),
+        np.zeros((blocks + 1, 9)),
+        np.zeros((blocks, 3)),
         np.zeros(blocks, dtype=np.int64),
         np.zeros(3 * blocks, dtype=np.int64),
         np.zeros(profile_room(blocks)),
@@ -332,6 +334,8 @@ def empty_work(bodies: int, room: int) -> Work:
         whole(room),
         whole(room),
         whole(bodies + 1),
+        whole(room),
+        whole(1),
         whole(room),
         whole(LAYERS + 1),
         np.zeros(2),
@@ -431,7 +435,7 @@ def pack_parameters(
         settings.penetration or PENETRATION_RATIO * size,
         SLACK_RATIO * size,
         settings.tolerance,
-        settings.sweep_tolerance or 0.0,
+        settings.sweep_tolerance,
         settings.open_close_iterations,
         static,
         settings.post_correction,

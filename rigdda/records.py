@@ -178,6 +178,8 @@ class Matrix(NamedTuple):
     direction: Floats
     product: Floats
     scaled: Floats  # (N + 1, 3)
+    motion: Floats  # (N + 1, 9) displacements in substeps, see linear.relaxation
+    late: Floats  # (N, 3) displacements besides d, where forces act early or late in the step
     first: Ints  # (N,) leftmost block of a row, or head of its chain of neighbours
     row: Ints  # (3 N,) place in `factor` of column 0 of a scalar row
     factor: Floats  # Cholesky factor within the profile
@@ -203,10 +205,12 @@ class Work(NamedTuple):
     contact_start: Ints  # (M + 1,) contacts of each island
     contact_item: Ints
     first: Ints  # (M + 1,) contacts of the last step by body a
-    row: Floats  # (C, columns) contacts of one island, see linear.psor
+    row: Floats  # (C, columns) contacts of one island, see linear.relaxation
     row_i: Ints  # (C,) slots of their bodies
     row_j: Ints
     moved_in: Ints  # (M + 1,) last sweep in which a slot moved
+    idle: Ints  # (C,) substep until which a contact cannot close
+    relaxed: Ints  # (1,) 1 if the forces of the island in work are those of relaxation
     ordered: Ints  # (C,) contacts of an island in another order
     layer: Ints  # (LAYERS + 1,) contacts of an island below a height
     field: Floats  # (2,) acceleration of free blocks in this step [m/s2]
@@ -257,7 +261,7 @@ class Parameters(NamedTuple):
     penetration: float
     slack: float
     tolerance: float
-    sweep_tolerance: float  # [m/s]; 0: that of the step
+    sweep_tolerance: float  # [m/s]
     iterations: int
     static: bool
     post_correction: bool

@@ -42,11 +42,10 @@ class Settings:
     tolerance : float
         Relative residual at which conjugate gradients stop. 1e-7: looser, and the small forces at
         the top of a tall stack drown in the error of the large ones at its base.
-    sweep_tolerance : float or None
-        Change of a contact's velocity in a sweep below which the forces of an island of several
-        blocks in motion count as found [m/s]. Slow islands are settled more closely. Below 0.05,
-        up to four times as many sweeps may be taken. None: 0.05, or half of what gravity gives in a
-        step if that is more, as it is in steps above 10 ms.
+    sweep_tolerance : float
+        Islands of several blocks in motion take a step in three substeps or more, of 2 ms at most.
+        In each their contacts are swept over until no velocity changes by more than this [m/s], up
+        to 25 times. Slow islands are settled more closely.
     open_close_iterations : int
         Open-close iterations in a step, after which an island goes on only while few of its
         contacts still change, up to eight times as long; nearly all steps need 1 to 3.
@@ -79,7 +78,7 @@ class Settings:
     dt: float = 5e-3
     penetration: float | None = None
     tolerance: float = 1e-7
-    sweep_tolerance: float | None = None
+    sweep_tolerance: float = 1.0
     open_close_iterations: int = 12
     displacement_limit: float = 0.25
     mode: str = "dynamic"
@@ -95,8 +94,7 @@ class Settings:
         if self.penetration is not None:
             check.set_number(self, "penetration", 0.0, open_low=True)
         check.set_number(self, "tolerance", 0.0, 1e-2, open_low=True)
-        if self.sweep_tolerance is not None:
-            check.set_number(self, "sweep_tolerance", 0.0, open_low=True)
+        check.set_number(self, "sweep_tolerance", 0.0, open_low=True)
         iterations = check.integer("open_close_iterations", self.open_close_iterations, 1)
         object.__setattr__(self, "open_close_iterations", iterations)
         check.set_number(self, "displacement_limit", 0.0, open_low=True)

@@ -187,7 +187,7 @@ def move_island(
     low, bad = work.block_start[island], -1
     struck = is_struck(c, work, c0, c1)
     for item in range(c0, c1):
-        keep_memory(c, work.contact_item[item], struck)
+        keep_memory(c, work.contact_item[item], struck, work.relaxed[0] == 1)
     account(bodies, c, m, work, island, p, ledger, gauges)
     for place in range(low, work.block_start[island + 1]):
         i = work.block_item[place]
@@ -233,7 +233,7 @@ def solve_and_move(
             since = lap(counters, MOTION, since, p.timing)
             settled = open_close(bodies, c, m, work, s, p, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
-            apply_forces(bodies, c, m, work, s, p)
+            apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
             far = too_far(bodies, c, m, work, s, p) if cutting else 0.0
             if far > 1.0 or (cutting and not settled):
                 excess = max(excess, far, 1.0)
@@ -241,10 +241,11 @@ def solve_and_move(
                 mark_cut(bodies, work, s)
                 continue
             if limit_fences(bodies, c, m, work, s, gauges, time, p, counters):
-                apply_forces(bodies, c, m, work, s, p)
+                apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
             counters[EVENTS] = note_hits(bodies, c, work, c0, c1, gauges, counters[EVENTS], time)
         else:
-            apply_forces(bodies, c, m, work, s, p)
+            work.relaxed[0] = 0
+            apply_forces(bodies, c, m, work, s, False, p)
         bad = max(bad, move_island(bodies, outlines, c, m, work, s, gauges, p, ledger))
     for k in range(count):
         if c[k].state != OPEN:

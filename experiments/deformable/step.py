@@ -128,7 +128,7 @@ def advance(
         pairs = pair_blocks(bodies, now, m, work, 0, count)
         settle(bodies, outlines, now, count, s, m, work, n, pairs, p, counters)
         for k in range(count):
-            keep_memory(now, k, False)
+            keep_memory(now, k, False, False)
         for i in range(n):
             move_block(bodies, outlines, s, i, p.dt)
         counters[STEPS] += 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigdda import Settings
-from rigdda.constants import PENETRATION_RATIO, RELAXATION_SPEED
+from rigdda.constants import PENETRATION_RATIO
 
 DEFAULT = Settings()
 
@@ -21,7 +21,7 @@ Stiffness is the load over it."""
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-10)
 """Of conjugate gradients, `Settings.tolerance` [-]."""
 
-SWEEP_TOLERANCES = (0.5, 0.05, 0.01, 0.002)
+SWEEP_TOLERANCES = (5.0, 1.0, 0.2, 0.05, 0.01)
 """Of the relaxation of blocks in motion, `Settings.sweep_tolerance` [m/s]."""
 
 OPEN_CLOSE = (1, 3, 12, 50)
@@ -54,7 +54,7 @@ def choices(size: float, steps: Sequence[float] = STEPS) -> Iterator[Choice]:
         if tolerance != DEFAULT.tolerance:
             yield Choice(TOLERANCE, tolerance, {"tolerance": tolerance})
     for change in SWEEP_TOLERANCES:
-        if change != RELAXATION_SPEED:
+        if change != DEFAULT.sweep_tolerance:
             yield Choice(SWEEPS, change, {"sweep_tolerance": change})
     for most in OPEN_CLOSE:
         if most != DEFAULT.open_close_iterations:

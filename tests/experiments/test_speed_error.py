@@ -99,7 +99,7 @@ def test_slides_are_exact_at_every_choice():
 
 
 def test_a_run_writes_its_tables_and_pictures(tmp_path, monkeypatch):
-    monkeypatch.setattr(highway, "QUICK", Budget(3, 2, 2, 12.0, (), 16.0))
+    monkeypatch.setattr(highway, "QUICK", Budget(8, 2, 2, 12.0, (), 16.0))
     monkeypatch.setattr(study, "peers", list)
     monkeypatch.setattr(closed_forms, "with_peers", lambda quick: [SLIDE])
     number = study.run(True, tmp_path)

@@ -1,0 +1,350 @@
+r"""Projected relaxation of contact forces in substeps, for islands in motion.
+
+In an avalanche many contacts open, close, stick and slip in one step, and open-close iteration
+around a global solve does not settle. Relaxation decides the state of each contact as it visits
+it: the normal force is kept from pulling, the shear force within its friction limit. A blow on one
+block reaches the others contact by contact; many short steps of few sweeps find where it takes them
+better than one step of many (Macklin et al. 2019, Small steps in physics simulation). So the step
+is taken in substeps, of length h, along the normals and with the arms of the step:
+
+.. math:: d_s = d_{s-1} + \frac{h^2}{M} \Bigl(F + \sum_c f_c e_c^t\Bigr), \qquad D_s = D_{s-1} + d_s
+
+with d the displacement of a block in a substep and D that since the start of the step, F its weight
+and loads, f_c the force of a contact and e_c its row. A contact whose gap g + e D is open may close
+by that gap, one that is closed not at all; an impact that has closed leaves by what its restitution
+asks for. Forces start from those of the last substep, so that d starts as 2 d_{s-1} - d_{s-2}.
+
+At rest the global solve takes over. What that does not settle is relaxed in a single substep.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rigdda.assembly.island import damping_of
+from rigdda.assembly.springs import normal_row, shear_row
+from rigdda.constants import (
+    BOLT,
+    IMPACT,
+    LARGE_ISLAND,
+    LEAST_RELAXATION,
+    LEAST_SUBSTEPS,
+    MOST_SWEEPS,
+    PIN,
+    PLAIN,
+    REACH,
+    RELAXATION_SHARE,
+    RELAXATION_STIFFNESS,
+    REST,
+    SLOW_SHARE,
+    SLOW_SWEEPS,
+    SUBSTEP,
+)
+from rigdda.kernel import arithmetic_kernel, inlined, kernel
+from rigdda.records import Bodies, Contacts, Floats, Ints, Matrix, Parameters, Work
+
+# columns of work.row, by direction: the rows of the contact for a and b, times h over the roots of
+# their inertia [(m/N)^1/2]; force [N]; the share of it that a visit keeps [-] and what a
+# displacement takes [N/m]; sum of the forces of all substeps [N]
+NORMAL, SHEAR = 0, 6
+FORCE, KEEP, GAIN, SUM = 12, 14, 16, 18
+# normal displacement per force [m/N]; what a normal force takes from the shear force [-]; friction;
+# shear and tension that it bears besides [N]
+FLEXIBLE, CROSS, FRICTION, COHESION, TENSION = 20, 21, 22, 23, 24
+# gap at the start of the step, and normal displacement that it aims at in a substep once closed
+# [m]; or where OWN is 1, a spring on displacements: at which normal and shear one it is free [m]
+GAP, AIM, OWN = 25, 26, 27
+SINCE = 28  # substep from which on it has borne its force
+REBOUND, HIT = 29, 30  # displacement in the substep in which an impact has closed [m]; its number
+COLUMNS = 31
+
+# columns of m.motion, each in three directions, times the roots of inertia over h: displacement in
+# this substep, since the start of the step, and in the substep before
+NOW, SO_FAR, BEFORE = 0, 3, 6
+
+
+@kernel
+def write_row(row: Floats, first: int, e: tuple[float, float, float], scale: Floats) -> None:
+    """Write a row, scaled by the inertia of its body."""
+    row[first], row[first + 1], row[first + 2] = e[0] * scale[0], e[1] * scale[1], e[2] * scale[2]
+
+
+@kernel
+def product(row: Floats, first: int, second: int) -> float:
+    """Return the displacement along one direction of a contact per force along another [m/N]."""
+    total = 0.0
+    for q in range(6):
+        total += row[first + q] * row[second + q]
+    return total
+
+
+@kernel
+def displace(row: Floats, first: int, motion: Floats, i: int, j: int, force: float) -> None:
+    """Move slots i and j by what a force along one direction of a contact displaces them."""
+    for q in range(3):
+        motion[i, NOW + q] += force * row[first + q]
+        motion[j, NOW + q] += force * row[first + 3 + q]
+
+
+@arithmetic_kernel
+def along_six(e: Floats, a: Floats, b: Floats, first: int) -> float:
+    """Return the displacement along a row of two bodies that move by columns of a and b [m]."""
+    own = e[0] * a[first] + e[1] * a[first + 1] + e[2] * a[first + 2]
+    return own + (e[3] * b[first] + e[4] * b[first + 1] + e[5] * b[first + 2])
+
+
+@kernel
+def set_rigid(
+    row: Floats, c: Contacts, k: int, flexible: float, rolling: float, substeps: int
+) -> None:
+    """Write what a visit needs of contact k, which gives way to nothing in a substep."""
+    row[KEEP], row[KEEP + 1], row[GAIN], row[GAIN + 1] = 1.0, 1.0, 1.0 / flexible, 1.0 / rolling
+    row[GAP], row[AIM], row[OWN], row[REBOUND], row[HIT] = c[k].gap, 0.0, 0.0, 0.0, -1.0
+    if c[k].kind == IMPACT and c[k].bias > 0.0:
+        row[REBOUND] = c[k].bias / substeps
+    elif c[k].kind == IMPACT:  # a fence that fails lets blocks pass
+        row[AIM] = c[k].bias / substeps
+    elif c[k].kind == REST:  # what pushes penetration out, without the force that is carried over
+        row[AIM] = max(c[k].bias - c[k].memory_normal / c[k].kappa, 0.0) / substeps
+
+
+@inlined
+def set_spring(
+    row: Floats, c: Contacts, k: int, m: Matrix, i: int, j: int, flexible: float, rolling: float,
+    substeps: int,
+) -> None:  # fmt: skip
+    """Write what a visit needs of the spring of contact k, see contact.law.
+
+    In a single substep every contact is one: its displacement is dt times the end velocity. A plain
+    contact is one on the displacement of the step, in the law with a factor of 2.
+    """
+    own = c[k].kind == PLAIN or c[k].kind == BOLT or c[k].kind == PIN
+    normal = shear = c[k].kappa
+    free = c[k].bias
+    if not own:
+        normal, shear = RELAXATION_STIFFNESS / flexible, RELAXATION_STIFFNESS / rolling
+        free += c[k].memory_normal * (1.0 / normal - 1.0 / c[k].kappa)
+    elif c[k].kind == PLAIN and substeps > 1:
+        normal = shear = 2.0 * c[k].kappa
+        free = 0.5 * c[k].bias
+    elif c[k].kind == PLAIN:
+        free -= along_six(row[NORMAL : NORMAL + 6], m.motion[i], m.motion[j], BEFORE)
+    row[KEEP] = normal * flexible / (1.0 + normal * flexible)
+    row[KEEP + 1] = shear * rolling / (1.0 + shear * rolling)
+    row[GAIN], row[GAIN + 1] = row[KEEP] / flexible, row[KEEP + 1] / rolling
+    row[GAP], row[AIM], row[OWN] = free, c[k].memory_shear / shear, 1.0
+
+
+@inlined
+def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, substeps: int) -> None:
+    """Write contact k as row `place` and add its starting force to the displacements.
+
+    Slot n stands for bodies without unknowns.
+    """
+    row, old = work.row[place], c[k]
+    i = work.slot[old.a]
+    j = work.slot[old.b] if old.pair >= 0 else n
+    work.row_i[place], work.row_j[place], work.idle[place] = i, j, 0
+    write_row(row, NORMAL, normal_row(c, k, True), m.scaled[i])
+    write_row(row, NORMAL + 3, normal_row(c, k, False), m.scaled[j])
+    write_row(row, SHEAR, shear_row(c, k, True), m.scaled[i])
+    write_row(row, SHEAR + 3, shear_row(c, k, False), m.scaled[j])
+    flexible, rolling = product(row, NORMAL, NORMAL), product(row, SHEAR, SHEAR)
+    if substeps == 1 or old.kind == PLAIN or old.kind == BOLT or old.kind == PIN:
+        set_spring(row, c, k, m, i, j, flexible, rolling, substeps)
+    else:
+        set_rigid(row, c, k, flexible, rolling, substeps)
+    row[FLEXIBLE], row[CROSS] = flexible, row[GAIN + 1] * product(row, NORMAL, SHEAR)
+    row[FRICTION], row[TENSION] = old.friction, old.tension
+    row[COHESION] = math.inf if old.kind == PIN else old.cohesion
+    row[FORCE], row[FORCE + 1] = old.start_normal, old.start_shear
+    row[SUM] = row[SUM + 1] = row[SINCE] = 0.0
+    displace(row, NORMAL, m.motion, i, j, old.start_normal)
+    displace(row, SHEAR, m.motion, i, j, old.start_shear)
+
+
+@arithmetic_kernel
+def add_up(row: Floats, number: int) -> None:
+    """Add the forces that a contact has had until the start of substep `number`."""
+    row[SUM] += row[FORCE] * (number - row[SINCE])
+    row[SUM + 1] += row[FORCE + 1] * (number - row[SINCE])
+    row[SINCE] = number
+
+
+@arithmetic_kernel
+def sweep(
+    row: Floats, row_i: Ints, row_j: Ints, motion: Floats, still: int, count: int, tries: int,
+    number: int, substeps: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
+) -> float:  # fmt: skip
+    """Visit every contact once, from the lowest up, or down; returns the greatest change [m].
+
+    But not those that cannot close before substep idle[k], at twice the speed at which they close
+    and `reach` [m] a substep besides; nor, after the first sweep of a substep, where neither body
+    has moved by more than `quiet` [m] in this or the last sweep: moved_in[s] is the number of the
+    last sweep of the substep in which slot s did. Slot `still` never does.
+
+    A visit reads the bodies once: what the normal force changes along the shear direction is added
+    to what was read. Unsigned indices spare numba's test for negative ones.
+    """
+    worst = 0.0
+    for visit in range(count):
+        place = np.uintp(count - 1 - visit if tries % 2 == 1 else visit)
+        if idle[place] > number:
+            continue
+        i, j = np.uintp(row_i[place]), np.uintp(row_j[place])
+        if moved_in[i] < tries - 1 and moved_in[j] < tries - 1:
+            continue
+        r, a, b = row[place], motion[i], motion[j]
+        n, s = r[NORMAL : NORMAL + 6], r[SHEAR : SHEAR + 6]
+        moved, gap = along_six(n, a, b, NOW), along_six(n, a, b, SO_FAR)
+        slid = along_six(s, a, b, NOW)
+        if r[OWN] == 0.0:
+            gap += r[GAP]
+            aim = min(r[AIM], -gap) if gap > 0.0 else r[AIM]
+            if gap <= 0.0 and r[REBOUND] > moved and (r[HIT] < 0.0 or r[HIT] == number):
+                aim, r[HIT] = r[REBOUND], number
+        else:
+            aim = r[GAP] - gap
+            slid += along_six(s, a, b, SO_FAR) - r[AIM]
+        force, before = r[FORCE], r[FORCE + 1]
+        normal = max(r[KEEP] * force + r[GAIN] * (aim - moved), -r[TENSION])
+        push = normal - force
+        limit = r[COHESION] + r[FRICTION] * max(normal, 0.0)
+        if push == 0.0 and limit == 0.0 and before == 0.0:
+            if r[OWN] == 0.0:
+                wait = (moved - aim) / (reach + abs(moved))
+                idle[place] = number + int(min(wait, float(substeps)))
+            continue
+        change = abs(push) * r[FLEXIBLE]
+        worst = max(worst, change)
+        shear = r[KEEP + 1] * before - r[GAIN + 1] * slid - r[CROSS] * push
+        shear = min(max(shear, -limit), limit)
+        drag = shear - before
+        if change + abs(drag) * r[FLEXIBLE] > quiet:
+            moved_in[i] = tries
+            if j != np.uintp(still):
+                moved_in[j] = tries
+        for q in range(3):
+            a[NOW + q] = (a[NOW + q] + push * n[q]) + drag * s[q]
+        for q in range(3):
+            b[NOW + q] = (b[NOW + q] + push * n[3 + q]) + drag * s[3 + q]
+        add_up(r, number)
+        r[FORCE], r[FORCE + 1] = normal, shear
+    return worst
+
+
+@kernel
+def sort_by_height(c: Contacts, work: Work, low: int, high: int) -> None:
+    """Order the contacts low:high by height, lowest first, so that a sweep carries loads through.
+
+    A counting sort in as many layers as there is room for: within one the order does not matter.
+    """
+    item, layers = work.contact_item, min(len(work.layer) - 1, high - low)
+    least, most = math.inf, -math.inf
+    for place in range(low, high):
+        y = c[item[place]].y
+        least, most = min(least, y), max(most, y)
+    scale = layers / (most - least) * (1.0 - 1e-9) if most > least else 0.0
+    for s in range(layers + 1):
+        work.layer[s] = 0
+    for place in range(low, high):
+        work.layer[int(scale * (c[item[place]].y - least)) + 1] += 1
+    for s in range(layers):
+        work.layer[s + 1] += work.layer[s]
+    for place in range(low, high):
+        s = int(scale * (c[item[place]].y - least))
+        work.ordered[work.layer[s]] = item[place]
+        work.layer[s] += 1
+    for place in range(low, high):
+        item[place] = work.ordered[place - low]
+
+
+@kernel
+def velocity(bodies: Bodies, i: int) -> tuple[float, float, float]:
+    """Return the velocity of body i at the start of the step."""
+    return bodies[i].vx, bodies[i].vy, bodies[i].omega
+
+
+@inlined
+def start(bodies: Bodies, m: Matrix, i: int, s: int, h: float, p: Parameters) -> None:
+    """Set the displacement of block i, slot s, in the first substep without contacts."""
+    v, alpha = velocity(bodies, i), damping_of(bodies, i, p)
+    for q in range(3):
+        inertia = bodies[i].inertia if q == 2 else bodies[i].mass
+        scale = h / math.sqrt(inertia)
+        pull = (m.rhs[s, q] - 2.0 * inertia * v[q] / p.dt) / inertia - alpha * v[q]
+        m.scaled[s, q] = scale
+        m.motion[s, BEFORE + q] = h * v[q] / scale
+        m.motion[s, NOW + q] = (h * v[q] + h * h * pull) / scale
+        m.motion[s, SO_FAR + q] = 0.0
+
+
+@kernel
+def go_on(motion: Floats, n: int, last: bool) -> None:
+    """End a substep: add its displacements, start the next with the accelerations of this one."""
+    for s in range(n):
+        for q in range(3):
+            now = motion[s, NOW + q]
+            motion[s, SO_FAR + q] += now
+            if not last:
+                motion[s, NOW + q] = 2.0 * now - motion[s, BEFORE + q]
+                motion[s, BEFORE + q] = now
+
+
+@kernel
+def relax_forces(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, first: int, n: int,
+    speed: float, fast: bool, p: Parameters,
+) -> int:  # fmt: skip
+    """Find the forces of an island with contacts low:high; returns the sweeps.
+
+    In substeps if it is `fast`, else in one that is settled more closely.
+
+    The matrix holds inertia and weight only. Forces are set to their means over the step, and
+    start_normal and start_shear to the last ones; m.d to the displacements at constant mean force,
+    and m.late to what the blocks move besides, since forces act early or late in the step. `speed`
+    is the greatest of the island [m/s].
+    """
+    substeps, most = 1, SLOW_SWEEPS
+    usual = p.sweep_tolerance * min(n / LARGE_ISLAND, 1.0)
+    tolerance = max(min(SLOW_SHARE * speed, usual), LEAST_RELAXATION * p.gravity * p.dt)
+    if fast:
+        substeps, most = max(LEAST_SUBSTEPS, math.ceil(p.dt / SUBSTEP - 1e-9)), MOST_SWEEPS
+        tolerance = min(RELAXATION_SHARE * speed, usual)
+    h, motion = p.dt / substeps, m.motion
+    for s in range(n):
+        start(bodies, m, work.block_item[first + s], s, h, p)
+    for q in range(3):
+        m.scaled[n, q] = 0.0
+        motion[n, NOW + q] = motion[n, SO_FAR + q] = motion[n, BEFORE + q] = 0.0
+    count = high - low
+    sort_by_height(c, work, low, high)
+    for place in range(count):
+        pack_row(c, work.contact_item[low + place], m, work, place, n, substeps)
+    sweeps = 0
+    for number in range(substeps):
+        for s in range(n + 1):
+            work.moved_in[s] = -1
+        worst, tries = math.inf, 0
+        while worst > tolerance * h and tries < most:
+            worst = sweep(
+                work.row, work.row_i, work.row_j, motion, n, count, tries, number, substeps,
+                work.idle, REACH * speed * h, work.moved_in, tolerance * h,
+            )  # fmt: skip
+            tries += 1
+        sweeps += tries
+        go_on(motion, n, number == substeps - 1)
+    for s in range(n):
+        v = velocity(bodies, work.block_item[first + s])
+        for q in range(3):
+            scale = m.scaled[s, q]
+            m.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)
+            m.late[s, q] = motion[s, SO_FAR + q] * scale - m.d[s, q]
+    for place in range(count):
+        k, row = work.contact_item[low + place], work.row[place]
+        add_up(row, substeps)
+        c[k].normal, c[k].shear = row[SUM] / substeps, row[SUM + 1] / substeps
+        c[k].start_normal, c[k].start_shear = row[FORCE], row[FORCE + 1]
+    return sweeps

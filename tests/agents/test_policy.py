@@ -15,7 +15,7 @@ from agents.crossings import ensemble
 from agents.features import WIDTH, features, rule_slot
 from agents.network import Network
 from agents.policy import SHIPPED, anchor, decide
-from agents.rule import rule
+from agents.rule import QUANTILE, rule
 from envs import DesignProblem, fidelity
 from envs.observation import observe
 from rigdda import BadInput, Fence, Site, __version__
@@ -83,9 +83,16 @@ def test_a_network_that_adds_nothing_builds_nearly_what_the_rule_does() -> None:
     posed = DesignProblem(fidelity.at(Site.load("quick"), "fast"))
     zeros = network(np.zeros(9), len(features(observe(posed, ()))))
     (fence,) = decide(zeros, posed)
-    (ruled,) = rule(posed.site, ensemble(posed.site, range(16)), "fence")
+    crossings = ensemble(posed.site, range(16))
+    (ruled,) = rule(posed.site, crossings, "fence")
     assert isinstance(ruled, Fence) and isinstance(fence, Fence)
-    assert fence.x == pytest.approx(ruled.x, abs=4.0)
+
+    def energy_at(x: float) -> float:
+        k = int(np.abs(np.array(crossings.stations) - x).argmin())
+        return float(np.quantile(crossings.at(k)["energy"], QUANTILE))
+
+    # two stations may be as good as one another; the network knows fewer releases
+    assert energy_at(fence.x) < 1.2 * energy_at(ruled.x)
     assert fence.height == pytest.approx(ruled.height, rel=0.3)
     assert 0.25 < fence.capacity / ruled.capacity < 4.0
 

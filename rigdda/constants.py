@@ -85,8 +85,8 @@ its state. Nearly every step that does not converge has one such contact."""
 
 SUBSTEP = 2e-3
 """Longest substep in the relaxation of an island in motion [s]: a blow goes on from contact to
-contact in each. In steps of 20 ms of 480 blocks contacts sink half as deep with it as with 2.5 ms,
-and a step costs 3 % more."""
+contact in each. In steps of 20 ms of 480 blocks contacts sink a third less than with 2.5 ms, and a
+step takes 3 % more time."""
 
 LEAST_SUBSTEPS = 3
 """Least substeps of a step."""
@@ -98,8 +98,8 @@ tolerance: `Settings.sweep_tolerance`,"""
 LARGE_ISLAND = 128
 """in an island of so many blocks or more, and less in proportion in smaller ones. Where a train of
 ten blocks hits the ground it is the difference between one blow and ten: with 1 m/s instead of 0.1
-a seventh more of it reached a road. In an avalanche of 120 blocks it made none, but took twice the
-time."""
+a seventh more of it reached a road. To an avalanche of 120 blocks it made none, but a step took
+half as much time again."""
 
 RELAXATION_SHARE = 0.2
 """In a slow island it is not more than this, over its speed [-]."""
@@ -119,7 +119,7 @@ RELAXATION_STIFFNESS = 6e3
 
 REACH = 1.0
 """Speed at which an open contact may begin to close, over the greatest of its island [-]: one that
-cannot close at that is not visited. With a quarter of it contacts sink twice as deep."""
+cannot close at that is not visited. With a quarter of it contacts sink up to twice as deep."""
 
 LAYERS = 64
 """Layers in which the contacts of an island are ordered by height for relaxation."""

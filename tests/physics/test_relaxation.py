@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigdda import Settings, Simulation, Site
+from rigdda import Scene, Settings, Simulation, Site
 from rigdda.constants import MOVING, OPEN
 from rigdda.records import CONTACTS
+from rigdda.validation.scenes import box, incline
+from rigdda.validation.slides import slide
 
 FALL = 3.0
 """Simulated time in which the rock of `quick` falls [s]."""
@@ -42,3 +44,21 @@ def test_forces_of_an_avalanche_press_and_stay_within_friction(dt: float) -> Non
         assert (np.abs(c["shear"]) <= limit * (1.0 + 1e-12)).all()
         tried += len(c)
     assert tried > 100
+
+
+@pytest.mark.parametrize("dt", [1e-3, 5e-3, 0.02])
+def test_a_train_slides_as_one_block_does(dt: float) -> None:
+    single, down = incline(30.0, 20.0)
+    angle = np.arctan2(down[1], down[0])
+    x, y = single.blocks[0].vertices.mean(axis=0)
+    blocks = [box(x + i * down[0], y + i * down[1], angle=angle) for i in range(4)]
+    sim = Simulation(Scene(single.terrain, blocks, single.surfaces), Settings(dt=dt))
+    before = sim.poses
+    sim.step(round(2.0 / dt))
+    assert sim.diagnostics.relaxed > 0.9 * sim.diagnostics.steps
+    way = (sim.poses[:, :2] - before[:, :2]) @ down
+    # in substeps h a block gets h v / 2 too far, which does not grow with time but with v
+    np.testing.assert_allclose(way, slide(30.0, 20.0, 2.0), atol=0.01)
+    np.testing.assert_allclose(way, way[0], atol=1e-3)
+    gain = sim.energy()
+    assert gain.friction < 0.0 and gain.impact < 1e-3 * abs(gain.friction)

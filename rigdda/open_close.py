@@ -18,6 +18,7 @@ from rigdda.constants import (
     BOLT,
     DIRECT,
     ENERGY_HALVINGS,
+    FAST_FALL,
     FEW_MOVING,
     FLIPS,
     FRICTION_TOLERANCE,
@@ -361,8 +362,8 @@ def open_close(
     speed = island_speed(bodies, work, b0, b1)
     waiting = is_waiting(bodies, work, b0, b1)
     small, settled = b1 - b0 <= SMALL_ISLAND, True
-    fast = not small and speed > QUIET_SPEED
-    relaxing = fast or (waiting and not small)
+    relaxing = not small and (waiting or speed > QUIET_SPEED)
+    fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
             relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)

@@ -12,6 +12,7 @@ from rigdda.barriers import Fence, GravityWall
 from rigdda.constants import (
     AWAKE,
     BOLT,
+    COARSE_SHARE,
     CUTS,
     DEFLECTED,
     FIXED,
@@ -435,7 +436,7 @@ def pack_parameters(
         settings.penetration or PENETRATION_RATIO * size,
         SLACK_RATIO * size,
         settings.tolerance,
-        settings.sweep_tolerance,
+        settings.sweep_tolerance * (COARSE_SHARE if coarse else 1.0),
         settings.open_close_iterations,
         static,
         settings.post_correction,

@@ -111,7 +111,7 @@ instead of 0.1 a seventh more of it reached a road. To an avalanche of 120 block
 a step took half as much time again."""
 
 RELAXATION_SHARE = 0.2
-"""In a slow island it is not more than this, over its speed [-]."""
+"""Greatest such tolerance over the speed of the island [-], so that slow ones come to rest."""
 
 SLOW_SWEEPS = 100
 """Most sweeps over an island that is relaxed since it did not settle as a whole,"""
@@ -124,7 +124,8 @@ LEAST_RELAXATION = 1e-3
 """of an island at rest it is this share of what gravity gives in a step, g dt [-]."""
 
 RELAXATION_STIFFNESS = 6e3
-"""Stiffness of a contact in a single substep times its flexibility there [-]."""
+"""Stiffness of a contact in a single substep times its flexibility there [-]: a blow on the foot of
+a train of blocks leaves them closing at the blow over this."""
 
 REACH = 1.0
 """Speed at which an open contact may begin to close, over the greatest of its island [-]: one that

@@ -45,7 +45,7 @@ class Settings:
     sweep_tolerance : float
         Islands of several blocks in motion take a step in three substeps or more, of 2 ms at most.
         In each their contacts are swept over until no velocity changes by more than this [m/s], up
-        to 25 times. Slow islands are settled more closely.
+        to 100 times. Islands of less than 128 blocks, and slow ones, are settled more closely.
     open_close_iterations : int
         Open-close iterations in a step, after which an island goes on only while few of its
         contacts still change, up to eight times as long; nearly all steps need 1 to 3.

@@ -96,6 +96,12 @@ def along_six(e: Floats, a: Floats, b: Floats, first: int) -> float:
 
 
 @kernel
+def is_elastic(c: Contacts, k: int) -> bool:
+    """Return whether contact k is a spring whose stiffness is given."""
+    return c[k].kind == PLAIN or c[k].kind == BOLT or c[k].kind == PIN
+
+
+@kernel
 def set_rigid(
     row: Floats, c: Contacts, k: int, flexible: float, rolling: float, substeps: int
 ) -> None:
@@ -120,10 +126,9 @@ def set_spring(
     In a single substep every contact is one: its displacement is dt times the end velocity. A plain
     contact is one on the displacement of the step, in the law with a factor of 2.
     """
-    own = c[k].kind == PLAIN or c[k].kind == BOLT or c[k].kind == PIN
     normal = shear = c[k].kappa
     free = c[k].bias
-    if not own:
+    if not is_elastic(c, k):
         normal, shear = RELAXATION_STIFFNESS / flexible, RELAXATION_STIFFNESS / rolling
         free += c[k].memory_normal * (1.0 / normal - 1.0 / c[k].kappa)
     elif c[k].kind == PLAIN and substeps > 1:
@@ -152,7 +157,7 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, sub
     write_row(row, SHEAR, shear_row(c, k, True), m.scaled[i])
     write_row(row, SHEAR + 3, shear_row(c, k, False), m.scaled[j])
     flexible, rolling = product(row, NORMAL, NORMAL), product(row, SHEAR, SHEAR)
-    if substeps == 1 or old.kind == PLAIN or old.kind == BOLT or old.kind == PIN:
+    if substeps == 1 or is_elastic(c, k):
         set_spring(row, c, k, m, i, j, flexible, rolling, substeps)
     else:
         set_rigid(row, c, k, flexible, rolling, substeps)
@@ -198,8 +203,9 @@ def sweep(
             continue
         r, a, b = row[place], motion[i], motion[j]
         n, s = r[NORMAL : NORMAL + 6], r[SHEAR : SHEAR + 6]
-        moved, gap = along_six(n, a, b, NOW), along_six(n, a, b, SO_FAR)
-        slid = along_six(s, a, b, NOW)
+        u, v, w, u2, v2, w2 = a[0], a[1], a[2], b[0], b[1], b[2]
+        moved = (n[0] * u + n[1] * v + n[2] * w) + (n[3] * u2 + n[4] * v2 + n[5] * w2)
+        gap = along_six(n, a, b, SO_FAR)
         if r[OWN] == 0.0:
             gap += r[GAP]
             aim = min(r[AIM], -gap) if gap > 0.0 else r[AIM]
@@ -207,7 +213,6 @@ def sweep(
                 aim, r[HIT] = r[REBOUND], number
         else:
             aim = r[GAP] - gap
-            slid += along_six(s, a, b, SO_FAR) - r[AIM]
         force, before = r[FORCE], r[FORCE + 1]
         normal = max(r[KEEP] * force + r[GAIN] * (aim - moved), -r[TENSION])
         push = normal - force
@@ -219,6 +224,9 @@ def sweep(
             continue
         change = abs(push) * r[FLEXIBLE]
         worst = max(worst, change)
+        slid = (s[0] * u + s[1] * v + s[2] * w) + (s[3] * u2 + s[4] * v2 + s[5] * w2)
+        if r[OWN] != 0.0:
+            slid += along_six(s, a, b, SO_FAR) - r[AIM]
         shear = r[KEEP + 1] * before - r[GAIN + 1] * slid - r[CROSS] * push
         shear = min(max(shear, -limit), limit)
         drag = shear - before
@@ -226,10 +234,9 @@ def sweep(
             moved_in[i] = tries
             if j != np.uintp(still):
                 moved_in[j] = tries
-        for q in range(3):
-            a[NOW + q] = (a[NOW + q] + push * n[q]) + drag * s[q]
-        for q in range(3):
-            b[NOW + q] = (b[NOW + q] + push * n[3 + q]) + drag * s[3 + q]
+        a[0], a[1] = (u + push * n[0]) + drag * s[0], (v + push * n[1]) + drag * s[1]
+        b[0], b[1] = (u2 + push * n[3]) + drag * s[3], (v2 + push * n[4]) + drag * s[4]
+        a[2], b[2] = (w + push * n[2]) + drag * s[2], (w2 + push * n[5]) + drag * s[5]
         add_up(r, number)
         r[FORCE], r[FORCE + 1] = normal, shear
     return worst

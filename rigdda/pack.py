@@ -31,6 +31,7 @@ from rigdda.geometry import convex_parts, polygon_properties, turns
 from rigdda.linear.relaxation import COLUMNS
 from rigdda.records import (
     BODY,
+    BOX,
     CONTACT,
     CORNER,
     LINK,
@@ -321,6 +322,7 @@ def empty_work(bodies: int, room: int) -> Work:
         np.zeros(bodies),
         np.zeros(bodies),
         np.arange(bodies),
+        np.zeros(bodies, BOX),
         whole(2 * room),
         whole(bodies + 1),
         whole(room),

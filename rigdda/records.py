@@ -106,6 +106,16 @@ LINK = _record(
 )
 """One support."""
 
+BOX = _record(
+    low_x=float,  # [m]
+    high_x=float,
+    low_y=float,
+    high_y=float,
+    body=np.int32,
+    awake=bool,
+)
+"""Swept box of a body."""
+
 Bodies = NDArray[np.void]
 """(M,) array of BODY."""
 Contacts = NDArray[np.void]
@@ -195,6 +205,7 @@ class Work(NamedTuple):
     high_y: Floats
     path: Floats  # (M,) longest way of any point of an awake body in this step, undeflected [m]
     sorted: Ints  # (M,) bodies by low_x, kept over steps
+    box: NDArray[np.void]  # (M,) of BOX in this order
     pairs: Ints  # (2 C,) candidate pairs of bodies
     partner_start: Ints  # (M + 1,) second bodies of the pairs by their first one
     partner: Ints  # (C,)

@@ -168,46 +168,45 @@ def apply_forces(
 
 
 @inlined
-def account(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters,
-    ledger: NDArray, gauges: Gauges,
-) -> None:  # fmt: skip
-    """Add the work of contacts, damping, loads and supports in this step to the ledger."""
-    b0, b1 = work.block_start[island], work.block_start[island + 1]
-    for s in range(b1 - b0):
-        i = work.block_item[b0 + s]
-        drag = damping_of_step(m, s, bodies[i].mass, p)
-        slow = m.d[s, 0] ** 2 + m.d[s, 1] ** 2
-        slow = bodies[i].mass * slow + bodies[i].inertia * m.d[s, 2] ** 2
-        ledger[2] -= drag * slow / p.dt
-        ledger[3] += bodies[i].force_x * m.d[s, 0] + bodies[i].force_y * m.d[s, 1]
-        ledger[3] += load_moment(bodies, i) * m.d[s, 2]
-        ledger[3] += bodies[i].mass * (work.field[0] - p.gravity_x) * m.d[s, 0]
-        ledger[3] += bodies[i].mass * (work.field[1] - p.gravity_y) * m.d[s, 1]
-        # an impulse that acts early or late in the step lifts or lowers the block
-        lift = p.gravity_x * m.residual[s, 0] + p.gravity_y * m.residual[s, 1]
-        ledger[1] -= bodies[i].mass * lift
-    for item in range(work.contact_start[island], work.contact_start[island + 1]):
-        k = work.contact_item[item]
-        if c[k].state == OPEN:
-            continue
-        i = work.slot[c[k].a]
-        dn = along(normal_row(c, k, True), m.d[i])
-        ds = along(shear_row(c, k, True), m.d[i])
-        block, barrier = barrier_contact(gauges, c[k].a, c[k].b)
-        if barrier >= 0 and block == c[k].a:
-            gauges.absorbed[barrier] -= c[k].normal * dn + c[k].shear * ds
-        if c[k].pair >= 0:
-            j = work.slot[c[k].b]
-            en = along(normal_row(c, k, False), m.d[j])
-            es = along(shear_row(c, k, False), m.d[j])
-            if barrier >= 0 and block != c[k].a:
-                gauges.absorbed[barrier] -= c[k].normal * en + c[k].shear * es
-            dn += en
-            ds += es
-        if c[k].kind == BOLT or c[k].kind == PIN:
-            ledger[4] += c[k].normal * dn + c[k].shear * ds
-            continue
+def account_block(
+    bodies: Bodies, m: Matrix, work: Work, i: int, s: int, p: Parameters, ledger: NDArray
+) -> None:
+    """Add the work of damping, loads and supports on block i, slot s, to the ledger."""
+    drag = damping_of_step(m, s, bodies[i].mass, p)
+    slow = m.d[s, 0] ** 2 + m.d[s, 1] ** 2
+    slow = bodies[i].mass * slow + bodies[i].inertia * m.d[s, 2] ** 2
+    ledger[2] -= drag * slow / p.dt
+    ledger[3] += bodies[i].force_x * m.d[s, 0] + bodies[i].force_y * m.d[s, 1]
+    ledger[3] += load_moment(bodies, i) * m.d[s, 2]
+    ledger[3] += bodies[i].mass * (work.field[0] - p.gravity_x) * m.d[s, 0]
+    ledger[3] += bodies[i].mass * (work.field[1] - p.gravity_y) * m.d[s, 1]
+    # an impulse that acts early or late in the step lifts or lowers the block
+    lift = p.gravity_x * m.residual[s, 0] + p.gravity_y * m.residual[s, 1]
+    ledger[1] -= bodies[i].mass * lift
+
+
+@inlined
+def account_contact(
+    c: Contacts, k: int, m: Matrix, work: Work, ledger: NDArray, gauges: Gauges
+) -> None:
+    """Add the work of closed contact k to the ledger."""
+    i = work.slot[c[k].a]
+    dn = along(normal_row(c, k, True), m.d[i])
+    ds = along(shear_row(c, k, True), m.d[i])
+    block, barrier = barrier_contact(gauges, c[k].a, c[k].b)
+    if barrier >= 0 and block == c[k].a:
+        gauges.absorbed[barrier] -= c[k].normal * dn + c[k].shear * ds
+    if c[k].pair >= 0:
+        j = work.slot[c[k].b]
+        en = along(normal_row(c, k, False), m.d[j])
+        es = along(shear_row(c, k, False), m.d[j])
+        if barrier >= 0 and block != c[k].a:
+            gauges.absorbed[barrier] -= c[k].normal * en + c[k].shear * es
+        dn += en
+        ds += es
+    if c[k].kind == BOLT or c[k].kind == PIN:
+        ledger[4] += c[k].normal * dn + c[k].shear * ds
+    else:
         ledger[0] += c[k].shear * ds
         ledger[1] += c[k].normal * dn
 

@@ -106,23 +106,28 @@ def _fill(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int, isla
 
 
 @kernel
-def pair_blocks(bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int) -> int:
+def pair_blocks(
+    bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int
+) -> tuple[int, bool]:
     """Assign the off-diagonal blocks of an island; contacts of a pair follow one another.
 
     Returns
     -------
-    int
+    pairs : int
         Number of pairs.
+    grounded : bool
+        Whether a block touches what has no unknowns.
     """
-    pairs, last_a, last_b = 0, -1, -1
+    pairs, last_a, last_b, grounded = 0, -1, -1, False
     for item in range(low, high):
         k = work.contact_item[item]
         c[k].pair = -1
         if not joins(bodies, c, k):
+            grounded = True
             continue
         if c[k].a != last_a or c[k].b != last_b:
             last_a, last_b = c[k].a, c[k].b
             m.pair_i[pairs], m.pair_j[pairs] = work.slot[last_a], work.slot[last_b]
             pairs += 1
         c[k].pair = pairs - 1
-    return pairs
+    return pairs, grounded

@@ -42,11 +42,11 @@ from rigdda.constants import (
 )
 from rigdda.contact.joint import break_joint
 from rigdda.contact.law import set_shock
-from rigdda.islands import joins, pair_blocks
+from rigdda.islands import pair_blocks
 from rigdda.kernel import inlined, kernel
 from rigdda.linear.direct import solve_block, solve_two_blocks
 from rigdda.linear.pcg import solve_pcg
-from rigdda.linear.relaxation import relax_forces
+from rigdda.linear.relaxation import relax_forces, take_forces
 from rigdda.linear.skyline import profile, solve_skyline
 from rigdda.linear.sor import solve_sor
 from rigdda.motion import top_speed
@@ -264,9 +264,11 @@ def relax(
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
     counters[RELAXED] += 1
-    counters[SWEEPS] += relax_forces(bodies, c, m, work, c0, c1, b0, b1 - b0, speed, fast, p)
+    sweeps, substeps = relax_forces(bodies, c, m, work, c0, c1, b0, b1 - b0, speed, fast, p)
+    counters[SWEEPS] += sweeps
     for item in range(c0, c1):
         k = work.contact_item[item]
+        take_forces(c, k, work.row[work.place[item]], substeps)
         limit = c[k].cohesion + c[k].friction * max(c[k].normal, 0.0)
         within = limit > abs(c[k].shear)
         if c[k].bond > 0.0:
@@ -325,6 +327,16 @@ def is_waiting(bodies: Bodies, work: Work, low: int, high: int) -> bool:
 
 
 @kernel
+def is_bouncing(c: Contacts, work: Work, low: int, high: int) -> bool:
+    """Return whether one of the contacts low:high is an impact that asks for restitution."""
+    for item in range(low, high):
+        k = work.contact_item[item]
+        if c[k].kind == IMPACT and c[k].bias > 0.0:
+            return True
+    return False
+
+
+@kernel
 def let_wait(bodies: Bodies, work: Work, low: int, high: int) -> None:
     """Let the island of the blocks low:high be relaxed for a while before it is solved again."""
     for place in range(low, high):
@@ -352,12 +364,8 @@ def open_close(
         Whether they settled; a large island that did not is taken as it is.
     """
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
-    bouncing = grounded = False
-    for item in range(c0, c1):
-        k = work.contact_item[item]
-        bouncing = bouncing or (c[k].kind == IMPACT and c[k].bias > 0.0)
-        grounded = grounded or not joins(bodies, c, k)
-    pairs = pair_blocks(bodies, c, m, work, c0, c1)
+    pairs, grounded = pair_blocks(bodies, c, m, work, c0, c1)
+    bouncing = is_bouncing(c, work, c0, c1)
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     speed = island_speed(bodies, work, b0, b1)
     waiting = is_waiting(bodies, work, b0, b1)

@@ -222,7 +222,7 @@ class Work(NamedTuple):
     moved_in: Ints  # (M + 1,) last sweep in which a slot moved
     idle: Ints  # (C,) substep until which a contact cannot close
     relaxed: Ints  # (1,) 1 if the forces of the island in work are those of relaxation
-    ordered: Ints  # (C,) contacts of an island in another order
+    place: Ints  # (C,) row of each contact of an island
     layer: Ints  # (LAYERS + 1,) contacts of an island below a height
     field: Floats  # (2,) acceleration of free blocks in this step [m/s2]
 

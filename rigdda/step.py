@@ -26,7 +26,8 @@ from rigdda.contact.narrow_phase import collide_pair
 from rigdda.contact.terrain_phase import collide_terrain
 from rigdda.contact.transfer import copy_contact, index_by_body, recall
 from rigdda.correction import (
-    account,
+    account_block,
+    account_contact,
     apply_forces,
     is_struck,
     keep_memory,
@@ -109,7 +110,7 @@ def keep_held(c: Contacts, count: int, old: Contacts, work: Work, a: int) -> int
 @stage
 def collide_block(
     bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, count: int, old: Contacts,
-    work: Work, a: int, start: bool, p: Parameters,
+    work: Work, a: int, start: bool, p: Parameters, deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write the contacts of awake block a with the terrain and with its partners.
 
@@ -131,6 +132,7 @@ def collide_block(
         bond_joints(c, first, count, p)
     for k in range(first, count):
         prepare(bodies, c, k, work, start, p)
+        deepest[0] = max(deepest[0], -c[k].gap)
     strike_at_once(bodies, c, first, count, p)
     return count
 
@@ -139,6 +141,7 @@ def collide_block(
 def detect(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, c: Contacts, old: Contacts,
     old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters, counters: NDArray,
+    deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
     since = lap(counters, BROAD_PHASE, 0, p.timing)
@@ -153,7 +156,9 @@ def detect(
         while link < len(links) and links[link].a == a:
             link += 1
         if bodies[a].status == AWAKE:
-            count = collide_block(bodies, outlines, ground, c, count, old, work, a, start, p)
+            count = collide_block(
+                bodies, outlines, ground, c, count, old, work, a, start, p, deepest
+            )
             if count < 0 or count + link - low_link > len(c):
                 return -1
             for q in range(low_link, link):
@@ -184,16 +189,26 @@ def move_island(
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
-    low, bad = work.block_start[island], -1
+    b0, b1 = work.block_start[island], work.block_start[island + 1]
+    bad = -1
+    for s in range(b1 - b0):
+        i = work.block_item[b0 + s]
+        bodies[i].touching = 0
+        account_block(bodies, m, work, i, s, p, ledger)
     struck = is_struck(c, work, c0, c1)
     for item in range(c0, c1):
-        keep_memory(c, work.contact_item[item], struck, work.relaxed[0] == 1)
-    account(bodies, c, m, work, island, p, ledger, gauges)
-    for place in range(low, work.block_start[island + 1]):
-        i = work.block_item[place]
-        bodies[i].touching = 0
+        k = work.contact_item[item]
+        keep_memory(c, k, struck, work.relaxed[0] == 1)
+        if c[k].state == OPEN:
+            continue
+        account_contact(c, k, m, work, ledger, gauges)
+        bodies[c[k].a].touching = 1
+        if c[k].b >= 0:
+            bodies[c[k].b].touching = 1
+    for s in range(b1 - b0):
+        i = work.block_item[b0 + s]
         bodies[i].wait = max(bodies[i].wait - 1, 0)
-        move_block(bodies, i, m, place - low, p.dt)
+        move_block(bodies, i, m, s, p.dt)
         if not top_speed(bodies, i) < SPEED_LIMIT:
             bad = i
         elif bodies[i].y < p.floor:
@@ -201,7 +216,7 @@ def move_island(
         if p.post_correction:
             place_corners(bodies, outlines, i)
         else:
-            move_corners(bodies, outlines, i, m, place - low)
+            move_corners(bodies, outlines, i, m, s)
     return bad
 
 
@@ -247,11 +262,6 @@ def solve_and_move(
             work.relaxed[0] = 0
             apply_forces(bodies, c, m, work, s, False, p)
         bad = max(bad, move_island(bodies, outlines, c, m, work, s, gauges, p, ledger))
-    for k in range(count):
-        if c[k].state != OPEN:
-            bodies[c[k].a].touching = 1
-            if c[k].b >= 0:
-                bodies[c[k].b].touching = 1
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
         wake_behind(bodies, c, count, gauges, p)
@@ -307,7 +317,7 @@ def advance(
         set_field(work, shaking, start * p.dt, time, p)
         count = detect(
             bodies, outlines, ground, links, before, now, counters[CONTACTS], work, gauges, time,
-            p, counters,
+            p, counters, deepest,
         )  # fmt: skip
         # a cut-back, which cannot be left, has room to spare
         if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
@@ -316,8 +326,6 @@ def advance(
         swapped = not swapped
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
-        for k in range(count):
-            deepest[0] = max(deepest[0], -now[k].gap)
         bad, excess = solve_and_move(
             bodies, outlines, now, count, m, work, gauges, time, p, level == 0, counters, ledger
         )

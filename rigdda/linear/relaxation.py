@@ -244,28 +244,28 @@ def sweep(
 
 @kernel
 def sort_by_height(c: Contacts, work: Work, low: int, high: int) -> None:
-    """Order the contacts low:high by height, lowest first, so that a sweep carries loads through.
+    """Set the rows of the contacts low:high by height, lowest first: a sweep carries loads through.
 
     A counting sort in as many layers as there is room for: within one the order does not matter.
+    Contacts stay in order: to read them one after the other is what takes long in a large island.
     """
-    item, layers = work.contact_item, min(len(work.layer) - 1, high - low)
+    item, place, layers = work.contact_item, work.place, min(len(work.layer) - 1, high - low)
     least, most = math.inf, -math.inf
-    for place in range(low, high):
-        y = c[item[place]].y
+    for q in range(low, high):
+        y = c[item[q]].y
         least, most = min(least, y), max(most, y)
     scale = layers / (most - least) * (1.0 - 1e-9) if most > least else 0.0
     for s in range(layers + 1):
         work.layer[s] = 0
-    for place in range(low, high):
-        work.layer[int(scale * (c[item[place]].y - least)) + 1] += 1
+    for q in range(low, high):
+        place[q] = int(scale * (c[item[q]].y - least))
+        work.layer[place[q] + 1] += 1
     for s in range(layers):
         work.layer[s + 1] += work.layer[s]
-    for place in range(low, high):
-        s = int(scale * (c[item[place]].y - least))
-        work.ordered[work.layer[s]] = item[place]
+    for q in range(low, high):
+        s = place[q]
+        place[q] = work.layer[s]
         work.layer[s] += 1
-    for place in range(low, high):
-        item[place] = work.ordered[place - low]
 
 
 @kernel
@@ -304,15 +304,18 @@ def go_on(motion: Floats, n: int, last: bool) -> None:
 def relax_forces(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, first: int, n: int,
     speed: float, fast: bool, p: Parameters,
-) -> int:  # fmt: skip
-    """Find the forces of an island with contacts low:high; returns the sweeps.
+) -> tuple[int, int]:  # fmt: skip
+    """Find the forces of an island with contacts low:high, in their rows: see `take_forces`.
 
-    In substeps if it is `fast`, else in one that is settled more closely.
+    In substeps if it is `fast`, else in one that is settled more closely; `speed` is the greatest
+    of the island [m/s]. The matrix holds inertia and weight only. m.d is set to the displacements
+    at constant mean force, m.late to what the blocks move besides, since forces act early or late
+    in the step.
 
-    The matrix holds inertia and weight only. Forces are set to their means over the step, and
-    start_normal and start_shear to the last ones; m.d to the displacements at constant mean force,
-    and m.late to what the blocks move besides, since forces act early or late in the step. `speed`
-    is the greatest of the island [m/s].
+    Returns
+    -------
+    sweeps, substeps : int
+        How many it took.
     """
     substeps, most = 1, SLOW_SWEEPS
     usual = p.sweep_tolerance * min(n / LARGE_ISLAND, 1.0)
@@ -328,8 +331,8 @@ def relax_forces(
         motion[n, NOW + q] = motion[n, SO_FAR + q] = motion[n, BEFORE + q] = 0.0
     count = high - low
     sort_by_height(c, work, low, high)
-    for place in range(count):
-        pack_row(c, work.contact_item[low + place], m, work, place, n, substeps)
+    for q in range(low, high):
+        pack_row(c, work.contact_item[q], m, work, work.place[q], n, substeps)
     sweeps = 0
     for number in range(substeps):
         for s in range(n + 1):
@@ -349,9 +352,12 @@ def relax_forces(
             scale = m.scaled[s, q]
             m.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)
             m.late[s, q] = motion[s, SO_FAR + q] * scale - m.d[s, q]
-    for place in range(count):
-        k, row = work.contact_item[low + place], work.row[place]
-        add_up(row, substeps)
-        c[k].normal, c[k].shear = row[SUM] / substeps, row[SUM + 1] / substeps
-        c[k].start_normal, c[k].start_shear = row[FORCE], row[FORCE + 1]
-    return sweeps
+    return sweeps, substeps
+
+
+@inlined
+def take_forces(c: Contacts, k: int, row: Floats, substeps: int) -> None:
+    """Set the forces of contact k to their means over the step, its starting ones to the last."""
+    add_up(row, substeps)
+    c[k].normal, c[k].shear = row[SUM] / substeps, row[SUM + 1] / substeps
+    c[k].start_normal, c[k].start_shear = row[FORCE], row[FORCE + 1]

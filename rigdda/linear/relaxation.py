@@ -178,29 +178,43 @@ def add_up(row: Floats, number: int) -> None:
     row[SINCE] = number
 
 
+@kernel
+def list_visits(work: Work, count: int, tries: int, number: int) -> int:
+    """Write the contacts that the next sweep is to visit into work.visit; returns how many.
+
+    Not those that cannot close before substep idle[k]; nor, after the first sweep of a substep,
+    where neither body has moved in the last one: moved_in[s] is the number of the last sweep of the
+    substep in which slot s did. Every contact is written, and the next one over it if it is not to
+    be visited: branches that go either way would cost more than the visits.
+    """
+    visits = 0
+    for place in range(count):
+        k = np.uintp(place)
+        i, j = np.uintp(work.row_i[k]), np.uintp(work.row_j[k])
+        moved = (work.moved_in[i] >= tries - 1) | (work.moved_in[j] >= tries - 1)
+        work.visit[np.uintp(visits)] = place
+        visits += int(moved & (work.idle[k] <= number))
+    return visits
+
+
 @arithmetic_kernel
 def sweep(
-    row: Floats, row_i: Ints, row_j: Ints, motion: Floats, still: int, count: int, tries: int,
-    number: int, substeps: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
+    row: Floats, row_i: Ints, row_j: Ints, motion: Floats, still: int, visit: Ints, visits: int,
+    tries: int, number: int, substeps: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
 ) -> float:  # fmt: skip
-    """Visit every contact once, from the lowest up, or down; returns the greatest change [m].
+    """Visit the contacts listed once, from the lowest up, or down; returns the greatest change [m].
 
-    But not those that cannot close before substep idle[k], at twice the speed at which they close
-    and `reach` [m] a substep besides; nor, after the first sweep of a substep, where neither body
-    has moved by more than `quiet` [m] in this or the last sweep: moved_in[s] is the number of the
-    last sweep of the substep in which slot s did. Slot `still` never does.
+    One that is open waits for as long as it cannot close, at twice the speed at which it closes and
+    `reach` [m] a substep besides. A slot has moved if it did by more than `quiet` [m]; slot `still`
+    never does.
 
     A visit reads the bodies once: what the normal force changes along the shear direction is added
     to what was read. Unsigned indices spare numba's test for negative ones.
     """
     worst = 0.0
-    for visit in range(count):
-        place = np.uintp(count - 1 - visit if tries % 2 == 1 else visit)
-        if idle[place] > number:
-            continue
+    for q in range(visits):
+        place = np.uintp(visit[np.uintp(visits - 1 - q if tries % 2 == 1 else q)])
         i, j = np.uintp(row_i[place]), np.uintp(row_j[place])
-        if moved_in[i] < tries - 1 and moved_in[j] < tries - 1:
-            continue
         r, a, b = row[place], motion[i], motion[j]
         n, s = r[NORMAL : NORMAL + 6], r[SHEAR : SHEAR + 6]
         u, v, w, u2, v2, w2 = a[0], a[1], a[2], b[0], b[1], b[2]
@@ -339,9 +353,10 @@ def relax_forces(
             work.moved_in[s] = -1
         worst, tries = math.inf, 0
         while worst > tolerance * h and tries < most:
+            visits = list_visits(work, count, tries, number)
             worst = sweep(
-                work.row, work.row_i, work.row_j, motion, n, count, tries, number, substeps,
-                work.idle, REACH * speed * h, work.moved_in, tolerance * h,
+                work.row, work.row_i, work.row_j, motion, n, work.visit, visits, tries, number,
+                substeps, work.idle, REACH * speed * h, work.moved_in, tolerance * h,
             )  # fmt: skip
             tries += 1
         sweeps += tries

@@ -322,7 +322,7 @@ def empty_work(bodies: int, room: int) -> Work:
         np.zeros(bodies),
         np.zeros(bodies),
         np.arange(bodies),
-        np.zeros(bodies, BOX),
+        np.zeros(bodies, BOX).view(np.recarray),
         whole(2 * room),
         whole(bodies + 1),
         whole(room),

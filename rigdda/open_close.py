@@ -369,14 +369,14 @@ def open_close(
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     speed = island_speed(bodies, work, b0, b1)
     waiting = is_waiting(bodies, work, b0, b1)
-    small, settled = b1 - b0 <= SMALL_ISLAND, True
-    relaxing = not small and (waiting or speed > QUIET_SPEED)
+    small, quiet, settled = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED, True
+    relaxing = waiting if quiet else not small
     fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
             relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)
             settled = settled and not (relaxing and small)
-            if relaxing and not small:
+            if relaxing and (quiet or not small):
                 let_wait(bodies, work, b0, b1)
         if relaxing:
             relax(bodies, c, m, work, island, p, counters, speed, fast)

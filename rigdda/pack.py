@@ -338,6 +338,7 @@ def empty_work(bodies: int, room: int) -> Work:
         whole(room),
         whole(bodies + 1),
         whole(room),
+        whole(room),
         whole(1),
         whole(room),
         whole(LAYERS + 1),

@@ -221,6 +221,7 @@ class Work(NamedTuple):
     row_j: Ints
     moved_in: Ints  # (M + 1,) last sweep in which a slot moved
     idle: Ints  # (C,) substep until which a contact cannot close
+    visit: Ints  # (C,) contacts that a sweep visits
     relaxed: Ints  # (1,) 1 if the forces of the island in work are those of relaxation
     place: Ints  # (C,) row of each contact of an island
     layer: Ints  # (LAYERS + 1,) contacts of an island below a height

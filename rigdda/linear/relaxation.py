@@ -45,20 +45,24 @@ from rigdda.constants import (
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 from rigdda.records import Bodies, Contacts, Floats, Ints, Matrix, Parameters, Work
 
-# columns of work.row, by direction: the rows of the contact for a and b, times h over the roots of
-# their inertia [(m/N)^1/2]; force [N]; the share of it that a visit keeps [-] and what a
-# displacement takes [N/m]; sum of the forces of all substeps [N]
-NORMAL, SHEAR = 0, 6
-FORCE, KEEP, GAIN, SUM = 12, 14, 16, 18
-# normal displacement per force [m/N]; what a normal force takes from the shear force [-]; friction;
-# shear and tension that it bears besides [N]
-FLEXIBLE, CROSS, FRICTION, COHESION, TENSION = 20, 21, 22, 23, 24
-# gap at the start of the step, and normal displacement that it aims at in a substep once closed
-# [m]; or where OWN is 1, a spring on displacements: at which normal and shear one it is free [m]
-GAP, AIM, OWN = 25, 26, 27
-SINCE = 28  # substep from which on it has borne its force
-REBOUND, HIT = 29, 30  # displacement in the substep in which an impact has closed [m]; its number
-COLUMNS = 31
+# columns of work.row, first what a visit to an open contact needs: the row of the contact for a and
+# b, times h over the roots of their inertia [(m/N)^1/2]; normal and shear force [N]
+NORMAL, FORCE = 0, 6
+# gap at the start of the substep, normal displacement that it aims at once closed [m], infinite
+# where a spring has a gap at which it is free; displacement in the substep in which an impact has
+# closed [m]; its number
+HERE, AIM, REBOUND, HIT = 8, 9, 10, 11
+# share of the normal force that a visit keeps [-], what a displacement takes [N/m]; shear and
+# tension that it bears besides [N]
+KEEP, GAIN, COHESION, TENSION = 12, 13, 14, 15
+# the same of the shear force, and what a normal force takes from it [-]
+SHEAR, KEEP_SHEAR, GAIN_SHEAR, CROSS = 16, 22, 23, 24
+# normal displacement per force [m/N]; friction; shear displacement at which a spring is free, gap
+# at the start of the step [m]
+FLEXIBLE, FRICTION, FREE, GAP = 25, 26, 27, 28
+# substep from which on it has borne its force; sum of the forces of all substeps [N]
+SINCE, SUM = 29, 30
+COLUMNS = 32
 
 # columns of m.motion, each in three directions, times the roots of inertia over h: displacement in
 # this substep, since the start of the step, and in the substep before
@@ -106,8 +110,9 @@ def set_rigid(
     row: Floats, c: Contacts, k: int, flexible: float, rolling: float, substeps: int
 ) -> None:
     """Write what a visit needs of contact k, which gives way to nothing in a substep."""
-    row[KEEP], row[KEEP + 1], row[GAIN], row[GAIN + 1] = 1.0, 1.0, 1.0 / flexible, 1.0 / rolling
-    row[GAP], row[AIM], row[OWN], row[REBOUND], row[HIT] = c[k].gap, 0.0, 0.0, 0.0, -1.0
+    row[KEEP], row[GAIN] = 1.0, 1.0 / flexible
+    row[KEEP_SHEAR], row[GAIN_SHEAR] = 1.0, 1.0 / rolling
+    row[GAP], row[AIM], row[REBOUND], row[HIT] = c[k].gap, 0.0, -math.inf, -1.0
     if c[k].kind == IMPACT and c[k].bias > 0.0:
         row[REBOUND] = c[k].bias / substeps
     elif c[k].kind == IMPACT:  # a fence that fails lets blocks pass
@@ -137,9 +142,10 @@ def set_spring(
     elif c[k].kind == PLAIN:
         free -= along_six(row[NORMAL : NORMAL + 6], m.motion[i], m.motion[j], BEFORE)
     row[KEEP] = normal * flexible / (1.0 + normal * flexible)
-    row[KEEP + 1] = shear * rolling / (1.0 + shear * rolling)
-    row[GAIN], row[GAIN + 1] = row[KEEP] / flexible, row[KEEP + 1] / rolling
-    row[GAP], row[AIM], row[OWN] = free, c[k].memory_shear / shear, 1.0
+    row[KEEP_SHEAR] = shear * rolling / (1.0 + shear * rolling)
+    row[GAIN], row[GAIN_SHEAR] = row[KEEP] / flexible, row[KEEP_SHEAR] / rolling
+    row[GAP], row[AIM], row[REBOUND] = -free, math.inf, -math.inf
+    row[FREE] = c[k].memory_shear / shear
 
 
 @inlined
@@ -161,7 +167,7 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, sub
         set_spring(row, c, k, m, i, j, flexible, rolling, substeps)
     else:
         set_rigid(row, c, k, flexible, rolling, substeps)
-    row[FLEXIBLE], row[CROSS] = flexible, row[GAIN + 1] * product(row, NORMAL, SHEAR)
+    row[FLEXIBLE], row[CROSS] = flexible, row[GAIN_SHEAR] * product(row, NORMAL, SHEAR)
     row[FRICTION], row[TENSION] = old.friction, old.tension
     row[COHESION] = math.inf if old.kind == PIN else old.cohesion
     row[FORCE], row[FORCE + 1] = old.start_normal, old.start_shear
@@ -178,56 +184,67 @@ def add_up(row: Floats, number: int) -> None:
     row[SINCE] = number
 
 
+@kernel
+def list_visits(work: Work, count: int, tries: int, number: int) -> int:
+    """Write the contacts that the next sweep is to visit into work.visit; returns how many.
+
+    Not those that cannot close before substep idle[k]; nor, after the first sweep of a substep,
+    where neither body has moved in the last one: moved_in[s] is the number of the last sweep of the
+    substep in which slot s did. Every contact is written, and the next one over it if it is not to
+    be visited: branches that go either way would cost more than the visits.
+    """
+    visits = 0
+    for place in range(count):
+        k = np.uintp(place)
+        i, j = np.uintp(work.row_i[k]), np.uintp(work.row_j[k])
+        moved = (work.moved_in[i] >= tries - 1) | (work.moved_in[j] >= tries - 1)
+        work.visit[np.uintp(visits)] = place
+        visits += int(moved & (work.idle[k] <= number))
+    return visits
+
+
 @arithmetic_kernel
 def sweep(
-    row: Floats, row_i: Ints, row_j: Ints, motion: Floats, still: int, count: int, tries: int,
-    number: int, substeps: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
+    row: Floats, row_i: Ints, row_j: Ints, motion: Floats, still: int, visit: Ints, visits: int,
+    tries: int, number: int, substeps: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
 ) -> float:  # fmt: skip
-    """Visit every contact once, from the lowest up, or down; returns the greatest change [m].
+    """Visit the contacts listed once, from the lowest up, or down; returns the greatest change [m].
 
-    But not those that cannot close before substep idle[k], at twice the speed at which they close
-    and `reach` [m] a substep besides; nor, after the first sweep of a substep, where neither body
-    has moved by more than `quiet` [m] in this or the last sweep: moved_in[s] is the number of the
-    last sweep of the substep in which slot s did. Slot `still` never does.
+    One that is open waits for as long as it cannot close, at twice the speed at which it closes and
+    `reach` [m] a substep besides. A slot has moved if it did by more than `quiet` [m]; slot `still`
+    never does.
 
     A visit reads the bodies once: what the normal force changes along the shear direction is added
     to what was read. Unsigned indices spare numba's test for negative ones.
     """
     worst = 0.0
-    for visit in range(count):
-        place = np.uintp(count - 1 - visit if tries % 2 == 1 else visit)
-        if idle[place] > number:
-            continue
+    for q in range(visits):
+        place = np.uintp(visit[np.uintp(visits - 1 - q if tries % 2 == 1 else q)])
         i, j = np.uintp(row_i[place]), np.uintp(row_j[place])
-        if moved_in[i] < tries - 1 and moved_in[j] < tries - 1:
-            continue
         r, a, b = row[place], motion[i], motion[j]
         n, s = r[NORMAL : NORMAL + 6], r[SHEAR : SHEAR + 6]
         u, v, w, u2, v2, w2 = a[0], a[1], a[2], b[0], b[1], b[2]
         moved = (n[0] * u + n[1] * v + n[2] * w) + (n[3] * u2 + n[4] * v2 + n[5] * w2)
-        gap = along_six(n, a, b, SO_FAR)
-        if r[OWN] == 0.0:
-            gap += r[GAP]
-            aim = min(r[AIM], -gap) if gap > 0.0 else r[AIM]
-            if gap <= 0.0 and r[REBOUND] > moved and (r[HIT] < 0.0 or r[HIT] == number):
-                aim, r[HIT] = r[REBOUND], number
-        else:
-            aim = r[GAP] - gap
-        force, before = r[FORCE], r[FORCE + 1]
+        if tries == 0:
+            r[HERE] = r[GAP] + along_six(n, a, b, SO_FAR)
+        gap, force, before = r[HERE], r[FORCE], r[FORCE + 1]
+        aim = min(r[AIM], -gap)
+        if gap <= 0.0 and r[REBOUND] > moved and (r[HIT] < 0.0 or r[HIT] == number):
+            aim, r[HIT] = r[REBOUND], number
         normal = max(r[KEEP] * force + r[GAIN] * (aim - moved), -r[TENSION])
-        push = normal - force
-        limit = r[COHESION] + r[FRICTION] * max(normal, 0.0)
-        if push == 0.0 and limit == 0.0 and before == 0.0:
-            if r[OWN] == 0.0:
+        if normal == 0.0 and force == 0.0 and before == 0.0 and r[COHESION] == 0.0:
+            if r[AIM] < math.inf:
                 wait = (moved - aim) / (reach + abs(moved))
                 idle[place] = number + int(min(wait, float(substeps)))
             continue
+        push = normal - force
         change = abs(push) * r[FLEXIBLE]
         worst = max(worst, change)
         slid = (s[0] * u + s[1] * v + s[2] * w) + (s[3] * u2 + s[4] * v2 + s[5] * w2)
-        if r[OWN] != 0.0:
-            slid += along_six(s, a, b, SO_FAR) - r[AIM]
-        shear = r[KEEP + 1] * before - r[GAIN + 1] * slid - r[CROSS] * push
+        if r[AIM] == math.inf:
+            slid += along_six(s, a, b, SO_FAR) - r[FREE]
+        shear = r[KEEP_SHEAR] * before - r[GAIN_SHEAR] * slid - r[CROSS] * push
+        limit = r[COHESION] + r[FRICTION] * max(normal, 0.0)
         shear = min(max(shear, -limit), limit)
         drag = shear - before
         if change + abs(drag) * r[FLEXIBLE] > quiet:
@@ -339,9 +356,10 @@ def relax_forces(
             work.moved_in[s] = -1
         worst, tries = math.inf, 0
         while worst > tolerance * h and tries < most:
+            visits = list_visits(work, count, tries, number)
             worst = sweep(
-                work.row, work.row_i, work.row_j, motion, n, count, tries, number, substeps,
-                work.idle, REACH * speed * h, work.moved_in, tolerance * h,
+                work.row, work.row_i, work.row_j, motion, n, work.visit, visits, tries, number,
+                substeps, work.idle, REACH * speed * h, work.moved_in, tolerance * h,
             )  # fmt: skip
             tries += 1
         sweeps += tries

@@ -27,7 +27,9 @@ def too_far(
     far = greatest_departure(bodies, m, work, island, p.dt) / p.displacement_limit
     far = max(far, greatest_deflection(bodies, m, work, island, p) / p.deflection_limit)
     if p.sinking_limit < math.inf:
-        far = max(far, greatest_sinking(bodies, c, m, work, island) / p.sinking_limit)
+        blocks = work.block_start[island + 1] - work.block_start[island]
+        limit = p.sinking_limit * (0.5 * blocks if work.relaxed[0] == 1 else 1.0)
+        far = max(far, greatest_sinking(bodies, c, m, work, island) / limit)
     return far
 
 

@@ -40,6 +40,8 @@ from rigdda.constants import (
     REST,
     SLOW_SHARE,
     SLOW_SWEEPS,
+    SMALL_SHARE,
+    SPREADING,
     SUBSTEP,
 )
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
@@ -318,6 +320,13 @@ def go_on(motion: Floats, n: int, last: bool) -> None:
 
 
 @kernel
+def substeps_of(n: int, dt: float) -> int:
+    """Return the substeps of a step of an island of n blocks: a blow goes on farther in more."""
+    share = SMALL_SHARE + (1.0 - SMALL_SHARE) * min(n / SPREADING, 1.0)
+    return max(LEAST_SUBSTEPS, math.ceil(share * dt / SUBSTEP - 1e-9))
+
+
+@kernel
 def relax_forces(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, first: int, n: int,
     speed: float, fast: bool, p: Parameters,
@@ -338,7 +347,7 @@ def relax_forces(
     usual = p.sweep_tolerance * min(n / LARGE_ISLAND, 1.0)
     tolerance = max(min(SLOW_SHARE * speed, usual), LEAST_RELAXATION * p.gravity * p.dt)
     if fast:
-        substeps, most = max(LEAST_SUBSTEPS, math.ceil(p.dt / SUBSTEP - 1e-9)), MOST_SWEEPS
+        substeps, most = substeps_of(n, p.dt), MOST_SWEEPS
         tolerance = min(RELAXATION_SHARE * speed, usual)
     h, motion = p.dt / substeps, m.motion
     for s in range(n):

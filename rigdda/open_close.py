@@ -376,7 +376,7 @@ def open_close(
         if not relaxing:
             relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)
             settled = settled and not (relaxing and small)
-            if relaxing and (quiet or not small):
+            if relaxing and not small:
                 let_wait(bodies, work, b0, b1)
         if relaxing:
             relax(bodies, c, m, work, island, p, counters, speed, fast)

@@ -42,7 +42,7 @@ from rigdda.gauges import barrier_contact, note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel, stage
 from rigdda.motion import top_speed
-from rigdda.open_close import open_close
+from rigdda.open_close import let_wait, open_close
 from rigdda.records import (
     BROAD_PHASE,
     CONTACT_TOTAL,
@@ -255,6 +255,8 @@ def solve_and_move(
                 counters[CUT_BACKS] += 1
                 mark_cut(bodies, work, s)
                 continue
+            if not settled:  # not in a shorter step, either
+                let_wait(bodies, work, work.block_start[s], work.block_start[s + 1])
             if limit_fences(bodies, c, m, work, s, gauges, time, p, counters):
                 apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
             counters[EVENTS] = note_hits(bodies, c, work, c0, c1, gauges, counters[EVENTS], time)

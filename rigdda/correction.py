@@ -136,7 +136,7 @@ def pass_on_shares(
 @inlined
 def apply_forces(
     bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, relaxed: bool, p: Parameters
-) -> None:
+) -> bool:
     """Set m.d and m.residual of an island to the displacement and its impact correction.
 
     Forces are applied equal and opposite here, once more and exactly, so that momentum is kept to
@@ -144,7 +144,10 @@ def apply_forces(
     by dt^2 F / 2M; an impulse that acts for the share s of the step displaces it by s dt^2 F / M.
     The first impact sets the share of all, or the corner that hits first would go on until then.
     Relaxation in substeps has found the correction: m.late.
+
+    Returns whether an impact acted on the island.
     """
+    struck = False
     b0, b1 = work.block_start[island], work.block_start[island + 1]
     assemble_blocks(bodies, m, work, b0, b1, p)
     for s in range(b1 - b0):
@@ -152,6 +155,8 @@ def apply_forces(
             m.residual[s, j] = m.direction[s, j] = 0.0
     for item in range(work.contact_start[island], work.contact_start[island + 1]):
         k = work.contact_item[item]
+        blow = c[k].kind == IMPACT or c[k].kind == SHOCK
+        struck = struck or (blow and c[k].normal > 0.0)
         add_contact_force(c, k, m, work.slot[c[k].a], True)
         if c[k].pair >= 0:
             add_contact_force(c, k, m, work.slot[c[k].b], False)
@@ -165,6 +170,7 @@ def apply_forces(
             m.d[s, j] = (m.rhs[s, j] + m.residual[s, j]) / m.diagonal[s, j, j]
             inertia = bodies[i].inertia if j == 2 else bodies[i].mass
             m.residual[s, j] = m.late[s, j] if relaxed else m.residual[s, j] * late / inertia
+    return struck
 
 
 @inlined
@@ -226,16 +232,6 @@ def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
     bodies[i].x += m.d[s, 0] + m.residual[s, 0]
     bodies[i].y += m.d[s, 1] + m.residual[s, 1]
     bodies[i].theta += m.d[s, 2] + m.residual[s, 2]
-
-
-@inlined
-def is_struck(c: Contacts, work: Work, low: int, high: int) -> bool:
-    """Return whether an impact acted on the island with contacts low:high in this step."""
-    for item in range(low, high):
-        k = work.contact_item[item]
-        if (c[k].kind == IMPACT or c[k].kind == SHOCK) and c[k].normal > 0.0:
-            return True
-    return False
 
 
 @inlined

@@ -47,10 +47,10 @@ def join_blocks(
 
 
 @kernel
-def find_islands(
-    bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int, apart: bool
-) -> int:
+def find_islands(bodies: Bodies, c: Contacts, work: Work, blocks: int, apart: bool) -> int:
     """List blocks and contacts island by island in `work`; the root is the smallest index.
+
+    Contacts come in order of their first body, so they are read once.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def find_islands(
         Number of islands.
     """
     parent, slot = work.parent, work.slot
-    join_blocks(bodies, c, count, parent, blocks, apart)
+    join_blocks(bodies, c, work.begin[blocks], parent, blocks, apart)
     islands = 0
     for s in range(len(work.block_start)):
         work.block_start[s] = work.contact_start[s] = 0
@@ -69,26 +69,26 @@ def find_islands(
             islands += 1
     for i in range(blocks):
         if bodies[i].status == AWAKE:
-            work.block_start[slot[root(parent, i)] + 1] += 1
-    for k in range(count):
-        if bodies[c[k].a].status == AWAKE:
-            work.contact_start[slot[root(parent, c[k].a)] + 1] += 1
+            s = slot[root(parent, i)]
+            work.block_start[s + 1] += 1
+            work.contact_start[s + 1] += work.begin[i + 1] - work.begin[i]
     for s in range(islands):
         work.block_start[s + 1] += work.block_start[s]
         work.contact_start[s + 1] += work.contact_start[s]
-    _fill(bodies, c, count, work, blocks, islands)
+    _fill(bodies, work, blocks, islands)
     return islands
 
 
 @kernel
-def _fill(bodies: Bodies, c: Contacts, count: int, work: Work, blocks: int, islands: int) -> None:
+def _fill(bodies: Bodies, work: Work, blocks: int, islands: int) -> None:
     """Write the items of each island in ascending order, then the slots of the blocks."""
     parent, slot = work.parent, work.slot
-    for k in range(count):
-        if bodies[c[k].a].status == AWAKE:
-            s = slot[root(parent, c[k].a)]
-            work.contact_item[work.contact_start[s]] = k
-            work.contact_start[s] += 1
+    for i in range(blocks):
+        if bodies[i].status == AWAKE:
+            s = slot[root(parent, i)]
+            for k in range(work.begin[i], work.begin[i + 1]):
+                work.contact_item[work.contact_start[s]] = k
+                work.contact_start[s] += 1
     for s in range(islands, 0, -1):
         work.contact_start[s] = work.contact_start[s - 1]
     work.contact_start[0] = 0

@@ -332,6 +332,8 @@ def empty_work(bodies: int, room: int) -> Work:
         whole(bodies + 1),
         whole(room),
         whole(bodies + 1),
+        whole(bodies + 1),
+        np.zeros(room),
         np.zeros((room, COLUMNS)),
         whole(room),
         whole(room),

@@ -215,7 +215,9 @@ class Work(NamedTuple):
     block_item: Ints
     contact_start: Ints  # (M + 1,) contacts of each island
     contact_item: Ints
-    first: Ints  # (M + 1,) contacts of the last step by body a
+    first: Ints  # (M + 1,) first contact of each body a in the last step
+    begin: Ints  # (M + 1,) the same in this step
+    height: Floats  # (C,) of the contacts of an island [m]
     row: Floats  # (C, columns) contacts of one island, see linear.relaxation
     row_i: Ints  # (C,) slots of their bodies
     row_j: Ints

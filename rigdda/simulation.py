@@ -449,10 +449,10 @@ class Simulation:
         grown = empty_contacts(room)
         grown[: len(self._now)] = self._now
         self._now, self._before = grown, empty_contacts(room)
-        order = self._arrays.work.sorted
+        work = self._arrays.work
         self._arrays = self._arrays._replace(
             matrix=empty_matrix(self._arrays.parameters[0].blocks, room),
-            work=empty_work(len(bodies), room)._replace(sorted=order),
+            work=empty_work(len(bodies), room)._replace(sorted=work.sorted, begin=work.begin),
         )
 
 

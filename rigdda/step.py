@@ -24,12 +24,11 @@ from rigdda.contact.law import prepare, strike_at_once
 from rigdda.contact.links import add_link, yield_bolts
 from rigdda.contact.narrow_phase import collide_pair
 from rigdda.contact.terrain_phase import collide_terrain
-from rigdda.contact.transfer import copy_contact, index_by_body, recall
+from rigdda.contact.transfer import copy_contact, recall
 from rigdda.correction import (
     account_block,
     account_contact,
     apply_forces,
-    is_struck,
     keep_memory,
     move_block,
     move_corners,
@@ -57,6 +56,7 @@ from rigdda.records import (
     Contacts,
     Gauges,
     Ground,
+    Ints,
     Links,
     Matrix,
     Outlines,
@@ -137,21 +137,28 @@ def collide_block(
     return count
 
 
+@kernel
+def copy_index(index: Ints, to: Ints) -> None:
+    """Copy an index of contacts by body."""
+    for a in range(len(index)):
+        to[a] = index[a]
+
+
 @stage
 def detect(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, c: Contacts, old: Contacts,
-    old_count: int, work: Work, gauges: Gauges, time: float, p: Parameters, counters: NDArray,
+    work: Work, gauges: Gauges, time: float, p: Parameters, counters: NDArray,
     deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
     since = lap(counters, BROAD_PHASE, 0, p.timing)
-    index_by_body(old, old_count, work.first, p.blocks)
     if not candidate_pairs(bodies, outlines, work, p):
         return -1
     since = lap(counters, BROAD_PHASE, since, p.timing)
     start = time <= 1.5 * p.dt
     count = link = 0
     for a in range(p.blocks):
+        work.begin[a] = count
         low_link = link
         while link < len(links) and links[link].a == a:
             link += 1
@@ -168,6 +175,7 @@ def detect(
             count = keep_asleep(bodies, c, count, old, work, a, gauges, time)
         elif bodies[a].status == HELD:
             count = keep_held(c, count, old, work, a)
+    work.begin[p.blocks] = count
     lap(counters, NARROW_PHASE, since, p.timing)
     return count
 
@@ -185,7 +193,7 @@ def retire(bodies: Bodies, i: int) -> float:
 @stage
 def move_island(
     bodies: Bodies, outlines: Outlines, c: Contacts, m: Matrix, work: Work, island: int,
-    gauges: Gauges, p: Parameters, ledger: NDArray,
+    struck: bool, gauges: Gauges, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
     c0, c1 = work.contact_start[island], work.contact_start[island + 1]
@@ -195,7 +203,6 @@ def move_island(
         i = work.block_item[b0 + s]
         bodies[i].touching = 0
         account_block(bodies, m, work, i, s, p, ledger)
-    struck = is_struck(c, work, c0, c1)
     for item in range(c0, c1):
         k = work.contact_item[item]
         keep_memory(c, k, struck, work.relaxed[0] == 1)
@@ -240,7 +247,7 @@ def solve_and_move(
         none.
     """
     since = lap(counters, MOTION, 0, p.timing)
-    islands = find_islands(bodies, c, count, work, p.blocks, p.islands)
+    islands = find_islands(bodies, c, work, p.blocks, p.islands)
     bad, excess = -1, 0.0
     for s in range(islands):
         c0, c1 = work.contact_start[s], work.contact_start[s + 1]
@@ -248,7 +255,7 @@ def solve_and_move(
             since = lap(counters, MOTION, since, p.timing)
             settled = open_close(bodies, c, m, work, s, p, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
-            apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
+            struck = apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
             far = too_far(bodies, c, m, work, s, p) if cutting else 0.0
             if far > 1.0 or (cutting and not settled):
                 excess = max(excess, far, 1.0)
@@ -258,12 +265,15 @@ def solve_and_move(
             if not settled:  # not in a shorter step, either
                 let_wait(bodies, work, work.block_start[s], work.block_start[s + 1])
             if limit_fences(bodies, c, m, work, s, gauges, time, p, counters):
-                apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
-            counters[EVENTS] = note_hits(bodies, c, work, c0, c1, gauges, counters[EVENTS], time)
+                struck = apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
+            if len(gauges.absorbed) > 0:
+                counters[EVENTS] = note_hits(
+                    bodies, c, work, c0, c1, gauges, counters[EVENTS], time
+                )
         else:
             work.relaxed[0] = 0
-            apply_forces(bodies, c, m, work, s, False, p)
-        bad = max(bad, move_island(bodies, outlines, c, m, work, s, gauges, p, ledger))
+            struck = apply_forces(bodies, c, m, work, s, False, p)
+        bad = max(bad, move_island(bodies, outlines, c, m, work, s, struck, gauges, p, ledger))
     if p.sleeping:
         watch_quiet(bodies, work, islands, p)
         wake_behind(bodies, c, count, gauges, p)
@@ -317,12 +327,13 @@ def advance(
         if p.static:
             rest_all(bodies)
         set_field(work, shaking, start * p.dt, time, p)
+        copy_index(work.begin, work.first)
         count = detect(
-            bodies, outlines, ground, links, before, now, counters[CONTACTS], work, gauges, time,
-            p, counters, deepest,
-        )  # fmt: skip
+            bodies, outlines, ground, links, before, now, work, gauges, time, p, counters, deepest
+        )
         # a cut-back, which cannot be left, has room to spare
         if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
+            copy_index(work.first, work.begin)
             return CONTACTS_FULL, -1, swapped
         now, before = before, now
         swapped = not swapped

@@ -14,17 +14,6 @@ from rigdda.records import Contacts
 
 
 @kernel
-def index_by_body(c: Contacts, count: int, first: NDArray, bodies: int) -> None:
-    """Set first[a] : first[a + 1] to the contacts of body a; contacts come in order of a."""
-    k = 0
-    for a in range(bodies):
-        first[a] = k
-        while k < count and c[k].a == a:
-            k += 1
-    first[bodies] = k
-
-
-@kernel
 def fits_another(
     c: Contacts, k: int, new_low: int, new_high: int, old: Contacts, m: int, cosine: float
 ) -> bool:

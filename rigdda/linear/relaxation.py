@@ -268,16 +268,16 @@ def sort_by_height(c: Contacts, work: Work, low: int, high: int) -> None:
     A counting sort in as many layers as there is room for: within one the order does not matter.
     Contacts stay in order: to read them one after the other is what takes long in a large island.
     """
-    item, place, layers = work.contact_item, work.place, min(len(work.layer) - 1, high - low)
+    place, height, layers = work.place, work.height, min(len(work.layer) - 1, high - low)
     least, most = math.inf, -math.inf
     for q in range(low, high):
-        y = c[item[q]].y
-        least, most = min(least, y), max(most, y)
+        height[q] = c[work.contact_item[q]].y
+        least, most = min(least, height[q]), max(most, height[q])
     scale = layers / (most - least) * (1.0 - 1e-9) if most > least else 0.0
     for s in range(layers + 1):
         work.layer[s] = 0
     for q in range(low, high):
-        place[q] = int(scale * (c[item[q]].y - least))
+        place[q] = int(scale * (height[q] - least))
         work.layer[place[q] + 1] += 1
     for s in range(layers):
         work.layer[s + 1] += work.layer[s]

@@ -228,7 +228,7 @@ def _number(text: str) -> float:
 
 def table(study: Study, path: Path) -> Table:
     """Return the table of means over releases with their 95 % intervals."""
-    out = empty_table(("layout", "cost", "debris [%] (95 %)", "largest energy on the road [kJ]"))
+    out = empty_table(("layout", "cost", "debris [%] (95 %)", "largest energy on the road [kJ/m]"))
     rows = _read(path, _fields(study))
     for name, layout in study.layouts.items():
         own = [row for row in rows if row["layout"] == name]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 OUTCOME = {
     "debris_fraction": ("debris past the road's edge", "%", 100.0),
     "debris_on_road": ("debris on the road at the end", "m2", 1.0),
-    "max_energy_on_road": ("largest energy on the road", "kJ", 1e-3),
+    "max_energy_on_road": ("largest energy on the road", "kJ/m", 1e-3),
     "slope_fraction": ("at the end on the slope", "%", 100.0),
     "held_fraction": ("at the end behind barriers", "%", 100.0),
     "road_fraction": ("at the end on the road", "%", 100.0),
@@ -36,9 +36,9 @@ OUTCOME = {
 
 HIT = {
     "hits": ("hits", "-", 1.0),
-    "max_energy": ("largest energy of a hit", "kJ", 1e-3),
-    "total_energy": ("energy of all hits", "kJ", 1e-3),
-    "absorbed_energy": ("energy absorbed", "kJ", 1e-3),
+    "max_energy": ("largest energy of a hit", "kJ/m", 1e-3),
+    "total_energy": ("energy of all hits", "kJ/m", 1e-3),
+    "absorbed_energy": ("energy absorbed", "kJ/m", 1e-3),
     "overtopped": ("blocks that passed", "-", 1.0),
     "caught": ("mass at rest behind or in it", "%", 100.0),
     "failed": ("failed", "%", 100.0),

@@ -92,7 +92,7 @@ def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
 @entry_kernel
 def assemble(bodies: Bodies, c: Contacts, count: int, m: Matrix, work: Work, p: Parameters) -> int:
     """Assemble all blocks as one island with their contacts as they are; returns the pairs."""
-    find_islands(bodies, c, count, work, p.blocks, False)
-    pairs = pair_blocks(bodies, c, m, work, 0, count)
+    find_islands(bodies, c, work, p.blocks, False)
+    pairs, _ = pair_blocks(bodies, c, m, work, 0, count)
     assemble_island(bodies, c, m, work, 0, pairs, p)
     return pairs

@@ -33,7 +33,7 @@ from rigdda.records import (
     Work,
 )
 from rigdda.shaking import set_field
-from rigdda.step import detect
+from rigdda.step import copy_index, detect
 
 
 @kernel
@@ -99,7 +99,7 @@ def rest_all(bodies: Bodies, velocity: Floats) -> None:
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
     now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters,
-    counters: NDArray, s: Solid, steps: int,
+    counters: NDArray, deepest: NDArray, s: Solid, steps: int,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Take steps with the contact detection of the core.
 
@@ -114,9 +114,10 @@ def advance(
         if p.static:
             rest_all(bodies, s.velocity)
         set_field(work, shaking, start, start + p.dt, p)
+        copy_index(work.begin, work.first)
         count = detect(
-            bodies, outlines, ground, links, before, now, counters[CONTACTS], work, gauges,
-            start + p.dt, p, counters,
+            bodies, outlines, ground, links, before, now, work, gauges, start + p.dt, p, counters,
+            deepest,
         )  # fmt: skip
         if count < 0:
             return False, swapped
@@ -124,8 +125,8 @@ def advance(
         swapped = not swapped
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
-        find_islands(bodies, now, count, work, p.blocks, False)
-        pairs = pair_blocks(bodies, now, m, work, 0, count)
+        find_islands(bodies, now, work, p.blocks, False)
+        pairs, _ = pair_blocks(bodies, now, m, work, 0, count)
         settle(bodies, outlines, now, count, s, m, work, n, pairs, p, counters)
         for k in range(count):
             keep_memory(now, k, False, False)

@@ -226,10 +226,12 @@ takes steps about as long as this; unchecked, 20 of 141 hard cases at 25 to 100 
 
 SINKING = 2.5e-4
 """Sinking over block size that such a step may bring [-], a few times that of a contact at rest:
-with ten times as much 6 of 141 hard cases at 25 and 100 ms sink too deep or do not come to rest. An
-island in motion may sink by half of this for each of its blocks. Were they all cut back at the
-same, an avalanche would take five times as long, and 1,000 blocks in a hopper would be kept from
-rest; without any bound a row of dominoes sinks too deep."""
+with ten times as much 6 of 141 hard cases at 25 and 100 ms sink too deep or do not come to rest."""
+
+MOVING_SINKING = 0.5
+"""Sinking of an island in motion over this bound and over its number of blocks [-]. Were they all
+cut back at the bound itself, an avalanche would take five times as long, and 1,000 blocks in a
+hopper would be kept from rest; without any bound a row of dominoes sinks too deep."""
 
 # status of a body
 AWAKE, ASLEEP, FIXED, RETIRED, HELD = 0, 1, 2, 3, 4

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.constants import AWAKE, BOLT, CUTS, HELD, PIN, PLAIN
+from rigdda.constants import AWAKE, BOLT, CUTS, HELD, MOVING_SINKING, PIN, PLAIN
 from rigdda.contact.transfer import recall
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
@@ -28,7 +28,7 @@ def too_far(
     far = max(far, greatest_deflection(bodies, m, work, island, p) / p.deflection_limit)
     if p.sinking_limit < math.inf:
         blocks = work.block_start[island + 1] - work.block_start[island]
-        limit = p.sinking_limit * (0.5 * blocks if work.relaxed[0] == 1 else 1.0)
+        limit = p.sinking_limit * (MOVING_SINKING * blocks if work.relaxed[0] == 1 else 1.0)
         far = max(far, greatest_sinking(bodies, c, m, work, island) / limit)
     return far
 

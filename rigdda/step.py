@@ -327,7 +327,7 @@ def advance(
         if p.static:
             rest_all(bodies)
         set_field(work, shaking, start * p.dt, time, p)
-        for a in range(p.blocks + 1):  # called, this would take a tenth of a step of one block
+        for a in range(p.blocks + 1):  # called, this takes a fifteenth of a step of one block
             work.first[a] = work.begin[a]
         count = detect(
             bodies, outlines, ground, links, before, now, work, gauges, time, p, counters, deepest

@@ -5,13 +5,14 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
 from rigdda.assembly.island import assemble_island
 from rigdda.geometry import polygon_properties
 from rigdda.islands import find_islands, pair_blocks
 from rigdda.kernel import entry_kernel
-from rigdda.records import CONTACTS, Bodies, Contacts, Matrix, Parameters, Work
+from rigdda.records import CONTACTS, Bodies, Contacts, Matrix, Work
 from rigdda.scene import Surface
 from rigdda.validation.scenes import GRAVITY, box
 
@@ -82,7 +83,7 @@ def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
     a = sim._arrays
     count = int(sim._counters[CONTACTS])
     a.bodies["vx"] = a.bodies["vy"] = a.bodies["omega"] = 0.0
-    pairs = assemble(a.bodies, sim._now, count, a.matrix, a.work, a.parameters[0])
+    pairs = assemble(a.bodies, sim._now, count, a.matrix, a.work, a.parameters)
     n = len(scene.blocks)
     stir = STIR * np.random.default_rng(n).standard_normal((n, 3))
     a.matrix.rhs[:n] += stir * np.abs(a.matrix.rhs[:n]).max()
@@ -90,9 +91,12 @@ def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
 
 
 @entry_kernel
-def assemble(bodies: Bodies, c: Contacts, count: int, m: Matrix, work: Work, p: Parameters) -> int:
+def assemble(
+    bodies: Bodies, c: Contacts, count: int, m: Matrix, work: Work, levels: NDArray
+) -> int:
     """Assemble all blocks as one island with their contacts as they are; returns the pairs."""
-    find_islands(bodies, c, work, p.blocks, False)
-    pairs, _ = pair_blocks(bodies, c, m, work, 0, count)
-    assemble_island(bodies, c, m, work, 0, pairs, p)
+    p = levels[0]
+    find_islands(bodies, c, work.begin, work.islands, p.blocks, False)
+    pairs, _ = pair_blocks(bodies, c, m, work.islands, 0, count)
+    assemble_island(bodies, c, m, work.islands, 0, pairs, p)
     return pairs

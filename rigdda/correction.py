@@ -13,7 +13,7 @@ from rigdda.contact.narrow_phase import over_edge
 from rigdda.gauges import barrier_contact
 from rigdda.islands import root
 from rigdda.kernel import entry_kernel, inlined, kernel
-from rigdda.records import Bodies, Contacts, Gauges, Matrix, Outlines, Parameters, Work
+from rigdda.records import Bodies, Contacts, Gauges, Islands, Matrix, Outlines, Parameters
 
 
 @inlined
@@ -65,11 +65,12 @@ def place_edges(outlines: Outlines, row: int) -> None:
         length = math.sqrt(ex * ex + ey * ey)
         outlines.normal_x[row, k] = ey / length
         outlines.normal_y[row, k] = -ex / length
-    outlines.middle_x[row], outlines.middle_y[row] = sum_x / n, sum_y / n
+    polygon = outlines.polygon[row]
+    polygon.middle_x, polygon.middle_y = sum_x / n, sum_y / n
     inside = math.inf
     for k in range(n):
         inside = min(inside, -over_edge(outlines, row, k, row))
-    outlines.inside[row] = (1.0 - 1e-9) * inside  # rounding is to leave out no face of contact
+    polygon.inside = (1.0 - 1e-9) * inside  # rounding is to leave out no face of contact
 
 
 @kernel
@@ -107,35 +108,42 @@ def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> Non
 
 @inlined
 def pass_on_shares(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, dt: float
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, dt: float
 ) -> None:
     """Let the time of an impact be that of the blows it sends through an island.
 
     Blocks that are struck through others would else move on for a while, into those that stopped.
     """
-    n, struck, share = work.block_start[island + 1] - work.block_start[island], False, m.direction
+    n = islands.block_start[island + 1] - islands.block_start[island]
+    struck, share, parent, slot = False, m.direction, islands.parent, islands.slot
     for s in range(n):
-        work.parent[s] = s
+        parent[s] = s
         struck = struck or share[s, 0] > 0.0
     if not struck:
         return
-    for item in range(work.contact_start[island], work.contact_start[island + 1]):
-        k = work.contact_item[item]
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        k = islands.contact_item[item]
         if c[k].pair < 0 or c[k].state == OPEN:
             continue
         lighter = min(bodies[c[k].a].mass, bodies[c[k].b].mass)
         if c[k].normal * dt > SHOCK_SPEED * lighter:
-            i, j = root(work.parent, work.slot[c[k].a]), root(work.parent, work.slot[c[k].b])
+            i, j = root(parent, slot[c[k].a]), root(parent, slot[c[k].b])
             first = min(i, j)
-            work.parent[max(i, j)] = first
+            parent[max(i, j)] = first
             share[first, 0] = max(share[i, 0], share[j, 0])
     for s in range(n):
-        share[s, 0] = share[root(work.parent, s), 0]
+        share[s, 0] = share[root(parent, s), 0]
 
 
 @inlined
 def apply_forces(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, relaxed: bool, p: Parameters
+    bodies: Bodies,
+    c: Contacts,
+    m: Matrix,
+    islands: Islands,
+    island: int,
+    relaxed: bool,
+    p: Parameters,
 ) -> bool:
     """Set m.d and m.residual of an island to the displacement and its impact correction.
 
@@ -148,22 +156,22 @@ def apply_forces(
     Returns whether an impact acted on the island.
     """
     struck = False
-    b0, b1 = work.block_start[island], work.block_start[island + 1]
-    assemble_blocks(bodies, m, work, b0, b1, p)
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    assemble_blocks(bodies, m, islands, b0, b1, p)
     for s in range(b1 - b0):
         for j in range(3):
             m.residual[s, j] = m.direction[s, j] = 0.0
-    for item in range(work.contact_start[island], work.contact_start[island + 1]):
-        k = work.contact_item[item]
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        k = islands.contact_item[item]
         blow = c[k].kind == IMPACT or c[k].kind == SHOCK
         struck = struck or (blow and c[k].normal > 0.0)
-        add_contact_force(c, k, m, work.slot[c[k].a], True)
+        add_contact_force(c, k, m, islands.slot[c[k].a], True)
         if c[k].pair >= 0:
-            add_contact_force(c, k, m, work.slot[c[k].b], False)
+            add_contact_force(c, k, m, islands.slot[c[k].b], False)
     if not relaxed:
-        pass_on_shares(bodies, c, m, work, island, p.dt)
+        pass_on_shares(bodies, c, m, islands, island, p.dt)
     for s in range(b1 - b0):
-        i = work.block_item[b0 + s]
+        i = islands.block_item[b0 + s]
         share = m.direction[s, 0]
         late = (share - 0.5) * p.dt * p.dt if share > 0.0 else 0.0
         for j in range(3):
@@ -175,7 +183,7 @@ def apply_forces(
 
 @inlined
 def account_block(
-    bodies: Bodies, m: Matrix, work: Work, i: int, s: int, p: Parameters, ledger: NDArray
+    bodies: Bodies, m: Matrix, i: int, s: int, p: Parameters, ledger: NDArray
 ) -> None:
     """Add the work of damping, loads and supports on block i, slot s, to the ledger."""
     drag = damping_of_step(m, s, bodies[i].mass, p)
@@ -184,8 +192,8 @@ def account_block(
     ledger[2] -= drag * slow / p.dt
     ledger[3] += bodies[i].force_x * m.d[s, 0] + bodies[i].force_y * m.d[s, 1]
     ledger[3] += load_moment(bodies, i) * m.d[s, 2]
-    ledger[3] += bodies[i].mass * (work.field[0] - p.gravity_x) * m.d[s, 0]
-    ledger[3] += bodies[i].mass * (work.field[1] - p.gravity_y) * m.d[s, 1]
+    ledger[3] += bodies[i].mass * (p.field_x - p.gravity_x) * m.d[s, 0]
+    ledger[3] += bodies[i].mass * (p.field_y - p.gravity_y) * m.d[s, 1]
     # an impulse that acts early or late in the step lifts or lowers the block
     lift = p.gravity_x * m.residual[s, 0] + p.gravity_y * m.residual[s, 1]
     ledger[1] -= bodies[i].mass * lift
@@ -193,17 +201,17 @@ def account_block(
 
 @inlined
 def account_contact(
-    c: Contacts, k: int, m: Matrix, work: Work, ledger: NDArray, gauges: Gauges
+    c: Contacts, k: int, m: Matrix, islands: Islands, ledger: NDArray, gauges: Gauges
 ) -> None:
     """Add the work of closed contact k to the ledger."""
-    i = work.slot[c[k].a]
+    i = islands.slot[c[k].a]
     dn = along(normal_row(c, k, True), m.d[i])
     ds = along(shear_row(c, k, True), m.d[i])
     block, barrier = barrier_contact(gauges, c[k].a, c[k].b)
     if barrier >= 0 and block == c[k].a:
         gauges.absorbed[barrier] -= c[k].normal * dn + c[k].shear * ds
     if c[k].pair >= 0:
-        j = work.slot[c[k].b]
+        j = islands.slot[c[k].b]
         en = along(normal_row(c, k, False), m.d[j])
         es = along(shear_row(c, k, False), m.d[j])
         if barrier >= 0 and block != c[k].a:

@@ -13,32 +13,34 @@ import math
 from rigdda.constants import AWAKE, BOLT, CUTS, HELD, MOVING_SINKING, PIN, PLAIN
 from rigdda.contact.transfer import recall
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
+from rigdda.records import Bodies, Contacts, Ints, Islands, Matrix, Parameters
 
 
 @inlined
 def too_far(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, p: Parameters
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, p: Parameters
 ) -> float:
     """Return how far an island goes in this step, over how far a step should take it [-].
 
     Forces are applied: m.d and m.residual are its displacements.
     """
-    far = greatest_departure(bodies, m, work, island, p.dt) / p.displacement_limit
-    far = max(far, greatest_deflection(bodies, m, work, island, p) / p.deflection_limit)
+    far = greatest_departure(bodies, m, islands, island, p.dt) / p.displacement_limit
+    far = max(far, greatest_deflection(bodies, m, islands, island, p) / p.deflection_limit)
     if p.sinking_limit < math.inf:
-        blocks = work.block_start[island + 1] - work.block_start[island]
-        limit = p.sinking_limit * (MOVING_SINKING * blocks if work.relaxed[0] == 1 else 1.0)
-        far = max(far, greatest_sinking(bodies, c, m, work, island) / limit)
+        blocks = islands.block_start[island + 1] - islands.block_start[island]
+        limit = p.sinking_limit * (MOVING_SINKING * blocks if islands.relaxed[0] == 1 else 1.0)
+        far = max(far, greatest_sinking(bodies, c, m, islands, island) / limit)
     return far
 
 
 @inlined
-def greatest_departure(bodies: Bodies, m: Matrix, work: Work, island: int, dt: float) -> float:
+def greatest_departure(
+    bodies: Bodies, m: Matrix, islands: Islands, island: int, dt: float
+) -> float:
     """Return a bound on how far from its straight path any corner of an island ends a step [m]."""
-    most, low = 0.0, work.block_start[island]
-    for place in range(low, work.block_start[island + 1]):
-        d, i = m.d[place - low], work.block_item[place]
+    most, low = 0.0, islands.block_start[island]
+    for place in range(low, islands.block_start[island + 1]):
+        d, i = m.d[place - low], islands.block_item[place]
         turn = abs(d[2]) * bodies[i].radius
         dx, dy = d[0] - dt * bodies[i].vx, d[1] - dt * bodies[i].vy
         most = max(most, math.sqrt(dx * dx + dy * dy) + turn)
@@ -46,13 +48,15 @@ def greatest_departure(bodies: Bodies, m: Matrix, work: Work, island: int, dt: f
 
 
 @inlined
-def greatest_deflection(bodies: Bodies, m: Matrix, work: Work, island: int, p: Parameters) -> float:
+def greatest_deflection(
+    bodies: Bodies, m: Matrix, islands: Islands, island: int, p: Parameters
+) -> float:
     """Return how much farther than foreseen any corner of an island goes in a step [m]."""
-    most, low = 0.0, work.block_start[island]
-    for place in range(low, work.block_start[island + 1]):
-        d, i = m.d[place - low], work.block_item[place]
+    most, low = 0.0, islands.block_start[island]
+    for place in range(low, islands.block_start[island + 1]):
+        d, i = m.d[place - low], islands.block_item[place]
         way = math.sqrt(d[0] * d[0] + d[1] * d[1]) + abs(d[2]) * bodies[i].radius
-        most = max(most, way - work.path[i])
+        most = max(most, way - bodies[i].path)
     return most - p.gravity * p.dt * p.dt
 
 
@@ -67,21 +71,21 @@ def point_after(
 
 
 @kernel
-def gap_after(bodies: Bodies, c: Contacts, k: int, m: Matrix, work: Work) -> float:
+def gap_after(bodies: Bodies, c: Contacts, k: int, m: Matrix, islands: Islands) -> float:
     """Return the gap of contact k at the end of the step, after the post-correction [m]."""
     nx, ny = c[k].nx, c[k].ny
     # the corner, and the point of the face that it is over; the normal points to a
     side = 1.0 if c[k].owner == 1 else 0.0
     ax, ay = c[k].x + (1.0 - side) * c[k].gap * nx, c[k].y + (1.0 - side) * c[k].gap * ny
     bx, by = c[k].x - side * c[k].gap * nx, c[k].y - side * c[k].gap * ny
-    a, b, s = c[k].a, c[k].b, work.slot[c[k].a]
+    a, b, s = c[k].a, c[k].b, islands.slot[c[k].a]
     turn = m.d[s, 2] + m.residual[s, 2]
     cos, sin = math.cos(turn), math.sin(turn)
     ax, ay = point_after(bodies, m, a, s, ax, ay, cos, sin)
     if c[k].owner == 0:  # the face turns with a
         nx, ny = cos * nx - sin * ny, sin * nx + cos * ny
     if c[k].pair >= 0:
-        s = work.slot[b]
+        s = islands.slot[b]
         turn = m.d[s, 2] + m.residual[s, 2]
         cos, sin = math.cos(turn), math.sin(turn)
         bx, by = point_after(bodies, m, b, s, bx, by, cos, sin)
@@ -91,13 +95,15 @@ def gap_after(bodies: Bodies, c: Contacts, k: int, m: Matrix, work: Work) -> flo
 
 
 @kernel
-def greatest_sinking(bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int) -> float:
+def greatest_sinking(
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int
+) -> float:
     """Return by how much a contact of an island ends the step deeper than it began it [m]."""
     most = 0.0
-    for item in range(work.contact_start[island], work.contact_start[island + 1]):
-        k = work.contact_item[item]
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        k = islands.contact_item[item]
         if c[k].kind != BOLT and c[k].kind != PIN and c[k].kind != PLAIN:
-            most = max(most, min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, work))
+            most = max(most, min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, islands))
     return most
 
 
@@ -111,23 +117,23 @@ def level_for(excess: float, p: Parameters) -> int:
 
 
 @kernel
-def mark_cut(bodies: Bodies, work: Work, island: int) -> None:
+def mark_cut(bodies: Bodies, islands: Islands, island: int) -> None:
     """Mark the blocks of an island that is to be cut back."""
-    for place in range(work.block_start[island], work.block_start[island + 1]):
-        bodies[work.block_item[place]].cut = 1
+    for place in range(islands.block_start[island], islands.block_start[island + 1]):
+        bodies[islands.block_item[place]].cut = 1
 
 
 @kernel
-def hold_others(bodies: Bodies, now: Contacts, count: int, before: Contacts, work: Work,
-    p: Parameters,
-) -> None:  # fmt: skip
+def hold_others(
+    bodies: Bodies, now: Contacts, count: int, before: Contacts, first: Ints, p: Parameters
+) -> None:
     """Begin a cut-back: all blocks but those of the islands left have taken the step and are held.
 
     The contacts of the islands left are as they were before the step.
     """
     for k in range(count):
         if bodies[now[k].a].cut == 1:
-            recall(now, k, k + 1, before, work.first, p.slack)
+            recall(now, k, k + 1, before, first, p.slack)
     for i in range(p.blocks):
         if bodies[i].status == AWAKE and bodies[i].cut == 0:
             bodies[i].status = HELD

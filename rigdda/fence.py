@@ -33,28 +33,30 @@ from rigdda.constants import (
 from rigdda.gauges import FAILED, write_event
 from rigdda.kernel import inlined, kernel
 from rigdda.open_close import open_close
-from rigdda.records import EVENTS, Bodies, Contacts, Gauges, Matrix, Parameters, Work
+from rigdda.records import EVENTS, Bodies, Contacts, Gauges, Islands, Matrix, Parameters, Rows
 from rigdda.sleep import wake_island
 
 
 @kernel
-def work_taken(c: Contacts, m: Matrix, work: Work, low: int, high: int, fence: int) -> float:
+def work_taken(c: Contacts, m: Matrix, islands: Islands, low: int, high: int, fence: int) -> float:
     """Return the work that body `fence` takes from the blocks of an island in this step [J]."""
     total = 0.0
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         if c[k].b == fence and c[k].state != OPEN:
-            d = m.d[work.slot[c[k].a]]
+            d = m.d[islands.slot[c[k].a]]
             total -= c[k].normal * along(normal_row(c, k, True), d)
             total -= c[k].shear * along(shear_row(c, k, True), d)
     return total
 
 
 @kernel
-def let_pass(c: Contacts, work: Work, low: int, high: int, fence: int, s: float, dt: float) -> None:
+def let_pass(
+    c: Contacts, islands: Islands, low: int, high: int, fence: int, s: float, dt: float
+) -> None:
     """Make the contacts with a fence impacts after which a share s of c.passing is left."""
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         if c[k].b == fence:
             c[k].kind, c[k].state, c[k].flips = IMPACT, STICK, 0
             c[k].memory_normal = c[k].memory_shear = 0.0
@@ -63,10 +65,10 @@ def let_pass(c: Contacts, work: Work, low: int, high: int, fence: int, s: float,
 
 
 @kernel
-def let_go(c: Contacts, work: Work, low: int, high: int, fence: int, dt: float) -> None:
+def let_go(c: Contacts, islands: Islands, low: int, high: int, fence: int, dt: float) -> None:
     """Keep the contacts with a fence from closing in this step, whatever comes."""
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         if c[k].b == fence:
             c[k].kind, c[k].state = IMPACT, OPEN
             c[k].memory_normal = c[k].memory_shear = 0.0
@@ -75,7 +77,7 @@ def let_go(c: Contacts, work: Work, low: int, high: int, fence: int, dt: float) 
 
 
 @kernel
-def passed_on(c: Contacts, work: Work, low: int, high: int, fence: int, dt: float) -> float:
+def passed_on(c: Contacts, islands: Islands, low: int, high: int, fence: int, dt: float) -> float:
     """Return the energy of blows that blocks at rest against a fence pass on to it [J].
 
     Blow and support act within one step, so that the block does not move and the fence does no
@@ -84,7 +86,7 @@ def passed_on(c: Contacts, work: Work, low: int, high: int, fence: int, dt: floa
     """
     total = 0.0
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         if c[k].b == fence and c[k].state != OPEN:
             total += 0.5 * dt * c[k].normal * max(c[k].passing + min(c[k].un, 0.0), 0.0)
     return total
@@ -92,46 +94,46 @@ def passed_on(c: Contacts, work: Work, low: int, high: int, fence: int, dt: floa
 
 @kernel
 def set_passing(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, fence: int, p: Parameters,
-    counters: NDArray,
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    fence: int, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Set c.passing at a fence: the closing velocities as if the fence were not there.
 
     Where blocks of the island hit each other it is settled without the fence first.
     """
-    low, high = work.contact_start[island], work.contact_start[island + 1]
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
     struck = False
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         blow = c[k].kind == IMPACT or c[k].kind == SHOCK
         struck = struck or (blow and 0 <= c[k].b < p.blocks and c[k].normal > 0.0)
         c[k].passing = max(-c[k].un, 0.0)
     if not struck:
         return
-    let_go(c, work, low, high, fence, p.dt)
-    open_close(bodies, c, m, work, island, p, counters)
+    let_go(c, islands, low, high, fence, p.dt)
+    open_close(bodies, c, m, islands, rows, island, p, counters)
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         if c[k].b == fence:
-            dn = along(normal_row(c, k, True), m.d[work.slot[c[k].a]])
+            dn = along(normal_row(c, k, True), m.d[islands.slot[c[k].a]])
             c[k].passing = max(c[k].un - 2.0 * dn / p.dt, 0.0)
-    let_pass(c, work, low, high, fence, 0.0, p.dt)
-    open_close(bodies, c, m, work, island, p, counters)
+    let_pass(c, islands, low, high, fence, 0.0, p.dt)
+    open_close(bodies, c, m, islands, rows, island, p, counters)
 
 
 @kernel
 def break_through(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, fence: int, left: float,
-    taken: float, tolerance: float, p: Parameters, counters: NDArray,
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    fence: int, left: float, taken: float, tolerance: float, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Settle an island so that a fence takes what is left of its capacity, where it took more.
 
     If no share s does, it takes less or nothing: never more than is left and `tolerance` [J].
     """
-    low, high = work.contact_start[island], work.contact_start[island + 1]
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
     if left <= 0.0:
-        let_go(c, work, low, high, fence, p.dt)
-        open_close(bodies, c, m, work, island, p, counters)
+        let_go(c, islands, low, high, fence, p.dt)
+        open_close(bodies, c, m, islands, rows, island, p, counters)
         return
     # squares of shares with which it takes too much and too little, and by how much
     small, over = 0.0, taken - left
@@ -139,10 +141,10 @@ def break_through(
     side = 0
     square = 1.0 - left / taken
     for _ in range(BREAK_SOLVES):
-        let_pass(c, work, low, high, fence, math.sqrt(square), p.dt)
-        open_close(bodies, c, m, work, island, p, counters)
-        off = work_taken(c, m, work, low, high, fence) - left
-        off += passed_on(c, work, low, high, fence, p.dt)
+        let_pass(c, islands, low, high, fence, math.sqrt(square), p.dt)
+        open_close(bodies, c, m, islands, rows, island, p, counters)
+        off = work_taken(c, m, islands, low, high, fence) - left
+        off += passed_on(c, islands, low, high, fence, p.dt)
         if abs(off) <= tolerance:
             return
         # regula falsi after Illinois: an end that stays counts half from its second time on
@@ -156,15 +158,15 @@ def break_through(
             side = -1
         square = small + (large - small) * over / (over - under)
     if off > 0.0:
-        let_go(c, work, low, high, fence, p.dt)
-        open_close(bodies, c, m, work, island, p, counters)
+        let_go(c, islands, low, high, fence, p.dt)
+        open_close(bodies, c, m, islands, rows, island, p, counters)
 
 
 @kernel
-def touches(c: Contacts, work: Work, low: int, high: int, fence: int) -> int:
+def touches(c: Contacts, islands: Islands, low: int, high: int, fence: int) -> int:
     """Return a closed contact of an island with a fence, -1 if there is none."""
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         if c[k].b == fence and c[k].state != OPEN:
             return k
     return -1
@@ -172,8 +174,8 @@ def touches(c: Contacts, work: Work, low: int, high: int, fence: int) -> int:
 
 @inlined
 def limit_fences(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, gauges: Gauges, time: float,
-    p: Parameters, counters: NDArray,
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    gauges: Gauges, time: float, p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Let an island that was settled break the fences that would take more than they can.
 
@@ -182,18 +184,18 @@ def limit_fences(
     if gauges.fences == 0:
         return False
     touched = False
-    low, high = work.contact_start[island], work.contact_start[island + 1]
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
     for fence in range(p.blocks, len(bodies)):
         barrier = gauges.barrier[fence]
         capacity = gauges.capacity[barrier]
-        k = touches(c, work, low, high, fence) if capacity < math.inf else -1
+        k = touches(c, islands, low, high, fence) if capacity < math.inf else -1
         if k < 0:
             continue
         touched = True
-        set_passing(bodies, c, m, work, island, fence, p, counters)
+        set_passing(bodies, c, m, islands, rows, island, fence, p, counters)
         left, tolerance = capacity - gauges.absorbed[barrier], BREAK_TOLERANCE * capacity
-        taken = work_taken(c, m, work, low, high, fence)
-        taken += passed_on(c, work, low, high, fence, p.dt)
+        taken = work_taken(c, m, islands, low, high, fence)
+        taken += passed_on(c, islands, low, high, fence, p.dt)
         if taken > left + tolerance:
             if bodies[fence].status != RETIRED:
                 bodies[fence].status = RETIRED
@@ -202,8 +204,10 @@ def limit_fences(
                     gauges, counters[EVENTS], time, FAILED, bodies, c[k].a, barrier, c[k].x, c[k].y,
                     height,
                 )  # fmt: skip
-            break_through(bodies, c, m, work, island, fence, left, taken, tolerance, p, counters)
-        gauges.absorbed[barrier] += passed_on(c, work, low, high, fence, p.dt)
+            break_through(
+                bodies, c, m, islands, rows, island, fence, left, taken, tolerance, p, counters
+            )
+        gauges.absorbed[barrier] += passed_on(c, islands, low, high, fence, p.dt)
     return touched
 
 

@@ -7,7 +7,7 @@ import math
 from rigdda.constants import NEW_HIT_TIME, OPEN
 from rigdda.kernel import inlined, kernel
 from rigdda.motion import kinetic_energy
-from rigdda.records import Bodies, Contacts, Gauges, Work
+from rigdda.records import Bodies, Contacts, Gauges, Islands
 
 HIT, CROSSING, FAILED = 0, 1, 2
 """Kinds of event: a block touches a barrier; a block's centroid first passes a station; a block
@@ -46,12 +46,12 @@ def barrier_contact(gauges: Gauges, a: int, b: int) -> tuple[int, int]:
 
 @inlined
 def note_hits(
-    bodies: Bodies, c: Contacts, work: Work, low: int, high: int, gauges: Gauges, events: int,
+    bodies: Bodies, c: Contacts, islands: Islands, low: int, high: int, gauges: Gauges, events: int,
     time: float,
 ) -> int:  # fmt: skip
     """Write a hit for each barrier that a block touches anew; velocities still those before."""
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         i, barrier = barrier_contact(gauges, c[k].a, c[k].b)
         if barrier < 0 or c[k].state == OPEN:
             continue
@@ -64,7 +64,7 @@ def note_hits(
     return events
 
 
-@kernel
+@inlined
 def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> int:
     """Write a crossing for each station that a centroid first passes; watch energies."""
     stations = len(gauges.station)

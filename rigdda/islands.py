@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rigdda.constants import AWAKE
 from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contacts, Matrix, Work
+from rigdda.records import Bodies, Contacts, Ints, Islands, Matrix
 
 
 @kernel
@@ -47,67 +47,72 @@ def join_blocks(
 
 
 @kernel
-def find_islands(bodies: Bodies, c: Contacts, work: Work, blocks: int, apart: bool) -> int:
-    """List blocks and contacts island by island in `work`; the root is the smallest index.
+def find_islands(
+    bodies: Bodies, c: Contacts, begin: Ints, islands: Islands, blocks: int, apart: bool
+) -> int:
+    """List blocks and contacts island by island; the root is the smallest index.
 
-    Contacts come in order of their first body, so they are read once.
+    Contacts come in order of their first body, those of body a from begin[a], so they are read
+    once.
 
     Returns
     -------
     int
         Number of islands.
     """
-    parent, slot = work.parent, work.slot
-    join_blocks(bodies, c, work.begin[blocks], parent, blocks, apart)
-    islands = 0
-    for s in range(len(work.block_start)):
-        work.block_start[s] = work.contact_start[s] = 0
+    parent, slot = islands.parent, islands.slot
+    block_start, contact_start = islands.block_start, islands.contact_start
+    join_blocks(bodies, c, begin[blocks], parent, blocks, apart)
+    count = 0
+    for s in range(len(block_start)):
+        block_start[s] = contact_start[s] = 0
     # slot serves first as the number of the root's island
     for i in range(blocks):
         if bodies[i].status == AWAKE and root(parent, i) == i:
-            slot[i] = islands
-            islands += 1
+            slot[i] = count
+            count += 1
     for i in range(blocks):
         if bodies[i].status == AWAKE:
             s = slot[root(parent, i)]
-            work.block_start[s + 1] += 1
-            work.contact_start[s + 1] += work.begin[i + 1] - work.begin[i]
-    for s in range(islands):
-        work.block_start[s + 1] += work.block_start[s]
-        work.contact_start[s + 1] += work.contact_start[s]
-    _fill(bodies, work, blocks, islands)
-    return islands
+            block_start[s + 1] += 1
+            contact_start[s + 1] += begin[i + 1] - begin[i]
+    for s in range(count):
+        block_start[s + 1] += block_start[s]
+        contact_start[s + 1] += contact_start[s]
+    _fill(bodies, begin, islands, blocks, count)
+    return count
 
 
 @kernel
-def _fill(bodies: Bodies, work: Work, blocks: int, islands: int) -> None:
+def _fill(bodies: Bodies, begin: Ints, islands: Islands, blocks: int, count: int) -> None:
     """Write the items of each island in ascending order, then the slots of the blocks."""
-    parent, slot = work.parent, work.slot
+    parent, slot = islands.parent, islands.slot
+    block_start, contact_start = islands.block_start, islands.contact_start
     for i in range(blocks):
         if bodies[i].status == AWAKE:
             s = slot[root(parent, i)]
-            for k in range(work.begin[i], work.begin[i + 1]):
-                work.contact_item[work.contact_start[s]] = k
-                work.contact_start[s] += 1
-    for s in range(islands, 0, -1):
-        work.contact_start[s] = work.contact_start[s - 1]
-    work.contact_start[0] = 0
+            for k in range(begin[i], begin[i + 1]):
+                islands.contact_item[contact_start[s]] = k
+                contact_start[s] += 1
+    for s in range(count, 0, -1):
+        contact_start[s] = contact_start[s - 1]
+    contact_start[0] = 0
     for i in range(blocks):
         if bodies[i].status == AWAKE:
             s = slot[root(parent, i)]
-            work.block_item[work.block_start[s]] = i
-            work.block_start[s] += 1
-    for s in range(islands, 0, -1):
-        work.block_start[s] = work.block_start[s - 1]
-    work.block_start[0] = 0
-    for s in range(islands):
-        for place in range(work.block_start[s], work.block_start[s + 1]):
-            slot[work.block_item[place]] = place - work.block_start[s]
+            islands.block_item[block_start[s]] = i
+            block_start[s] += 1
+    for s in range(count, 0, -1):
+        block_start[s] = block_start[s - 1]
+    block_start[0] = 0
+    for s in range(count):
+        for place in range(block_start[s], block_start[s + 1]):
+            slot[islands.block_item[place]] = place - block_start[s]
 
 
 @kernel
 def pair_blocks(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, low: int, high: int
 ) -> tuple[int, bool]:
     """Assign the off-diagonal blocks of an island; contacts of a pair follow one another.
 
@@ -120,14 +125,14 @@ def pair_blocks(
     """
     pairs, last_a, last_b, grounded = 0, -1, -1, False
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         c[k].pair = -1
         if not joins(bodies, c, k):
             grounded = True
             continue
         if c[k].a != last_a or c[k].b != last_b:
             last_a, last_b = c[k].a, c[k].b
-            m.pair_i[pairs], m.pair_j[pairs] = work.slot[last_a], work.slot[last_b]
+            m.pair_i[pairs], m.pair_j[pairs] = islands.slot[last_a], islands.slot[last_b]
             pairs += 1
         c[k].pair = pairs - 1
     return pairs, grounded

@@ -58,9 +58,10 @@ from rigdda.records import (
     SWEEPS,
     Bodies,
     Contacts,
+    Islands,
     Matrix,
     Parameters,
-    Work,
+    Rows,
 )
 
 NONE, MOVED, LOCKED = 0, 1, 2
@@ -167,7 +168,7 @@ def next_state(
 
 @inlined
 def update_states(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, coupled: bool,
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, low: int, high: int, coupled: bool,
     one: bool, p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
     """Move every contact of an island to its next state; returns how many moved and are locked.
@@ -176,9 +177,9 @@ def update_states(
     """
     moved = locked = 0
     for item in range(low, high):
-        k = work.contact_item[item]
-        i = work.slot[c[k].a]
-        j = work.slot[c[k].b] if c[k].pair >= 0 else -1
+        k = islands.contact_item[item]
+        i = islands.slot[c[k].a]
+        j = islands.slot[c[k].b] if c[k].pair >= 0 else -1
         normal, shear, after = spring_forces(c, k, m, i, j, p.dt)
         sinking = -after - max(c[k].gap, 0.0) / p.dt  # what closes a gap is not driven in
         if c[k].state != OPEN and c[k].kind == REST and sinking > SHOCK_SPEED:
@@ -212,24 +213,24 @@ def solve_island(m: Matrix, n: int, pairs: int, p: Parameters) -> int:
 
 @kernel
 def solve_states(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, pairs: int, p: Parameters,
-    counters: NDArray,
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, pairs: int,
+    p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Iterate until no contact of the island changes; returns whether that was reached.
 
     Afterwards normal and shear of each contact hold its force, zero where it is open.
     """
-    b0, b1 = work.block_start[island], work.block_start[island + 1]
-    c0, c1 = work.contact_start[island], work.contact_start[island + 1]
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     n = b1 - b0
     small = n <= SMALL_ISLAND
     for s in range(n):
-        i = work.block_item[b0 + s]
+        i = islands.block_item[b0 + s]
         m.d[s, 0], m.d[s, 1] = bodies[i].vx * p.dt, bodies[i].vy * p.dt
         m.d[s, 2] = bodies[i].omega * p.dt
     few = 2 + (c1 - c0) // FEW_MOVING
     for iteration in range(PATIENCE * p.iterations):
-        assemble_island(bodies, c, m, work, island, pairs, p)
+        assemble_island(bodies, c, m, islands, island, pairs, p)
         counters[ITERATIONS] += 1
         if n == 1:
             solve_block(m.diagonal[0], m.rhs[0], m.d[0])
@@ -239,7 +240,7 @@ def solve_states(
             counters[SOLVES] += 1
             counters[SOLVER_ITERATIONS] += solve_island(m, n, pairs, p)
         one = small and iteration >= ONE_BY_ONE
-        moved, locked = update_states(bodies, c, m, work, c0, c1, small, one, p)
+        moved, locked = update_states(bodies, c, m, islands, c0, c1, small, one, p)
         if moved == 0:
             return locked == 0
         if iteration >= p.iterations - 1 and moved > few:
@@ -252,7 +253,8 @@ def relax(
     bodies: Bodies,
     c: Contacts,
     m: Matrix,
-    work: Work,
+    islands: Islands,
+    rows: Rows,
     island: int,
     p: Parameters,
     counters: NDArray,
@@ -260,15 +262,17 @@ def relax(
     fast: bool,
 ) -> None:
     """Find the forces of an island by relaxation, from those of the last step."""
-    b0, b1 = work.block_start[island], work.block_start[island + 1]
-    c0, c1 = work.contact_start[island], work.contact_start[island + 1]
-    assemble_blocks(bodies, m, work, b0, b1, p)
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    assemble_blocks(bodies, m, islands, b0, b1, p)
     counters[RELAXED] += 1
-    sweeps, substeps = relax_forces(bodies, c, m, work, c0, c1, b0, b1 - b0, speed, fast, p)
+    sweeps, substeps = relax_forces(
+        bodies, c, m, islands, rows, c0, c1, b0, b1 - b0, speed, fast, p
+    )
     counters[SWEEPS] += sweeps
     for item in range(c0, c1):
-        k = work.contact_item[item]
-        take_forces(c, k, work.row[work.place[item]], substeps)
+        k = islands.contact_item[item]
+        take_forces(c, k, rows.row[rows.place[item]], substeps)
         limit = c[k].cohesion + c[k].friction * max(c[k].normal, 0.0)
         within = limit > abs(c[k].shear)
         if c[k].bond > 0.0:
@@ -286,7 +290,7 @@ def relax(
 
 
 @kernel
-def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int) -> float:
+def impact_work(c: Contacts, m: Matrix, islands: Islands, low: int, high: int) -> float:
     """Return the work of the contact forces of an island in this step [J], supports left out.
 
     Friction that gives energy counts twice: to rebound out of a wedge a block would be pressed
@@ -294,11 +298,11 @@ def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int) -> floa
     """
     total = 0.0
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         if c[k].kind == BOLT or c[k].kind == PIN:
             continue
-        i = work.slot[c[k].a]
-        j = work.slot[c[k].b] if c[k].pair >= 0 else -1
+        i = islands.slot[c[k].a]
+        j = islands.slot[c[k].b] if c[k].pair >= 0 else -1
         dn = along(normal_row(c, k, True), m.d[i])
         ds = along(shear_row(c, k, True), m.d[i])
         if j >= 0:
@@ -309,38 +313,38 @@ def impact_work(c: Contacts, m: Matrix, work: Work, low: int, high: int) -> floa
 
 
 @kernel
-def island_speed(bodies: Bodies, work: Work, low: int, high: int) -> float:
+def island_speed(bodies: Bodies, islands: Islands, low: int, high: int) -> float:
     """Return the greatest speed of the blocks low:high [m/s]."""
     speed = 0.0
     for place in range(low, high):
-        speed = max(speed, top_speed(bodies, work.block_item[place]))
+        speed = max(speed, top_speed(bodies, islands.block_item[place]))
     return speed
 
 
 @kernel
-def is_waiting(bodies: Bodies, work: Work, low: int, high: int) -> bool:
+def is_waiting(bodies: Bodies, islands: Islands, low: int, high: int) -> bool:
     """Return whether one of the blocks low:high did not settle a moment ago."""
     waiting = False
     for place in range(low, high):
-        waiting = waiting or bodies[work.block_item[place]].wait > 0
+        waiting = waiting or bodies[islands.block_item[place]].wait > 0
     return waiting
 
 
 @kernel
-def is_bouncing(c: Contacts, work: Work, low: int, high: int) -> bool:
+def is_bouncing(c: Contacts, islands: Islands, low: int, high: int) -> bool:
     """Return whether one of the contacts low:high is an impact that asks for restitution."""
     for item in range(low, high):
-        k = work.contact_item[item]
+        k = islands.contact_item[item]
         if c[k].kind == IMPACT and c[k].bias > 0.0:
             return True
     return False
 
 
 @kernel
-def let_wait(bodies: Bodies, work: Work, low: int, high: int) -> None:
+def let_wait(bodies: Bodies, islands: Islands, low: int, high: int) -> None:
     """Let the island of the blocks low:high be relaxed for a while before it is solved again."""
     for place in range(low, high):
-        bodies[work.block_item[place]].wait = WAIT_STEPS
+        bodies[islands.block_item[place]].wait = WAIT_STEPS
 
 
 @kernel
@@ -348,7 +352,8 @@ def open_close(
     bodies: Bodies,
     c: Contacts,
     m: Matrix,
-    work: Work,
+    islands: Islands,
+    rows: Rows,
     island: int,
     p: Parameters,
     counters: NDArray,
@@ -363,29 +368,29 @@ def open_close(
     bool
         Whether they settled; a large island that did not is taken as it is.
     """
-    c0, c1 = work.contact_start[island], work.contact_start[island + 1]
-    pairs, grounded = pair_blocks(bodies, c, m, work, c0, c1)
-    bouncing = is_bouncing(c, work, c0, c1)
-    b0, b1 = work.block_start[island], work.block_start[island + 1]
-    speed = island_speed(bodies, work, b0, b1)
-    waiting = is_waiting(bodies, work, b0, b1)
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    pairs, grounded = pair_blocks(bodies, c, m, islands, c0, c1)
+    bouncing = is_bouncing(c, islands, c0, c1)
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    speed = island_speed(bodies, islands, b0, b1)
+    waiting = is_waiting(bodies, islands, b0, b1)
     small, quiet, settled = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED, True
     relaxing = waiting if quiet else not small
     fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
-            relaxing = not solve_states(bodies, c, m, work, island, pairs, p, counters)
+            relaxing = not solve_states(bodies, c, m, islands, island, pairs, p, counters)
             settled = settled and not (relaxing and small)
             if relaxing and not small:
-                let_wait(bodies, work, b0, b1)
+                let_wait(bodies, islands, b0, b1)
         if relaxing:
-            relax(bodies, c, m, work, island, p, counters, speed, fast)
+            relax(bodies, c, m, islands, rows, island, p, counters, speed, fast)
         # a cluster in flight keeps its angular momentum: its impulses act at one time
-        work.relaxed[0] = int(fast and grounded)
-        if not bouncing or impact_work(c, m, work, c0, c1) <= 0.0:
+        islands.relaxed[0] = int(fast and grounded)
+        if not bouncing or impact_work(c, m, islands, c0, c1) <= 0.0:
             return settled
         for item in range(c0, c1):
-            k = work.contact_item[item]
+            k = islands.contact_item[item]
             c[k].flips = 0
             if c[k].kind == IMPACT:
                 c[k].bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0

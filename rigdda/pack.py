@@ -33,17 +33,22 @@ from rigdda.records import (
     BOX,
     CONTACT,
     CORNER,
+    INTERFACE,
     LINK,
+    PARAMETERS,
     POLYGON,
     Bodies,
+    Boxes,
     Contacts,
     Floats,
     Gauges,
     Ground,
+    Interfaces,
+    Islands,
     Links,
     Matrix,
     Outlines,
-    Parameters,
+    Rows,
     Shaking,
     Work,
 )
@@ -70,6 +75,7 @@ class Arrays(NamedTuple):
     bodies: Bodies
     outlines: Outlines
     ground: Ground
+    interfaces: Interfaces
     links: Links
     shaking: Shaking
     now: Contacts
@@ -77,7 +83,7 @@ class Arrays(NamedTuple):
     matrix: Matrix
     work: Work
     gauges: Gauges
-    parameters: tuple[Parameters, ...]  # of the step, then of its halves, quarters, ...
+    parameters: NDArray[np.void]  # of PARAMETERS: of the step, then of its halves, quarters, ...
 
 
 def pack(
@@ -99,19 +105,20 @@ def pack(
     bodies, outlines = pack_bodies(scene, names)
     blocks = free_bodies(scene)
     room = 16 * blocks + 64
-    parameters = pack_parameters(scene, settings, bodies, names)
+    interfaces = pack_interfaces(scene, names)
     return Arrays(
         bodies,
         outlines,
         pack_ground(scene, names),
+        interfaces,
         pack_links(scene, bodies),
         pack_shaking(scene),
         empty_contacts(room),
         empty_contacts(room),
         empty_matrix(blocks, room),
-        empty_work(len(bodies), room),
+        empty_work(len(bodies), blocks, room),
         pack_gauges(scene, bodies, stations, watch),
-        tuple(parameters._replace(dt=settings.dt / 2**level) for level in range(CUTS + 1)),
+        pack_parameters(scene, settings, bodies, interfaces),
     )
 
 
@@ -225,9 +232,6 @@ def pack_outlines(polygons: list[Floats], centres: list[Floats], bodies: Bodies)
         world_y=np.zeros(shape),
         normal_x=np.zeros(shape),
         normal_y=np.zeros(shape),
-        middle_x=np.zeros(len(rows)),
-        middle_y=np.zeros(len(rows)),
-        inside=np.zeros(len(rows)),
         polygon=outlined.view(np.recarray),
         corner=corners.view(np.recarray),
     )
@@ -293,8 +297,7 @@ def empty_matrix(blocks: int, room: int) -> Matrix:
         np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
-        np.zeros((blocks + 1, 3)),
-        np.zeros((blocks + 1, 9)),
+        np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
         np.zeros(blocks, dtype=np.int64),
         np.zeros(3 * blocks, dtype=np.int64),
@@ -308,42 +311,46 @@ def profile_room(blocks: int) -> int:
     return 9 * blocks * min(blocks, MOST_BANDWIDTH)
 
 
-def empty_work(bodies: int, room: int) -> Work:
+def empty_work(bodies: int, blocks: int, room: int) -> Work:
     """Return the scratch arrays of a step."""
 
     def whole(n: int) -> NDArray[np.int64]:
         return np.zeros(n, dtype=np.int64)
 
+    row = np.zeros(bodies, BOX).view(np.recarray)
+    row["body"] = np.arange(bodies)
     return Work(
-        np.zeros(bodies),
-        np.zeros(bodies),
-        np.zeros(bodies),
-        np.zeros(bodies),
-        np.zeros(bodies),
-        np.arange(bodies),
-        np.zeros(bodies, BOX).view(np.recarray),
-        whole(2 * room),
-        whole(bodies + 1),
-        whole(room),
-        whole(bodies),
-        whole(bodies),
-        whole(bodies + 1),
-        whole(bodies),
-        whole(bodies + 1),
-        whole(room),
-        whole(bodies + 1),
-        whole(bodies + 1),
-        np.zeros(room),
-        np.zeros((room, COLUMNS)),
-        whole(room),
-        whole(room),
-        whole(bodies + 1),
-        whole(room),
-        whole(room),
-        whole(1),
-        whole(room),
-        whole(LAYERS + 1),
-        np.zeros(2),
+        Boxes(
+            swept=row.copy(),
+            row=row,
+            pairs=whole(2 * room),
+            partner_start=whole(bodies + 1),
+            partner=whole(room),
+        ),
+        Islands(
+            parent=whole(bodies),
+            slot=whole(bodies),
+            block_start=whole(bodies + 1),
+            block_item=whole(bodies),
+            contact_start=whole(bodies + 1),
+            contact_item=whole(room),
+            relaxed=whole(1),
+        ),
+        Rows(
+            row=np.zeros((room, COLUMNS)),
+            row_i=whole(room),
+            row_j=whole(room),
+            idle=whole(room),
+            visit=whole(room),
+            place=whole(room),
+            height=np.zeros(room),
+            layer=whole(LAYERS + 1),
+            moved_in=whole(blocks + 1),
+            scale=np.zeros((blocks + 1, 3)),
+            motion=np.zeros((blocks + 1, 9)),
+        ),
+        first=whole(bodies + 1),
+        begin=whole(bodies + 1),
     )
 
 
@@ -392,10 +399,29 @@ def check_step(settings: Settings, block: int, size: float, gravity: float) -> N
         raise BadInput("dt", settings.dt, mend + f"{fall:.2g} m more in every step")
 
 
+def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
+    """Return how each two surfaces meet.
+
+    Fences, which come last, are of the surface of barriers, but plastic and without strength.
+    """
+    fences = any(isinstance(b, Fence) for b in scene.barriers)
+    every = [*names, scene.barrier_surface] if fences else names
+    found = np.zeros((len(every), len(every)), dtype=INTERFACE)
+    for i, a in enumerate(every):
+        for j, b in enumerate(every):
+            surface = scene.interface(a, b)
+            found["friction"][i, j] = np.tan(np.radians(surface.friction_deg))
+            if max(i, j) < len(names):
+                plain = surface.restitution is None
+                found["restitution"][i, j] = PLAIN_CONTACT if plain else surface.restitution
+                found["cohesion"][i, j], found["tension"][i, j] = surface.cohesion, surface.tension
+    return found.view(np.recarray)
+
+
 def pack_parameters(
-    scene: Scene, settings: Settings, bodies: Bodies, names: list[str]
-) -> Parameters:
-    """Return the numbers of the scene and the settings."""
+    scene: Scene, settings: Settings, bodies: Bodies, interfaces: Interfaces
+) -> NDArray[np.void]:
+    """Return the numbers of the scene and the settings, for the step and for its parts."""
     free = [i for i, b in enumerate(scene.blocks) if not b.fixed]
     area = [bodies["mass"][i] / scene.blocks[i].density for i in free]
     size = math.sqrt(np.mean(area))
@@ -403,56 +429,46 @@ def pack_parameters(
     gravity = math.hypot(gx, gy)
     check_step(settings, free[int(np.argmin(area))], math.sqrt(min(area)), gravity)
     steady = STEADY_STEP * math.sqrt(size / gravity) if gravity > 0.0 else math.inf
-    coarse = settings.dt > steady and settings.mode == "dynamic"
-    shaken = scene.base_motion is not None
     static = settings.mode == "static"
-    weight = np.mean(bodies["mass"][free]) * (gravity or 9.81)
-    pairs = [[scene.interface(a, b) for b in names] for a in names]
-    friction, cohesion, tension = (
-        np.array([[getattr(s, name) for s in row] for row in pairs])
-        for name in ("friction_deg", "cohesion", "tension")
-    )
-    restitution = np.array(
-        [[PLAIN_CONTACT if s.restitution is None else s.restitution for s in row] for row in pairs]
-    )
-    if any(isinstance(b, Fence) for b in scene.barriers):
-        # fences are of the surface of barriers, but plastic
-        same = [*range(len(names)), names.index(scene.barrier_surface)]
-        friction, restitution = friction[np.ix_(same, same)], np.pad(restitution, ((0, 1), (0, 1)))
-        cohesion, tension = (np.pad(s, ((0, 1), (0, 1))) for s in (cohesion, tension))
-    if scene.terrain is None or gx != 0.0 or gy >= 0.0:
-        floor = -np.inf
-    else:
+    coarse = settings.dt > steady and not static
+    shaken = scene.base_motion is not None
+    floor = -np.inf
+    if scene.terrain is not None and gx == 0.0 and gy < 0.0:
         floor = scene.terrain.points[:, 1].min() - FALL_BELOW
-    return Parameters(
-        free_bodies(scene),
-        settings.dt,
-        settings.displacement_limit * size,
-        math.inf if static else DEFLECTED * size,
-        SINKING * size if coarse else math.inf,
-        min(max(1, round(math.log2(settings.dt / steady))), CUTS) if coarse else 1,
-        gx,
-        gy,
-        gravity,
-        scene.damping,
-        scene.damping_when == "contact",
-        float(weight),
-        settings.penetration or PENETRATION_RATIO * size,
-        SLACK_RATIO * size,
-        settings.tolerance,
-        settings.sweep_tolerance,
-        settings.open_close_iterations,
-        static,
-        settings.post_correction,
-        settings.islands,
-        SOLVERS.index(settings.solver),
-        settings.relaxation,
-        settings.sleeping and not (static or shaken or scene.supports),
-        settings.timing,
-        float(floor),
-        np.tan(np.radians(friction)),
-        bool((cohesion + tension).any()),
-        cohesion,
-        tension,
-        restitution,
-    )
+    numbers = {
+        "blocks": free_bodies(scene),
+        "displacement_limit": settings.displacement_limit * size,
+        "deflection_limit": math.inf if static else DEFLECTED * size,
+        "sinking_limit": SINKING * size if coarse else math.inf,
+        "first_cut": 1,
+        "gravity_x": gx,
+        "gravity_y": gy,
+        "gravity": gravity,
+        "field_x": gx,
+        "field_y": gy,
+        "damping": scene.damping,
+        "damping_in_contact_only": scene.damping_when == "contact",
+        "block_weight": np.mean(bodies["mass"][free]) * (gravity or 9.81),
+        "penetration": settings.penetration or PENETRATION_RATIO * size,
+        "slack": SLACK_RATIO * size,
+        "tolerance": settings.tolerance,
+        "sweep_tolerance": settings.sweep_tolerance,
+        "iterations": settings.open_close_iterations,
+        "static": static,
+        "post_correction": settings.post_correction,
+        "islands": settings.islands,
+        "solver": SOLVERS.index(settings.solver),
+        "relaxation": settings.relaxation,
+        "sleeping": settings.sleeping and not (static or shaken or scene.supports),
+        "timing": settings.timing,
+        "floor": floor,
+        "bonded": (interfaces["cohesion"] + interfaces["tension"]).any(),
+    }
+    if coarse:
+        halvings = round(math.log2(settings.dt / steady))
+        numbers["first_cut"] = min(max(1, halvings), CUTS)
+    levels = np.zeros(CUTS + 1, dtype=PARAMETERS)
+    for name, value in numbers.items():
+        levels[name] = value
+    levels["dt"] = settings.dt / 2.0 ** np.arange(CUTS + 1)
+    return levels.view(np.recarray)

@@ -7,7 +7,7 @@ corners of a polygon. S: terrain segments. C: room for contacts.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ BODY = _record(
     radius=float,  # of the circumscribed circle about the centroid [m]
     quiet=float,  # time it has been quiet [s]
     lately=float,  # greatest speed of a point of it of late, see broad_phase [m/s]
+    path=float,  # longest way of any point of it in this step, undeflected [m]
     count=int,  # corners
     part=int,  # first polygon of its convex parts: itself where it is convex
     parts=int,  # number of them
@@ -116,17 +117,65 @@ BOX = _record(
 )
 """Swept box of a body."""
 
+INTERFACE = _record(
+    friction=float,  # tan phi
+    cohesion=float,  # [Pa]
+    tension=float,  # [Pa]
+    restitution=float,  # PLAIN_CONTACT: the paper's penalty contact
+)
+"""How two surfaces meet."""
+
+PARAMETERS = _record(
+    blocks=int,  # bodies that may move: the blocks of the scene and its gravity walls
+    dt=float,
+    displacement_limit=float,  # of a corner off its straight path, before a cut-back [m]
+    deflection_limit=float,  # of the way of a corner over its path, before a cut-back [m]
+    sinking_limit=float,  # of a contact in a step, before a cut-back [m]; inf where steps are fine
+    first_cut=int,  # least halvings of a step that is cut back
+    gravity_x=float,  # [m/s2]
+    gravity_y=float,
+    gravity=float,  # its magnitude
+    field_x=float,  # acceleration of free blocks in this step, of gravity and the ground [m/s2]
+    field_y=float,
+    damping=float,
+    damping_in_contact_only=bool,
+    block_weight=float,  # mean of the free blocks [N]
+    penetration=float,
+    slack=float,
+    tolerance=float,
+    sweep_tolerance=float,  # [m/s]
+    iterations=int,
+    static=bool,
+    post_correction=bool,
+    islands=bool,
+    solver=int,  # AUTO, PCG, BLOCK_PCG, SOR, DIRECT
+    relaxation=float,
+    sleeping=bool,
+    timing=bool,
+    floor=float,  # a centroid below it is retired [m]
+    bonded=bool,  # whether a surface has cohesion or tension
+)
+"""Numbers of the scene and the settings."""
+
 Bodies = NDArray[np.void]
 """(M,) array of BODY."""
 Contacts = NDArray[np.void]
 """(C,) array of CONTACT."""
 Links = NDArray[np.void]
 """Array of LINK in order of a."""
-
+Interfaces = NDArray[np.void]
+"""(surfaces, surfaces) array of INTERFACE."""
+Box = Any
+"""One BOX."""
+Parameters = Any
+"""One PARAMETERS: of a step, or of its half, quarter, ..., for islands that are cut back."""
 
 POLYGON = _record(
     count=int,  # corners
     body=int,
+    middle_x=float,  # mean of the corners now [m]
+    middle_y=float,
+    inside=float,  # radius of the circle about it that touches the nearest edge [m]
 )
 """One outline or convex part."""
 
@@ -150,9 +199,6 @@ class Outlines(NamedTuple):
     world_y: Floats
     normal_x: Floats  # (R, P) outward unit normal of the edge that starts at the corner
     normal_y: Floats
-    middle_x: Floats  # (R,) mean of the corners now [m]
-    middle_y: Floats
-    inside: Floats  # (R,) radius of the circle about it that touches the nearest edge [m]
     polygon: NDArray[np.void]  # (R,) of POLYGON
     corner: NDArray[np.void]  # (R, P) of CORNER
 
@@ -187,8 +233,7 @@ class Matrix(NamedTuple):
     residual: Floats  # (N, 3) and the vectors of conjugate gradients
     direction: Floats
     product: Floats
-    scaled: Floats  # (N + 1, 3)
-    motion: Floats  # (N + 1, 9) displacements in substeps, see linear.relaxation
+    scaled: Floats
     late: Floats  # (N, 3) displacements besides d, where forces act early or late in the step
     first: Ints  # (N,) leftmost block of a row, or head of its chain of neighbours
     row: Ints  # (3 N,) place in `factor` of column 0 of a scalar row
@@ -196,38 +241,52 @@ class Matrix(NamedTuple):
     next: Ints  # (2 pairs,) next entry in a chain of neighbours, -1 at its end
 
 
-class Work(NamedTuple):
-    """Scratch arrays of a step."""
+class Boxes(NamedTuple):
+    """Swept boxes of the bodies, and the pairs of bodies whose boxes overlap."""
 
-    low_x: Floats  # (M,) swept boxes [m]
-    high_x: Floats
-    low_y: Floats
-    high_y: Floats
-    path: Floats  # (M,) longest way of any point of an awake body in this step, undeflected [m]
-    sorted: Ints  # (M,) bodies by low_x, kept over steps
-    box: NDArray[np.void]  # (M,) of BOX in this order
+    swept: NDArray[np.void]  # (M,) of BOX
+    row: NDArray[np.void]  # (M,) the same in order of low_x, kept over steps
     pairs: Ints  # (2 C,) candidate pairs of bodies
     partner_start: Ints  # (M + 1,) second bodies of the pairs by their first one
     partner: Ints  # (C,)
+
+
+class Islands(NamedTuple):
+    """Blocks and contacts island by island."""
+
     parent: Ints  # (M,) union-find
     slot: Ints  # (M,) place of a body in its island's matrix
     block_start: Ints  # (M + 1,) blocks of each island
     block_item: Ints
     contact_start: Ints  # (M + 1,) contacts of each island
     contact_item: Ints
-    first: Ints  # (M + 1,) first contact of each body a in the last step
-    begin: Ints  # (M + 1,) the same in this step
-    height: Floats  # (C,) of the contacts of an island [m]
-    row: Floats  # (C, columns) contacts of one island, see linear.relaxation
+    relaxed: Ints  # (1,) 1 if the forces of the island in work are those of relaxation
+
+
+class Rows(NamedTuple):
+    """Contacts of one island in relaxation and the motion of its blocks, see linear.relaxation."""
+
+    row: Floats  # (C, columns)
     row_i: Ints  # (C,) slots of their bodies
     row_j: Ints
-    moved_in: Ints  # (M + 1,) last sweep in which a slot moved
     idle: Ints  # (C,) substep until which a contact cannot close
     visit: Ints  # (C,) contacts that a sweep visits
-    relaxed: Ints  # (1,) 1 if the forces of the island in work are those of relaxation
-    place: Ints  # (C,) row of each contact of an island
-    layer: Ints  # (LAYERS + 1,) contacts of an island below a height
-    field: Floats  # (2,) acceleration of free blocks in this step [m/s2]
+    place: Ints  # (C,) row of each contact
+    height: Floats  # (C,) of each contact [m]
+    layer: Ints  # (LAYERS + 1,) contacts below a height
+    moved_in: Ints  # (N + 1,) last sweep in which a slot moved
+    scale: Floats  # (N + 1, 3) displacement per unit of `motion` [m]
+    motion: Floats  # (N + 1, 9) displacements in substeps
+
+
+class Work(NamedTuple):
+    """Scratch arrays of a step, by what they are for: kernels are handed no more than they use."""
+
+    boxes: Boxes
+    islands: Islands
+    rows: Rows
+    first: Ints  # (M + 1,) first contact of each body a in the last step
+    begin: Ints  # (M + 1,) the same in this step
 
 
 class Gauges(NamedTuple):
@@ -255,41 +314,6 @@ class Shaking(NamedTuple):
     y: Floats
     sum_x: Floats  # (K,) integrals up to then [m/s]
     sum_y: Floats
-
-
-class Parameters(NamedTuple):
-    """Numbers of the scene and the settings."""
-
-    blocks: int  # bodies that may move: the blocks of the scene and its gravity walls
-    dt: float
-    displacement_limit: float  # of a corner off its straight path, before a cut-back [m]
-    deflection_limit: float  # of the way of a corner over its path, before a cut-back [m]
-    sinking_limit: float  # of a contact in a step, before a cut-back [m]; inf where steps are fine
-    first_cut: int  # least halvings of a step that is cut back
-    gravity_x: float  # [m/s2]
-    gravity_y: float
-    gravity: float  # its magnitude
-    damping: float
-    damping_in_contact_only: bool
-    block_weight: float  # mean of the free blocks [N]
-    penetration: float
-    slack: float
-    tolerance: float
-    sweep_tolerance: float  # [m/s]
-    iterations: int
-    static: bool
-    post_correction: bool
-    islands: bool
-    solver: int  # AUTO, PCG, BLOCK_PCG, SOR, DIRECT
-    relaxation: float
-    sleeping: bool
-    timing: bool
-    floor: float  # a centroid below it is retired [m]
-    friction: Floats  # (surfaces, surfaces) tan phi
-    bonded: bool  # whether a surface has cohesion or tension
-    cohesion: Floats  # [Pa]
-    tension: Floats
-    restitution: Floats  # PLAIN_CONTACT: the paper's penalty contact
 
 
 LEDGER = ("friction", "impact", "damping", "external", "links")

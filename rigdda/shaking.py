@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rigdda.kernel import kernel
-from rigdda.records import Floats, Parameters, Shaking, Work
+from rigdda.records import Floats, Parameters, Shaking
 
 
 @kernel
@@ -26,12 +26,10 @@ def velocity(t: Floats, a: Floats, total: Floats, time: float) -> float:
 
 
 @kernel
-def set_field(work: Work, shaking: Shaking, start: float, end: float, p: Parameters) -> None:
+def set_field(shaking: Shaking, start: float, end: float, p: Parameters) -> None:
     """Set the acceleration of free blocks relative to the ground, averaged over a step."""
-    work.field[0], work.field[1] = p.gravity_x, p.gravity_y
-    if len(shaking.time) > 0:
-        t, x, y = shaking.time, shaking.x, shaking.y
-        gain_x = velocity(t, x, shaking.sum_x, end) - velocity(t, x, shaking.sum_x, start)
-        gain_y = velocity(t, y, shaking.sum_y, end) - velocity(t, y, shaking.sum_y, start)
-        work.field[0] -= gain_x / (end - start)
-        work.field[1] -= gain_y / (end - start)
+    t, x, y = shaking.time, shaking.x, shaking.y
+    gain_x = velocity(t, x, shaking.sum_x, end) - velocity(t, x, shaking.sum_x, start)
+    gain_y = velocity(t, y, shaking.sum_y, end) - velocity(t, y, shaking.sum_y, start)
+    p.field_x = p.gravity_x - gain_x / (end - start)
+    p.field_y = p.gravity_y - gain_y / (end - start)

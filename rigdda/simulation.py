@@ -328,6 +328,7 @@ class Simulation:
                 a.bodies,
                 a.outlines,
                 a.ground,
+                a.interfaces,
                 a.links,
                 a.shaking,
                 self._now,
@@ -444,16 +445,14 @@ class Simulation:
         self._counters[EVENTS] = 0
 
     def _grow(self) -> None:
-        room = 2 * len(self._now)
-        bodies = self._arrays.bodies
+        room, bodies = 2 * len(self._now), self._arrays.bodies
+        blocks = self._arrays.parameters[0].blocks
         grown = empty_contacts(room)
         grown[: len(self._now)] = self._now
         self._now, self._before = grown, empty_contacts(room)
-        work = self._arrays.work
-        self._arrays = self._arrays._replace(
-            matrix=empty_matrix(self._arrays.parameters[0].blocks, room),
-            work=empty_work(len(bodies), room)._replace(sorted=work.sorted, begin=work.begin),
-        )
+        work, before = empty_work(len(bodies), blocks, room), self._arrays.work
+        work.boxes.row[:], work.begin[:] = before.boxes.row, before.begin
+        self._arrays = self._arrays._replace(matrix=empty_matrix(blocks, room), work=work)
 
 
 def simulate_many(

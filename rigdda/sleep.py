@@ -5,7 +5,7 @@ from __future__ import annotations
 from rigdda.constants import ASLEEP, AWAKE, SLEEP_SPEED, SLEEP_TIME, WAKE_SPEED
 from rigdda.kernel import kernel
 from rigdda.motion import top_speed
-from rigdda.records import Bodies, Parameters, Work
+from rigdda.records import Bodies, Ints, Islands, Parameters
 
 
 @kernel
@@ -21,11 +21,11 @@ def wake_island(bodies: Bodies, island: int, blocks: int) -> int:
 
 
 @kernel
-def wake_neighbours(bodies: Bodies, work: Work, pairs: int, blocks: int) -> int:
+def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int:
     """Wake the islands of sleeping bodies paired with a moving one; returns how many bodies."""
     woken = 0
-    for q in range(pairs):
-        i, j = work.pairs[2 * q], work.pairs[2 * q + 1]
+    for q in range(count):
+        i, j = pairs[2 * q], pairs[2 * q + 1]
         if bodies[j].status != ASLEEP or top_speed(bodies, i) < WAKE_SPEED:
             continue
         woken += wake_island(bodies, bodies[j].island, blocks)
@@ -33,19 +33,19 @@ def wake_neighbours(bodies: Bodies, work: Work, pairs: int, blocks: int) -> int:
 
 
 @kernel
-def watch_quiet(bodies: Bodies, work: Work, islands: int, p: Parameters) -> None:
+def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> None:
     """Count how long blocks have been quiet and put wholly quiet islands to sleep."""
-    for s in range(islands):
+    for s in range(count):
         least = 1e300
-        for place in range(work.block_start[s], work.block_start[s + 1]):
-            i = work.block_item[place]
+        for place in range(islands.block_start[s], islands.block_start[s + 1]):
+            i = islands.block_item[place]
             quiet = bodies[i].touching == 1 and top_speed(bodies, i) < SLEEP_SPEED
             bodies[i].quiet = bodies[i].quiet + p.dt if quiet else 0.0
             least = min(least, bodies[i].quiet)
         if least < SLEEP_TIME:
             continue
-        for place in range(work.block_start[s], work.block_start[s + 1]):
-            i = work.block_item[place]
+        for place in range(islands.block_start[s], islands.block_start[s + 1]):
+            i = islands.block_item[place]
             bodies[i].status = ASLEEP
-            bodies[i].island = work.block_item[work.block_start[s]]
+            bodies[i].island = islands.block_item[islands.block_start[s]]
             bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0

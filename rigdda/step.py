@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.clock import lap
@@ -53,10 +54,14 @@ from rigdda.records import (
     OPEN_CLOSE,
     STEPS,
     Bodies,
+    Boxes,
     Contacts,
+    Floats,
     Gauges,
     Ground,
+    Interfaces,
     Ints,
+    Islands,
     Links,
     Matrix,
     Outlines,
@@ -69,24 +74,24 @@ from rigdda.sleep import wake_neighbours, watch_quiet
 
 
 @kernel
-def candidate_pairs(bodies: Bodies, outlines: Outlines, work: Work, p: Parameters) -> bool:
+def candidate_pairs(bodies: Bodies, x: Floats, y: Floats, boxes: Boxes, p: Parameters) -> bool:
     """List the bodies that each awake one may touch in this step; returns whether they fit."""
-    pairs = sweep_and_prune(bodies, outlines, work, p)
-    if pairs > 0 and p.sleeping and wake_neighbours(bodies, work, pairs, p.blocks) > 0:
-        pairs = sweep_and_prune(bodies, outlines, work, p)
+    pairs = sweep_and_prune(bodies, x, y, boxes, p)
+    if pairs > 0 and p.sleeping and wake_neighbours(bodies, boxes.pairs, pairs, p.blocks) > 0:
+        pairs = sweep_and_prune(bodies, x, y, boxes, p)
     if pairs < 0:
         return False
-    partners_of_bodies(work, pairs)
+    partners_of_bodies(boxes, pairs)
     return True
 
 
 @kernel
 def keep_asleep(
-    bodies: Bodies, c: Contacts, count: int, old: Contacts, work: Work, a: int, gauges: Gauges,
+    bodies: Bodies, c: Contacts, count: int, old: Contacts, first: Ints, a: int, gauges: Gauges,
     time: float,
 ) -> int:  # fmt: skip
     """Keep the contacts of sleeping block a with what is still; returns the new number."""
-    for m in range(work.first[a], work.first[a + 1]):
+    for m in range(first[a], first[a + 1]):
         b = old[m].b
         if count < len(c) and (b == TERRAIN or bodies[b].status != AWAKE):
             copy_contact(c, count, old, m)
@@ -98,9 +103,9 @@ def keep_asleep(
 
 
 @kernel
-def keep_held(c: Contacts, count: int, old: Contacts, work: Work, a: int) -> int:
+def keep_held(c: Contacts, count: int, old: Contacts, first: Ints, a: int) -> int:
     """Keep the contacts of block a, which has taken its step; returns the new number."""
-    for k in range(work.first[a], work.first[a + 1]):
+    for k in range(first[a], first[a + 1]):
         if count < len(c):
             c[count] = old[k]
             count += 1
@@ -109,8 +114,8 @@ def keep_held(c: Contacts, count: int, old: Contacts, work: Work, a: int) -> int
 
 @stage
 def collide_block(
-    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, count: int, old: Contacts,
-    work: Work, a: int, start: bool, p: Parameters, deepest: NDArray,
+    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, c: Contacts,
+    count: int, old: Contacts, work: Work, a: int, start: bool, p: Parameters, deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write the contacts of awake block a with the terrain and with its partners.
 
@@ -119,19 +124,19 @@ def collide_block(
     int
         The new number of contacts; -1 if they do not fit.
     """
-    first, room = count, len(c) - outlines.world_x.shape[1] - 4
-    count = collide_terrain(bodies, outlines, ground, work, c, count, a, p)
-    for q in range(work.partner_start[a], work.partner_start[a + 1]):
+    first, room, boxes = count, len(c) - outlines.world_x.shape[1] - 4, work.boxes
+    count = collide_terrain(bodies, outlines, ground, boxes.swept[a], c, count, a, p)
+    for q in range(boxes.partner_start[a], boxes.partner_start[a + 1]):
         if count < 0 or count > room:
             return -1
-        count = collide_pair(bodies, outlines, work, c, count, a, work.partner[q], p)
+        count = collide_pair(bodies, outlines, c, count, a, boxes.partner[q], p)
     if count < 0 or count > room:
         return -1
     recall(c, first, count, old, work.first, p.slack)
     if p.bonded and start:
         bond_joints(c, first, count, p)
     for k in range(first, count):
-        prepare(bodies, c, k, work, start, p)
+        prepare(bodies, c, k, interfaces, start, p)
         deepest[0] = max(deepest[0], -c[k].gap)
     strike_at_once(bodies, c, first, count, p)
     return count
@@ -146,13 +151,13 @@ def copy_index(index: Ints, to: Ints) -> None:
 
 @stage
 def detect(
-    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, c: Contacts, old: Contacts,
-    work: Work, gauges: Gauges, time: float, p: Parameters, counters: NDArray,
-    deepest: NDArray,
+    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
+    c: Contacts, old: Contacts, work: Work, gauges: Gauges, time: float, p: Parameters,
+    counters: NDArray, deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
     since = lap(counters, BROAD_PHASE, 0, p.timing)
-    if not candidate_pairs(bodies, outlines, work, p):
+    if not candidate_pairs(bodies, outlines.world_x, outlines.world_y, work.boxes, p):
         return -1
     since = lap(counters, BROAD_PHASE, since, p.timing)
     start = time <= 1.5 * p.dt
@@ -164,7 +169,7 @@ def detect(
             link += 1
         if bodies[a].status == AWAKE:
             count = collide_block(
-                bodies, outlines, ground, c, count, old, work, a, start, p, deepest
+                bodies, outlines, ground, interfaces, c, count, old, work, a, start, p, deepest
             )
             if count < 0 or count + link - low_link > len(c):
                 return -1
@@ -172,9 +177,9 @@ def detect(
                 add_link(bodies, links, q, c, count, p)
                 count += 1
         elif bodies[a].status == ASLEEP:
-            count = keep_asleep(bodies, c, count, old, work, a, gauges, time)
+            count = keep_asleep(bodies, c, count, old, work.first, a, gauges, time)
         elif bodies[a].status == HELD:
-            count = keep_held(c, count, old, work, a)
+            count = keep_held(c, count, old, work.first, a)
     work.begin[p.blocks] = count
     lap(counters, NARROW_PHASE, since, p.timing)
     return count
@@ -192,28 +197,28 @@ def retire(bodies: Bodies, i: int) -> float:
 
 @stage
 def move_island(
-    bodies: Bodies, outlines: Outlines, c: Contacts, m: Matrix, work: Work, island: int,
+    bodies: Bodies, outlines: Outlines, c: Contacts, m: Matrix, islands: Islands, island: int,
     struck: bool, gauges: Gauges, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
-    c0, c1 = work.contact_start[island], work.contact_start[island + 1]
-    b0, b1 = work.block_start[island], work.block_start[island + 1]
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     bad = -1
     for s in range(b1 - b0):
-        i = work.block_item[b0 + s]
+        i = islands.block_item[b0 + s]
         bodies[i].touching = 0
-        account_block(bodies, m, work, i, s, p, ledger)
+        account_block(bodies, m, i, s, p, ledger)
     for item in range(c0, c1):
-        k = work.contact_item[item]
-        keep_memory(c, k, struck, work.relaxed[0] == 1)
+        k = islands.contact_item[item]
+        keep_memory(c, k, struck, islands.relaxed[0] == 1)
         if c[k].state == OPEN:
             continue
-        account_contact(c, k, m, work, ledger, gauges)
+        account_contact(c, k, m, islands, ledger, gauges)
         bodies[c[k].a].touching = 1
         if c[k].b >= 0:
             bodies[c[k].b].touching = 1
     for s in range(b1 - b0):
-        i = work.block_item[b0 + s]
+        i = islands.block_item[b0 + s]
         bodies[i].wait = max(bodies[i].wait - 1, 0)
         move_block(bodies, i, m, s, p.dt)
         if not top_speed(bodies, i) < SPEED_LIMIT:
@@ -247,35 +252,36 @@ def solve_and_move(
         none.
     """
     since = lap(counters, MOTION, 0, p.timing)
-    islands = find_islands(bodies, c, work, p.blocks, p.islands)
+    islands, rows = work.islands, work.rows
+    found = find_islands(bodies, c, work.begin, islands, p.blocks, p.islands)
     bad, excess = -1, 0.0
-    for s in range(islands):
-        c0, c1 = work.contact_start[s], work.contact_start[s + 1]
+    for s in range(found):
+        c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
         if c1 > c0:
             since = lap(counters, MOTION, since, p.timing)
-            settled = open_close(bodies, c, m, work, s, p, counters)
+            settled = open_close(bodies, c, m, islands, rows, s, p, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
-            struck = apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
-            far = too_far(bodies, c, m, work, s, p) if cutting else 0.0
+            struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
+            far = too_far(bodies, c, m, islands, s, p) if cutting else 0.0
             if far > 1.0 or (cutting and not settled):
                 excess = max(excess, far, 1.0)
                 counters[CUT_BACKS] += 1
-                mark_cut(bodies, work, s)
+                mark_cut(bodies, islands, s)
                 continue
             if not settled:  # not in a shorter step, either
-                let_wait(bodies, work, work.block_start[s], work.block_start[s + 1])
-            if limit_fences(bodies, c, m, work, s, gauges, time, p, counters):
-                struck = apply_forces(bodies, c, m, work, s, work.relaxed[0] == 1, p)
+                let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
+            if limit_fences(bodies, c, m, islands, rows, s, gauges, time, p, counters):
+                struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
             if len(gauges.absorbed) > 0:
                 counters[EVENTS] = note_hits(
-                    bodies, c, work, c0, c1, gauges, counters[EVENTS], time
+                    bodies, c, islands, c0, c1, gauges, counters[EVENTS], time
                 )
         else:
-            work.relaxed[0] = 0
-            struck = apply_forces(bodies, c, m, work, s, False, p)
-        bad = max(bad, move_island(bodies, outlines, c, m, work, s, struck, gauges, p, ledger))
+            islands.relaxed[0] = 0
+            struck = apply_forces(bodies, c, m, islands, s, False, p)
+        bad = max(bad, move_island(bodies, outlines, c, m, islands, s, struck, gauges, p, ledger))
     if p.sleeping:
-        watch_quiet(bodies, work, islands, p)
+        watch_quiet(bodies, islands, found, p)
         wake_behind(bodies, c, count, gauges, p)
     lap(counters, MOTION, since, p.timing)
     return bad, excess
@@ -291,16 +297,16 @@ def rest_all(bodies: Bodies) -> None:
 
 @entry_kernel
 def advance(
-    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
-    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges,
-    levels: tuple[Parameters, ...], counters: NDArray, ledger: NDArray, deepest: NDArray,
+    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
+    shaking: Shaking, now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges,
+    levels: NDArray[np.void], counters: NDArray, ledger: NDArray, deepest: NDArray,
     steps: int, frames: NDArray, stride: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Take up to `steps` steps, and keep a frame whenever a multiple of `stride` is left.
 
     Parameters
     ----------
-    levels : tuple of Parameters
+    levels : array of PARAMETERS
         Of the step, then of its halves, quarters, ..., which are for islands that are cut back.
     counters, ledger, deepest : arrays
         See `records.COUNTERS`, `records.LEDGER`; deepest[0] is the greatest penetration [m].
@@ -326,11 +332,24 @@ def advance(
         time = (start + 1) * p.dt
         if p.static:
             rest_all(bodies)
-        set_field(work, shaking, start * p.dt, time, p)
+        if len(shaking.time) > 0:
+            set_field(shaking, start * p.dt, time, p)
         for a in range(p.blocks + 1):  # called, this takes a fifteenth of a step of one block
             work.first[a] = work.begin[a]
         count = detect(
-            bodies, outlines, ground, links, before, now, work, gauges, time, p, counters, deepest
+            bodies,
+            outlines,
+            ground,
+            interfaces,
+            links,
+            before,
+            now,
+            work,
+            gauges,
+            time,
+            p,
+            counters,
+            deepest,
         )
         # a cut-back, which cannot be left, has room to spare
         if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
@@ -346,7 +365,7 @@ def advance(
         yield_bolts(bodies, links)
         part += 1
         if bad < 0 and excess > 0.0:
-            hold_others(bodies, now, count, before, work, p)
+            hold_others(bodies, now, count, before, work.first, p)
             level, part = level_for(excess, p), 0
         elif bad >= 0 or part == parts:
             release_all(bodies)

@@ -14,7 +14,7 @@ from experiments.deformable.submatrices import (
 )
 from rigdda.constants import OPEN, STICK
 from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contacts, Floats, Matrix, Outlines, Parameters, Work
+from rigdda.records import Bodies, Contacts, Floats, Matrix, Outlines, Parameters
 
 
 class Solid(NamedTuple):
@@ -36,9 +36,7 @@ class Solid(NamedTuple):
 
 
 @kernel
-def assemble_blocks(
-    bodies: Bodies, outlines: Outlines, s: Solid, work: Work, n: int, p: Parameters
-) -> None:
+def assemble_blocks(bodies: Bodies, outlines: Outlines, s: Solid, n: int, p: Parameters) -> None:
     """Set inertia, damping, elasticity, weight and loads of all blocks.
 
     K = (2 / dt^2 + alpha / dt) M + S E and F = 2 M V0 / dt + weight + loads - S sigma_0.
@@ -52,8 +50,8 @@ def assemble_blocks(
             for b in range(UNKNOWNS):
                 s.diagonal[i, a, b] = factor * s.inertia[i, a, b]
                 s.rhs[i, a] += 2.0 / p.dt * s.inertia[i, a, b] * s.velocity[i, b]
-        s.rhs[i, 0] += bodies[i].mass * work.field[0]
-        s.rhs[i, 1] += bodies[i].mass * work.field[1]
+        s.rhs[i, 0] += bodies[i].mass * p.field_x
+        s.rhs[i, 1] += bodies[i].mass * p.field_y
         add_elasticity(s.diagonal[i], s.rhs[i], moments[0], s.elasticity, s.stress[i])
 
 
@@ -102,11 +100,11 @@ def add_contact(c: Contacts, k: int, s: Solid) -> None:
 
 @kernel
 def assemble(
-    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, s: Solid, work: Work, n: int,
-    pairs: int, p: Parameters,
+    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, s: Solid, n: int, pairs: int,
+    p: Parameters,
 ) -> None:  # fmt: skip
     """Set the equations with all contacts in their current states."""
-    assemble_blocks(bodies, outlines, s, work, n, p)
+    assemble_blocks(bodies, outlines, s, n, p)
     for q in range(pairs):
         s.off[q] = 0.0
     for k in range(count):

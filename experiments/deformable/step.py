@@ -25,28 +25,27 @@ from rigdda.records import (
     Floats,
     Gauges,
     Ground,
+    Interfaces,
     Links,
     Matrix,
     Outlines,
     Parameters,
-    Shaking,
     Work,
 )
-from rigdda.shaking import set_field
 from rigdda.step import copy_index, detect
 
 
 @kernel
 def settle(
-    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, s: Solid, m: Matrix, work: Work,
-    n: int, pairs: int, p: Parameters, counters: NDArray,
+    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, s: Solid, m: Matrix, n: int,
+    pairs: int, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Iterate until no contact opens, closes, slips or sticks any more."""
     for i in range(n):
         for a in range(UNKNOWNS):
             s.d[i, a] = p.dt * s.velocity[i, a]
     for _ in range(p.iterations):
-        assemble(bodies, outlines, c, count, s, work, n, pairs, p)
+        assemble(bodies, outlines, c, count, s, n, pairs, p)
         counters[ITERATIONS] += 1
         counters[SOLVES] += 1
         counters[SOLVER_ITERATIONS] += solve_pcg(s, m, n, pairs, p.tolerance)
@@ -97,8 +96,8 @@ def rest_all(bodies: Bodies, velocity: Floats) -> None:
 
 @entry
 def advance(
-    bodies: Bodies, outlines: Outlines, ground: Ground, links: Links, shaking: Shaking,
-    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, p: Parameters,
+    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
+    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, levels: NDArray,
     counters: NDArray, deepest: NDArray, s: Solid, steps: int,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Take steps with the contact detection of the core.
@@ -108,16 +107,15 @@ def advance(
     fits, swapped : bool
         Whether all contacts fitted; whether `now` and `before` have changed roles.
     """
-    n, swapped = len(s.d), False
+    n, swapped, p = len(s.d), False, levels[0]
     for _ in range(steps):
         start = counters[STEPS] * p.dt
         if p.static:
             rest_all(bodies, s.velocity)
-        set_field(work, shaking, start, start + p.dt, p)
         copy_index(work.begin, work.first)
         count = detect(
-            bodies, outlines, ground, links, before, now, work, gauges, start + p.dt, p, counters,
-            deepest,
+            bodies, outlines, ground, interfaces, links, before, now, work, gauges, start + p.dt, p,
+            counters, deepest,
         )  # fmt: skip
         if count < 0:
             return False, swapped
@@ -125,9 +123,9 @@ def advance(
         swapped = not swapped
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
-        find_islands(bodies, now, work, p.blocks, False)
-        pairs, _ = pair_blocks(bodies, now, m, work, 0, count)
-        settle(bodies, outlines, now, count, s, m, work, n, pairs, p, counters)
+        find_islands(bodies, now, work.begin, work.islands, p.blocks, False)
+        pairs, _ = pair_blocks(bodies, now, m, work.islands, 0, count)
+        settle(bodies, outlines, now, count, s, m, n, pairs, p, counters)
         for k in range(count):
             keep_memory(now, k, False, False)
         for i in range(n):

@@ -8,7 +8,7 @@ from rigdda.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.assembly.springs import add_block, add_force, normal_row, shear_row
 from rigdda.constants import BOLT, OPEN, SLIP, SMALL_ISLAND, STICK
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Contacts, Matrix, Parameters, Work
+from rigdda.records import Bodies, Contacts, Islands, Matrix, Parameters
 
 
 @kernel
@@ -30,11 +30,11 @@ def load_moment(bodies: Bodies, i: int) -> float:
 
 @inlined
 def assemble_blocks(
-    bodies: Bodies, m: Matrix, work: Work, low: int, high: int, p: Parameters
+    bodies: Bodies, m: Matrix, islands: Islands, low: int, high: int, p: Parameters
 ) -> None:
     """Set the diagonal blocks and forces of inertia, damping, weight and loads."""
     for place in range(low, high):
-        i, s = work.block_item[place], place - low
+        i, s = islands.block_item[place], place - low
         alpha = damping_of(bodies, i, p)
         inertia = inertia_stiffness(bodies[i].inertia, alpha, p.dt)
         mass = inertia_stiffness(bodies[i].mass, alpha, p.dt)
@@ -46,8 +46,8 @@ def assemble_blocks(
         m.rhs[s, 0] = inertia_force(bodies[i].mass, bodies[i].vx, p.dt)
         m.rhs[s, 1] = inertia_force(bodies[i].mass, bodies[i].vy, p.dt)
         m.rhs[s, 2] = inertia_force(bodies[i].inertia, bodies[i].omega, p.dt)
-        m.rhs[s, 0] += bodies[i].mass * work.field[0] + bodies[i].force_x
-        m.rhs[s, 1] += bodies[i].mass * work.field[1] + bodies[i].force_y
+        m.rhs[s, 0] += bodies[i].mass * p.field_x + bodies[i].force_x
+        m.rhs[s, 1] += bodies[i].mass * p.field_y + bodies[i].force_y
         m.rhs[s, 2] += load_moment(bodies, i)
 
 
@@ -109,20 +109,20 @@ def assemble_contact(
 
 @inlined
 def assemble_island(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, island: int, pairs: int, p: Parameters
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, pairs: int, p: Parameters
 ) -> None:
     """Set the system of an island with its contacts in their current states."""
-    b0, b1 = work.block_start[island], work.block_start[island + 1]
-    assemble_blocks(bodies, m, work, b0, b1, p)
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    assemble_blocks(bodies, m, islands, b0, b1, p)
     for a in range(3):
         for b in range(3):
             m.lower[a, b] = 0.0
             for q in range(max(pairs, 1)):
                 m.off[q, a, b] = 0.0
-    for item in range(work.contact_start[island], work.contact_start[island + 1]):
-        k = work.contact_item[item]
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        k = islands.contact_item[item]
         if c[k].state == OPEN:
             c[k].normal = c[k].shear = 0.0
         else:
-            j = work.slot[c[k].b] if c[k].pair >= 0 else -1
-            assemble_contact(c, k, m, work.slot[c[k].a], j, p.dt, b1 - b0 <= SMALL_ISLAND)
+            j = islands.slot[c[k].b] if c[k].pair >= 0 else -1
+            assemble_contact(c, k, m, islands.slot[c[k].a], j, p.dt, b1 - b0 <= SMALL_ISLAND)

@@ -57,7 +57,7 @@ from rigdda.constants import (
     UNLOADED,
 )
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Contacts, Parameters, Work
+from rigdda.records import Bodies, Contacts, Interfaces, Parameters
 
 
 @kernel
@@ -242,11 +242,13 @@ def strike_at_once(bodies: Bodies, c: Contacts, low: int, high: int, p: Paramete
 
 
 @inlined
-def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Parameters) -> None:
+def prepare(
+    bodies: Bodies, c: Contacts, k: int, interfaces: Interfaces, start: bool, p: Parameters
+) -> None:
     """Set the law of contact k from its geometry and memory; `start` is the very first step."""
     a, b = c[k].a, c[k].b
     # free relative acceleration along the normal is that of gravity
-    pull = -(work.field[0] * c[k].nx + work.field[1] * c[k].ny)
+    pull = -(p.field_x * c[k].nx + p.field_y * c[k].ny)
     mass_b = 0.0
     if b >= 0 and bodies[b].status == AWAKE:
         pull, mass_b = 0.0, bodies[b].mass
@@ -256,13 +258,12 @@ def prepare(bodies: Bodies, c: Contacts, k: int, work: Work, start: bool, p: Par
     c[k].memory_normal = min(c[k].memory_normal, most)
     c[k].start_normal = min(c[k].start_normal, most)
     c[k].stiffness = rest_stiffness(weight, c, k, p)
-    surface = bodies[a].surface
-    c[k].friction = p.friction[surface, c[k].other]
-    c[k].restitution = p.restitution[surface, c[k].other]
+    interface = interfaces[bodies[a].surface, c[k].other]
+    c[k].friction, c[k].restitution = interface.friction, interface.restitution
     c[k].flips = 0
     c[k].lag = c[k].start_shear
-    c[k].cohesion = c[k].bond * p.cohesion[surface, c[k].other]
-    c[k].tension = c[k].bond * p.tension[surface, c[k].other]
+    c[k].cohesion = c[k].bond * interface.cohesion
+    c[k].tension = c[k].bond * interface.tension
     if c[k].cohesion == 0.0 and c[k].tension == 0.0:
         c[k].bond = 0.0
     strike(bodies, c, k, 0.5 * p.dt, pull, p)

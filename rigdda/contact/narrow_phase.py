@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters, Work
+from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
 
 NEVER = 2.0
 """Time of entry, over the step, of what does not come nearer or not soon."""
@@ -35,8 +35,8 @@ def axis_gap(
 @kernel
 def over_edge(outlines: Outlines, i: int, edge: int, j: int) -> float:
     """Return the gap of the middle of polygon j above an edge of polygon i [m]."""
-    dx = outlines.middle_x[j] - outlines.world_x[i, edge]
-    dy = outlines.middle_y[j] - outlines.world_y[i, edge]
+    dx = outlines.polygon[j].middle_x - outlines.world_x[i, edge]
+    dy = outlines.polygon[j].middle_y - outlines.world_y[i, edge]
     return outlines.normal_x[i, edge] * dx + outlines.normal_y[i, edge] * dy
 
 
@@ -73,7 +73,7 @@ def face_of_contact(
         edge = facing if visit < 0 else visit
         nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
         if visit >= 0:
-            most = over_edge(outlines, i, edge, j) - outlines.inside[j]
+            most = over_edge(outlines, i, edge, j) - outlines.polygon[j].inside
             if edge == facing or (most <= slack and (time > 0.0 or most < depth)):
                 continue
         gap, corner = axis_gap(
@@ -208,17 +208,16 @@ def add_corner(
 
 @inlined
 def collide_pair(
-    bodies: Bodies, outlines: Outlines, work: Work, c: Contacts, k: int, a: int, b: int,
-    p: Parameters,
+    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, p: Parameters
 ) -> int:  # fmt: skip
     """Add the contacts of bodies a and b to `c` from entry k; returns the new number, or -1."""
     dt = p.dt
     dx, dy = -bodies[a].vx * dt, -bodies[a].vy * dt
-    path, fall = work.path[a], p.gravity * dt * dt
+    path, fall = bodies[a].path, p.gravity * dt * dt
     if bodies[b].status == AWAKE:
         dx += bodies[b].vx * dt
         dy += bodies[b].vy * dt
-        path += work.path[b]
+        path += bodies[b].path
         fall = 0.0
     spread = path + fall + p.slack
     turning = abs(bodies[a].omega) * bodies[a].radius + abs(bodies[b].omega) * bodies[b].radius

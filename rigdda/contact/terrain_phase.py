@@ -12,7 +12,7 @@ import math
 from rigdda.constants import LEAN, SAME_FACE, TERRAIN
 from rigdda.contact.narrow_phase import NEVER, add_contact, keep_nearest
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Contacts, Ground, Outlines, Parameters, Work
+from rigdda.records import Bodies, Box, Contacts, Ground, Outlines, Parameters
 
 
 @kernel
@@ -127,7 +127,6 @@ def corners_on_segment(
     bodies: Bodies,
     outlines: Outlines,
     ground: Ground,
-    work: Work,
     c: Contacts,
     k: int,
     first: int,
@@ -137,7 +136,7 @@ def corners_on_segment(
 ) -> int:
     """Add contacts of the corners of block a with segment s; returns the new number."""
     nx, ny = ground.normal_x[s], ground.normal_y[s]
-    reach = work.path[a] + p.gravity * p.dt * p.dt + p.slack
+    reach = bodies[a].path + p.gravity * p.dt * p.dt + p.slack
     concave = bodies[a].parts > 1
     lowest = below_segment(ground, s, bodies[a].x, bodies[a].y) - bodies[a].radius
     if lowest > reach:
@@ -188,7 +187,7 @@ def edge_on_ridge(
     bodies: Bodies,
     outlines: Outlines,
     ground: Ground,
-    work: Work,
+    box: Box,
     c: Contacts,
     k: int,
     a: int,
@@ -205,11 +204,11 @@ def edge_on_ridge(
     dt, n = p.dt, outlines.polygon[part].count
     dx = -(bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
     dy = -(bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
-    if not (work.low_x[a] <= x <= work.high_x[a] and work.low_y[a] <= y <= work.high_y[a]):
+    if not (box.low_x <= x <= box.high_x and box.low_y <= y <= box.high_y):
         return k
     left, right, concave = corner - 1, corner, part != a
     lean = LEAN + abs(bodies[a].omega) * dt
-    reach = work.path[a] + p.gravity * dt * dt + p.slack
+    reach = bodies[a].path + p.gravity * dt * dt + p.slack
     best, best_time, best_gap = -1, -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
@@ -261,19 +260,22 @@ def collide_terrain(
     bodies: Bodies,
     outlines: Outlines,
     ground: Ground,
-    work: Work,
+    box: Box,
     c: Contacts,
     k: int,
     a: int,
     p: Parameters,
 ) -> int:
-    """Add the contacts of block a with the terrain from entry k; returns the new number."""
+    """Add the contacts of block a with the terrain from entry k; returns the new number.
+
+    `box` is the swept box of the block.
+    """
     bins = len(ground.bin_start) - 1
     if bins == 0:
         return k
     first = k
-    low = int((work.low_x[a] - ground.bin_origin) / ground.bin_width)
-    high = int((work.high_x[a] - ground.bin_origin) / ground.bin_width)
+    low = int((box.low_x - ground.bin_origin) / ground.bin_width)
+    high = int((box.high_x - ground.bin_origin) / ground.bin_width)
     low, high = min(max(low, 0), bins - 1), min(max(high, 0), bins - 1)
     for cell in range(low, high + 1):
         for item in range(ground.bin_start[cell], ground.bin_start[cell + 1]):
@@ -284,17 +286,17 @@ def collide_terrain(
             if cell != max(min(max(from_cell, 0), bins - 1), low):
                 continue  # seen in an earlier cell
             if (
-                min(ground.x[s], ground.x[s + 1]) > work.high_x[a]
-                or max(ground.x[s], ground.x[s + 1]) < work.low_x[a]
-                or min(ground.y[s], ground.y[s + 1]) > work.high_y[a]
-                or max(ground.y[s], ground.y[s + 1]) < work.low_y[a]
+                min(ground.x[s], ground.x[s + 1]) > box.high_x
+                or max(ground.x[s], ground.x[s + 1]) < box.low_x
+                or min(ground.y[s], ground.y[s + 1]) > box.high_y
+                or max(ground.y[s], ground.y[s + 1]) < box.low_y
             ):
                 continue
             if k + outlines.world_x.shape[1] + bodies[a].parts + 2 > len(c):
                 return -1
-            k = corners_on_segment(bodies, outlines, ground, work, c, k, first, a, s, p)
+            k = corners_on_segment(bodies, outlines, ground, c, k, first, a, s, p)
             if ground.turn[s] < 0.0:
                 for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):
-                    found = edge_on_ridge(bodies, outlines, ground, work, c, k, a, part, s, p)
+                    found = edge_on_ridge(bodies, outlines, ground, box, c, k, a, part, s, p)
                     k = keep_nearest(c, first, k, k) if found > k and part != a else found
     return k

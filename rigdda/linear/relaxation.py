@@ -45,9 +45,9 @@ from rigdda.constants import (
     SUBSTEP,
 )
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
-from rigdda.records import Bodies, Contacts, Floats, Ints, Matrix, Parameters, Work
+from rigdda.records import Bodies, Contacts, Floats, Ints, Islands, Matrix, Parameters, Rows
 
-# columns of work.row, first what a visit to an open contact needs: the row of the contact for a and
+# columns of rows.row, first what a visit to an open contact needs: the row of the contact for a and
 # b, times h over the roots of their inertia [(m/N)^1/2]; normal and shear force [N]
 NORMAL, FORCE = 0, 6
 # gap at the start of the substep, normal displacement that it aims at once closed [m], infinite
@@ -66,8 +66,8 @@ FLEXIBLE, FRICTION, FREE, GAP = 25, 26, 27, 28
 SINCE, SUM = 29, 30
 COLUMNS = 32
 
-# columns of m.motion, each in three directions, times the roots of inertia over h: displacement in
-# this substep, since the start of the step, and in the substep before
+# columns of rows.motion, each in three directions, times the roots of inertia over h: displacement
+# in this substep, since the start of the step, and in the substep before
 NOW, SO_FAR, BEFORE = 0, 3, 6
 
 
@@ -125,7 +125,7 @@ def set_rigid(
 
 @inlined
 def set_spring(
-    row: Floats, c: Contacts, k: int, m: Matrix, i: int, j: int, flexible: float, rolling: float,
+    row: Floats, c: Contacts, k: int, rows: Rows, i: int, j: int, flexible: float, rolling: float,
     substeps: int,
 ) -> None:  # fmt: skip
     """Write what a visit needs of the spring of contact k, see contact.law.
@@ -142,7 +142,7 @@ def set_spring(
         normal = shear = 2.0 * c[k].kappa
         free = 0.5 * c[k].bias
     elif c[k].kind == PLAIN:
-        free -= along_six(row[NORMAL : NORMAL + 6], m.motion[i], m.motion[j], BEFORE)
+        free -= along_six(row[NORMAL : NORMAL + 6], rows.motion[i], rows.motion[j], BEFORE)
     row[KEEP] = normal * flexible / (1.0 + normal * flexible)
     row[KEEP_SHEAR] = shear * rolling / (1.0 + shear * rolling)
     row[GAIN], row[GAIN_SHEAR] = row[KEEP] / flexible, row[KEEP_SHEAR] / rolling
@@ -151,22 +151,24 @@ def set_spring(
 
 
 @inlined
-def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, substeps: int) -> None:
+def pack_row(
+    c: Contacts, k: int, islands: Islands, rows: Rows, place: int, n: int, substeps: int
+) -> None:
     """Write contact k as row `place` and add its starting force to the displacements.
 
     Slot n stands for bodies without unknowns.
     """
-    row, old = work.row[place], c[k]
-    i = work.slot[old.a]
-    j = work.slot[old.b] if old.pair >= 0 else n
-    work.row_i[place], work.row_j[place], work.idle[place] = i, j, 0
-    write_row(row, NORMAL, normal_row(c, k, True), m.scaled[i])
-    write_row(row, NORMAL + 3, normal_row(c, k, False), m.scaled[j])
-    write_row(row, SHEAR, shear_row(c, k, True), m.scaled[i])
-    write_row(row, SHEAR + 3, shear_row(c, k, False), m.scaled[j])
+    row, old = rows.row[place], c[k]
+    i = islands.slot[old.a]
+    j = islands.slot[old.b] if old.pair >= 0 else n
+    rows.row_i[place], rows.row_j[place], rows.idle[place] = i, j, 0
+    write_row(row, NORMAL, normal_row(c, k, True), rows.scale[i])
+    write_row(row, NORMAL + 3, normal_row(c, k, False), rows.scale[j])
+    write_row(row, SHEAR, shear_row(c, k, True), rows.scale[i])
+    write_row(row, SHEAR + 3, shear_row(c, k, False), rows.scale[j])
     flexible, rolling = product(row, NORMAL, NORMAL), product(row, SHEAR, SHEAR)
     if substeps == 1 or is_elastic(c, k):
-        set_spring(row, c, k, m, i, j, flexible, rolling, substeps)
+        set_spring(row, c, k, rows, i, j, flexible, rolling, substeps)
     else:
         set_rigid(row, c, k, flexible, rolling, substeps)
     row[FLEXIBLE], row[CROSS] = flexible, row[GAIN_SHEAR] * product(row, NORMAL, SHEAR)
@@ -174,8 +176,8 @@ def pack_row(c: Contacts, k: int, m: Matrix, work: Work, place: int, n: int, sub
     row[COHESION] = math.inf if old.kind == PIN else old.cohesion
     row[FORCE], row[FORCE + 1] = old.start_normal, old.start_shear
     row[SUM] = row[SUM + 1] = row[SINCE] = 0.0
-    displace(row, NORMAL, m.motion, i, j, old.start_normal)
-    displace(row, SHEAR, m.motion, i, j, old.start_shear)
+    displace(row, NORMAL, rows.motion, i, j, old.start_normal)
+    displace(row, SHEAR, rows.motion, i, j, old.start_shear)
 
 
 @arithmetic_kernel
@@ -187,8 +189,8 @@ def add_up(row: Floats, number: int) -> None:
 
 
 @kernel
-def list_visits(work: Work, count: int, tries: int, number: int) -> int:
-    """Write the contacts that the next sweep is to visit into work.visit; returns how many.
+def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
+    """Write the contacts that the next sweep is to visit into rows.visit; returns how many.
 
     Not those that cannot close before substep idle[k]; nor, after the first sweep of a substep,
     where neither body has moved in the last one: moved_in[s] is the number of the last sweep of the
@@ -198,10 +200,10 @@ def list_visits(work: Work, count: int, tries: int, number: int) -> int:
     visits = 0
     for place in range(count):
         k = np.uintp(place)
-        i, j = np.uintp(work.row_i[k]), np.uintp(work.row_j[k])
-        moved = (work.moved_in[i] >= tries - 1) | (work.moved_in[j] >= tries - 1)
-        work.visit[np.uintp(visits)] = place
-        visits += int(moved & (work.idle[k] <= number))
+        i, j = np.uintp(rows.row_i[k]), np.uintp(rows.row_j[k])
+        moved = (rows.moved_in[i] >= tries - 1) | (rows.moved_in[j] >= tries - 1)
+        rows.visit[np.uintp(visits)] = place
+        visits += int(moved & (rows.idle[k] <= number))
     return visits
 
 
@@ -262,29 +264,30 @@ def sweep(
 
 
 @kernel
-def sort_by_height(c: Contacts, work: Work, low: int, high: int) -> None:
+def sort_by_height(c: Contacts, islands: Islands, rows: Rows, low: int, high: int) -> None:
     """Set the rows of the contacts low:high by height, lowest first: a sweep carries loads through.
 
     A counting sort in as many layers as there is room for: within one the order does not matter.
     Contacts stay in order: to read them one after the other is what takes long in a large island.
     """
-    place, height, layers = work.place, work.height, min(len(work.layer) - 1, high - low)
+    place, height, layer = rows.place, rows.height, rows.layer
+    layers = min(len(layer) - 1, high - low)
     least, most = math.inf, -math.inf
     for q in range(low, high):
-        height[q] = c[work.contact_item[q]].y
+        height[q] = c[islands.contact_item[q]].y
         least, most = min(least, height[q]), max(most, height[q])
     scale = layers / (most - least) * (1.0 - 1e-9) if most > least else 0.0
     for s in range(layers + 1):
-        work.layer[s] = 0
+        layer[s] = 0
     for q in range(low, high):
         place[q] = int(scale * (height[q] - least))
-        work.layer[place[q] + 1] += 1
+        layer[place[q] + 1] += 1
     for s in range(layers):
-        work.layer[s + 1] += work.layer[s]
+        layer[s + 1] += layer[s]
     for q in range(low, high):
         s = place[q]
-        place[q] = work.layer[s]
-        work.layer[s] += 1
+        place[q] = layer[s]
+        layer[s] += 1
 
 
 @kernel
@@ -294,17 +297,17 @@ def velocity(bodies: Bodies, i: int) -> tuple[float, float, float]:
 
 
 @inlined
-def start(bodies: Bodies, m: Matrix, i: int, s: int, h: float, p: Parameters) -> None:
+def start(bodies: Bodies, m: Matrix, rows: Rows, i: int, s: int, h: float, p: Parameters) -> None:
     """Set the displacement of block i, slot s, in the first substep without contacts."""
     v, alpha = velocity(bodies, i), damping_of(bodies, i, p)
     for q in range(3):
         inertia = bodies[i].inertia if q == 2 else bodies[i].mass
         scale = h / math.sqrt(inertia)
         pull = (m.rhs[s, q] - 2.0 * inertia * v[q] / p.dt) / inertia - alpha * v[q]
-        m.scaled[s, q] = scale
-        m.motion[s, BEFORE + q] = h * v[q] / scale
-        m.motion[s, NOW + q] = (h * v[q] + h * h * pull) / scale
-        m.motion[s, SO_FAR + q] = 0.0
+        rows.scale[s, q] = scale
+        rows.motion[s, BEFORE + q] = h * v[q] / scale
+        rows.motion[s, NOW + q] = (h * v[q] + h * h * pull) / scale
+        rows.motion[s, SO_FAR + q] = 0.0
 
 
 @kernel
@@ -328,8 +331,8 @@ def substeps_of(n: int, dt: float) -> int:
 
 @kernel
 def relax_forces(
-    bodies: Bodies, c: Contacts, m: Matrix, work: Work, low: int, high: int, first: int, n: int,
-    speed: float, fast: bool, p: Parameters,
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, low: int,
+    high: int, first: int, n: int, speed: float, fast: bool, p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
     """Find the forces of an island with contacts low:high, in their rows: see `take_forces`.
 
@@ -349,34 +352,34 @@ def relax_forces(
     if fast:
         substeps, most = substeps_of(n, p.dt), MOST_SWEEPS
         tolerance = min(RELAXATION_SHARE * speed, usual)
-    h, motion = p.dt / substeps, m.motion
+    h, motion = p.dt / substeps, rows.motion
     for s in range(n):
-        start(bodies, m, work.block_item[first + s], s, h, p)
+        start(bodies, m, rows, islands.block_item[first + s], s, h, p)
     for q in range(3):
-        m.scaled[n, q] = 0.0
+        rows.scale[n, q] = 0.0
         motion[n, NOW + q] = motion[n, SO_FAR + q] = motion[n, BEFORE + q] = 0.0
     count = high - low
-    sort_by_height(c, work, low, high)
+    sort_by_height(c, islands, rows, low, high)
     for q in range(low, high):
-        pack_row(c, work.contact_item[q], m, work, work.place[q], n, substeps)
+        pack_row(c, islands.contact_item[q], islands, rows, rows.place[q], n, substeps)
     sweeps = 0
     for number in range(substeps):
         for s in range(n + 1):
-            work.moved_in[s] = -1
+            rows.moved_in[s] = -1
         worst, tries = math.inf, 0
         while worst > tolerance * h and tries < most:
-            visits = list_visits(work, count, tries, number)
+            visits = list_visits(rows, count, tries, number)
             worst = sweep(
-                work.row, work.row_i, work.row_j, motion, n, work.visit, visits, tries, number,
-                substeps, work.idle, REACH * speed * h, work.moved_in, tolerance * h,
+                rows.row, rows.row_i, rows.row_j, motion, n, rows.visit, visits, tries, number,
+                substeps, rows.idle, REACH * speed * h, rows.moved_in, tolerance * h,
             )  # fmt: skip
             tries += 1
         sweeps += tries
         go_on(motion, n, number == substeps - 1)
     for s in range(n):
-        v = velocity(bodies, work.block_item[first + s])
+        v = velocity(bodies, islands.block_item[first + s])
         for q in range(3):
-            scale = m.scaled[s, q]
+            scale = rows.scale[s, q]
             m.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)
             m.late[s, q] = motion[s, SO_FAR + q] * scale - m.d[s, q]
     return sweeps, substeps

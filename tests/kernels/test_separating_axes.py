@@ -76,5 +76,6 @@ def test_the_circle_in_a_square_touches_its_edges() -> None:
     corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 2.0), (0.0, 2.0)]
     scene = Scene(None, (Block(corners),), rock())
     outlines = pack(scene, Settings(), np.zeros(0), (0.0, 0.0)).outlines
-    assert math.isclose(outlines.inside[0], 1.0, rel_tol=1e-8) and outlines.inside[0] < 1.0
-    assert (outlines.middle_x[0], outlines.middle_y[0]) == (2.0, 1.0)
+    polygon = outlines.polygon[0]
+    assert math.isclose(polygon.inside, 1.0, rel_tol=1e-8) and polygon.inside < 1.0
+    assert (polygon.middle_x, polygon.middle_y) == (2.0, 1.0)

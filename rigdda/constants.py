@@ -191,6 +191,10 @@ DEFLECTED = 0.03
 """How much farther than foreseen a corner may go in a step, over the block size [-], before its
 island is cut back: it may meet what was no candidate for a contact."""
 
+SLIDING = 0.01
+"""Share of what gravity adds to a speed in a step at which a contact that slipped still slides [-].
+One that hardly does may as well stick now, and to begin with the wrong friction takes long."""
+
 LEAN = 0.05
 """Angle by which an edge may lean beyond the sides of a ridge that it rests on [rad], besides what
 it turns by in the step: along a side, rounding and the next blow decide which way it leans."""

@@ -35,7 +35,7 @@ from rigdda.correction import (
     move_corners,
     place_corners,
 )
-from rigdda.cut_back import hold_others, level_for, mark_cut, release_all, too_far
+from rigdda.cut_back import act_early, hold_others, level_for, mark_cut, release_all, too_far
 from rigdda.fence import limit_fences, wake_behind
 from rigdda.frames import keep_frame
 from rigdda.gauges import barrier_contact, note_hits, note_passage
@@ -263,6 +263,8 @@ def solve_and_move(
             since = lap(counters, OPEN_CLOSE, since, p.timing)
             struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
             far = too_far(bodies, c, m, islands, s, p) if cutting else 0.0
+            if far > 1.0 and settled and act_early(bodies, c, m, islands, s, p):
+                struck, far = True, too_far(bodies, c, m, islands, s, p)
             if far > 1.0 or (cutting and not settled):
                 excess = max(excess, far, 1.0)
                 counters[CUT_BACKS] += 1

@@ -126,33 +126,36 @@ def set_rigid(
 @inlined
 def set_spring(
     row: Floats, c: Contacts, k: int, rows: Rows, i: int, j: int, flexible: float, rolling: float,
-    substeps: int,
+    substeps: int, h: float,
 ) -> None:  # fmt: skip
     """Write what a visit needs of the spring of contact k, see contact.law.
 
-    In a single substep every contact is one: its displacement is dt times the end velocity. A plain
-    contact is one on the displacement of the step, in the law with a factor of 2.
+    In a single substep every contact is one: its displacement is dt times the end velocity, but for
+    what its velocity at the start is not that of the bodies along its row. A plain contact is one
+    on the displacement of the step, in the law with a factor of 2.
     """
     normal = shear = c[k].kappa
-    free = c[k].bias
+    free, slid = c[k].bias, 0.0
+    if substeps == 1:
+        a, b = rows.motion[i], rows.motion[j]
+        free += h * c[k].un - along_six(row[NORMAL : NORMAL + 6], a, b, BEFORE)
+        slid += h * c[k].us - along_six(row[SHEAR : SHEAR + 6], a, b, BEFORE)
     if not is_elastic(c, k):
         normal, shear = RELAXATION_STIFFNESS / flexible, RELAXATION_STIFFNESS / rolling
         free += c[k].memory_normal * (1.0 / normal - 1.0 / c[k].kappa)
     elif c[k].kind == PLAIN and substeps > 1:
         normal = shear = 2.0 * c[k].kappa
         free = 0.5 * c[k].bias
-    elif c[k].kind == PLAIN:
-        free -= along_six(row[NORMAL : NORMAL + 6], rows.motion[i], rows.motion[j], BEFORE)
     row[KEEP] = normal * flexible / (1.0 + normal * flexible)
     row[KEEP_SHEAR] = shear * rolling / (1.0 + shear * rolling)
     row[GAIN], row[GAIN_SHEAR] = row[KEEP] / flexible, row[KEEP_SHEAR] / rolling
     row[GAP], row[AIM], row[REBOUND] = -free, math.inf, -math.inf
-    row[FREE] = c[k].memory_shear / shear
+    row[FREE] = c[k].memory_shear / shear + slid
 
 
 @inlined
 def pack_row(
-    c: Contacts, k: int, islands: Islands, rows: Rows, place: int, n: int, substeps: int
+    c: Contacts, k: int, islands: Islands, rows: Rows, place: int, n: int, substeps: int, h: float
 ) -> None:
     """Write contact k as row `place` and add its starting force to the displacements.
 
@@ -168,7 +171,7 @@ def pack_row(
     write_row(row, SHEAR + 3, shear_row(c, k, False), rows.scale[j])
     flexible, rolling = product(row, NORMAL, NORMAL), product(row, SHEAR, SHEAR)
     if substeps == 1 or is_elastic(c, k):
-        set_spring(row, c, k, rows, i, j, flexible, rolling, substeps)
+        set_spring(row, c, k, rows, i, j, flexible, rolling, substeps, h)
     else:
         set_rigid(row, c, k, flexible, rolling, substeps)
     row[FLEXIBLE], row[CROSS] = flexible, row[GAIN_SHEAR] * product(row, NORMAL, SHEAR)
@@ -361,7 +364,7 @@ def relax_forces(
     count = high - low
     sort_by_height(c, islands, rows, low, high)
     for q in range(low, high):
-        pack_row(c, islands.contact_item[q], islands, rows, rows.place[q], n, substeps)
+        pack_row(c, islands.contact_item[q], islands, rows, rows.place[q], n, substeps, h)
     sweeps = 0
     for number in range(substeps):
         for s in range(n + 1):

@@ -13,8 +13,8 @@ What differs is the bias b:
 at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
          shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
          on, the rest viscous (Kelvin and Voigt's solid). Penetration beyond what N_0 explains is
-         pushed out slowly, a small gap closed so. An open gap g gives b = -g: the contact closes
-         within the step, at most.
+         pushed out slowly, a small gap closed so. An open gap g gives b = -2 g - dt u_0, at
+         most 0: the contact closes within the step, no farther, or stops.
 impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
          impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
@@ -179,6 +179,19 @@ def recovery(surplus: float, dt: float) -> float:
 
 
 @kernel
+def closing(c: Contacts, k: int, p: Parameters) -> float:
+    """Return the bias with which an open contact closes at the end of the step, or stops [m].
+
+    It bears force if it would close within the step, u_0 + u_1 < -2 g / dt, and where that would
+    send it back, u_1 > 0, only what stops it. Where nothing watches over what sinks in next, it is
+    slowed down before, to the speed that would close it in one more step.
+    """
+    if p.sinking_limit == math.inf:
+        return -c[k].gap
+    return min(-2.0 * c[k].gap - p.dt * c[k].un, 0.0)
+
+
+@kernel
 def set_rest(c: Contacts, k: int, weight: float, most: float, p: Parameters) -> None:
     """Make contact k a spring that carries on with the force of the last step.
 
@@ -190,7 +203,7 @@ def set_rest(c: Contacts, k: int, weight: float, most: float, p: Parameters) -> 
     elastic = c[k].memory_normal / c[k].stiffness
     if c[k].gap > p.penetration and c[k].bond == 0.0:
         c[k].memory_normal = c[k].start_normal = 0.0
-        c[k].bias = -c[k].gap
+        c[k].bias = closing(c, k, p)
     else:
         c[k].bias = c[k].memory_normal / c[k].kappa
         if PUSHED * weight < c[k].memory_normal < most:
@@ -205,7 +218,7 @@ def set_new(bodies: Bodies, c: Contacts, k: int, start: bool, p: Parameters) -> 
     stiffness = impact_stiffness(effective_mass(bodies, c, k), p.dt)
     c[k].kappa = max(START_STIFFNESS * stiffness if start else stiffness, c[k].stiffness)
     # a gap of rounding would be a force in so stiff a spring
-    c[k].bias = -c[k].gap if c[k].gap > TOUCHING * p.penetration else 0.0
+    c[k].bias = closing(c, k, p) if c[k].gap > TOUCHING * p.penetration else 0.0
 
 
 @kernel

@@ -209,13 +209,13 @@ def account_contact(
     ds = along(shear_row(c, k, True), m.d[i])
     block, barrier = barrier_contact(gauges, c[k].a, c[k].b)
     if barrier >= 0 and block == c[k].a:
-        gauges.absorbed[barrier] -= c[k].normal * dn + c[k].shear * ds
+        gauges.target[barrier].absorbed -= c[k].normal * dn + c[k].shear * ds
     if c[k].pair >= 0:
         j = islands.slot[c[k].b]
         en = along(normal_row(c, k, False), m.d[j])
         es = along(shear_row(c, k, False), m.d[j])
         if barrier >= 0 and block != c[k].a:
-            gauges.absorbed[barrier] -= c[k].normal * en + c[k].shear * es
+            gauges.target[barrier].absorbed -= c[k].normal * en + c[k].shear * es
         dn += en
         ds += es
     if c[k].kind == BOLT or c[k].kind == PIN:

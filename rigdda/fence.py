@@ -187,19 +187,19 @@ def limit_fences(
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     for fence in range(p.blocks, len(bodies)):
         barrier = gauges.barrier[fence]
-        capacity = gauges.capacity[barrier]
+        capacity = gauges.target[barrier].capacity
         k = touches(c, islands, low, high, fence) if capacity < math.inf else -1
         if k < 0:
             continue
         touched = True
         set_passing(bodies, c, m, islands, rows, island, fence, p, counters)
-        left, tolerance = capacity - gauges.absorbed[barrier], BREAK_TOLERANCE * capacity
+        left, tolerance = capacity - gauges.target[barrier].absorbed, BREAK_TOLERANCE * capacity
         taken = work_taken(c, m, islands, low, high, fence)
         taken += passed_on(c, islands, low, high, fence, p.dt)
         if taken > left + tolerance:
             if bodies[fence].status != RETIRED:
                 bodies[fence].status = RETIRED
-                height = c[k].y - gauges.barrier_ground[barrier]
+                height = c[k].y - gauges.target[barrier].ground
                 counters[EVENTS] = write_event(
                     gauges, counters[EVENTS], time, FAILED, bodies, c[k].a, barrier, c[k].x, c[k].y,
                     height,
@@ -207,7 +207,7 @@ def limit_fences(
             break_through(
                 bodies, c, m, islands, rows, island, fence, left, taken, tolerance, p, counters
             )
-        gauges.absorbed[barrier] += passed_on(c, islands, low, high, fence, p.dt)
+        gauges.target[barrier].absorbed += passed_on(c, islands, low, high, fence, p.dt)
     return touched
 
 

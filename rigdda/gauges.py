@@ -21,7 +21,7 @@ def write_event(
 ) -> int:  # fmt: skip
     """Write event n of body i; returns the new number of events."""
     event = gauges.event[n]
-    rocks = len(gauges.next_station)
+    rocks = len(gauges.rock)
     event.time, event.kind, event.target = time, kind, target
     event.block = i if i < rocks else rocks + gauges.barrier[i]
     event.x, event.y, event.height = x, y, height
@@ -36,7 +36,7 @@ def barrier_contact(gauges: Gauges, a: int, b: int) -> tuple[int, int]:
 
     A gravity wall that is carried along strikes other barriers.
     """
-    rocks = len(gauges.next_station)
+    rocks = len(gauges.rock)
     if b >= rocks:
         return a, gauges.barrier[b]
     if a >= rocks and b >= 0:
@@ -56,7 +56,7 @@ def note_hits(
         if barrier < 0 or c[k].state == OPEN:
             continue
         if time - gauges.last_touch[i, barrier] > NEW_HIT_TIME:
-            height = c[k].y - gauges.barrier_ground[barrier]
+            height = c[k].y - gauges.target[barrier].ground
             events = write_event(
                 gauges, events, time, HIT, bodies, i, barrier, c[k].x, c[k].y, height
             )
@@ -68,14 +68,13 @@ def note_hits(
 def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> int:
     """Write a crossing for each station that a centroid first passes; watch energies."""
     stations = len(gauges.station)
-    for i in range(len(gauges.next_station)):
-        x = bodies[i].x
-        if gauges.watch[0] <= x <= gauges.watch[1]:
-            gauges.watch_energy[i] = max(gauges.watch_energy[i], kinetic_energy(bodies, i))
-        while gauges.next_station[i] < stations and x >= gauges.station[gauges.next_station[i]]:
-            s = gauges.next_station[i]
-            y = bodies[i].y
-            height = y - gauges.station_ground[s]
+    for i in range(len(gauges.rock)):
+        x, rock = bodies[i].x, gauges.rock[i]
+        if gauges.watch_low <= x <= gauges.watch_high:
+            rock.energy = max(rock.energy, kinetic_energy(bodies, i))
+        while rock.next < stations and x >= gauges.station[rock.next].x:
+            s, y = rock.next, bodies[i].y
+            height = y - gauges.station[s].ground
             events = write_event(gauges, events, time, CROSSING, bodies, i, s, x, y, height)
-            gauges.next_station[i] += 1
+            rock.next += 1
     return events

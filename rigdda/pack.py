@@ -37,6 +37,11 @@ from rigdda.records import (
     LINK,
     PARAMETERS,
     POLYGON,
+    SEGMENT,
+    SHAKING,
+    STATION,
+    TARGET,
+    WATCHED,
     Bodies,
     Boxes,
     Contacts,
@@ -198,9 +203,11 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
 def pack_shaking(scene: Scene) -> Shaking:
     """Return the motion of the ground with its integrals over time."""
     history = np.zeros((0, 3)) if scene.base_motion is None else scene.base_motion
-    t, x, y = np.ascontiguousarray(history.T)
-    sums = (np.concatenate([np.zeros(min(len(t), 1)), cumulative(t, a)]) for a in (x, y))
-    return Shaking(t, x, y, *sums)
+    shaking = np.zeros(len(history), dtype=SHAKING)
+    shaking["time"], shaking["x"], shaking["y"] = t, x, y = history.T
+    if len(t):
+        shaking["sum_x"][1:], shaking["sum_y"][1:] = cumulative(t, x), cumulative(t, y)
+    return shaking.view(np.recarray)
 
 
 def cumulative(t: Floats, a: Floats) -> Floats:
@@ -240,9 +247,8 @@ def pack_outlines(polygons: list[Floats], centres: list[Floats], bodies: Bodies)
 def pack_ground(scene: Scene, names: list[str]) -> Ground:
     """Return the terrain segments and the bins that find them by x."""
     if scene.ground is None:
-        none, start = np.zeros(0), np.zeros(1, dtype=np.int64)
-        whole = np.zeros(0, dtype=np.int64)
-        return Ground(none, none, none, none, none, none, whole, start, whole, 0.0, 1.0)
+        none, start = np.zeros(1, dtype=SEGMENT), np.zeros(1, dtype=np.int64)
+        return Ground(none.view(np.recarray), start, start[:0], 0.0, 1.0)
     points = scene.ground.points
     step = np.diff(points, axis=0)
     length = np.hypot(step[:, 0], step[:, 1])
@@ -253,24 +259,32 @@ def pack_ground(scene: Scene, names: list[str]) -> Ground:
         (tangent[:-1] * tangent[1:]).sum(axis=1),
     )
     turn[np.abs(turn) < 1e-12] = 0.0
-    left = np.minimum(points[:-1, 0], points[1:, 0])
-    right = np.maximum(points[:-1, 0], points[1:, 0])
+    extent = np.sort(np.stack([points[:-1], points[1:]]), axis=0)
+    (left, bottom), (right, top) = (corner.T for corner in extent)
     origin, bins = left.min(), max(1, min(2 * len(step), 4096))
     width = max((right.max() - origin) / bins, 1e-9)
+    first, last = (np.minimum((x - origin) / width, bins - 1).astype(int) for x in (left, right))
     items: list[list[int]] = [[] for _ in range(bins)]
     for s in range(len(step)):
-        low = min(int((left[s] - origin) / width), bins - 1)
-        high = min(int((right[s] - origin) / width), bins - 1)
-        for cell in range(low, high + 1):
+        for cell in range(first[s], last[s] + 1):
             items[cell].append(s)
+    segment = np.zeros(len(points), dtype=SEGMENT)
+    segment["x"], segment["y"], segment["turn"] = *points.T, turn
+    columns = {
+        "normal_x": -tangent[:, 1],
+        "normal_y": tangent[:, 0],
+        "length": length,
+        "surface": [names.index(s) for s in scene.ground.surfaces],
+        "left": left,
+        "right": right,
+        "bottom": bottom,
+        "top": top,
+        "bin": first,
+    }
+    for name, values in columns.items():
+        segment[name][:-1] = values
     return Ground(
-        np.ascontiguousarray(points[:, 0]),
-        np.ascontiguousarray(points[:, 1]),
-        np.ascontiguousarray(-tangent[:, 1]),
-        np.ascontiguousarray(tangent[:, 0]),
-        length,
-        turn,
-        np.array([names.index(s) for s in scene.ground.surfaces], dtype=np.int64),
+        segment.view(np.recarray),
         np.cumsum([0, *(len(i) for i in items)]).astype(np.int64),
         np.array([s for cell in items for s in cell], dtype=np.int64),
         float(origin),
@@ -358,23 +372,24 @@ def pack_gauges(
     scene: Scene, bodies: Bodies, stations: NDArray[np.float64], watch: tuple[float, float]
 ) -> Gauges:
     """Return the gauges, with no station passed that a block starts beyond."""
-    blocks, barriers = len(scene.blocks), len(scene.barriers)
-    start = bodies["x"][:blocks]
-    ground = scene.ground
-    fences = [isinstance(b, Fence) for b in scene.barriers]
+    blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.ground
+    station = np.zeros(len(stations), dtype=STATION)
+    station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
+    rock = np.zeros(blocks, dtype=WATCHED)
+    rock["next"] = np.searchsorted(stations, bodies["x"][:blocks], side="right")
+    target = np.zeros(barriers, dtype=TARGET)
+    target["capacity"] = [b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]
+    target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
     room = event_room(free_bodies(scene), len(stations), barriers)
     return Gauges(
-        stations,
-        np.array([_ground(ground, x) for x in stations]),
-        np.searchsorted(stations, start, side="right").astype(np.int64),
+        station.view(np.recarray),
+        rock.view(np.recarray),
+        target.view(np.recarray),
         np.array([-1] * blocks + list(scene.bodies), dtype=np.int64),
-        np.array([b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]),
-        sum(fences),
-        np.array([_ground(ground, b.x) for b in scene.barriers]),
+        sum(isinstance(b, Fence) for b in scene.barriers),
         np.full((free_bodies(scene), barriers), -np.inf),
-        np.zeros(barriers),
-        np.array(watch, dtype=np.float64),
-        np.zeros(blocks),
+        float(watch[0]),
+        float(watch[1]),
         np.zeros(room, dtype=EVENT).view(np.recarray),
     )
 

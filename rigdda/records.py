@@ -117,6 +117,50 @@ BOX = _record(
 )
 """Swept box of a body."""
 
+SEGMENT = _record(
+    x=float,  # where it starts [m]
+    y=float,
+    normal_x=float,  # unit normal out of the ground
+    normal_y=float,
+    length=float,  # [m]
+    turn=float,  # of the ground where it starts [rad], positive concave, 0 at the ends
+    surface=int,
+    left=float,  # its extent [m]
+    right=float,
+    bottom=float,
+    top=float,
+    bin=int,  # the first one that it is in
+)
+"""One segment of the terrain."""
+
+STATION = _record(
+    x=float,  # chainage [m]
+    ground=float,  # elevation of the highest ground there [m]
+)
+"""Where crossings are recorded."""
+
+WATCHED = _record(
+    next=int,  # first station that it has not passed
+    energy=float,  # largest energy in the interval watched [J]
+)
+"""What is known of a block."""
+
+TARGET = _record(
+    capacity=float,  # energy that it absorbs before it fails [J], inf: it does not
+    absorbed=float,  # [J]
+    ground=float,  # elevation from which impact heights count [m]
+)
+"""What is known of a barrier."""
+
+SHAKING = _record(
+    time=float,  # [s]
+    x=float,  # acceleration of the ground [m/s2]
+    y=float,
+    sum_x=float,  # integrals up to then [m/s]
+    sum_y=float,
+)
+"""One corner of the polygon that is the motion of the ground."""
+
 INTERFACE = _record(
     friction=float,  # tan phi
     cohesion=float,  # [Pa]
@@ -163,6 +207,8 @@ Contacts = NDArray[np.void]
 """(C,) array of CONTACT."""
 Links = NDArray[np.void]
 """Array of LINK in order of a."""
+Shaking = NDArray[np.void]
+"""(K,) array of SHAKING, times never falling; none where the ground rests."""
 Interfaces = NDArray[np.void]
 """(surfaces, surfaces) array of INTERFACE."""
 Box = Any
@@ -206,13 +252,7 @@ class Outlines(NamedTuple):
 class Ground(NamedTuple):
     """Terrain segments with bins along x that list those above them."""
 
-    x: Floats  # (S + 1,) corners [m]
-    y: Floats
-    normal_x: Floats  # (S,) unit normal out of the ground
-    normal_y: Floats
-    length: Floats  # (S,) [m]
-    turn: Floats  # (S + 1,) turn at a corner [rad], positive concave, 0 at the ends
-    surface: Ints  # (S,)
+    segment: NDArray[np.void]  # (S + 1,) of SEGMENT; the last is only where the one before ends
     bin_start: Ints  # (bins + 1,)
     bin_item: Ints
     bin_origin: float
@@ -292,28 +332,15 @@ class Work(NamedTuple):
 class Gauges(NamedTuple):
     """What is watched during a run."""
 
-    station: Floats  # (K,) ascending chainages [m]
-    station_ground: Floats  # (K,) elevation of the highest ground there [m]
-    next_station: Ints  # (N,) first station a block has not passed
+    station: NDArray[np.void]  # (K,) of STATION, ascending
+    rock: NDArray[np.void]  # (N,) of WATCHED
+    target: NDArray[np.void]  # (B,) of TARGET
     barrier: Ints  # (M,) barrier that a body is, -1: rock
-    capacity: Floats  # (B,) energy that a barrier absorbs before it fails [J], inf: it does not
     fences: int  # barriers that can fail
-    barrier_ground: Floats  # (B,) elevation from which impact heights count [m]
     last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
-    absorbed: Floats  # (B,) [J]
-    watch: Floats  # (2,) interval of x
-    watch_energy: Floats  # (N,) largest energy in it [J]
+    watch_low: float  # interval of x [m]
+    watch_high: float
     event: NDArray[np.void]
-
-
-class Shaking(NamedTuple):
-    """Acceleration of the ground: a polygon over time."""
-
-    time: Floats  # (K,) never falling [s]
-    x: Floats  # (K,) [m/s2]
-    y: Floats
-    sum_x: Floats  # (K,) integrals up to then [m/s]
-    sum_y: Floats
 
 
 LEDGER = ("friction", "impact", "damping", "external", "links")

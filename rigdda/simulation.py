@@ -434,8 +434,8 @@ class Simulation:
             frames[:, :n, :3].copy(),
             frames[:, :n, 3:].copy(),
             events,
-            gauges.absorbed.copy(),
-            gauges.watch_energy.copy(),
+            gauges.target["absorbed"].copy(),
+            gauges.rock["energy"].copy(),
             barrier_poses,
         )
 

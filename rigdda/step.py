@@ -274,7 +274,7 @@ def solve_and_move(
                 let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
             if limit_fences(bodies, c, m, islands, rows, s, gauges, time, p, counters):
                 struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
-            if len(gauges.absorbed) > 0:
+            if len(gauges.target) > 0:
                 counters[EVENTS] = note_hits(
                     bodies, c, islands, c0, c1, gauges, counters[EVENTS], time
                 )
@@ -328,13 +328,13 @@ def advance(
     while steps > 0:
         p, parts = levels[level], 2**level
         room = len(gauges.event) - counters[EVENTS]
-        if level == 0 and room < (p.blocks + 1) * (len(gauges.station) + len(gauges.absorbed)):
+        if level == 0 and room < (p.blocks + 1) * (len(gauges.station) + len(gauges.target)):
             return EVENTS_FULL, -1, swapped
         start = counters[STEPS] * parts + part
         time = (start + 1) * p.dt
         if p.static:
             rest_all(bodies)
-        if len(shaking.time) > 0:
+        if len(shaking) > 0:
             set_field(shaking, start * p.dt, time, p)
         for a in range(p.blocks + 1):  # called, this takes a fifteenth of a step of one block
             work.first[a] = work.begin[a]

@@ -18,22 +18,30 @@ from rigdda.records import Bodies, Box, Contacts, Ground, Outlines, Parameters
 @kernel
 def below_segment(ground: Ground, s: int, x: float, y: float) -> float:
     """Return the gap of a point above the line of segment s [m]."""
-    return ground.normal_x[s] * (x - ground.x[s]) + ground.normal_y[s] * (y - ground.y[s])
+    one = ground.segment[s]
+    return one.normal_x * (x - one.x) + one.normal_y * (y - one.y)
+
+
+@kernel
+def along_segment(ground: Ground, s: int, x: float, y: float) -> float:
+    """Return how far along segment s a point lies [m]."""
+    one = ground.segment[s]
+    return one.normal_y * (x - one.x) - one.normal_x * (y - one.y)
 
 
 @kernel
 def over_segment(ground: Ground, s: int, x: float, y: float, depth: float) -> bool:
     """Return whether a point lies over segment s, lengthened by what `depth` needs at its ends."""
-    tx, ty = ground.normal_y[s], -ground.normal_x[s]
-    along = tx * (x - ground.x[s]) + ty * (y - ground.y[s])
+    along, one = along_segment(ground, s, x, y), ground.segment[s]
+    turn_end = ground.segment[s + 1].turn
     # in a concave corner: what is deeper under this segment than beyond it, or under both
-    if along < 0.0 and ground.turn[s] > 0.0:
-        near = -along <= depth * math.tan(0.5 * ground.turn[s])
+    if along < 0.0 and one.turn > 0.0:
+        near = -along <= depth * math.tan(0.5 * one.turn)
         return near or below_segment(ground, s - 1, x, y) <= 0.0
-    if along > ground.length[s] and ground.turn[s + 1] > 0.0:
-        near = along - ground.length[s] <= depth * math.tan(0.5 * ground.turn[s + 1])
+    if along > one.length and turn_end > 0.0:
+        near = along - one.length <= depth * math.tan(0.5 * turn_end)
         return near or below_segment(ground, s + 1, x, y) <= 0.0
-    return -1e-9 <= along <= ground.length[s] + 1e-9
+    return -1e-9 <= along <= one.length + 1e-9
 
 
 @kernel
@@ -41,9 +49,9 @@ def shadowed(ground: Ground, s: int, x: float, y: float, gap: float) -> bool:
     """Return whether a point under segment s is less deep under a convex neighbour."""
     if gap >= 0.0:
         return False
-    if ground.turn[s] < 0.0 and below_segment(ground, s - 1, x, y) > gap:
+    if ground.segment[s].turn < 0.0 and below_segment(ground, s - 1, x, y) > gap:
         return True
-    return ground.turn[s + 1] < 0.0 and below_segment(ground, s + 1, x, y) > gap
+    return ground.segment[s + 1].turn < 0.0 and below_segment(ground, s + 1, x, y) > gap
 
 
 @kernel
@@ -53,8 +61,7 @@ def crosses_segment(ground: Ground, s: int, x0: float, y0: float, x1: float, y1:
     if g0 * g1 >= 0.0:
         return False
     x, y = x0 + g0 / (g0 - g1) * (x1 - x0), y0 + g0 / (g0 - g1) * (y1 - y0)
-    tx, ty = ground.normal_y[s], -ground.normal_x[s]
-    return 0.0 < tx * (x - ground.x[s]) + ty * (y - ground.y[s]) < ground.length[s]
+    return 0.0 < along_segment(ground, s, x, y) < ground.segment[s].length
 
 
 @kernel
@@ -67,9 +74,9 @@ def beneath_roof(
     no such case: the block still reaches through segment s.
     """
     x, y = outlines.world_x[a, vertex], outlines.world_y[a, vertex]
-    foot_x, foot_y = x - gap * ground.normal_x[s], y - gap * ground.normal_y[s]
+    foot_x, foot_y = x - gap * ground.segment[s].normal_x, y - gap * ground.segment[s].normal_y
     between = False
-    for other in range(len(ground.length)):
+    for other in range(len(ground.segment) - 1):
         if other != s:
             between = between or crosses_segment(ground, other, x, y, foot_x, foot_y)
     if not between:
@@ -94,10 +101,10 @@ def along_neighbour(
     It slides along that segment.
     """
     gap = below_segment(ground, s, x, y)
-    sunk = min(gap, 0.0) - gap - (ground.normal_x[s] * dx + ground.normal_y[s] * dy)
+    sunk = min(gap, 0.0) - gap - (ground.segment[s].normal_x * dx + ground.segment[s].normal_y * dy)
     if sunk <= 0.0 or not over_segment(ground, s, x, y, max(-gap, 0.0)):
         return dx, dy
-    return dx + sunk * ground.normal_x[s], dy + sunk * ground.normal_y[s]
+    return dx + sunk * ground.segment[s].normal_x, dy + sunk * ground.segment[s].normal_y
 
 
 @kernel
@@ -113,11 +120,11 @@ def place_of_hit(
         return x, y
     dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * p.dt
     dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * p.dt
-    if ground.turn[s] > 0.0:
+    if ground.segment[s].turn > 0.0:
         dx, dy = along_neighbour(ground, s - 1, x, y, dx, dy)
-    if ground.turn[s + 1] > 0.0:
+    if ground.segment[s + 1].turn > 0.0:
         dx, dy = along_neighbour(ground, s + 1, x, y, dx, dy)
-    approach = -(ground.normal_x[s] * dx + ground.normal_y[s] * dy)
+    approach = -(ground.segment[s].normal_x * dx + ground.segment[s].normal_y * dy)
     time = min(gap / approach, 1.0) if approach > 0.0 else 0.0
     return x + time * dx, y + time * dy
 
@@ -135,7 +142,8 @@ def corners_on_segment(
     p: Parameters,
 ) -> int:
     """Add contacts of the corners of block a with segment s; returns the new number."""
-    nx, ny = ground.normal_x[s], ground.normal_y[s]
+    one = ground.segment[s]
+    nx, ny, surface = one.normal_x, one.normal_y, one.surface
     reach = bodies[a].path + p.gravity * p.dt * p.dt + p.slack
     concave = bodies[a].parts > 1
     lowest = below_segment(ground, s, bodies[a].x, bodies[a].y) - bodies[a].radius
@@ -161,9 +169,9 @@ def corners_on_segment(
             if c[m].owner == 1 and c[m].key == key and c[m].nx * nx + c[m].ny * ny > SAME_FACE:
                 again = True
                 if gap < c[m].gap:
-                    add_contact(c, m, a, TERRAIN, key, 1, ground.surface[s], x, y, nx, ny, gap)
+                    add_contact(c, m, a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
         if not again:
-            add_contact(c, k, a, TERRAIN, key, 1, ground.surface[s], x, y, nx, ny, gap)
+            add_contact(c, k, a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
             k += 1
     return k
 
@@ -200,13 +208,13 @@ def edge_on_ridge(
     The edge is the last to separate the corner from the block, or about as deep; its normal must
     lie about between those of the two segments, or a corner of the block is in contact instead.
     """
-    x, y = ground.x[corner], ground.y[corner]
+    x, y = ground.segment[corner].x, ground.segment[corner].y
     dt, n = p.dt, outlines.polygon[part].count
     dx = -(bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
     dy = -(bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
     if not (box.low_x <= x <= box.high_x and box.low_y <= y <= box.high_y):
         return k
-    left, right, concave = corner - 1, corner, part != a
+    left, right, concave = ground.segment[corner - 1], ground.segment[corner], part != a
     lean = LEAN + abs(bodies[a].omega) * dt
     reach = bodies[a].path + p.gravity * dt * dt + p.slack
     best, best_time, best_gap = -1, -1.0, -1e300
@@ -224,9 +232,9 @@ def edge_on_ridge(
         if gap > p.slack:
             time = NEVER if approach <= 0.0 else min(gap / approach, NEVER)
         # the normal out of the ground is opposite to that of the edge
-        after_left = ground.normal_x[left] * -ny - ground.normal_y[left] * -nx <= lean
-        before_right = -nx * ground.normal_y[right] + ny * ground.normal_x[right] <= lean
-        outward = nx * ground.normal_x[left] + ny * ground.normal_y[left] < 0.0
+        after_left = left.normal_x * -ny - left.normal_y * -nx <= lean
+        before_right = -nx * right.normal_y + ny * right.normal_x <= lean
+        outward = nx * left.normal_x + ny * left.normal_y < 0.0
         fits = after_left and before_right and outward and not inner
         if fits and (time > best_time or (time == best_time and gap > best_gap)):
             best, best_time, best_gap = edge, time, gap
@@ -251,7 +259,7 @@ def edge_on_ridge(
     if gap > 0.0 and (along < 0.0 or along > ex * ex + ey * ey):
         return k
     key = len(bodies) * outlines.world_x.shape[1] + corner
-    add_contact(c, k, a, TERRAIN, key, 0, ground.surface[right], x, y, -nx, -ny, gap)
+    add_contact(c, k, a, TERRAIN, key, 0, right.surface, x, y, -nx, -ny, gap)
     return k + 1
 
 
@@ -280,22 +288,17 @@ def collide_terrain(
     for cell in range(low, high + 1):
         for item in range(ground.bin_start[cell], ground.bin_start[cell + 1]):
             s = ground.bin_item[item]
-            from_cell = int(
-                (min(ground.x[s], ground.x[s + 1]) - ground.bin_origin) / ground.bin_width
-            )
-            if cell != max(min(max(from_cell, 0), bins - 1), low):
+            one = ground.segment[s]
+            if cell != max(one.bin, low):
                 continue  # seen in an earlier cell
-            if (
-                min(ground.x[s], ground.x[s + 1]) > box.high_x
-                or max(ground.x[s], ground.x[s + 1]) < box.low_x
-                or min(ground.y[s], ground.y[s + 1]) > box.high_y
-                or max(ground.y[s], ground.y[s + 1]) < box.low_y
-            ):
+            if one.left > box.high_x or one.right < box.low_x:
+                continue
+            if one.bottom > box.high_y or one.top < box.low_y:
                 continue
             if k + outlines.world_x.shape[1] + bodies[a].parts + 2 > len(c):
                 return -1
             k = corners_on_segment(bodies, outlines, ground, c, k, first, a, s, p)
-            if ground.turn[s] < 0.0:
+            if one.turn < 0.0:
                 for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):
                     found = edge_on_ridge(bodies, outlines, ground, box, c, k, a, part, s, p)
                     k = keep_nearest(c, first, k, k) if found > k and part != a else found

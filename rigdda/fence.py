@@ -31,7 +31,7 @@ from rigdda.constants import (
     STICK,
 )
 from rigdda.gauges import FAILED, write_event
-from rigdda.kernel import inlined, kernel
+from rigdda.kernel import kernel, stage
 from rigdda.open_close import open_close
 from rigdda.records import EVENTS, Bodies, Contacts, Gauges, Islands, Matrix, Parameters, Rows
 from rigdda.sleep import wake_island
@@ -92,7 +92,7 @@ def passed_on(c: Contacts, islands: Islands, low: int, high: int, fence: int, dt
     return total
 
 
-@kernel
+@stage
 def set_passing(
     bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     fence: int, p: Parameters, counters: NDArray,
@@ -121,7 +121,7 @@ def set_passing(
     open_close(bodies, c, m, islands, rows, island, p, counters)
 
 
-@kernel
+@stage
 def break_through(
     bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     fence: int, left: float, taken: float, tolerance: float, p: Parameters, counters: NDArray,
@@ -172,7 +172,7 @@ def touches(c: Contacts, islands: Islands, low: int, high: int, fence: int) -> i
     return -1
 
 
-@inlined
+@stage
 def limit_fences(
     bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     gauges: Gauges, time: float, p: Parameters, counters: NDArray,

@@ -5,6 +5,7 @@ Fixed and sleeping bodies and the terrain have no unknowns and join nothing.
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.constants import AWAKE
@@ -63,7 +64,7 @@ def find_islands(
     parent, slot = islands.parent, islands.slot
     block_start, contact_start = islands.block_start, islands.contact_start
     join_blocks(bodies, c, begin[blocks], parent, blocks, apart)
-    count = 0
+    count = int(np.int64(0))  # with a literal `_fill` would be compiled twice
     for s in range(len(block_start)):
         block_start[s] = contact_start[s] = 0
     # slot serves first as the number of the root's island

@@ -161,7 +161,7 @@ def detect(
         return -1
     since = lap(counters, BROAD_PHASE, since, p.timing)
     start = time <= 1.5 * p.dt
-    count = link = 0
+    count, link = int(np.int64(0)), 0  # with a literal all that it is handed to is compiled twice
     for a in range(p.blocks):
         work.begin[a] = count
         low_link = link
@@ -257,14 +257,21 @@ def solve_and_move(
     bad, excess = -1, 0.0
     for s in range(found):
         c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
+        settled, islands.relaxed[0] = True, 0
         if c1 > c0:
             since = lap(counters, MOTION, since, p.timing)
             settled = open_close(bodies, c, m, islands, rows, s, p, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
-            struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
-            far = too_far(bodies, c, m, islands, s, p) if cutting else 0.0
-            if far > 1.0 and settled and act_early(bodies, c, m, islands, s, p):
-                struck, far = True, too_far(bodies, c, m, islands, s, p)
+        struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
+        if c1 > c0:
+            far = 0.0
+            for attempt in range(2 if cutting else 0):
+                far = too_far(bodies, c, m, islands, s, p)
+                if far <= 1.0 or attempt == 1 or not settled:
+                    break
+                if not act_early(bodies, c, m, islands, s, p):
+                    break
+                struck = True
             if far > 1.0 or (cutting and not settled):
                 excess = max(excess, far, 1.0)
                 counters[CUT_BACKS] += 1
@@ -278,9 +285,6 @@ def solve_and_move(
                 counters[EVENTS] = note_hits(
                     bodies, c, islands, c0, c1, gauges, counters[EVENTS], time
                 )
-        else:
-            islands.relaxed[0] = 0
-            struck = apply_forces(bodies, c, m, islands, s, False, p)
         bad = max(bad, move_island(bodies, outlines, c, m, islands, s, struck, gauges, p, ledger))
     if p.sleeping:
         watch_quiet(bodies, islands, found, p)

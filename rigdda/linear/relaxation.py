@@ -369,15 +369,15 @@ def relax_forces(
     for number in range(substeps):
         for s in range(n + 1):
             rows.moved_in[s] = -1
-        worst, tries = math.inf, 0
-        while worst > tolerance * h and tries < most:
+        for tries in range(most):
             visits = list_visits(rows, count, tries, number)
             worst = sweep(
                 rows.row, rows.row_i, rows.row_j, motion, n, rows.visit, visits, tries, number,
                 substeps, rows.idle, REACH * speed * h, rows.moved_in, tolerance * h,
             )  # fmt: skip
-            tries += 1
-        sweeps += tries
+            sweeps += 1
+            if worst <= tolerance * h:
+                break
         go_on(motion, n, number == substeps - 1)
     for s in range(n):
         v = velocity(bodies, islands.block_item[first + s])

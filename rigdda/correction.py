@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rigdda.assembly.island import assemble_blocks, load_moment
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, REST, SHOCK, SHOCK_SPEED, STEADY_RATE
-from rigdda.contact.narrow_phase import over_edge
+from rigdda.contact.narrow_phase import following, over_edge
 from rigdda.gauges import barrier_contact
 from rigdda.islands import root
 from rigdda.kernel import entry_kernel, inlined, kernel
@@ -27,9 +27,9 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
     for place in range(polygons(bodies, i)):
         row = polygon_row(bodies, i, place)
         for k in range(outlines.polygon[row].count):
-            x, y = outlines.corner[row, k].x, outlines.corner[row, k].y
-            outlines.world_x[row, k] = bodies[i].x + cos * x - sin * y
-            outlines.world_y[row, k] = bodies[i].y + sin * x + cos * y
+            own, x, y = outlines.corner[row, k], outlines.shape[row, k].x, outlines.shape[row, k].y
+            own.x = bodies[i].x + cos * x - sin * y
+            own.y = bodies[i].y + sin * x + cos * y
         place_edges(outlines, row)
 
 
@@ -57,14 +57,12 @@ def place_edges(outlines: Outlines, row: int) -> None:
     """Set the edge normals of a polygon, its middle and the circle in it, from its corners."""
     n, sum_x, sum_y = outlines.polygon[row].count, 0.0, 0.0
     for k in range(n):
-        sum_x += outlines.world_x[row, k]
-        sum_y += outlines.world_y[row, k]
-        end = k + 1 if k + 1 < n else 0
-        ex = outlines.world_x[row, end] - outlines.world_x[row, k]
-        ey = outlines.world_y[row, end] - outlines.world_y[row, k]
+        own, end = outlines.corner[row, k], outlines.corner[row, following(k, n)]
+        sum_x += own.x
+        sum_y += own.y
+        ex, ey = end.x - own.x, end.y - own.y
         length = math.sqrt(ex * ex + ey * ey)
-        outlines.normal_x[row, k] = ey / length
-        outlines.normal_y[row, k] = -ex / length
+        own.normal_x, own.normal_y = ey / length, -ex / length
     polygon = outlines.polygon[row]
     polygon.middle_x, polygon.middle_y = sum_x / n, sum_y / n
     inside = math.inf
@@ -85,10 +83,10 @@ def move_corners(bodies: Bodies, outlines: Outlines, i: int, m: Matrix, s: int) 
     for place in range(polygons(bodies, i)):
         row = polygon_row(bodies, i, place)
         for k in range(outlines.polygon[row].count):
-            x = outlines.world_x[row, k] - bodies[i].x + u
-            y = outlines.world_y[row, k] - bodies[i].y + v
-            outlines.world_x[row, k] += u - y * r
-            outlines.world_y[row, k] += v + x * r
+            own = outlines.corner[row, k]
+            x, y = own.x - bodies[i].x + u, own.y - bodies[i].y + v
+            own.x += u - y * r
+            own.y += v + x * r
             bodies[i].radius = max(bodies[i].radius, math.hypot(x - y * r, y + x * r))
         place_edges(outlines, row)
 

@@ -36,6 +36,7 @@ from rigdda.records import (
     INTERFACE,
     LINK,
     PARAMETERS,
+    POINT,
     POLYGON,
     SEGMENT,
     SHAKING,
@@ -224,23 +225,22 @@ def pack_outlines(polygons: list[Floats], centres: list[Floats], bodies: Bodies)
         bodies["part"][i] = i if len(parts) == 1 else len(rows)
         rows += [(i, part) for part in parts if len(parts) > 1]
     shape = (len(rows), max(len(corner) for _, corner in rows))
-    outlined, corners = np.zeros(len(rows), dtype=POLYGON), np.zeros(shape, dtype=CORNER)
+    outlined, points = np.zeros(len(rows), dtype=POLYGON), np.zeros(shape, dtype=POINT)
+    corners = np.zeros(shape, dtype=CORNER)
     for row, (i, number) in enumerate(rows):
         polygon, corner = polygons[i], corners[row, : len(number)]
         outlined["count"][row], outlined["body"][row] = len(number), i
-        corner["x"], corner["y"] = (polygon - centres[i])[number].T
+        own = points[row, : len(number)]
+        own["x"], own["y"] = (polygon - centres[i])[number].T
         corner["number"] = number
         following = [*number[1:], number[0]]
         corner["inner"] = np.subtract(following, number) % len(polygon) != 1
         if bodies["parts"][i] > 1:
             corner["reentrant"] = turns(polygon)[number] < 0.0
     return Outlines(
-        world_x=np.zeros(shape),
-        world_y=np.zeros(shape),
-        normal_x=np.zeros(shape),
-        normal_y=np.zeros(shape),
-        polygon=outlined.view(np.recarray),
-        corner=corners.view(np.recarray),
+        outlined.view(np.recarray),
+        corners.view(np.recarray),
+        points.view(np.recarray),
     )
 
 

@@ -226,13 +226,22 @@ POLYGON = _record(
 """One outline or convex part."""
 
 CORNER = _record(
-    x=float,  # about the centroid of the body at theta = 0 [m]
+    x=float,  # now [m]
     y=float,
-    number=int,  # the same corner in the outline of the body
+    normal_x=float,  # outward unit normal of the edge that starts here, now
+    normal_y=float,
+    number=np.int32,  # the same corner in the outline of the body
     inner=bool,  # whether the edge that starts here is inside the body
     reentrant=bool,  # whether the body is concave here
 )
-"""What does not change of one corner of a polygon."""
+"""One corner of a polygon."""
+
+POINT = _record(x=float, y=float)
+"""A point in body coordinates: about the centroid at theta = 0 [m]."""
+
+
+Corners = NDArray[np.void]
+"""(R, P) array of CORNER."""
 
 
 class Outlines(NamedTuple):
@@ -241,12 +250,9 @@ class Outlines(NamedTuple):
     Parts have corners of their body only; an edge inside the body is never a face of contact.
     """
 
-    world_x: Floats  # (R, P) now [m]
-    world_y: Floats
-    normal_x: Floats  # (R, P) outward unit normal of the edge that starts at the corner
-    normal_y: Floats
     polygon: NDArray[np.void]  # (R,) of POLYGON
-    corner: NDArray[np.void]  # (R, P) of CORNER
+    corner: Corners
+    shape: NDArray[np.void]  # (R, P) of POINT: the corners in body coordinates
 
 
 class Ground(NamedTuple):

@@ -209,8 +209,8 @@ class Simulation:
     def vertices(self, block: int) -> NDArray[np.float64]:
         """Return the corners of a block now, (n, 2) [m]."""
         n = self._arrays.bodies["count"][block]
-        o = self._arrays.outlines
-        return np.stack([o.world_x[block, :n], o.world_y[block, :n]], axis=1)
+        corner = self._arrays.outlines.corner[block, :n]
+        return np.stack([corner["x"], corner["y"]], axis=1)
 
     def contacts(self) -> NDArray[np.void]:
         """Return the contacts of the last step as a structured array, see `CONTACT`."""

@@ -56,7 +56,7 @@ from rigdda.records import (
     Bodies,
     Boxes,
     Contacts,
-    Floats,
+    Corners,
     Gauges,
     Ground,
     Interfaces,
@@ -74,11 +74,11 @@ from rigdda.sleep import wake_neighbours, watch_quiet
 
 
 @kernel
-def candidate_pairs(bodies: Bodies, x: Floats, y: Floats, boxes: Boxes, p: Parameters) -> bool:
+def candidate_pairs(bodies: Bodies, corner: Corners, boxes: Boxes, p: Parameters) -> bool:
     """List the bodies that each awake one may touch in this step; returns whether they fit."""
-    pairs = sweep_and_prune(bodies, x, y, boxes, p)
+    pairs = sweep_and_prune(bodies, corner, boxes, p)
     if pairs > 0 and p.sleeping and wake_neighbours(bodies, boxes.pairs, pairs, p.blocks) > 0:
-        pairs = sweep_and_prune(bodies, x, y, boxes, p)
+        pairs = sweep_and_prune(bodies, corner, boxes, p)
     if pairs < 0:
         return False
     partners_of_bodies(boxes, pairs)
@@ -124,7 +124,7 @@ def collide_block(
     int
         The new number of contacts; -1 if they do not fit.
     """
-    first, room, boxes = count, len(c) - outlines.world_x.shape[1] - 4, work.boxes
+    first, room, boxes = count, len(c) - outlines.corner.shape[1] - 4, work.boxes
     count = collide_terrain(bodies, outlines, ground, boxes.swept[a], c, count, a, p)
     for q in range(boxes.partner_start[a], boxes.partner_start[a + 1]):
         if count < 0 or count > room:
@@ -157,7 +157,7 @@ def detect(
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
     since = lap(counters, BROAD_PHASE, 0, p.timing)
-    if not candidate_pairs(bodies, outlines.world_x, outlines.world_y, work.boxes, p):
+    if not candidate_pairs(bodies, outlines.corner, work.boxes, p):
         return -1
     since = lap(counters, BROAD_PHASE, since, p.timing)
     start = time <= 1.5 * p.dt

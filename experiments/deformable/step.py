@@ -69,10 +69,10 @@ def move_block(bodies: Bodies, outlines: Outlines, s: Solid, i: int, dt: float) 
     u, v, r, ex, ey, g = s.d[i, 0], s.d[i, 1], s.d[i, 2], s.d[i, 3], s.d[i, 4], s.d[i, 5]
     radius = 0.0
     for k in range(bodies[i].count):
-        x, y = outlines.world_x[i, k] - bodies[i].x, outlines.world_y[i, k] - bodies[i].y
+        x, y = outlines.corner[i, k].x - bodies[i].x, outlines.corner[i, k].y - bodies[i].y
         moved_x, moved_y = x - y * r + x * ex + 0.5 * y * g, y + x * r + y * ey + 0.5 * x * g
-        outlines.world_x[i, k] = bodies[i].x + u + moved_x
-        outlines.world_y[i, k] = bodies[i].y + v + moved_y
+        outlines.corner[i, k].x = bodies[i].x + u + moved_x
+        outlines.corner[i, k].y = bodies[i].y + v + moved_y
         radius = max(radius, math.hypot(moved_x, moved_y))
     place_edges(outlines, i)
     bodies[i].radius = radius

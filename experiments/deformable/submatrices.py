@@ -38,8 +38,8 @@ def area_moments(outlines: Outlines, i: int, n: int, x0: float, y0: float) -> Ro
     area = xx = yy = xy = 0.0
     for k in range(n):
         end = k + 1 if k + 1 < n else 0
-        ax, ay = outlines.world_x[i, k] - x0, outlines.world_y[i, k] - y0
-        bx, by = outlines.world_x[i, end] - x0, outlines.world_y[i, end] - y0
+        ax, ay = outlines.corner[i, k].x - x0, outlines.corner[i, k].y - y0
+        bx, by = outlines.corner[i, end].x - x0, outlines.corner[i, end].y - y0
         cross = ax * by - ay * bx
         area += 0.5 * cross
         xx += cross * (ax * ax + ax * bx + bx * bx) / 12.0

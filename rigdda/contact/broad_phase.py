@@ -9,21 +9,19 @@ import numpy as np
 from rigdda.constants import AWAKE, HELD, LATELY, RETIRED
 from rigdda.kernel import kernel
 from rigdda.motion import top_speed
-from rigdda.records import Bodies, Boxes, Floats, Parameters
+from rigdda.records import Bodies, Boxes, Corners, Parameters
 
 
 @kernel
-def sweep_boxes(bodies: Bodies, x: Floats, y: Floats, boxes: Boxes, p: Parameters) -> None:
-    """Set the box of each body that holds it over the step, however it is deflected, with slack.
-
-    (x, y) are the corners of the outlines.
-    """
+def sweep_boxes(bodies: Bodies, corner: Corners, boxes: Boxes, p: Parameters) -> None:
+    """Set the box of each body that holds it over the step, however it is deflected, with slack."""
     for i in range(len(bodies)):
-        low_x = high_x = x[i, 0]
-        low_y = high_y = y[i, 0]
+        low_x = high_x = corner[i, 0].x
+        low_y = high_y = corner[i, 0].y
         for k in range(1, bodies[i].count):
-            low_x, high_x = min(low_x, x[i, k]), max(high_x, x[i, k])
-            low_y, high_y = min(low_y, y[i, k]), max(high_y, y[i, k])
+            x, y = corner[i, k].x, corner[i, k].y
+            low_x, high_x = min(low_x, x), max(high_x, x)
+            low_y, high_y = min(low_y, y), max(high_y, y)
         grow = p.slack
         if bodies[i].status == AWAKE:
             bodies[i].lately = max(top_speed(bodies, i), LATELY * bodies[i].lately)
@@ -88,9 +86,9 @@ def overlapping_pairs(boxes: Boxes) -> int:
 
 
 @kernel
-def sweep_and_prune(bodies: Bodies, x: Floats, y: Floats, boxes: Boxes, p: Parameters) -> int:
+def sweep_and_prune(bodies: Bodies, corner: Corners, boxes: Boxes, p: Parameters) -> int:
     """Write the pairs of bodies that may touch in this step; returns how many, -1: too many."""
-    sweep_boxes(bodies, x, y, boxes, p)
+    sweep_boxes(bodies, corner, boxes, p)
     sort_by_low(boxes)
     return overlapping_pairs(boxes)
 

@@ -13,20 +13,26 @@ from __future__ import annotations
 
 from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Contacts, Floats, Outlines, Parameters
+from rigdda.records import Bodies, Contacts, Corners, Outlines, Parameters
 
 NEVER = 2.0
 """Time of entry, over the step, of what does not come nearer or not soon."""
 
 
 @kernel
+def following(corner: int, corners: int) -> int:
+    """Return the corner after this one, anticlockwise."""
+    return corner + 1 if corner + 1 < corners else 0
+
+
+@kernel
 def axis_gap(
-    nx: float, ny: float, x0: float, y0: float, corner_x: Floats, corner_y: Floats, j: int, n: int
+    nx: float, ny: float, x0: float, y0: float, corners: Corners, j: int, n: int
 ) -> tuple[float, int]:
     """Return the least gap of the n corners of body j above a line, and the corner."""
     least, corner = 1e300, 0
     for k in range(n):
-        gap = nx * (corner_x[j, k] - x0) + ny * (corner_y[j, k] - y0)
+        gap = nx * (corners[j, k].x - x0) + ny * (corners[j, k].y - y0)
         if gap < least:
             least, corner = gap, k
     return least, corner
@@ -35,9 +41,9 @@ def axis_gap(
 @kernel
 def over_edge(outlines: Outlines, i: int, edge: int, j: int) -> float:
     """Return the gap of the middle of polygon j above an edge of polygon i [m]."""
-    dx = outlines.polygon[j].middle_x - outlines.world_x[i, edge]
-    dy = outlines.polygon[j].middle_y - outlines.world_y[i, edge]
-    return outlines.normal_x[i, edge] * dx + outlines.normal_y[i, edge] * dy
+    other, own = outlines.polygon[j], outlines.corner[i, edge]
+    dx, dy = other.middle_x - own.x, other.middle_y - own.y
+    return own.normal_x * dx + own.normal_y * dy
 
 
 @kernel
@@ -67,22 +73,20 @@ def face_of_contact(
     one that separates them. Others are looked at only as far as the circle in j may be over them.
     """
     time, depth, best, nearest = -1.0, -1e300, -1, -1
-    corner_x, corner_y = outlines.world_x, outlines.world_y
     facing = facing_edge(outlines, i, edges, j)
     for visit in range(-1, edges):
         edge = facing if visit < 0 else visit
-        nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+        own = outlines.corner[i, edge]
+        nx, ny = own.normal_x, own.normal_y
         if visit >= 0:
             most = over_edge(outlines, i, edge, j) - outlines.polygon[j].inside
             if edge == facing or (most <= slack and (time > 0.0 or most < depth)):
                 continue
-        gap, corner = axis_gap(
-            nx, ny, corner_x[i, edge], corner_y[i, edge], corner_x, corner_y, j, corners
-        )
+        gap, corner = axis_gap(nx, ny, own.x, own.y, outlines.corner, j, corners)
         approach = -(nx * dx + ny * dy)
         if gap > spread:
             return False, time, depth, edge
-        if sunk > 0.0 and outlines.corner[i, edge].inner:
+        if sunk > 0.0 and own.inner:
             gap -= sunk
         entry = 0.0
         if gap > slack:
@@ -99,16 +103,17 @@ def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, 
 
     Of edges in one line rounding alone decides which is the best face.
     """
-    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
-    x, y = outlines.world_x[j, corner], outlines.world_y[j, corner]
+    nx, ny = outlines.corner[i, edge].normal_x, outlines.corner[i, edge].normal_y
+    x, y = outlines.corner[j, corner].x, outlines.corner[j, corner].y
     for _ in range(edges):
-        end = edge + 1 if edge + 1 < edges else 0
-        beyond_end = ny * (outlines.world_x[i, end] - x) > nx * (outlines.world_y[i, end] - y)
-        before_start = ny * (outlines.world_x[i, edge] - x) < nx * (outlines.world_y[i, edge] - y)
+        start, end = outlines.corner[i, edge], outlines.corner[i, following(edge, edges)]
+        beyond_end = ny * (end.x - x) > nx * (end.y - y)
+        before_start = ny * (start.x - x) < nx * (start.y - y)
         step = (1 if beyond_end else 0) - (1 if before_start else 0)
         near = (edge + step) % edges
-        dot = nx * outlines.normal_x[i, near] + ny * outlines.normal_y[i, near]
-        if step == 0 or dot < SAME_FACE or outlines.corner[i, near].inner:
+        other = outlines.corner[i, near]
+        dot = nx * other.normal_x + ny * other.normal_y
+        if step == 0 or dot < SAME_FACE or other.inner:
             break
         edge = near
     return edge
@@ -117,12 +122,13 @@ def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, 
 @kernel
 def incident_edge(outlines: Outlines, i: int, edge: int, j: int, n: int) -> int:
     """Return the edge of j at its nearest corner that faces edge `edge` of i most squarely."""
-    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
-    _, corner = axis_gap(nx, ny, 0.0, 0.0, outlines.world_x, outlines.world_y, j, n)
+    nx, ny = outlines.corner[i, edge].normal_x, outlines.corner[i, edge].normal_y
+    _, corner = axis_gap(nx, ny, 0.0, 0.0, outlines.corner, j, n)
     before = corner - 1 if corner > 0 else n - 1
-    dot_at = nx * outlines.normal_x[j, corner] + ny * outlines.normal_y[j, corner]
-    dot_before = nx * outlines.normal_x[j, before] + ny * outlines.normal_y[j, before]
-    return corner if dot_at < dot_before else before
+    after, ahead = outlines.corner[j, corner], outlines.corner[j, before]
+    dot_after = nx * after.normal_x + ny * after.normal_y
+    dot_ahead = nx * ahead.normal_x + ny * ahead.normal_y
+    return corner if dot_after < dot_ahead else before
 
 
 @kernel
@@ -146,20 +152,20 @@ def clip_contacts(
     (shift_x, shift_y) moves j to where it is at the time of entry, but for its turning: a corner
     within `beside` of the face may come over it. Returns the new number of contacts.
     """
-    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
+    face = outlines.corner[i, edge]
+    nx, ny, x0, y0 = face.normal_x, face.normal_y, face.x, face.y
     tx, ty = -ny, nx
-    x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
-    end = edge + 1 if edge + 1 < outlines.polygon[i].count else 0
-    length = tx * (outlines.world_x[i, end] - x0) + ty * (outlines.world_y[i, end] - y0)
-    other_end = other + 1 if other + 1 < outlines.polygon[j].count else 0
+    end = following(edge, outlines.polygon[i].count)
+    length = tx * (outlines.corner[i, end].x - x0) + ty * (outlines.corner[i, end].y - y0)
+    other_end = following(other, outlines.polygon[j].count)
     # along the face, the incident edge runs from its end (s1) to its start (s2)
-    x1, y1 = outlines.world_x[j, other_end], outlines.world_y[j, other_end]
-    x2, y2 = outlines.world_x[j, other], outlines.world_y[j, other]
+    x1, y1 = outlines.corner[j, other_end].x, outlines.corner[j, other_end].y
+    x2, y2 = outlines.corner[j, other].x, outlines.corner[j, other].y
     s1 = tx * (x1 + shift_x - x0) + ty * (y1 + shift_y - y0)
     s2 = tx * (x2 + shift_x - x0) + ty * (y2 + shift_y - y0)
     g1, g2 = nx * (x1 - x0) + ny * (y1 - y0), nx * (x2 - x0) + ny * (y2 - y0)
     # a corner of j that touches the next edge of a notch, too, may be a little beyond the face
-    start = -slack if outlines.corner[i, edge].reentrant else -beside
+    start = -slack if face.reentrant else -beside
     stop = length + slack if outlines.corner[i, end].reentrant else length + beside
     low = s1 if s1 >= start else 0.0
     high = s2 if s2 <= stop else length
@@ -197,11 +203,11 @@ def add_corner(
     """
     sign = 1.0 if outlines.polygon[i].body == b else -1.0  # the normal points to a
     body = outlines.polygon[owner].body
-    key = body * outlines.world_x.shape[1] + outlines.corner[owner, corner].number
+    own, face = outlines.corner[owner, corner], outlines.corner[i, edge]
+    key = body * outlines.corner.shape[1] + own.number
     add_contact(
         c, k, a, b, key, 1 if body == a else 0, bodies[b].surface,
-        outlines.world_x[owner, corner], outlines.world_y[owner, corner],
-        sign * outlines.normal_x[i, edge], sign * outlines.normal_y[i, edge], gap,
+        own.x, own.y, sign * face.normal_x, sign * face.normal_y, gap,
     )  # fmt: skip
     return k + 1
 
@@ -334,7 +340,7 @@ def deepest_corner(
     in a row, where rounding decides which of them is the face.
     """
     n = outlines.polygon[j].count
-    nx, ny = outlines.normal_x[i, edge], outlines.normal_y[i, edge]
-    x0, y0 = outlines.world_x[i, edge], outlines.world_y[i, edge]
-    gap, corner = axis_gap(nx, ny, x0, y0, outlines.world_x, outlines.world_y, j, n)
+    nx, ny = outlines.corner[i, edge].normal_x, outlines.corner[i, edge].normal_y
+    x0, y0 = outlines.corner[i, edge].x, outlines.corner[i, edge].y
+    gap, corner = axis_gap(nx, ny, x0, y0, outlines.corner, j, n)
     return add_corner(bodies, outlines, c, k, a, b, j, corner, i, edge, gap)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from rigdda.constants import LEAN, SAME_FACE, TERRAIN
-from rigdda.contact.narrow_phase import NEVER, add_contact, keep_nearest
+from rigdda.contact.narrow_phase import NEVER, add_contact, following, keep_nearest
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Box, Contacts, Ground, Outlines, Parameters
 
@@ -73,7 +73,7 @@ def beneath_roof(
     Another segment is between them then. A corner that was pushed right through something thin is
     no such case: the block still reaches through segment s.
     """
-    x, y = outlines.world_x[a, vertex], outlines.world_y[a, vertex]
+    x, y = outlines.corner[a, vertex].x, outlines.corner[a, vertex].y
     foot_x, foot_y = x - gap * ground.segment[s].normal_x, y - gap * ground.segment[s].normal_y
     between = False
     for other in range(len(ground.segment) - 1):
@@ -85,8 +85,8 @@ def beneath_roof(
         n, mean_x, mean_y, its = outlines.polygon[part].count, 0.0, 0.0, False
         for k in range(n):
             its = its or outlines.corner[part, k].number == vertex
-            mean_x += outlines.world_x[part, k] / n
-            mean_y += outlines.world_y[part, k] / n
+            mean_x += outlines.corner[part, k].x / n
+            mean_y += outlines.corner[part, k].y / n
         if its and not crosses_segment(ground, s, mean_x, mean_y, x, y):
             return True
     return False
@@ -150,8 +150,8 @@ def corners_on_segment(
     if lowest > reach:
         return k
     for vertex in range(bodies[a].count):
-        key = a * outlines.world_x.shape[1] + vertex
-        x, y = outlines.world_x[a, vertex], outlines.world_y[a, vertex]
+        key = a * outlines.corner.shape[1] + vertex
+        x, y = outlines.corner[a, vertex].x, outlines.corner[a, vertex].y
         gap = below_segment(ground, s, x, y)
         if gap > reach or gap < -bodies[a].radius:
             continue
@@ -184,10 +184,10 @@ def bridges(
 
     The start on the left and the end on the right, since outlines run anticlockwise.
     """
-    end = edge + 1 if edge + 1 < outlines.polygon[part].count else 0
-    x, y = outlines.world_x[part], outlines.world_y[part]
-    left = below_segment(ground, corner - 1, x[edge], y[edge])
-    return left >= least and below_segment(ground, corner, x[end], y[end]) >= least
+    start = outlines.corner[part, edge]
+    end = outlines.corner[part, following(edge, outlines.polygon[part].count)]
+    left = below_segment(ground, corner - 1, start.x, start.y)
+    return left >= least and below_segment(ground, corner, end.x, end.y) >= least
 
 
 @inlined
@@ -220,12 +220,13 @@ def edge_on_ridge(
     best, best_time, best_gap = -1, -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
-        nx, ny = outlines.normal_x[part, edge], outlines.normal_y[part, edge]
-        gap = nx * (x - outlines.world_x[part, edge]) + ny * (y - outlines.world_y[part, edge])
+        own = outlines.corner[part, edge]
+        nx, ny = own.normal_x, own.normal_y
+        gap = nx * (x - own.x) + ny * (y - own.y)
         approach = -(nx * dx + ny * dy)
         if gap > reach:
             return k
-        inner = concave and outlines.corner[part, edge].inner
+        inner = concave and own.inner
         if inner and gap <= 0.0:
             continue  # a corner inside the part is pushed out of the block, not into the next part
         time = 0.0
@@ -247,18 +248,16 @@ def edge_on_ridge(
     alike = best_gap >= 2.0 * min(depth, 0.0) - p.slack
     if not alike and not bridges(outlines, ground, part, best, corner, 0.5 * best_gap):
         return k
-    nx, ny = outlines.normal_x[part, best], outlines.normal_y[part, best]
-    gap = nx * (x - outlines.world_x[part, best]) + ny * (y - outlines.world_y[part, best])
+    start, end = outlines.corner[part, best], outlines.corner[part, following(best, n)]
+    nx, ny = start.normal_x, start.normal_y
+    gap = nx * (x - start.x) + ny * (y - start.y)
     time = min(best_time, 1.0) if 0.0 < best_time < NEVER else 0.0
-    end = best + 1 if best + 1 < n else 0
-    ex = outlines.world_x[part, end] - outlines.world_x[part, best]
-    ey = outlines.world_y[part, end] - outlines.world_y[part, best]
-    along = (x + time * dx - outlines.world_x[part, best]) * ex
-    along += (y + time * dy - outlines.world_y[part, best]) * ey
+    ex, ey = end.x - start.x, end.y - start.y
+    along = (x + time * dx - start.x) * ex + (y + time * dy - start.y) * ey
     # a corner inside the block counts even where edges in one line make the choice of edge a tie
     if gap > 0.0 and (along < 0.0 or along > ex * ex + ey * ey):
         return k
-    key = len(bodies) * outlines.world_x.shape[1] + corner
+    key = len(bodies) * outlines.corner.shape[1] + corner
     add_contact(c, k, a, TERRAIN, key, 0, right.surface, x, y, -nx, -ny, gap)
     return k + 1
 
@@ -295,7 +294,7 @@ def collide_terrain(
                 continue
             if one.bottom > box.high_y or one.top < box.low_y:
                 continue
-            if k + outlines.world_x.shape[1] + bodies[a].parts + 2 > len(c):
+            if k + outlines.corner.shape[1] + bodies[a].parts + 2 > len(c):
                 return -1
             k = corners_on_segment(bodies, outlines, ground, c, k, first, a, s, p)
             if one.turn < 0.0:

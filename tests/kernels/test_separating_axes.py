@@ -41,11 +41,11 @@ def over_all_edges(
 ) -> tuple[bool, float, float]:
     """Return what `face_of_contact` does, over every edge of i and corner of j."""
     out, count = arrays.outlines, arrays.outlines.polygon.count
-    corners = np.stack([out.world_x[j, : count[j]], out.world_y[j, : count[j]]], axis=1)
+    corners = np.stack([out.corner[j, : count[j]].x, out.corner[j, : count[j]].y], axis=1)
     ranks = []
     for edge in range(count[i]):
-        normal = np.array([out.normal_x[i, edge], out.normal_y[i, edge]])
-        gap = ((corners - (out.world_x[i, edge], out.world_y[i, edge])) @ normal).min()
+        normal = np.array([out.corner[i, edge].normal_x, out.corner[i, edge].normal_y])
+        gap = ((corners - (out.corner[i, edge].x, out.corner[i, edge].y)) @ normal).min()
         if gap > spread:
             return False, 0.0, 0.0
         approach = -way @ normal

@@ -54,17 +54,21 @@ def polygon_row(bodies: Bodies, i: int, place: int) -> int:
 
 @inlined
 def place_edges(outlines: Outlines, row: int) -> None:
-    """Set the edge normals of a polygon, its middle and the circle in it, from its corners."""
-    n, sum_x, sum_y = outlines.polygon[row].count, 0.0, 0.0
+    """Set edge normals, middle, extent and the circle in a polygon from its corners."""
+    polygon, n, sum_x, sum_y = outlines.polygon[row], outlines.polygon[row].count, 0.0, 0.0
+    low_x = low_y = math.inf
+    high_x = high_y = -math.inf
     for k in range(n):
         own, end = outlines.corner[row, k], outlines.corner[row, following(k, n)]
         sum_x += own.x
         sum_y += own.y
+        low_x, high_x = min(low_x, own.x), max(high_x, own.x)
+        low_y, high_y = min(low_y, own.y), max(high_y, own.y)
         ex, ey = end.x - own.x, end.y - own.y
         length = math.sqrt(ex * ex + ey * ey)
         own.normal_x, own.normal_y = ey / length, -ex / length
-    polygon = outlines.polygon[row]
     polygon.middle_x, polygon.middle_y = sum_x / n, sum_y / n
+    polygon.low_x, polygon.high_x, polygon.low_y, polygon.high_y = low_x, high_x, low_y, high_y
     inside = math.inf
     for k in range(n):
         inside = min(inside, -over_edge(outlines, row, k, row))

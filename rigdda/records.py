@@ -222,6 +222,10 @@ POLYGON = _record(
     middle_x=float,  # mean of the corners now [m]
     middle_y=float,
     inside=float,  # radius of the circle about it that touches the nearest edge [m]
+    low_x=float,  # its extent now [m]
+    high_x=float,
+    low_y=float,
+    high_y=float,
 )
 """One outline or convex part."""
 
@@ -240,6 +244,8 @@ POINT = _record(x=float, y=float)
 """A point in body coordinates: about the centroid at theta = 0 [m]."""
 
 
+Polygons = NDArray[np.void]
+"""(R,) array of POLYGON."""
 Corners = NDArray[np.void]
 """(R, P) array of CORNER."""
 
@@ -250,7 +256,7 @@ class Outlines(NamedTuple):
     Parts have corners of their body only; an edge inside the body is never a face of contact.
     """
 
-    polygon: NDArray[np.void]  # (R,) of POLYGON
+    polygon: Polygons
     corner: Corners
     shape: NDArray[np.void]  # (R, P) of POINT: the corners in body coordinates
 

@@ -56,7 +56,6 @@ from rigdda.records import (
     Bodies,
     Boxes,
     Contacts,
-    Corners,
     Gauges,
     Ground,
     Interfaces,
@@ -66,6 +65,7 @@ from rigdda.records import (
     Matrix,
     Outlines,
     Parameters,
+    Polygons,
     Shaking,
     Work,
 )
@@ -74,11 +74,11 @@ from rigdda.sleep import wake_neighbours, watch_quiet
 
 
 @kernel
-def candidate_pairs(bodies: Bodies, corner: Corners, boxes: Boxes, p: Parameters) -> bool:
+def candidate_pairs(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> bool:
     """List the bodies that each awake one may touch in this step; returns whether they fit."""
-    pairs = sweep_and_prune(bodies, corner, boxes, p)
+    pairs = sweep_and_prune(bodies, polygon, boxes, p)
     if pairs > 0 and p.sleeping and wake_neighbours(bodies, boxes.pairs, pairs, p.blocks) > 0:
-        pairs = sweep_and_prune(bodies, corner, boxes, p)
+        pairs = sweep_and_prune(bodies, polygon, boxes, p)
     if pairs < 0:
         return False
     partners_of_bodies(boxes, pairs)
@@ -157,7 +157,7 @@ def detect(
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
     since = lap(counters, BROAD_PHASE, 0, p.timing)
-    if not candidate_pairs(bodies, outlines.corner, work.boxes, p):
+    if not candidate_pairs(bodies, outlines.polygon, work.boxes, p):
         return -1
     since = lap(counters, BROAD_PHASE, since, p.timing)
     start = time <= 1.5 * p.dt

@@ -9,27 +9,21 @@ import numpy as np
 from rigdda.constants import AWAKE, HELD, LATELY, RETIRED
 from rigdda.kernel import kernel
 from rigdda.motion import top_speed
-from rigdda.records import Bodies, Boxes, Corners, Parameters
+from rigdda.records import Bodies, Boxes, Parameters, Polygons
 
 
 @kernel
-def sweep_boxes(bodies: Bodies, corner: Corners, boxes: Boxes, p: Parameters) -> None:
+def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> None:
     """Set the box of each body that holds it over the step, however it is deflected, with slack."""
     for i in range(len(bodies)):
-        low_x = high_x = corner[i, 0].x
-        low_y = high_y = corner[i, 0].y
-        for k in range(1, bodies[i].count):
-            x, y = corner[i, k].x, corner[i, k].y
-            low_x, high_x = min(low_x, x), max(high_x, x)
-            low_y, high_y = min(low_y, y), max(high_y, y)
-        grow = p.slack
+        outline, grow = polygon[i], p.slack
         if bodies[i].status == AWAKE:
             bodies[i].lately = max(top_speed(bodies, i), LATELY * bodies[i].lately)
             bodies[i].path = bodies[i].lately * p.dt
             grow += bodies[i].path + p.gravity * p.dt * p.dt
         box = boxes.swept[i]
-        box.low_x, box.high_x = low_x - grow, high_x + grow
-        box.low_y, box.high_y = low_y - grow, high_y + grow
+        box.low_x, box.high_x = outline.low_x - grow, outline.high_x + grow
+        box.low_y, box.high_y = outline.low_y - grow, outline.high_y + grow
         box.body, box.awake = i, bodies[i].status == AWAKE
         if bodies[i].status == RETIRED or bodies[i].status == HELD:  # nothing overlaps it
             box.low_y, box.high_y = math.inf, -math.inf
@@ -86,9 +80,9 @@ def overlapping_pairs(boxes: Boxes) -> int:
 
 
 @kernel
-def sweep_and_prune(bodies: Bodies, corner: Corners, boxes: Boxes, p: Parameters) -> int:
+def sweep_and_prune(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> int:
     """Write the pairs of bodies that may touch in this step; returns how many, -1: too many."""
-    sweep_boxes(bodies, corner, boxes, p)
+    sweep_boxes(bodies, polygon, boxes, p)
     sort_by_low(boxes)
     return overlapping_pairs(boxes)
 

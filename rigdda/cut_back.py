@@ -112,32 +112,29 @@ def greatest_sinking(
 def act_early(
     bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, p: Parameters
 ) -> bool:
-    """Let the forces on a lone block act as early in the step as keeps its corners from sinking.
+    """Let the velocity of a lone block change so early in the step that its corners do not sink.
 
     A force that stops a corner over a step lets it sink by half of the way that it would have gone.
     A blow stops it at once, also one too slow to pass for an impact beside what gravity adds to the
-    speed in a coarse step. Returns whether that is so in this step, and m.residual then is what
-    displaces the block besides, see `correction.apply_forces`.
+    speed in a coarse step. What changes by the share s of the step early displaces the block by
+    s dt (v_1 - v_0) besides: m.residual. Returns whether that is what it takes.
     """
     low = islands.block_start[island]
     if islands.block_start[island + 1] - low > 1 or m.direction[0, 0] > 0.0:
         return False
     i, share = islands.block_item[low], 0.0
-    for j in range(3):
-        inertia = bodies[i].inertia if j == 2 else bodies[i].mass
-        force = m.d[0, j] * m.diagonal[0, j, j] - m.rhs[0, j]
-        m.direction[0, j] = force * p.dt * p.dt / inertia
+    m.direction[0, 0] = 2.0 * (m.d[0, 0] - p.dt * bodies[i].vx)
+    m.direction[0, 1] = 2.0 * (m.d[0, 1] - p.dt * bodies[i].vy)
+    m.direction[0, 2] = 2.0 * (m.d[0, 2] - p.dt * bodies[i].omega)
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         k = islands.contact_item[item]
         sinking = min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, islands)
         if sinking > 0.0:
             push = along(normal_row(c, k, True), m.direction[0])
             share = max(share, sinking / push) if push > 0.0 else math.inf
-    if share > 0.5:  # not before the step
-        return False
-    for j in range(3):
-        m.residual[0, j] = share * m.direction[0, j]
-    return True
+    for j in range(3):  # not before the step
+        m.residual[0, j] = min(share, 0.5) * m.direction[0, j]
+    return share < math.inf
 
 
 @kernel

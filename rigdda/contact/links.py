@@ -8,8 +8,13 @@ from __future__ import annotations
 
 import math
 
-from rigdda.constants import BOLT, PIN_RECOVERY, STICK
-from rigdda.contact.law import effective_mass, impact_stiffness, set_velocities
+from rigdda.constants import BOLT, PIN, PIN_RECOVERY, STICK
+from rigdda.contact.law import (
+    effective_mass,
+    impact_stiffness,
+    point_velocity,
+    set_velocities,
+)
 from rigdda.kernel import entry_kernel, kernel
 from rigdda.records import Bodies, Contacts, Links, Parameters
 
@@ -77,6 +82,8 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contacts, k: int, p: Param
         c[k].bias = -PIN_RECOVERY * (ax - bx)
         c[k].memory_shear = -PIN_RECOVERY * (ay - by) * c[k].kappa
     set_velocities(bodies, c, k)
+    if links[q].kind == PIN:
+        c[k].un, c[k].us = point_velocity(bodies, a, ax, ay)
 
 
 @kernel

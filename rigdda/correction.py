@@ -139,14 +139,9 @@ def pass_on_shares(
 
 @inlined
 def apply_forces(
-    bodies: Bodies,
-    c: Contacts,
-    m: Matrix,
-    islands: Islands,
-    island: int,
-    relaxed: bool,
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, relaxed: bool,
     p: Parameters,
-) -> bool:
+) -> bool:  # fmt: skip
     """Set m.d and m.residual of an island to the displacement and its impact correction.
 
     Forces are applied equal and opposite here, once more and exactly, so that momentum is kept to

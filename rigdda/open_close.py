@@ -250,17 +250,9 @@ def solve_states(
 
 @kernel
 def relax(
-    bodies: Bodies,
-    c: Contacts,
-    m: Matrix,
-    islands: Islands,
-    rows: Rows,
-    island: int,
-    p: Parameters,
-    counters: NDArray,
-    speed: float,
-    fast: bool,
-) -> None:
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    p: Parameters, counters: NDArray, speed: float, fast: bool,
+) -> None:  # fmt: skip
     """Find the forces of an island by relaxation, from those of the last step."""
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
@@ -349,15 +341,9 @@ def let_wait(bodies: Bodies, islands: Islands, low: int, high: int) -> None:
 
 @kernel
 def open_close(
-    bodies: Bodies,
-    c: Contacts,
-    m: Matrix,
-    islands: Islands,
-    rows: Rows,
-    island: int,
-    p: Parameters,
-    counters: NDArray,
-) -> bool:
+    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    p: Parameters, counters: NDArray,
+) -> bool:  # fmt: skip
     """Settle the contacts of an island, with less restitution where impacts would gain energy.
 
     Newton's restitution with friction can raise the kinetic energy of an eccentric impact; a

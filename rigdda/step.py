@@ -340,23 +340,11 @@ def advance(
             rest_all(bodies)
         if len(shaking) > 0:
             set_field(shaking, start * p.dt, time, p)
-        for a in range(p.blocks + 1):  # called, this takes a fifteenth of a step of one block
-            work.first[a] = work.begin[a]
+        copy_index(work.begin, work.first)
         count = detect(
-            bodies,
-            outlines,
-            ground,
-            interfaces,
-            links,
-            before,
-            now,
-            work,
-            gauges,
-            time,
-            p,
-            counters,
-            deepest,
-        )
+            bodies, outlines, ground, interfaces, links, before, now, work, gauges, time, p,
+            counters, deepest,
+        )  # fmt: skip
         # a cut-back, which cannot be left, has room to spare
         if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
             copy_index(work.first, work.begin)

@@ -13,8 +13,7 @@ What differs is the bias b:
 at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
          shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
          on, the rest viscous (Kelvin and Voigt's solid). Penetration beyond what N_0 explains is
-         pushed out slowly, a small gap closed so. An open gap g gives b = -2 g - dt u_0, at
-         most 0: the contact closes within the step, no farther, or stops.
+         pushed out slowly, a small gap closed so. An open gap g gives b = -g, see `closing`.
 impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
          impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the

@@ -131,16 +131,9 @@ def place_of_hit(
 
 @inlined
 def corners_on_segment(
-    bodies: Bodies,
-    outlines: Outlines,
-    ground: Ground,
-    c: Contacts,
-    k: int,
-    first: int,
-    a: int,
-    s: int,
-    p: Parameters,
-) -> int:
+    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, k: int, first: int, a: int,
+    s: int, p: Parameters,
+) -> int:  # fmt: skip
     """Add contacts of the corners of block a with segment s; returns the new number."""
     one = ground.segment[s]
     nx, ny, surface = one.normal_x, one.normal_y, one.surface
@@ -192,17 +185,9 @@ def bridges(
 
 @inlined
 def edge_on_ridge(
-    bodies: Bodies,
-    outlines: Outlines,
-    ground: Ground,
-    box: Box,
-    c: Contacts,
-    k: int,
-    a: int,
-    part: int,
-    corner: int,
-    p: Parameters,
-) -> int:
+    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, c: Contacts, k: int, a: int,
+    part: int, corner: int, p: Parameters,
+) -> int:  # fmt: skip
     """Add the contact of a convex terrain corner with an edge of a part of block a, if it has one.
 
     The edge is the last to separate the corner from the block, or about as deep; its normal must
@@ -264,15 +249,9 @@ def edge_on_ridge(
 
 @inlined
 def collide_terrain(
-    bodies: Bodies,
-    outlines: Outlines,
-    ground: Ground,
-    box: Box,
-    c: Contacts,
-    k: int,
-    a: int,
+    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, c: Contacts, k: int, a: int,
     p: Parameters,
-) -> int:
+) -> int:  # fmt: skip
     """Add the contacts of block a with the terrain from entry k; returns the new number.
 
     `box` is the swept box of the block.

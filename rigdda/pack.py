@@ -486,4 +486,5 @@ def pack_parameters(
     for name, value in numbers.items():
         levels[name] = value
     levels["dt"] = settings.dt / 2.0 ** np.arange(CUTS + 1)
+    levels["sinking_limit"][1:] = math.inf  # the parts of a step are not cut back
     return levels.view(np.recarray)

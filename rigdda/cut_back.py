@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from rigdda.assembly.springs import along, normal_row
-from rigdda.constants import AWAKE, BOLT, CUTS, HELD, MOVING_SINKING, PIN, PLAIN
+from rigdda.constants import AWAKE, BOLT, CUTS, HELD, MOVING_SINKING, PIN, PLAIN, TERRAIN
 from rigdda.contact.transfer import recall
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contacts, Ints, Islands, Matrix, Parameters
@@ -117,7 +117,8 @@ def act_early(
     A force that stops a corner over a step lets it sink by half of the way that it would have gone.
     A blow stops it at once, also one too slow to pass for an impact beside what gravity adds to the
     speed in a coarse step. What changes by the share s of the step early displaces the block by
-    s dt (v_1 - v_0) besides: m.residual. Returns whether that is what it takes.
+    s dt (v_1 - v_0) besides: m.residual. Returns whether that is what it takes: on the ground it
+    is, from a corner of another body the block may turn into what it does not touch yet.
     """
     low = islands.block_start[island]
     if islands.block_start[island + 1] - low > 1 or m.direction[0, 0] > 0.0:
@@ -131,7 +132,8 @@ def act_early(
         sinking = min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, islands)
         if sinking > 0.0:
             push = along(normal_row(c, k, True), m.direction[0])
-            share = max(share, sinking / push) if push > 0.0 else math.inf
+            on_ground = c[k].b == TERRAIN and c[k].owner == 1
+            share = max(share, sinking / push) if on_ground and push > 0.0 else math.inf
     for j in range(3):  # not before the step
         m.residual[0, j] = min(share, 0.5) * m.direction[0, j]
     return share < math.inf

@@ -54,6 +54,7 @@ from rigdda.constants import (
     START_STIFFNESS,
     STICK,
     STIFFNESS_CHANGE,
+    TERRAIN,
     TOUCHING,
     UNLOADED,
 )
@@ -188,10 +189,11 @@ def closing(c: Contacts, k: int, p: Parameters) -> float:
     """Return the bias with which an open contact closes at the end of the step, or stops [m].
 
     It bears force if it would close within the step, u_0 + u_1 < -2 g / dt, and where that would
-    send it back, u_1 > 0, only what stops it. Where nothing watches over what sinks in next, it is
-    slowed down before, to the speed that would close it in one more step.
+    send it back, u_1 > 0, only what stops it: b = -2 g - dt u_0, at most 0. In fine steps, in which
+    nothing watches what sinks in next, and between blocks, of which many strike at a time, it is
+    slowed down before, to the speed that would close it in one more step: b = -g.
     """
-    if p.sinking_limit == math.inf:
+    if p.sinking_limit == math.inf or c[k].b != TERRAIN:
         return -c[k].gap
     return min(-2.0 * c[k].gap - p.dt * c[k].un, 0.0)
 

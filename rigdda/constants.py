@@ -226,7 +226,8 @@ CUTS = 5
 STEADY_STEP = 0.055
 """Longest step, over the time in which a block falls by half its size, sqrt(size / g), in which
 contacts are left to sink in [-]: blocks of 1 m, 18 ms. In longer ones an island of which one sinks
-takes steps about as long as this; unchecked, 20 of 141 hard cases at 25 to 100 ms sink too deep."""
+takes steps about as long as this, unless it is a lone block whose blow can act early; unchecked, 20
+of 141 hard cases at 25 to 100 ms sink too deep."""
 
 SINKING = 2.5e-4
 """Sinking over block size that such a step may bring [-], a few times that of a contact at rest:

@@ -27,7 +27,7 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
     for place in range(polygons(bodies, i)):
         row = polygon_row(bodies, i, place)
         for k in range(outlines.polygon[row].count):
-            own, x, y = outlines.corner[row, k], outlines.shape[row, k].x, outlines.shape[row, k].y
+            own, x, y = outlines.corner[row, k], outlines.local[row, k].x, outlines.local[row, k].y
             own.x = bodies[i].x + cos * x - sin * y
             own.y = bodies[i].y + sin * x + cos * y
         place_edges(outlines, row)

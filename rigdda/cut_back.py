@@ -2,8 +2,9 @@
 
 A step is too long for an island if a corner ends it far from the straight path along which its
 contacts were foreseen, or goes farther than in any direction they were; or, in steps that are
-coarse for the blocks, if a contact sinks in: contacts are settled in the linear displacements of
-the step (equation 2), and what turns far enough ends it elsewhere (equation 1).
+coarse for the blocks, if a contact sinks in, by what stops over the step, or because contacts are
+settled in linear displacements (equation 2) and what turns far enough ends elsewhere (equation 1).
+Where a lone block sinks in on the ground, its blow may act early instead.
 """
 
 from __future__ import annotations
@@ -129,6 +130,8 @@ def act_early(
     m.direction[0, 2] = 2.0 * (m.d[0, 2] - p.dt * bodies[i].omega)
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         k = islands.contact_item[item]
+        if c[k].kind == BOLT or c[k].kind == PIN or c[k].kind == PLAIN:
+            continue
         sinking = min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, islands)
         if sinking > 0.0:
             push = along(normal_row(c, k, True), m.direction[0])

@@ -174,7 +174,7 @@ PARAMETERS = _record(
     dt=float,
     displacement_limit=float,  # of a corner off its straight path, before a cut-back [m]
     deflection_limit=float,  # of the way of a corner over its path, before a cut-back [m]
-    sinking_limit=float,  # of a contact in a step, before a cut-back [m]; inf where steps are fine
+    sinking_limit=float,  # of a contact in a step, before a cut-back [m]; inf: not watched
     first_cut=int,  # least halvings of a step that is cut back
     gravity_x=float,  # [m/s2]
     gravity_y=float,
@@ -258,7 +258,7 @@ class Outlines(NamedTuple):
 
     polygon: Polygons
     corner: Corners
-    shape: NDArray[np.void]  # (R, P) of POINT: the corners in body coordinates
+    local: NDArray[np.void]  # (R, P) of POINT: the corners in body coordinates
 
 
 class Ground(NamedTuple):

@@ -264,14 +264,14 @@ def solve_and_move(
             since = lap(counters, OPEN_CLOSE, since, p.timing)
         struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
         if c1 > c0:
-            far = 0.0
+            far, early = 0.0, False
             for attempt in range(2 if cutting else 0):
                 far = too_far(bodies, c, m, islands, s, p)
                 if far <= 1.0 or attempt == 1 or not settled:
                     break
-                if not act_early(bodies, c, m, islands, s, p):
+                early = act_early(bodies, c, m, islands, s, p)
+                if not early:
                     break
-                struck = True
             if far > 1.0 or (cutting and not settled):
                 excess = max(excess, far, 1.0)
                 counters[CUT_BACKS] += 1
@@ -281,6 +281,8 @@ def solve_and_move(
                 let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
             if limit_fences(bodies, c, m, islands, rows, s, gauges, time, p, counters):
                 struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
+                early = early and act_early(bodies, c, m, islands, s, p)
+            struck = struck or early
             if len(gauges.target) > 0:
                 counters[EVENTS] = note_hits(
                     bodies, c, islands, c0, c1, gauges, counters[EVENTS], time

@@ -45,8 +45,10 @@ class Deformable:
     """
 
     def __init__(self, scene: Scene, settings: Settings, rock: Rock | None = None):
-        if scene.barriers or scene.supports or any(b.fixed for b in scene.blocks):
-            raise ValueError("give a scene of free blocks without barriers and supports")
+        if scene.barriers or scene.supports or scene.base_motion is not None:
+            raise ValueError("give a scene without barriers, supports and base motion")
+        if any(b.fixed for b in scene.blocks):
+            raise ValueError("give a scene of free blocks")
         if not all(is_convex(b.vertices) for b in scene.blocks):
             raise ValueError("give convex blocks")
         self._sim = Simulation(scene, settings)  # its arrays serve the detection of contacts

@@ -13,7 +13,8 @@ What differs is the bias b:
 at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
          shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
          on, the rest viscous (Kelvin and Voigt's solid). Penetration beyond what N_0 explains is
-         pushed out slowly, a small gap closed so. An open gap g gives b = -g, see `closing`.
+         pushed out slowly, a small gap closed so. u_0 is that of the points that touch at the
+         start of the step, see `set_velocities_at_start`. What an open gap gives: see `closing`.
 impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
          impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
@@ -141,9 +142,9 @@ def set_velocities_at_start(bodies: Bodies, c: Contacts, k: int, dt: float) -> N
     """Set the velocities from the places at the start, after those with the arms of mid-step.
 
     Points of a turning body do not go straight, and a face that turns comes nearer to what slides
-    along it. With the displacement along the rows of mid-step u_1 is the velocity at the end, to
-    second order: a block that rocks on a corner neither lifts nor sinks it. A greater u_0 than that
-    along the rows would let the contact give energy.
+    along it. With the displacement along the rows of mid-step u_1 then is the velocity at the end,
+    to second order: a block that rocks on a corner neither lifts nor sinks it. But u_0 is at most
+    that along the rows: greater, it would let the contact give energy.
     """
     ax, ay = point_velocity(bodies, c[k].a, c[k].x, c[k].y)
     bx, by = point_velocity(bodies, c[k].b, c[k].x, c[k].y)
@@ -151,7 +152,7 @@ def set_velocities_at_start(bodies: Bodies, c: Contacts, k: int, dt: float) -> N
     c[k].us = -c[k].ny * (ax - bx) + c[k].nx * (ay - by)
     face = c[k].a if c[k].owner == 0 else c[k].b
     if face >= 0 and bodies[face].status == AWAKE:
-        opening -= 2.0 * bodies[face].omega * c[k].us * dt
+        opening -= bodies[face].omega * c[k].us * dt
     c[k].un = min(c[k].un, opening)
 
 

@@ -193,7 +193,8 @@ island is cut back: it may meet what was no candidate for a contact."""
 
 SLIDING = 0.01
 """Share of what gravity adds to a speed in a step at which a contact that slipped still slides [-].
-One that hardly does may as well stick now, and to begin with the wrong friction takes long."""
+One that hardly does may as well stick now; one or two blocks that begin with the wrong friction
+take long. In a pile at rest many are at their limit, and begin as they ended."""
 
 LEAN = 0.05
 """Angle by which an edge may lean beyond the sides of a ridge that it rests on [rad], besides what

@@ -34,6 +34,7 @@ from rigdda.constants import (
     REST,
     SHOCK_SPEED,
     SHORT_PROFILE,
+    SLIDING,
     SLIP,
     SMALL_ISLAND,
     SOR,
@@ -228,6 +229,10 @@ def solve_states(
         i = islands.block_item[b0 + s]
         m.d[s, 0], m.d[s, 1] = bodies[i].vx * p.dt, bodies[i].vy * p.dt
         m.d[s, 2] = bodies[i].omega * p.dt
+    for item in range(c0, c1 if small else c0):
+        k = islands.contact_item[item]
+        if c[k].state == SLIP and c[k].kind == REST and abs(c[k].us) < SLIDING * p.gravity * p.dt:
+            c[k].state = STICK
     few = 2 + (c1 - c0) // FEW_MOVING
     for iteration in range(PATIENCE * p.iterations):
         assemble_island(bodies, c, m, islands, island, pairs, p)

@@ -50,8 +50,6 @@ from rigdda.constants import (
     REST,
     RETARDATION_TIME,
     SHOCK,
-    SLIDING,
-    SLIP,
     START_STIFFNESS,
     STICK,
     STIFFNESS_CHANGE,
@@ -323,8 +321,6 @@ def prepare(
             return
         strike(bodies, c, k, 0.5 * p.dt, pull, p)
     set_velocities_at_start(bodies, c, k, p.dt)
-    if c[k].state == SLIP and abs(c[k].us) < SLIDING * p.gravity * p.dt:
-        c[k].state = STICK
     if c[k].state != OPEN:
         set_rest(c, k, weight, most, p)
         return

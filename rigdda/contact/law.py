@@ -124,7 +124,7 @@ def set_arms(bodies: Bodies, c: Contacts, k: int, time: float) -> None:
 
 @kernel
 def set_velocities(bodies: Bodies, c: Contacts, k: int) -> None:
-    """Set the normal and shear relative velocities at the start of the step."""
+    """Set the normal and shear relative velocities, at the arms, of bodies as they move now."""
     a, b = c[k].a, c[k].b
     vx = bodies[a].vx - bodies[a].omega * c[k].ra_y
     vy = bodies[a].vy + bodies[a].omega * c[k].ra_x

@@ -81,12 +81,14 @@ def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -
     layout = rigdda.load_layout(folder / "layout.toml")
     table = rows(folder / "evaluations.csv")
     stored = [json.loads(line) for line in (folder / "evaluations.jsonl").read_text().splitlines()]
-    assert len(table) == len(stored)
-    for row, line in zip(table, stored, strict=True):
-        kept = line["evaluation"]
-        assert float(row["objective"]) == kept["objective"]
-        assert int(row["releases"]) == len(kept["seeds"])
-        assert json.loads(row["barriers"]) == kept["layout"]
+    told = [
+        (json.loads(row["barriers"]), int(row["releases"]), float(row["objective"]))
+        for row in table
+    ]
+    kept = [line["evaluation"] for line in stored]
+    # what was evaluated before, with the same releases, is told again but stored once
+    known = [(one["layout"], len(one["seeds"]), one["objective"]) for one in kept]
+    assert [one for i, one in enumerate(told) if one not in told[:i]] == known
     assert {row["stage"] for row in table} == {"search", "final", "verification"}
     assert [row["stage"] for row in table[-3:]] == 3 * ["verification"]
     assert json.loads(table[-1]["barriers"]) == to_tables(layout)

@@ -135,11 +135,12 @@ def act_early(
         sinking = min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, islands)
         if sinking > 0.0:
             push = along(normal_row(c, k, True), m.direction[0])
-            on_ground = c[k].b == TERRAIN and c[k].owner == 1
-            share = max(share, sinking / push) if on_ground and push > 0.0 else math.inf
+            if c[k].b != TERRAIN or c[k].owner != 1 or push <= 0.0:
+                return False
+            share = max(share, sinking / push)
     for j in range(3):  # not before the step
         m.residual[0, j] = min(share, 0.5) * m.direction[0, j]
-    return share < math.inf
+    return True
 
 
 @kernel

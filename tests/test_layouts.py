@@ -110,10 +110,10 @@ def test_every_kind_reports(released):
     for earthwork in (ditch, dam):
         assert (earthwork.hits, earthwork.absorbed_energy) == (0, 0.0)
         assert earthwork.state == "stands"
-    assert ditch.caught + dam.caught > 0.0
+    assert ditch.caught > 0.0
     shares = ("slope_fraction", "held_fraction", "road_fraction", "beyond_fraction")
     assert sum(getattr(outcome, name) for name in shares) == 1.0
-    assert outcome.held_fraction >= max(ditch.caught, dam.caught)
+    assert outcome.held_fraction >= ditch.caught
     released_mass = rigdda.release(QUICK, (), 2)[1].released_mass
     assert outcome.released_mass == pytest.approx(released_mass, rel=1e-12)
 

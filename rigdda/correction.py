@@ -13,7 +13,17 @@ from rigdda.contact.narrow_phase import following, over_edge
 from rigdda.gauges import barrier_contact
 from rigdda.islands import root
 from rigdda.kernel import entry_kernel, inlined, kernel
-from rigdda.records import Bodies, Contacts, Gauges, Islands, Matrix, Outlines, Parameters
+from rigdda.records import (
+    Bodies,
+    Body,
+    Contact,
+    Contacts,
+    Gauges,
+    Islands,
+    Matrix,
+    Outlines,
+    Parameters,
+)
 
 
 @inlined
@@ -23,13 +33,14 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
     The exact displacement function (equation 1), which replaces the linear one of the solve: the
     post-correction. Corners come from the angle and body coordinates, so area is kept exactly.
     """
-    cos, sin = math.cos(bodies[i].theta), math.sin(bodies[i].theta)
-    for place in range(polygons(bodies, i)):
-        row = polygon_row(bodies, i, place)
+    body = bodies[i]
+    cos, sin = math.cos(body.theta), math.sin(body.theta)
+    for place in range(polygons(body)):
+        row = polygon_row(body, i, place)
         for k in range(outlines.polygon[row].count):
-            own, x, y = outlines.corner[row, k], outlines.local[row, k].x, outlines.local[row, k].y
-            own.x = bodies[i].x + cos * x - sin * y
-            own.y = bodies[i].y + sin * x + cos * y
+            own, local = outlines.corner[row, k], outlines.local[row, k]
+            own.x = body.x + cos * local.x - sin * local.y
+            own.y = body.y + sin * local.x + cos * local.y
         place_edges(outlines, row)
 
 
@@ -41,15 +52,15 @@ def place_all_corners(bodies: Bodies, outlines: Outlines) -> None:
 
 
 @kernel
-def polygons(bodies: Bodies, i: int) -> int:
-    """Return how many polygons body i has: its outline, then its parts if it has several."""
-    return 1 + bodies[i].parts if bodies[i].parts > 1 else 1
+def polygons(body: Body) -> int:
+    """Return how many polygons a body has: its outline, then its parts if it has several."""
+    return 1 + body.parts if body.parts > 1 else 1
 
 
 @kernel
-def polygon_row(bodies: Bodies, i: int, place: int) -> int:
+def polygon_row(body: Body, i: int, place: int) -> int:
     """Return the row in the outlines of a polygon of body i."""
-    return i if place == 0 else bodies[i].part + place - 1
+    return i if place == 0 else body.part + place - 1
 
 
 @inlined
@@ -83,34 +94,35 @@ def move_corners(bodies: Bodies, outlines: Outlines, i: int, m: Matrix, s: int) 
     """
     u, v = m.d[s, 0] + m.residual[s, 0], m.d[s, 1] + m.residual[s, 1]
     r = m.d[s, 2] + m.residual[s, 2]
-    bodies[i].radius = 0.0
-    for place in range(polygons(bodies, i)):
-        row = polygon_row(bodies, i, place)
+    body = bodies[i]
+    body.radius = 0.0
+    for place in range(polygons(body)):
+        row = polygon_row(body, i, place)
         for k in range(outlines.polygon[row].count):
             own = outlines.corner[row, k]
-            x, y = own.x - bodies[i].x + u, own.y - bodies[i].y + v
+            x, y = own.x - body.x + u, own.y - body.y + v
             own.x += u - y * r
             own.y += v + x * r
-            bodies[i].radius = max(bodies[i].radius, math.hypot(x - y * r, y + x * r))
+            body.radius = max(body.radius, math.hypot(x - y * r, y + x * r))
         place_edges(outlines, row)
 
 
 @inlined
-def add_contact_force(c: Contacts, k: int, m: Matrix, i: int, of_a: bool) -> None:
-    """Add the force of contact k to slot i; m.direction holds the greatest share of its impacts.
+def add_contact_force(c: Contact, m: Matrix, i: int, of_a: bool) -> None:
+    """Add the force of a contact to slot i; m.direction holds the greatest share of its impacts.
 
     An impact that another one forestalls counts, too: its corner stops no later.
     """
-    if c[k].kind == IMPACT:
-        m.direction[i, 0] = max(m.direction[i, 0], c[k].share)
-    if c[k].state != OPEN:
-        add_force(m.residual[i], c[k].normal, normal_row(c, k, of_a))
-        add_force(m.residual[i], c[k].shear, shear_row(c, k, of_a))
+    if c.kind == IMPACT:
+        m.direction[i, 0] = max(m.direction[i, 0], c.share)
+    if c.state != OPEN:
+        add_force(m.residual[i], c.normal, normal_row(c, of_a))
+        add_force(m.residual[i], c.shear, shear_row(c, of_a))
 
 
 @inlined
 def pass_on_shares(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, dt: float
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, dt: float
 ) -> None:
     """Let the time of an impact be that of the blows it sends through an island.
 
@@ -124,12 +136,12 @@ def pass_on_shares(
     if not struck:
         return
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        k = islands.contact_item[item]
-        if c[k].pair < 0 or c[k].state == OPEN:
+        c = contacts[islands.contact_item[item]]
+        if c.pair < 0 or c.state == OPEN:
             continue
-        lighter = min(bodies[c[k].a].mass, bodies[c[k].b].mass)
-        if c[k].normal * dt > SHOCK_SPEED * lighter:
-            i, j = root(parent, slot[c[k].a]), root(parent, slot[c[k].b])
+        lighter = min(bodies[c.a].mass, bodies[c.b].mass)
+        if c.normal * dt > SHOCK_SPEED * lighter:
+            i, j = root(parent, slot[c.a]), root(parent, slot[c.b])
             first = min(i, j)
             parent[max(i, j)] = first
             share[first, 0] = max(share[i, 0], share[j, 0])
@@ -139,7 +151,7 @@ def pass_on_shares(
 
 @inlined
 def apply_forces(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, relaxed: bool,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, relaxed: bool,
     p: Parameters,
 ) -> bool:  # fmt: skip
     """Set m.d and m.residual of an island to the displacement and its impact correction.
@@ -159,67 +171,65 @@ def apply_forces(
         for j in range(3):
             m.residual[s, j] = m.direction[s, j] = 0.0
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        k = islands.contact_item[item]
-        blow = c[k].kind == IMPACT or c[k].kind == SHOCK
-        struck = struck or (blow and c[k].normal > 0.0)
-        add_contact_force(c, k, m, islands.slot[c[k].a], True)
-        if c[k].pair >= 0:
-            add_contact_force(c, k, m, islands.slot[c[k].b], False)
+        c = contacts[islands.contact_item[item]]
+        blow = c.kind == IMPACT or c.kind == SHOCK
+        struck = struck or (blow and c.normal > 0.0)
+        add_contact_force(c, m, islands.slot[c.a], True)
+        if c.pair >= 0:
+            add_contact_force(c, m, islands.slot[c.b], False)
     if not relaxed:
-        pass_on_shares(bodies, c, m, islands, island, p.dt)
+        pass_on_shares(bodies, contacts, m, islands, island, p.dt)
     for s in range(b1 - b0):
-        i = islands.block_item[b0 + s]
+        body = bodies[islands.block_item[b0 + s]]
         share = m.direction[s, 0]
         late = (share - 0.5) * p.dt * p.dt if share > 0.0 else 0.0
         for j in range(3):
             m.d[s, j] = (m.rhs[s, j] + m.residual[s, j]) / m.diagonal[s, j, j]
-            inertia = bodies[i].inertia if j == 2 else bodies[i].mass
+            inertia = body.inertia if j == 2 else body.mass
             m.residual[s, j] = m.late[s, j] if relaxed else m.residual[s, j] * late / inertia
     return struck
 
 
 @inlined
-def account_block(
-    bodies: Bodies, m: Matrix, i: int, s: int, p: Parameters, ledger: NDArray
-) -> None:
-    """Add the work of damping, loads and supports on block i, slot s, to the ledger."""
-    drag = damping_of_step(m, s, bodies[i].mass, p)
+def account_block(body: Body, m: Matrix, s: int, p: Parameters, ledger: NDArray) -> None:
+    """Add the work of damping, loads and supports on a block, slot s, to the ledger."""
+    drag = damping_of_step(m, s, body.mass, p)
     slow = m.d[s, 0] ** 2 + m.d[s, 1] ** 2
-    slow = bodies[i].mass * slow + bodies[i].inertia * m.d[s, 2] ** 2
+    slow = body.mass * slow + body.inertia * m.d[s, 2] ** 2
     ledger[2] -= drag * slow / p.dt
-    ledger[3] += bodies[i].force_x * m.d[s, 0] + bodies[i].force_y * m.d[s, 1]
-    ledger[3] += load_moment(bodies, i) * m.d[s, 2]
-    ledger[3] += bodies[i].mass * (p.field_x - p.gravity_x) * m.d[s, 0]
-    ledger[3] += bodies[i].mass * (p.field_y - p.gravity_y) * m.d[s, 1]
+    ledger[3] += body.force_x * m.d[s, 0] + body.force_y * m.d[s, 1]
+    ledger[3] += load_moment(body) * m.d[s, 2]
+    ledger[3] += body.mass * (p.field_x - p.gravity_x) * m.d[s, 0]
+    ledger[3] += body.mass * (p.field_y - p.gravity_y) * m.d[s, 1]
     # an impulse that acts early or late in the step lifts or lowers the block
     lift = p.gravity_x * m.residual[s, 0] + p.gravity_y * m.residual[s, 1]
-    ledger[1] -= bodies[i].mass * lift
+    ledger[1] -= body.mass * lift
 
 
 @inlined
 def account_contact(
-    c: Contacts, k: int, m: Matrix, islands: Islands, ledger: NDArray, gauges: Gauges
+    c: Contact, m: Matrix, islands: Islands, ledger: NDArray, gauges: Gauges
 ) -> None:
-    """Add the work of closed contact k to the ledger."""
-    i = islands.slot[c[k].a]
-    dn = along(normal_row(c, k, True), m.d[i])
-    ds = along(shear_row(c, k, True), m.d[i])
-    block, barrier = barrier_contact(gauges, c[k].a, c[k].b)
-    if barrier >= 0 and block == c[k].a:
-        gauges.target[barrier].absorbed -= c[k].normal * dn + c[k].shear * ds
-    if c[k].pair >= 0:
-        j = islands.slot[c[k].b]
-        en = along(normal_row(c, k, False), m.d[j])
-        es = along(shear_row(c, k, False), m.d[j])
-        if barrier >= 0 and block != c[k].a:
-            gauges.target[barrier].absorbed -= c[k].normal * en + c[k].shear * es
+    """Add the work of a closed contact to the ledger."""
+    i = islands.slot[c.a]
+    dn = along(normal_row(c, True), m.d[i])
+    ds = along(shear_row(c, True), m.d[i])
+    block, barrier = barrier_contact(gauges, c.a, c.b)
+    if barrier >= 0 and block == c.a:
+        gauges.target[barrier].absorbed -= c.normal * dn + c.shear * ds
+    if c.pair >= 0:
+        j = islands.slot[c.b]
+        en = along(normal_row(c, False), m.d[j])
+        es = along(shear_row(c, False), m.d[j])
+        if barrier >= 0 and block != c.a:
+            gauges.target[barrier].absorbed -= c.normal * en + c.shear * es
         dn += en
         ds += es
-    if c[k].kind == BOLT or c[k].kind == PIN:
-        ledger[4] += c[k].normal * dn + c[k].shear * ds
+    if c.kind == BOLT or c.kind == PIN:
+        ledger[4] += c.normal * dn + c.shear * ds
     else:
-        ledger[0] += c[k].shear * ds
-        ledger[1] += c[k].normal * dn
+        ledger[0] += c.shear * ds
+        ledger[1] += c.normal * dn
 
 
 @kernel
@@ -229,36 +239,36 @@ def damping_of_step(m: Matrix, s: int, mass: float, p: Parameters) -> float:
 
 
 @inlined
-def move_block(bodies: Bodies, i: int, m: Matrix, s: int, dt: float) -> None:
-    """Move block i by its displacement; the velocity is that of constant acceleration."""
-    bodies[i].vx = 2.0 * m.d[s, 0] / dt - bodies[i].vx
-    bodies[i].vy = 2.0 * m.d[s, 1] / dt - bodies[i].vy
-    bodies[i].omega = 2.0 * m.d[s, 2] / dt - bodies[i].omega
-    bodies[i].x += m.d[s, 0] + m.residual[s, 0]
-    bodies[i].y += m.d[s, 1] + m.residual[s, 1]
-    bodies[i].theta += m.d[s, 2] + m.residual[s, 2]
+def move_block(body: Body, m: Matrix, s: int, dt: float) -> None:
+    """Move a block, slot s, by its displacement; the velocity is that of constant acceleration."""
+    body.vx = 2.0 * m.d[s, 0] / dt - body.vx
+    body.vy = 2.0 * m.d[s, 1] / dt - body.vy
+    body.omega = 2.0 * m.d[s, 2] / dt - body.omega
+    body.x += m.d[s, 0] + m.residual[s, 0]
+    body.y += m.d[s, 1] + m.residual[s, 1]
+    body.theta += m.d[s, 2] + m.residual[s, 2]
 
 
 @inlined
-def keep_memory(c: Contacts, k: int, struck: bool, relaxed: bool) -> None:
-    """Carry the forces of contact k to the next step; an impulse does not last.
+def keep_memory(c: Contact, struck: bool, relaxed: bool) -> None:
+    """Carry the forces of a contact to the next step; an impulse does not last.
 
     In an island that was struck every force may be part of an impulse: what the contact carried
     before stays. Of a contact that moves only part of a rise counts. Relaxation has set the forces
     from which the next step is to start.
     """
-    if c[k].state == OPEN:
-        c[k].memory_normal = c[k].memory_shear = 0.0
-        c[k].start_normal = c[k].start_shear = 0.0
+    if c.state == OPEN:
+        c.memory_normal = c.memory_shear = 0.0
+        c.start_normal = c.start_shear = 0.0
         return
-    if c[k].kind == MOVING:
-        rise = c[k].normal - c[k].memory_normal
-        c[k].memory_normal += rise if rise < 0.0 else STEADY_RATE * rise
-        lasting = c[k].memory_normal / c[k].normal if c[k].normal > 0.0 else 1.0
-        c[k].memory_shear = lasting * c[k].shear
+    if c.kind == MOVING:
+        rise = c.normal - c.memory_normal
+        c.memory_normal += rise if rise < 0.0 else STEADY_RATE * rise
+        lasting = c.memory_normal / c.normal if c.normal > 0.0 else 1.0
+        c.memory_shear = lasting * c.shear
     elif not struck:
-        elastic = c[k].stiffness / c[k].kappa if c[k].kind == REST else 1.0
-        c[k].memory_normal += elastic * (c[k].normal - c[k].memory_normal)
-        c[k].memory_shear += elastic * (c[k].shear - c[k].memory_shear)
+        elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
+        c.memory_normal += elastic * (c.normal - c.memory_normal)
+        c.memory_shear += elastic * (c.shear - c.memory_shear)
     if not relaxed:
-        c[k].start_normal, c[k].start_shear = c[k].normal, c[k].shear
+        c.start_normal, c.start_shear = c.normal, c.shear

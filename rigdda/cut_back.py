@@ -15,12 +15,12 @@ from rigdda.assembly.springs import along, normal_row
 from rigdda.constants import AWAKE, BOLT, CUTS, HELD, MOVING_SINKING, PIN, PLAIN, TERRAIN
 from rigdda.contact.transfer import recall
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Contacts, Ints, Islands, Matrix, Parameters
+from rigdda.records import Bodies, Body, Contact, Contacts, Ints, Islands, Matrix, Parameters
 
 
 @inlined
 def too_far(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, p: Parameters
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, p: Parameters
 ) -> float:
     """Return how far an island goes in this step, over how far a step should take it [-].
 
@@ -31,7 +31,7 @@ def too_far(
     if p.sinking_limit < math.inf:
         blocks = islands.block_start[island + 1] - islands.block_start[island]
         limit = p.sinking_limit * (MOVING_SINKING * blocks if islands.relaxed[0] == 1 else 1.0)
-        far = max(far, greatest_sinking(bodies, c, m, islands, island) / limit)
+        far = max(far, greatest_sinking(bodies, contacts, m, islands, island) / limit)
     return far
 
 
@@ -42,9 +42,9 @@ def greatest_departure(
     """Return a bound on how far from its straight path any corner of an island ends a step [m]."""
     most, low = 0.0, islands.block_start[island]
     for place in range(low, islands.block_start[island + 1]):
-        d, i = m.d[place - low], islands.block_item[place]
-        turn = abs(d[2]) * bodies[i].radius
-        dx, dy = d[0] - dt * bodies[i].vx, d[1] - dt * bodies[i].vy
+        d, body = m.d[place - low], bodies[islands.block_item[place]]
+        turn = abs(d[2]) * body.radius
+        dx, dy = d[0] - dt * body.vx, d[1] - dt * body.vy
         most = max(most, math.sqrt(dx * dx + dy * dy) + turn)
     return most
 
@@ -56,62 +56,62 @@ def greatest_deflection(
     """Return how much farther than foreseen any corner of an island goes in a step [m]."""
     most, low = 0.0, islands.block_start[island]
     for place in range(low, islands.block_start[island + 1]):
-        d, i = m.d[place - low], islands.block_item[place]
-        way = math.sqrt(d[0] * d[0] + d[1] * d[1]) + abs(d[2]) * bodies[i].radius
-        most = max(most, way - bodies[i].path)
+        d, body = m.d[place - low], bodies[islands.block_item[place]]
+        way = math.sqrt(d[0] * d[0] + d[1] * d[1]) + abs(d[2]) * body.radius
+        most = max(most, way - body.path)
     return most - p.gravity * p.dt * p.dt
 
 
 @kernel
 def point_after(
-    bodies: Bodies, m: Matrix, i: int, s: int, x: float, y: float, cos: float, sin: float
+    body: Body, m: Matrix, s: int, x: float, y: float, cos: float, sin: float
 ) -> tuple[float, float]:
-    """Return where a point of body i, in slot s, ends the step; it turns by this angle."""
-    x, y = x - bodies[i].x, y - bodies[i].y
+    """Return where a point of a body, in slot s, ends the step; it turns by this angle."""
+    x, y = x - body.x, y - body.y
     u, v = m.d[s, 0] + m.residual[s, 0], m.d[s, 1] + m.residual[s, 1]
-    return bodies[i].x + u + cos * x - sin * y, bodies[i].y + v + sin * x + cos * y
+    return body.x + u + cos * x - sin * y, body.y + v + sin * x + cos * y
 
 
 @kernel
-def gap_after(bodies: Bodies, c: Contacts, k: int, m: Matrix, islands: Islands) -> float:
-    """Return the gap of contact k at the end of the step, after the post-correction [m]."""
-    nx, ny = c[k].nx, c[k].ny
+def gap_after(bodies: Bodies, c: Contact, m: Matrix, islands: Islands) -> float:
+    """Return the gap of a contact at the end of the step, after the post-correction [m]."""
+    nx, ny = c.nx, c.ny
     # the corner, and the point of the face that it is over; the normal points to a
-    side = 1.0 if c[k].owner == 1 else 0.0
-    ax, ay = c[k].x + (1.0 - side) * c[k].gap * nx, c[k].y + (1.0 - side) * c[k].gap * ny
-    bx, by = c[k].x - side * c[k].gap * nx, c[k].y - side * c[k].gap * ny
-    a, b, s = c[k].a, c[k].b, islands.slot[c[k].a]
+    side = 1.0 if c.owner == 1 else 0.0
+    ax, ay = c.x + (1.0 - side) * c.gap * nx, c.y + (1.0 - side) * c.gap * ny
+    bx, by = c.x - side * c.gap * nx, c.y - side * c.gap * ny
+    s = islands.slot[c.a]
     turn = m.d[s, 2] + m.residual[s, 2]
     cos, sin = math.cos(turn), math.sin(turn)
-    ax, ay = point_after(bodies, m, a, s, ax, ay, cos, sin)
-    if c[k].owner == 0:  # the face turns with a
+    ax, ay = point_after(bodies[c.a], m, s, ax, ay, cos, sin)
+    if c.owner == 0:  # the face turns with a
         nx, ny = cos * nx - sin * ny, sin * nx + cos * ny
-    if c[k].pair >= 0:
-        s = islands.slot[b]
+    if c.pair >= 0:
+        s = islands.slot[c.b]
         turn = m.d[s, 2] + m.residual[s, 2]
         cos, sin = math.cos(turn), math.sin(turn)
-        bx, by = point_after(bodies, m, b, s, bx, by, cos, sin)
-        if c[k].owner == 1:
+        bx, by = point_after(bodies[c.b], m, s, bx, by, cos, sin)
+        if c.owner == 1:
             nx, ny = cos * nx - sin * ny, sin * nx + cos * ny
     return nx * (ax - bx) + ny * (ay - by)
 
 
 @kernel
 def greatest_sinking(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int
 ) -> float:
     """Return by how much a contact of an island ends the step deeper than it began it [m]."""
     most = 0.0
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        k = islands.contact_item[item]
-        if c[k].kind != BOLT and c[k].kind != PIN and c[k].kind != PLAIN:
-            most = max(most, min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, islands))
+        c = contacts[islands.contact_item[item]]
+        if c.kind != BOLT and c.kind != PIN and c.kind != PLAIN:
+            most = max(most, min(c.gap, 0.0) - gap_after(bodies, c, m, islands))
     return most
 
 
 @kernel
 def act_early(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, p: Parameters
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, p: Parameters
 ) -> bool:
     """Let the velocity of a lone block change so early in the step that its corners do not sink.
 
@@ -124,18 +124,18 @@ def act_early(
     low = islands.block_start[island]
     if islands.block_start[island + 1] - low > 1 or m.direction[0, 0] > 0.0:
         return False
-    i, share = islands.block_item[low], 0.0
-    m.direction[0, 0] = 2.0 * (m.d[0, 0] - p.dt * bodies[i].vx)
-    m.direction[0, 1] = 2.0 * (m.d[0, 1] - p.dt * bodies[i].vy)
-    m.direction[0, 2] = 2.0 * (m.d[0, 2] - p.dt * bodies[i].omega)
+    body, share = bodies[islands.block_item[low]], 0.0
+    m.direction[0, 0] = 2.0 * (m.d[0, 0] - p.dt * body.vx)
+    m.direction[0, 1] = 2.0 * (m.d[0, 1] - p.dt * body.vy)
+    m.direction[0, 2] = 2.0 * (m.d[0, 2] - p.dt * body.omega)
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        k = islands.contact_item[item]
-        if c[k].kind == BOLT or c[k].kind == PIN or c[k].kind == PLAIN:
+        c = contacts[islands.contact_item[item]]
+        if c.kind == BOLT or c.kind == PIN or c.kind == PLAIN:
             continue
-        sinking = min(c[k].gap, 0.0) - gap_after(bodies, c, k, m, islands)
+        sinking = min(c.gap, 0.0) - gap_after(bodies, c, m, islands)
         if sinking > 0.0:
-            push = along(normal_row(c, k, True), m.direction[0])
-            if c[k].b != TERRAIN or c[k].owner != 1 or push <= 0.0:
+            push = along(normal_row(c, True), m.direction[0])
+            if c.b != TERRAIN or c.owner != 1 or push <= 0.0:
                 return False
             share = max(share, sinking / push)
     for j in range(3):  # not before the step
@@ -171,9 +171,10 @@ def hold_others(
         if bodies[now[k].a].cut == 1:
             recall(now, k, k + 1, before, first, p.slack)
     for i in range(p.blocks):
-        if bodies[i].status == AWAKE and bodies[i].cut == 0:
-            bodies[i].status = HELD
-        bodies[i].cut = 0
+        body = bodies[i]
+        if body.status == AWAKE and body.cut == 0:
+            body.status = HELD
+        body.cut = 0
 
 
 @kernel

@@ -38,46 +38,52 @@ from rigdda.sleep import wake_island
 
 
 @kernel
-def work_taken(c: Contacts, m: Matrix, islands: Islands, low: int, high: int, fence: int) -> float:
+def work_taken(
+    contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int, fence: int
+) -> float:
     """Return the work that body `fence` takes from the blocks of an island in this step [J]."""
     total = 0.0
     for item in range(low, high):
-        k = islands.contact_item[item]
-        if c[k].b == fence and c[k].state != OPEN:
-            d = m.d[islands.slot[c[k].a]]
-            total -= c[k].normal * along(normal_row(c, k, True), d)
-            total -= c[k].shear * along(shear_row(c, k, True), d)
+        c = contacts[islands.contact_item[item]]
+        if c.b == fence and c.state != OPEN:
+            d = m.d[islands.slot[c.a]]
+            total -= c.normal * along(normal_row(c, True), d)
+            total -= c.shear * along(shear_row(c, True), d)
     return total
 
 
 @kernel
 def let_pass(
-    c: Contacts, islands: Islands, low: int, high: int, fence: int, s: float, dt: float
+    contacts: Contacts, islands: Islands, low: int, high: int, fence: int, s: float, dt: float
 ) -> None:
     """Make the contacts with a fence impacts after which a share s of c.passing is left."""
     for item in range(low, high):
-        k = islands.contact_item[item]
-        if c[k].b == fence:
-            c[k].kind, c[k].state, c[k].flips = IMPACT, STICK, 0
-            c[k].memory_normal = c[k].memory_shear = 0.0
-            c[k].start_normal = c[k].start_shear = 0.0
-            c[k].bias = -dt * s * c[k].passing
+        c = contacts[islands.contact_item[item]]
+        if c.b == fence:
+            c.kind, c.state, c.flips = IMPACT, STICK, 0
+            c.memory_normal = c.memory_shear = 0.0
+            c.start_normal = c.start_shear = 0.0
+            c.bias = -dt * s * c.passing
 
 
 @kernel
-def let_go(c: Contacts, islands: Islands, low: int, high: int, fence: int, dt: float) -> None:
+def let_go(
+    contacts: Contacts, islands: Islands, low: int, high: int, fence: int, dt: float
+) -> None:
     """Keep the contacts with a fence from closing in this step, whatever comes."""
     for item in range(low, high):
-        k = islands.contact_item[item]
-        if c[k].b == fence:
-            c[k].kind, c[k].state = IMPACT, OPEN
-            c[k].memory_normal = c[k].memory_shear = 0.0
-            c[k].start_normal = c[k].start_shear = 0.0
-            c[k].bias = -dt * SPEED_LIMIT
+        c = contacts[islands.contact_item[item]]
+        if c.b == fence:
+            c.kind, c.state = IMPACT, OPEN
+            c.memory_normal = c.memory_shear = 0.0
+            c.start_normal = c.start_shear = 0.0
+            c.bias = -dt * SPEED_LIMIT
 
 
 @kernel
-def passed_on(c: Contacts, islands: Islands, low: int, high: int, fence: int, dt: float) -> float:
+def passed_on(
+    contacts: Contacts, islands: Islands, low: int, high: int, fence: int, dt: float
+) -> float:
     """Return the energy of blows that blocks at rest against a fence pass on to it [J].
 
     Blow and support act within one step, so that the block does not move and the fence does no
@@ -86,15 +92,15 @@ def passed_on(c: Contacts, islands: Islands, low: int, high: int, fence: int, dt
     """
     total = 0.0
     for item in range(low, high):
-        k = islands.contact_item[item]
-        if c[k].b == fence and c[k].state != OPEN:
-            total += 0.5 * dt * c[k].normal * max(c[k].passing + min(c[k].un, 0.0), 0.0)
+        c = contacts[islands.contact_item[item]]
+        if c.b == fence and c.state != OPEN:
+            total += 0.5 * dt * c.normal * max(c.passing + min(c.un, 0.0), 0.0)
     return total
 
 
 @stage
 def set_passing(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     fence: int, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Set c.passing at a fence: the closing velocities as if the fence were not there.
@@ -104,26 +110,26 @@ def set_passing(
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     struck = False
     for item in range(low, high):
-        k = islands.contact_item[item]
-        blow = c[k].kind == IMPACT or c[k].kind == SHOCK
-        struck = struck or (blow and 0 <= c[k].b < p.blocks and c[k].normal > 0.0)
-        c[k].passing = max(-c[k].un, 0.0)
+        c = contacts[islands.contact_item[item]]
+        blow = c.kind == IMPACT or c.kind == SHOCK
+        struck = struck or (blow and 0 <= c.b < p.blocks and c.normal > 0.0)
+        c.passing = max(-c.un, 0.0)
     if not struck:
         return
-    let_go(c, islands, low, high, fence, p.dt)
-    open_close(bodies, c, m, islands, rows, island, p, counters)
+    let_go(contacts, islands, low, high, fence, p.dt)
+    open_close(bodies, contacts, m, islands, rows, island, p, counters)
     for item in range(low, high):
-        k = islands.contact_item[item]
-        if c[k].b == fence:
-            dn = along(normal_row(c, k, True), m.d[islands.slot[c[k].a]])
-            c[k].passing = max(c[k].un - 2.0 * dn / p.dt, 0.0)
-    let_pass(c, islands, low, high, fence, 0.0, p.dt)
-    open_close(bodies, c, m, islands, rows, island, p, counters)
+        c = contacts[islands.contact_item[item]]
+        if c.b == fence:
+            dn = along(normal_row(c, True), m.d[islands.slot[c.a]])
+            c.passing = max(c.un - 2.0 * dn / p.dt, 0.0)
+    let_pass(contacts, islands, low, high, fence, 0.0, p.dt)
+    open_close(bodies, contacts, m, islands, rows, island, p, counters)
 
 
 @stage
 def break_through(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     fence: int, left: float, taken: float, tolerance: float, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Settle an island so that a fence takes what is left of its capacity, where it took more.
@@ -132,8 +138,8 @@ def break_through(
     """
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     if left <= 0.0:
-        let_go(c, islands, low, high, fence, p.dt)
-        open_close(bodies, c, m, islands, rows, island, p, counters)
+        let_go(contacts, islands, low, high, fence, p.dt)
+        open_close(bodies, contacts, m, islands, rows, island, p, counters)
         return
     # squares of shares with which it takes too much and too little, and by how much
     small, over = 0.0, taken - left
@@ -141,10 +147,10 @@ def break_through(
     side = 0
     square = 1.0 - left / taken
     for _ in range(BREAK_SOLVES):
-        let_pass(c, islands, low, high, fence, math.sqrt(square), p.dt)
-        open_close(bodies, c, m, islands, rows, island, p, counters)
-        off = work_taken(c, m, islands, low, high, fence) - left
-        off += passed_on(c, islands, low, high, fence, p.dt)
+        let_pass(contacts, islands, low, high, fence, math.sqrt(square), p.dt)
+        open_close(bodies, contacts, m, islands, rows, island, p, counters)
+        off = work_taken(contacts, m, islands, low, high, fence) - left
+        off += passed_on(contacts, islands, low, high, fence, p.dt)
         if abs(off) <= tolerance:
             return
         # regula falsi after Illinois: an end that stays counts half from its second time on
@@ -158,23 +164,23 @@ def break_through(
             side = -1
         square = small + (large - small) * over / (over - under)
     if off > 0.0:
-        let_go(c, islands, low, high, fence, p.dt)
-        open_close(bodies, c, m, islands, rows, island, p, counters)
+        let_go(contacts, islands, low, high, fence, p.dt)
+        open_close(bodies, contacts, m, islands, rows, island, p, counters)
 
 
 @kernel
-def touches(c: Contacts, islands: Islands, low: int, high: int, fence: int) -> int:
+def touches(contacts: Contacts, islands: Islands, low: int, high: int, fence: int) -> int:
     """Return a closed contact of an island with a fence, -1 if there is none."""
     for item in range(low, high):
         k = islands.contact_item[item]
-        if c[k].b == fence and c[k].state != OPEN:
+        if contacts[k].b == fence and contacts[k].state != OPEN:
             return k
     return -1
 
 
 @stage
 def limit_fences(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     gauges: Gauges, time: float, p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Let an island that was settled break the fences that would take more than they can.
@@ -187,34 +193,48 @@ def limit_fences(
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     for fence in range(p.blocks, len(bodies)):
         barrier = gauges.barrier[fence]
-        capacity = gauges.target[barrier].capacity
-        k = touches(c, islands, low, high, fence) if capacity < math.inf else -1
+        target = gauges.target[barrier]
+        capacity = target.capacity
+        k = touches(contacts, islands, low, high, fence) if capacity < math.inf else -1
         if k < 0:
             continue
         touched = True
-        set_passing(bodies, c, m, islands, rows, island, fence, p, counters)
-        left, tolerance = capacity - gauges.target[barrier].absorbed, BREAK_TOLERANCE * capacity
-        taken = work_taken(c, m, islands, low, high, fence)
-        taken += passed_on(c, islands, low, high, fence, p.dt)
+        set_passing(bodies, contacts, m, islands, rows, island, fence, p, counters)
+        left, tolerance = capacity - target.absorbed, BREAK_TOLERANCE * capacity
+        taken = work_taken(contacts, m, islands, low, high, fence)
+        taken += passed_on(contacts, islands, low, high, fence, p.dt)
         if taken > left + tolerance:
             if bodies[fence].status != RETIRED:
                 bodies[fence].status = RETIRED
-                height = c[k].y - gauges.target[barrier].ground
+                c = contacts[k]
                 counters[EVENTS] = write_event(
-                    gauges, counters[EVENTS], time, FAILED, bodies, c[k].a, barrier, c[k].x, c[k].y,
-                    height,
+                    gauges, counters[EVENTS], time, FAILED, bodies[c.a], c.a, barrier, c.x, c.y,
+                    c.y - target.ground,
                 )  # fmt: skip
             break_through(
-                bodies, c, m, islands, rows, island, fence, left, taken, tolerance, p, counters
+                bodies,
+                contacts,
+                m,
+                islands,
+                rows,
+                island,
+                fence,
+                left,
+                taken,
+                tolerance,
+                p,
+                counters,
             )
-        gauges.target[barrier].absorbed += passed_on(c, islands, low, high, fence, p.dt)
+        target.absorbed += passed_on(contacts, islands, low, high, fence, p.dt)
     return touched
 
 
 @kernel
-def wake_behind(bodies: Bodies, c: Contacts, count: int, gauges: Gauges, p: Parameters) -> None:
+def wake_behind(
+    bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, p: Parameters
+) -> None:
     """Wake what sleeps against a fence that failed in this step."""
     for k in range(count if gauges.fences > 0 else 0):
-        b, a = c[k].b, c[k].a
-        if b >= p.blocks and bodies[b].status == RETIRED and bodies[a].status == ASLEEP:
-            wake_island(bodies, bodies[a].island, p.blocks)
+        a, b = bodies[contacts[k].a], contacts[k].b
+        if b >= p.blocks and bodies[b].status == RETIRED and a.status == ASLEEP:
+            wake_island(bodies, a.island, p.blocks)

@@ -7,7 +7,7 @@ import math
 from rigdda.constants import NEW_HIT_TIME, OPEN
 from rigdda.kernel import inlined, kernel
 from rigdda.motion import kinetic_energy
-from rigdda.records import Bodies, Contacts, Gauges, Islands
+from rigdda.records import Bodies, Body, Contacts, Gauges, Islands
 
 HIT, CROSSING, FAILED = 0, 1, 2
 """Kinds of event: a block touches a barrier; a block's centroid first passes a station; a block
@@ -16,7 +16,7 @@ breaks a barrier."""
 
 @kernel
 def write_event(
-    gauges: Gauges, n: int, time: float, kind: int, bodies: Bodies, i: int, target: int,
+    gauges: Gauges, n: int, time: float, kind: int, body: Body, i: int, target: int,
     x: float, y: float, height: float,
 ) -> int:  # fmt: skip
     """Write event n of body i; returns the new number of events."""
@@ -25,8 +25,8 @@ def write_event(
     event.time, event.kind, event.target = time, kind, target
     event.block = i if i < rocks else rocks + gauges.barrier[i]
     event.x, event.y, event.height = x, y, height
-    event.speed = math.hypot(bodies[i].vx, bodies[i].vy)
-    event.energy = kinetic_energy(bodies, i)
+    event.speed = math.hypot(body.vx, body.vy)
+    event.energy = kinetic_energy(body)
     return n + 1
 
 
@@ -46,20 +46,18 @@ def barrier_contact(gauges: Gauges, a: int, b: int) -> tuple[int, int]:
 
 @inlined
 def note_hits(
-    bodies: Bodies, c: Contacts, islands: Islands, low: int, high: int, gauges: Gauges, events: int,
-    time: float,
+    bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, gauges: Gauges,
+    events: int, time: float,
 ) -> int:  # fmt: skip
     """Write a hit for each barrier that a block touches anew; velocities still those before."""
     for item in range(low, high):
-        k = islands.contact_item[item]
-        i, barrier = barrier_contact(gauges, c[k].a, c[k].b)
-        if barrier < 0 or c[k].state == OPEN:
+        c = contacts[islands.contact_item[item]]
+        i, barrier = barrier_contact(gauges, c.a, c.b)
+        if barrier < 0 or c.state == OPEN:
             continue
         if time - gauges.last_touch[i, barrier] > NEW_HIT_TIME:
-            height = c[k].y - gauges.target[barrier].ground
-            events = write_event(
-                gauges, events, time, HIT, bodies, i, barrier, c[k].x, c[k].y, height
-            )
+            height = c.y - gauges.target[barrier].ground
+            events = write_event(gauges, events, time, HIT, bodies[i], i, barrier, c.x, c.y, height)
         gauges.last_touch[i, barrier] = time
     return events
 
@@ -69,12 +67,13 @@ def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> in
     """Write a crossing for each station that a centroid first passes; watch energies."""
     stations = len(gauges.station)
     for i in range(len(gauges.rock)):
-        x, rock = bodies[i].x, gauges.rock[i]
+        body, rock = bodies[i], gauges.rock[i]
+        x = body.x
         if gauges.watch_low <= x <= gauges.watch_high:
-            rock.energy = max(rock.energy, kinetic_energy(bodies, i))
+            rock.energy = max(rock.energy, kinetic_energy(body))
         while rock.next < stations and x >= gauges.station[rock.next].x:
-            s, y = rock.next, bodies[i].y
+            s, y = rock.next, body.y
             height = y - gauges.station[s].ground
-            events = write_event(gauges, events, time, CROSSING, bodies, i, s, x, y, height)
+            events = write_event(gauges, events, time, CROSSING, body, i, s, x, y, height)
             rock.next += 1
     return events

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigdda.constants import AWAKE
 from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contacts, Ints, Islands, Matrix
+from rigdda.records import Bodies, Contact, Contacts, Ints, Islands, Matrix
 
 
 @kernel
@@ -23,14 +23,14 @@ def root(parent: NDArray, i: int) -> int:
 
 
 @kernel
-def joins(bodies: Bodies, c: Contacts, k: int) -> bool:
-    """Return whether contact k couples two bodies with unknowns."""
-    return c[k].b >= 0 and bodies[c[k].a].status == AWAKE and bodies[c[k].b].status == AWAKE
+def joins(bodies: Bodies, c: Contact) -> bool:
+    """Return whether a contact couples two bodies with unknowns."""
+    return c.b >= 0 and bodies[c.a].status == AWAKE and bodies[c.b].status == AWAKE
 
 
 @kernel
 def join_blocks(
-    bodies: Bodies, c: Contacts, count: int, parent: NDArray, blocks: int, apart: bool
+    bodies: Bodies, contacts: Contacts, count: int, parent: NDArray, blocks: int, apart: bool
 ) -> None:
     """Join the blocks that contacts couple, or all, in a union-find; a root is the least index."""
     for i in range(blocks):
@@ -42,14 +42,15 @@ def join_blocks(
                 first = i if first < 0 else first
                 parent[i] = first
     for k in range(count):
-        if joins(bodies, c, k):
-            i, j = root(parent, c[k].a), root(parent, c[k].b)
+        c = contacts[k]
+        if joins(bodies, c):
+            i, j = root(parent, c.a), root(parent, c.b)
             parent[max(i, j)] = min(i, j)
 
 
 @kernel
 def find_islands(
-    bodies: Bodies, c: Contacts, begin: Ints, islands: Islands, blocks: int, apart: bool
+    bodies: Bodies, contacts: Contacts, begin: Ints, islands: Islands, blocks: int, apart: bool
 ) -> int:
     """List blocks and contacts island by island; the root is the smallest index.
 
@@ -63,7 +64,7 @@ def find_islands(
     """
     parent, slot = islands.parent, islands.slot
     block_start, contact_start = islands.block_start, islands.contact_start
-    join_blocks(bodies, c, begin[blocks], parent, blocks, apart)
+    join_blocks(bodies, contacts, begin[blocks], parent, blocks, apart)
     count = int(np.int64(0))  # with a literal `_fill` would be compiled twice
     for s in range(len(block_start)):
         block_start[s] = contact_start[s] = 0
@@ -113,7 +114,7 @@ def _fill(bodies: Bodies, begin: Ints, islands: Islands, blocks: int, count: int
 
 @kernel
 def pair_blocks(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, low: int, high: int
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int
 ) -> tuple[int, bool]:
     """Assign the off-diagonal blocks of an island; contacts of a pair follow one another.
 
@@ -126,14 +127,14 @@ def pair_blocks(
     """
     pairs, last_a, last_b, grounded = 0, -1, -1, False
     for item in range(low, high):
-        k = islands.contact_item[item]
-        c[k].pair = -1
-        if not joins(bodies, c, k):
+        c = contacts[islands.contact_item[item]]
+        c.pair = -1
+        if not joins(bodies, c):
             grounded = True
             continue
-        if c[k].a != last_a or c[k].b != last_b:
-            last_a, last_b = c[k].a, c[k].b
+        if c.a != last_a or c.b != last_b:
+            last_a, last_b = c.a, c.b
             m.pair_i[pairs], m.pair_j[pairs] = islands.slot[last_a], islands.slot[last_b]
             pairs += 1
-        c[k].pair = pairs - 1
+        c.pair = pairs - 1
     return pairs, grounded

@@ -58,6 +58,7 @@ from rigdda.records import (
     SOLVES,
     SWEEPS,
     Bodies,
+    Contact,
     Contacts,
     Islands,
     Matrix,
@@ -69,108 +70,104 @@ NONE, MOVED, LOCKED = 0, 1, 2
 
 
 @inlined
-def spring_forces(
-    c: Contacts, k: int, m: Matrix, i: int, j: int, dt: float
-) -> tuple[float, float, float]:
+def spring_forces(c: Contact, m: Matrix, i: int, j: int, dt: float) -> tuple[float, float, float]:
     """Return normal force, shear force if it stuck [N], and normal velocity after the step."""
-    dn = along(normal_row(c, k, True), m.d[i])
-    ds = along(shear_row(c, k, True), m.d[i])
+    dn = along(normal_row(c, True), m.d[i])
+    ds = along(shear_row(c, True), m.d[i])
     if j >= 0:
-        dn += along(normal_row(c, k, False), m.d[j])
-        ds += along(shear_row(c, k, False), m.d[j])
-    after = 2.0 * dn / dt - c[k].un
-    normal = c[k].kappa * (c[k].bias - dt * after)
-    shear = c[k].memory_shear - c[k].kappa * (2.0 * ds - dt * c[k].us)
+        dn += along(normal_row(c, False), m.d[j])
+        ds += along(shear_row(c, False), m.d[j])
+    after = 2.0 * dn / dt - c.un
+    normal = c.kappa * (c.bias - dt * after)
+    shear = c.memory_shear - c.kappa * (2.0 * ds - dt * c.us)
     return normal, shear, after
 
 
 @kernel
-def next_state_of_link(c: Contacts, k: int, normal: float, shear: float) -> int:
+def next_state_of_link(c: Contact, normal: float, shear: float) -> int:
     """Let a bolt yield, or no more: SLIP stands for yielding; a pin holds whatever its force."""
-    c[k].normal, c[k].shear = max(normal, -c[k].tension), 0.0 if c[k].kind == BOLT else shear
-    state = SLIP if normal < -c[k].tension else STICK
-    if state == c[k].state:
+    c.normal, c.shear = max(normal, -c.tension), 0.0 if c.kind == BOLT else shear
+    state = SLIP if normal < -c.tension else STICK
+    if state == c.state:
         return NONE
-    if c[k].flips >= FLIPS:
+    if c.flips >= FLIPS:
         return LOCKED
-    c[k].flips += 1
-    c[k].state = state
+    c.flips += 1
+    c.state = state
     return MOVED
 
 
 @kernel
-def close(c: Contacts, k: int, normal: float, shear: float, coupled: bool) -> int:
-    """Close contact k, which would bear these forces if it stuck; returns MOVED or LOCKED.
+def close(c: Contact, normal: float, shear: float, coupled: bool) -> int:
+    """Close a contact that would bear these forces if it stuck; returns MOVED or LOCKED.
 
     Where friction is coupled to the normal force it slips at once if it slides faster than it
     closes: a contact that stuck would be torn open again.
     """
-    if c[k].flips >= FLIPS:
+    if c.flips >= FLIPS:
         return LOCKED
-    c[k].state = STICK
-    if coupled and abs(shear) > c[k].friction * normal:
-        c[k].state, c[k].lag = SLIP, shear
+    c.state = STICK
+    if coupled and abs(shear) > c.friction * normal:
+        c.state, c.lag = SLIP, shear
     return MOVED
 
 
 @kernel
-def next_friction(c: Contacts, k: int, shear: float, tension: float, coupled: bool) -> int:
-    """Let closed contact k, whose normal force is set, stick or slip: a return mapping.
+def next_friction(c: Contact, shear: float, tension: float, coupled: bool) -> int:
+    """Let a closed contact whose normal force is set stick or slip: a return mapping.
 
     Where friction is coupled to the normal force a slipping contact is settled if its direction
     is right.
     """
-    state, limit = c[k].state, c[k].friction * c[k].normal
-    c[k].shear = min(max(shear, -limit), limit)
+    state, limit = c.state, c.friction * c.normal
+    c.shear = min(max(shear, -limit), limit)
     if abs(shear) <= limit:
         if state == STICK:
             return NONE
-        if c[k].flips >= FLIPS:
+        if c.flips >= FLIPS:
             return LOCKED
-        c[k].state = STICK
-        c[k].flips += 1
+        c.state = STICK
+        c.flips += 1
         return MOVED
-    change = abs(c[k].shear - c[k].lag) if state == SLIP else math.inf
-    if coupled and state == SLIP and c[k].shear * math.copysign(1.0, c[k].lag) >= 0.0:
+    change = abs(c.shear - c.lag) if state == SLIP else math.inf
+    if coupled and state == SLIP and c.shear * math.copysign(1.0, c.lag) >= 0.0:
         change = 0.0
-    c[k].state = SLIP
-    c[k].lag = c[k].shear
+    c.state = SLIP
+    c.lag = c.shear
     return MOVED if change > FRICTION_TOLERANCE * (limit - tension) else NONE
 
 
 @inlined
-def next_state(
-    c: Contacts, k: int, normal: float, shear: float, weight: float, coupled: bool
-) -> int:
-    """Move contact k to the state that its forces ask for; returns NONE, MOVED or LOCKED.
+def next_state(c: Contact, normal: float, shear: float, weight: float, coupled: bool) -> int:
+    """Move a contact to the state that its forces ask for; returns NONE, MOVED or LOCKED.
 
     A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
     """
-    if c[k].kind == BOLT or c[k].kind == PIN:
-        return next_state_of_link(c, k, normal, shear)
+    if c.kind == BOLT or c.kind == PIN:
+        return next_state_of_link(c, normal, shear)
     tension = -OPENING_TOLERANCE * weight
-    if c[k].state == OPEN:
-        return NONE if normal <= -tension else close(c, k, normal, shear, coupled)
-    if c[k].bond > 0.0:
-        strength = c[k].cohesion + c[k].friction * max(normal, 0.0)
-        if normal >= -c[k].tension and abs(shear) <= strength:
-            c[k].normal, c[k].shear = normal, shear
+    if c.state == OPEN:
+        return NONE if normal <= -tension else close(c, normal, shear, coupled)
+    if c.bond > 0.0:
+        strength = c.cohesion + c.friction * max(normal, 0.0)
+        if normal >= -c.tension and abs(shear) <= strength:
+            c.normal, c.shear = normal, shear
             return NONE
-        break_joint(c, k)
+        break_joint(c)
         if normal >= tension:
             return MOVED
     if normal < tension:
-        c[k].state = OPEN
-        c[k].flips += 1
+        c.state = OPEN
+        c.flips += 1
         return MOVED
-    c[k].normal = max(normal, 0.0)
-    return next_friction(c, k, shear, tension, coupled)
+    c.normal = max(normal, 0.0)
+    return next_friction(c, shear, tension, coupled)
 
 
 @inlined
 def update_states(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, low: int, high: int, coupled: bool,
-    one: bool, p: Parameters,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int,
+    coupled: bool, one: bool, p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
     """Move every contact of an island to its next state; returns how many moved and are locked.
 
@@ -178,19 +175,19 @@ def update_states(
     """
     moved = locked = 0
     for item in range(low, high):
-        k = islands.contact_item[item]
-        i = islands.slot[c[k].a]
-        j = islands.slot[c[k].b] if c[k].pair >= 0 else -1
-        normal, shear, after = spring_forces(c, k, m, i, j, p.dt)
-        sinking = -after - max(c[k].gap, 0.0) / p.dt  # what closes a gap is not driven in
-        if c[k].state != OPEN and c[k].kind == REST and sinking > SHOCK_SPEED:
-            set_shock(bodies, c, k, p)
+        c = contacts[islands.contact_item[item]]
+        i = islands.slot[c.a]
+        j = islands.slot[c.b] if c.pair >= 0 else -1
+        normal, shear, after = spring_forces(c, m, i, j, p.dt)
+        sinking = -after - max(c.gap, 0.0) / p.dt  # what closes a gap is not driven in
+        if c.state != OPEN and c.kind == REST and sinking > SHOCK_SPEED:
+            set_shock(bodies, c, p)
             moved += 1
             continue
-        weight = bodies[c[k].a].mass * p.gravity
+        weight = bodies[c.a].mass * p.gravity
         if one:
-            c[k].flips = 0
-        change = next_state(c, k, normal, shear, weight, coupled)
+            c.flips = 0
+        change = next_state(c, normal, shear, weight, coupled)
         moved += change == MOVED
         locked += change == LOCKED
         if one and moved > 0:
@@ -214,7 +211,7 @@ def solve_island(m: Matrix, n: int, pairs: int, p: Parameters) -> int:
 
 @kernel
 def solve_states(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, island: int, pairs: int,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, pairs: int,
     p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Iterate until no contact of the island changes; returns whether that was reached.
@@ -226,16 +223,15 @@ def solve_states(
     n = b1 - b0
     small = n <= SMALL_ISLAND
     for s in range(n):
-        i = islands.block_item[b0 + s]
-        m.d[s, 0], m.d[s, 1] = bodies[i].vx * p.dt, bodies[i].vy * p.dt
-        m.d[s, 2] = bodies[i].omega * p.dt
+        body = bodies[islands.block_item[b0 + s]]
+        m.d[s, 0], m.d[s, 1], m.d[s, 2] = body.vx * p.dt, body.vy * p.dt, body.omega * p.dt
     for item in range(c0, c1 if small else c0):
-        k = islands.contact_item[item]
-        if c[k].state == SLIP and c[k].kind == REST and abs(c[k].us) < SLIDING * p.gravity * p.dt:
-            c[k].state = STICK
+        c = contacts[islands.contact_item[item]]
+        if c.state == SLIP and c.kind == REST and abs(c.us) < SLIDING * p.gravity * p.dt:
+            c.state = STICK
     few = 2 + (c1 - c0) // FEW_MOVING
     for iteration in range(PATIENCE * p.iterations):
-        assemble_island(bodies, c, m, islands, island, pairs, p)
+        assemble_island(bodies, contacts, m, islands, island, pairs, p)
         counters[ITERATIONS] += 1
         if n == 1:
             solve_block(m.diagonal[0], m.rhs[0], m.d[0])
@@ -245,7 +241,7 @@ def solve_states(
             counters[SOLVES] += 1
             counters[SOLVER_ITERATIONS] += solve_island(m, n, pairs, p)
         one = small and iteration >= ONE_BY_ONE
-        moved, locked = update_states(bodies, c, m, islands, c0, c1, small, one, p)
+        moved, locked = update_states(bodies, contacts, m, islands, c0, c1, small, one, p)
         if moved == 0:
             return locked == 0
         if iteration >= p.iterations - 1 and moved > few:
@@ -255,7 +251,7 @@ def solve_states(
 
 @kernel
 def relax(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     p: Parameters, counters: NDArray, speed: float, fast: bool,
 ) -> None:  # fmt: skip
     """Find the forces of an island by relaxation, from those of the last step."""
@@ -264,30 +260,30 @@ def relax(
     assemble_blocks(bodies, m, islands, b0, b1, p)
     counters[RELAXED] += 1
     sweeps, substeps = relax_forces(
-        bodies, c, m, islands, rows, c0, c1, b0, b1 - b0, speed, fast, p
+        bodies, contacts, m, islands, rows, c0, c1, b0, b1 - b0, speed, fast, p
     )
     counters[SWEEPS] += sweeps
     for item in range(c0, c1):
-        k = islands.contact_item[item]
-        take_forces(c, k, rows.row[rows.place[item]], substeps)
-        limit = c[k].cohesion + c[k].friction * max(c[k].normal, 0.0)
-        within = limit > abs(c[k].shear)
-        if c[k].bond > 0.0:
-            if within and c[k].normal > -c[k].tension:
-                c[k].state, c[k].kind = STICK, MOVING
+        c = contacts[islands.contact_item[item]]
+        take_forces(c, rows.row[rows.place[item]], substeps)
+        limit = c.cohesion + c.friction * max(c.normal, 0.0)
+        within = limit > abs(c.shear)
+        if c.bond > 0.0:
+            if within and c.normal > -c.tension:
+                c.state, c.kind = STICK, MOVING
                 continue
-            break_joint(c, k)
-        kind = c[k].kind
+            break_joint(c)
+        kind = c.kind
         if kind == BOLT or kind == PIN:
-            c[k].state = SLIP if c[k].normal == -c[k].tension else STICK
+            c.state = SLIP if c.normal == -c.tension else STICK
             continue
-        c[k].state = OPEN if c[k].normal == 0.0 else (STICK if within else SLIP)
+        c.state = OPEN if c.normal == 0.0 else (STICK if within else SLIP)
         if kind != IMPACT and kind != PLAIN:
-            c[k].kind = MOVING
+            c.kind = MOVING
 
 
 @kernel
-def impact_work(c: Contacts, m: Matrix, islands: Islands, low: int, high: int) -> float:
+def impact_work(contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int) -> float:
     """Return the work of the contact forces of an island in this step [J], supports left out.
 
     Friction that gives energy counts twice: to rebound out of a wedge a block would be pressed
@@ -295,17 +291,17 @@ def impact_work(c: Contacts, m: Matrix, islands: Islands, low: int, high: int) -
     """
     total = 0.0
     for item in range(low, high):
-        k = islands.contact_item[item]
-        if c[k].kind == BOLT or c[k].kind == PIN:
+        c = contacts[islands.contact_item[item]]
+        if c.kind == BOLT or c.kind == PIN:
             continue
-        i = islands.slot[c[k].a]
-        j = islands.slot[c[k].b] if c[k].pair >= 0 else -1
-        dn = along(normal_row(c, k, True), m.d[i])
-        ds = along(shear_row(c, k, True), m.d[i])
+        i = islands.slot[c.a]
+        j = islands.slot[c.b] if c.pair >= 0 else -1
+        dn = along(normal_row(c, True), m.d[i])
+        ds = along(shear_row(c, True), m.d[i])
         if j >= 0:
-            dn += along(normal_row(c, k, False), m.d[j])
-            ds += along(shear_row(c, k, False), m.d[j])
-        total += c[k].normal * dn + c[k].shear * ds + max(c[k].shear * ds, 0.0)
+            dn += along(normal_row(c, False), m.d[j])
+            ds += along(shear_row(c, False), m.d[j])
+        total += c.normal * dn + c.shear * ds + max(c.shear * ds, 0.0)
     return total
 
 
@@ -314,7 +310,7 @@ def island_speed(bodies: Bodies, islands: Islands, low: int, high: int) -> float
     """Return the greatest speed of the blocks low:high [m/s]."""
     speed = 0.0
     for place in range(low, high):
-        speed = max(speed, top_speed(bodies, islands.block_item[place]))
+        speed = max(speed, top_speed(bodies[islands.block_item[place]]))
     return speed
 
 
@@ -328,11 +324,11 @@ def is_waiting(bodies: Bodies, islands: Islands, low: int, high: int) -> bool:
 
 
 @kernel
-def is_bouncing(c: Contacts, islands: Islands, low: int, high: int) -> bool:
+def is_bouncing(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
     """Return whether one of the contacts low:high is an impact that asks for restitution."""
     for item in range(low, high):
-        k = islands.contact_item[item]
-        if c[k].kind == IMPACT and c[k].bias > 0.0:
+        c = contacts[islands.contact_item[item]]
+        if c.kind == IMPACT and c.bias > 0.0:
             return True
     return False
 
@@ -346,7 +342,7 @@ def let_wait(bodies: Bodies, islands: Islands, low: int, high: int) -> None:
 
 @kernel
 def open_close(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Settle the contacts of an island, with less restitution where impacts would gain energy.
@@ -360,8 +356,8 @@ def open_close(
         Whether they settled; a large island that did not is taken as it is.
     """
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
-    pairs, grounded = pair_blocks(bodies, c, m, islands, c0, c1)
-    bouncing = is_bouncing(c, islands, c0, c1)
+    pairs, grounded = pair_blocks(bodies, contacts, m, islands, c0, c1)
+    bouncing = is_bouncing(contacts, islands, c0, c1)
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     speed = island_speed(bodies, islands, b0, b1)
     waiting = is_waiting(bodies, islands, b0, b1)
@@ -370,20 +366,20 @@ def open_close(
     fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
-            relaxing = not solve_states(bodies, c, m, islands, island, pairs, p, counters)
+            relaxing = not solve_states(bodies, contacts, m, islands, island, pairs, p, counters)
             settled = settled and not (relaxing and small)
             if relaxing and not small:
                 let_wait(bodies, islands, b0, b1)
         if relaxing:
-            relax(bodies, c, m, islands, rows, island, p, counters, speed, fast)
+            relax(bodies, contacts, m, islands, rows, island, p, counters, speed, fast)
         # a cluster in flight keeps its angular momentum: its impulses act at one time
         islands.relaxed[0] = int(fast and grounded)
-        if not bouncing or impact_work(c, m, islands, c0, c1) <= 0.0:
+        if not bouncing or impact_work(contacts, m, islands, c0, c1) <= 0.0:
             return settled
         for item in range(c0, c1):
-            k = islands.contact_item[item]
-            c[k].flips = 0
-            if c[k].kind == IMPACT:
-                c[k].bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0
-                c[k].state = STICK
+            c = contacts[islands.contact_item[item]]
+            c.flips = 0
+            if c.kind == IMPACT:
+                c.bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0
+                c.state = STICK
     return settled

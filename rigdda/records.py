@@ -203,10 +203,16 @@ PARAMETERS = _record(
 
 Bodies = NDArray[np.void]
 """(M,) array of BODY."""
+Body = Any
+"""One BODY: a record of an array, which is written where it is."""
 Contacts = NDArray[np.void]
 """(C,) array of CONTACT."""
+Contact = Any
+"""One CONTACT."""
 Links = NDArray[np.void]
 """Array of LINK in order of a."""
+Link = Any
+"""One LINK."""
 Shaking = NDArray[np.void]
 """(K,) array of SHAKING, times never falling; none where the ground rests."""
 Interfaces = NDArray[np.void]

@@ -13,9 +13,10 @@ def wake_island(bodies: Bodies, island: int, blocks: int) -> int:
     """Wake the bodies that fell asleep in an island; returns how many."""
     woken = 0
     for k in range(blocks):
-        if bodies[k].status == ASLEEP and bodies[k].island == island:
-            bodies[k].status = AWAKE
-            bodies[k].quiet = 0.0
+        body = bodies[k]
+        if body.status == ASLEEP and body.island == island:
+            body.status = AWAKE
+            body.quiet = 0.0
             woken += 1
     return woken
 
@@ -26,7 +27,7 @@ def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int
     woken = 0
     for q in range(count):
         i, j = pairs[2 * q], pairs[2 * q + 1]
-        if bodies[j].status != ASLEEP or top_speed(bodies, i) < WAKE_SPEED:
+        if bodies[j].status != ASLEEP or top_speed(bodies[i]) < WAKE_SPEED:
             continue
         woken += wake_island(bodies, bodies[j].island, blocks)
     return woken
@@ -38,14 +39,14 @@ def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> 
     for s in range(count):
         least = 1e300
         for place in range(islands.block_start[s], islands.block_start[s + 1]):
-            i = islands.block_item[place]
-            quiet = bodies[i].touching == 1 and top_speed(bodies, i) < SLEEP_SPEED
-            bodies[i].quiet = bodies[i].quiet + p.dt if quiet else 0.0
-            least = min(least, bodies[i].quiet)
+            body = bodies[islands.block_item[place]]
+            quiet = body.touching == 1 and top_speed(body) < SLEEP_SPEED
+            body.quiet = body.quiet + p.dt if quiet else 0.0
+            least = min(least, body.quiet)
         if least < SLEEP_TIME:
             continue
         for place in range(islands.block_start[s], islands.block_start[s + 1]):
-            i = islands.block_item[place]
-            bodies[i].status = ASLEEP
-            bodies[i].island = islands.block_item[islands.block_start[s]]
-            bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
+            body = bodies[islands.block_item[place]]
+            body.status = ASLEEP
+            body.island = islands.block_item[islands.block_start[s]]
+            body.vx = body.vy = body.omega = 0.0

@@ -41,7 +41,7 @@ from rigdda.frames import keep_frame
 from rigdda.gauges import barrier_contact, note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel, stage
-from rigdda.motion import top_speed
+from rigdda.motion import kinetic_energy, top_speed
 from rigdda.open_close import let_wait, open_close
 from rigdda.records import (
     BROAD_PHASE,
@@ -54,6 +54,7 @@ from rigdda.records import (
     OPEN_CLOSE,
     STEPS,
     Bodies,
+    Body,
     Boxes,
     Contacts,
     Gauges,
@@ -87,14 +88,14 @@ def candidate_pairs(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Paramete
 
 @kernel
 def keep_asleep(
-    bodies: Bodies, c: Contacts, count: int, old: Contacts, first: Ints, a: int, gauges: Gauges,
-    time: float,
+    bodies: Bodies, contacts: Contacts, count: int, old: Contacts, first: Ints, a: int,
+    gauges: Gauges, time: float,
 ) -> int:  # fmt: skip
     """Keep the contacts of sleeping block a with what is still; returns the new number."""
     for m in range(first[a], first[a + 1]):
         b = old[m].b
-        if count < len(c) and (b == TERRAIN or bodies[b].status != AWAKE):
-            copy_contact(c, count, old, m)
+        if count < len(contacts) and (b == TERRAIN or bodies[b].status != AWAKE):
+            copy_contact(contacts[count], old[m])
             count += 1
             block, barrier = barrier_contact(gauges, a, b)
             if barrier >= 0:
@@ -103,18 +104,18 @@ def keep_asleep(
 
 
 @kernel
-def keep_held(c: Contacts, count: int, old: Contacts, first: Ints, a: int) -> int:
+def keep_held(contacts: Contacts, count: int, old: Contacts, first: Ints, a: int) -> int:
     """Keep the contacts of block a, which has taken its step; returns the new number."""
     for k in range(first[a], first[a + 1]):
-        if count < len(c):
-            c[count] = old[k]
+        if count < len(contacts):
+            contacts[count] = old[k]
             count += 1
     return count
 
 
 @stage
 def collide_block(
-    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, c: Contacts,
+    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, contacts: Contacts,
     count: int, old: Contacts, work: Work, a: int, start: bool, p: Parameters, deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write the contacts of awake block a with the terrain and with its partners.
@@ -124,21 +125,21 @@ def collide_block(
     int
         The new number of contacts; -1 if they do not fit.
     """
-    first, room, boxes = count, len(c) - outlines.corner.shape[1] - 4, work.boxes
-    count = collide_terrain(bodies, outlines, ground, boxes.swept[a], c, count, a, p)
+    first, room, boxes = count, len(contacts) - outlines.corner.shape[1] - 4, work.boxes
+    count = collide_terrain(bodies, outlines, ground, boxes.swept[a], contacts, count, a, p)
     for q in range(boxes.partner_start[a], boxes.partner_start[a + 1]):
         if count < 0 or count > room:
             return -1
-        count = collide_pair(bodies, outlines, c, count, a, boxes.partner[q], p)
+        count = collide_pair(bodies, outlines, contacts, count, a, boxes.partner[q], p)
     if count < 0 or count > room:
         return -1
-    recall(c, first, count, old, work.first, p.slack)
+    recall(contacts, first, count, old, work.first, p.slack)
     if p.bonded and start:
-        bond_joints(c, first, count, p)
+        bond_joints(contacts, first, count, p)
     for k in range(first, count):
-        prepare(bodies, c, k, interfaces, start, p)
-        deepest[0] = max(deepest[0], -c[k].gap)
-    strike_at_once(bodies, c, first, count, p)
+        prepare(bodies, contacts[k], interfaces, start, p)
+        deepest[0] = max(deepest[0], -contacts[k].gap)
+    strike_at_once(bodies, contacts, first, count, p)
     return count
 
 
@@ -152,7 +153,7 @@ def copy_index(index: Ints, to: Ints) -> None:
 @stage
 def detect(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
-    c: Contacts, old: Contacts, work: Work, gauges: Gauges, time: float, p: Parameters,
+    contacts: Contacts, old: Contacts, work: Work, gauges: Gauges, time: float, p: Parameters,
     counters: NDArray, deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
@@ -169,62 +170,73 @@ def detect(
             link += 1
         if bodies[a].status == AWAKE:
             count = collide_block(
-                bodies, outlines, ground, interfaces, c, count, old, work, a, start, p, deepest
+                bodies,
+                outlines,
+                ground,
+                interfaces,
+                contacts,
+                count,
+                old,
+                work,
+                a,
+                start,
+                p,
+                deepest,
             )
-            if count < 0 or count + link - low_link > len(c):
+            if count < 0 or count + link - low_link > len(contacts):
                 return -1
             for q in range(low_link, link):
-                add_link(bodies, links, q, c, count, p)
+                add_link(bodies, links, q, contacts[count], p)
                 count += 1
         elif bodies[a].status == ASLEEP:
-            count = keep_asleep(bodies, c, count, old, work.first, a, gauges, time)
+            count = keep_asleep(bodies, contacts, count, old, work.first, a, gauges, time)
         elif bodies[a].status == HELD:
-            count = keep_held(c, count, old, work.first, a)
+            count = keep_held(contacts, count, old, work.first, a)
     work.begin[p.blocks] = count
     lap(counters, NARROW_PHASE, since, p.timing)
     return count
 
 
 @kernel
-def retire(bodies: Bodies, i: int) -> float:
+def retire(body: Body) -> float:
     """Take a block that has left the site out of the simulation; returns its kinetic energy [J]."""
-    slow = bodies[i].mass * (bodies[i].vx ** 2 + bodies[i].vy ** 2)
-    energy = 0.5 * (slow + bodies[i].inertia * bodies[i].omega ** 2)
-    bodies[i].status = RETIRED
-    bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
+    energy = kinetic_energy(body)
+    body.status = RETIRED
+    body.vx = body.vy = body.omega = 0.0
     return energy
 
 
 @stage
 def move_island(
-    bodies: Bodies, outlines: Outlines, c: Contacts, m: Matrix, islands: Islands, island: int,
-    struck: bool, gauges: Gauges, p: Parameters, ledger: NDArray,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, m: Matrix, islands: Islands,
+    island: int, struck: bool, gauges: Gauges, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     bad = -1
     for s in range(b1 - b0):
-        i = islands.block_item[b0 + s]
-        bodies[i].touching = 0
-        account_block(bodies, m, i, s, p, ledger)
+        block = bodies[islands.block_item[b0 + s]]
+        block.touching = 0
+        account_block(block, m, s, p, ledger)
     for item in range(c0, c1):
-        k = islands.contact_item[item]
-        keep_memory(c, k, struck, islands.relaxed[0] == 1)
-        if c[k].state == OPEN:
+        c = contacts[islands.contact_item[item]]
+        keep_memory(c, struck, islands.relaxed[0] == 1)
+        if c.state == OPEN:
             continue
-        account_contact(c, k, m, islands, ledger, gauges)
-        bodies[c[k].a].touching = 1
-        if c[k].b >= 0:
-            bodies[c[k].b].touching = 1
+        account_contact(c, m, islands, ledger, gauges)
+        bodies[c.a].touching = 1
+        if c.b >= 0:
+            bodies[c.b].touching = 1
     for s in range(b1 - b0):
         i = islands.block_item[b0 + s]
-        bodies[i].wait = max(bodies[i].wait - 1, 0)
-        move_block(bodies, i, m, s, p.dt)
-        if not top_speed(bodies, i) < SPEED_LIMIT:
+        block = bodies[i]
+        block.wait = max(block.wait - 1, 0)
+        move_block(block, m, s, p.dt)
+        if not top_speed(block) < SPEED_LIMIT:
             bad = i
-        elif bodies[i].y < p.floor:
-            ledger[1] -= retire(bodies, i)
+        elif block.y < p.floor:
+            ledger[1] -= retire(block)
         if p.post_correction:
             place_corners(bodies, outlines, i)
         else:
@@ -234,7 +246,7 @@ def move_island(
 
 @stage
 def solve_and_move(
-    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, m: Matrix, work: Work,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, m: Matrix, work: Work,
     gauges: Gauges, time: float, p: Parameters, cutting: bool, counters: NDArray,
     ledger: NDArray,
 ) -> tuple[int, float]:  # fmt: skip
@@ -253,23 +265,23 @@ def solve_and_move(
     """
     since = lap(counters, MOTION, 0, p.timing)
     islands, rows = work.islands, work.rows
-    found = find_islands(bodies, c, work.begin, islands, p.blocks, p.islands)
+    found = find_islands(bodies, contacts, work.begin, islands, p.blocks, p.islands)
     bad, excess = -1, 0.0
     for s in range(found):
         c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
         settled, islands.relaxed[0] = True, 0
         if c1 > c0:
             since = lap(counters, MOTION, since, p.timing)
-            settled = open_close(bodies, c, m, islands, rows, s, p, counters)
+            settled = open_close(bodies, contacts, m, islands, rows, s, p, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
-        struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
+        struck = apply_forces(bodies, contacts, m, islands, s, islands.relaxed[0] == 1, p)
         if c1 > c0:
             far, early = 0.0, False
             for attempt in range(2 if cutting else 0):
-                far = too_far(bodies, c, m, islands, s, p)
+                far = too_far(bodies, contacts, m, islands, s, p)
                 if far <= 1.0 or attempt == 1 or not settled:
                     break
-                early = act_early(bodies, c, m, islands, s, p)
+                early = act_early(bodies, contacts, m, islands, s, p)
                 if not early:
                     break
             if far > 1.0 or (cutting and not settled):
@@ -279,18 +291,20 @@ def solve_and_move(
                 continue
             if not settled:  # not in a shorter step, either
                 let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
-            if limit_fences(bodies, c, m, islands, rows, s, gauges, time, p, counters):
-                struck = apply_forces(bodies, c, m, islands, s, islands.relaxed[0] == 1, p)
-                early = early and act_early(bodies, c, m, islands, s, p)
+            if limit_fences(bodies, contacts, m, islands, rows, s, gauges, time, p, counters):
+                struck = apply_forces(bodies, contacts, m, islands, s, islands.relaxed[0] == 1, p)
+                early = early and act_early(bodies, contacts, m, islands, s, p)
             struck = struck or early
             if len(gauges.target) > 0:
                 counters[EVENTS] = note_hits(
-                    bodies, c, islands, c0, c1, gauges, counters[EVENTS], time
+                    bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
                 )
-        bad = max(bad, move_island(bodies, outlines, c, m, islands, s, struck, gauges, p, ledger))
+        bad = max(
+            bad, move_island(bodies, outlines, contacts, m, islands, s, struck, gauges, p, ledger)
+        )
     if p.sleeping:
         watch_quiet(bodies, islands, found, p)
-        wake_behind(bodies, c, count, gauges, p)
+        wake_behind(bodies, contacts, count, gauges, p)
     lap(counters, MOTION, since, p.timing)
     return bad, excess
 
@@ -299,8 +313,9 @@ def solve_and_move(
 def rest_all(bodies: Bodies) -> None:
     """Take the velocity from every block: static mode."""
     for i in range(len(bodies)):
-        if bodies[i].status != HELD:
-            bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
+        body = bodies[i]
+        if body.status != HELD:
+            body.vx = body.vy = body.omega = 0.0
 
 
 @entry_kernel

@@ -14,7 +14,7 @@ from experiments.deformable.submatrices import (
 )
 from rigdda.constants import OPEN, STICK
 from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contacts, Floats, Matrix, Outlines, Parameters
+from rigdda.records import Bodies, Contact, Contacts, Floats, Matrix, Outlines, Parameters
 
 
 class Solid(NamedTuple):
@@ -43,26 +43,27 @@ def assemble_blocks(bodies: Bodies, outlines: Outlines, s: Solid, n: int, p: Par
     """
     factor = 2.0 / (p.dt * p.dt) + p.damping / p.dt
     for i in range(n):
-        moments = area_moments(outlines, i, bodies[i].count, bodies[i].x, bodies[i].y)
-        set_inertia(s.inertia[i], bodies[i].mass, moments)
+        body = bodies[i]
+        moments = area_moments(outlines, i, body.count, body.x, body.y)
+        set_inertia(s.inertia[i], body.mass, moments)
         for a in range(UNKNOWNS):
             s.rhs[i, a] = s.load[i, a]
             for b in range(UNKNOWNS):
                 s.diagonal[i, a, b] = factor * s.inertia[i, a, b]
                 s.rhs[i, a] += 2.0 / p.dt * s.inertia[i, a, b] * s.velocity[i, b]
-        s.rhs[i, 0] += bodies[i].mass * p.field_x
-        s.rhs[i, 1] += bodies[i].mass * p.field_y
+        s.rhs[i, 0] += body.mass * p.field_x
+        s.rhs[i, 1] += body.mass * p.field_y
         add_elasticity(s.diagonal[i], s.rhs[i], moments[0], s.elasticity, s.stress[i])
 
 
 @kernel
-def rows(c: Contacts, k: int, of_a: bool) -> tuple[Row, Row]:
-    """Return the rows of contact k along its normal and its shear direction for a, or b."""
-    nx, ny = c[k].nx, c[k].ny
+def rows(c: Contact, of_a: bool) -> tuple[Row, Row]:
+    """Return the rows of a contact along its normal and its shear direction for a, or b."""
+    nx, ny = c.nx, c.ny
     if of_a:
-        x, y = c[k].ra_x, c[k].ra_y
+        x, y = c.ra_x, c.ra_y
         return row_along(x, y, nx, ny), row_along(x, y, -ny, nx)
-    x, y = c[k].rb_x, c[k].rb_y
+    x, y = c.rb_x, c.rb_y
     return row_along(x, y, -nx, -ny), row_along(x, y, ny, -nx)
 
 
@@ -75,23 +76,23 @@ def add(matrix: Floats, stiffness: float, e: Row, f: Row) -> None:
 
 
 @kernel
-def add_contact(c: Contacts, k: int, s: Solid) -> None:
-    """Add closed contact k: N = k_n (-gap - d_n) and, while it sticks, S = S_0 - k_n d_s."""
-    i, j, stiffness = c[k].a, c[k].b, c[k].stiffness
-    stick = c[k].state == STICK
-    normal, shear = -stiffness * c[k].gap, c[k].memory_shear if stick else c[k].lag
-    en, es = rows(c, k, True)
-    fn, fs = rows(c, k, False)
-    coupled = c[k].pair >= 0
+def add_contact(c: Contact, s: Solid) -> None:
+    """Add a closed contact: N = k_n (-gap - d_n) and, while it sticks, S = S_0 - k_n d_s."""
+    i, j, stiffness = c.a, c.b, c.stiffness
+    stick = c.state == STICK
+    normal, shear = -stiffness * c.gap, c.memory_shear if stick else c.lag
+    en, es = rows(c, True)
+    fn, fs = rows(c, False)
+    coupled = c.pair >= 0
     add(s.diagonal[i], stiffness, en, en)
     if stick:
         add(s.diagonal[i], stiffness, es, es)
     if coupled:
         add(s.diagonal[j], stiffness, fn, fn)
-        add(s.off[c[k].pair], stiffness, en, fn)
+        add(s.off[c.pair], stiffness, en, fn)
         if stick:
             add(s.diagonal[j], stiffness, fs, fs)
-            add(s.off[c[k].pair], stiffness, es, fs)
+            add(s.off[c.pair], stiffness, es, fs)
     for a in range(UNKNOWNS):
         s.rhs[i, a] += normal * en[a] + shear * es[a]
         if coupled:
@@ -100,33 +101,34 @@ def add_contact(c: Contacts, k: int, s: Solid) -> None:
 
 @kernel
 def assemble(
-    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, s: Solid, n: int, pairs: int,
-    p: Parameters,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, s: Solid, n: int,
+    pairs: int, p: Parameters,
 ) -> None:  # fmt: skip
     """Set the equations with all contacts in their current states."""
     assemble_blocks(bodies, outlines, s, n, p)
     for q in range(pairs):
         s.off[q] = 0.0
     for k in range(count):
-        if c[k].state == OPEN:
-            c[k].normal = c[k].shear = 0.0
+        c = contacts[k]
+        if c.state == OPEN:
+            c.normal = c.shear = 0.0
         else:
-            add_contact(c, k, s)
+            add_contact(c, s)
 
 
 @kernel
-def forces(c: Contacts, k: int, s: Solid) -> tuple[float, float]:
-    """Return the normal force of contact k and the shear force if it stuck [N]."""
-    en, es = rows(c, k, True)
-    fn, fs = rows(c, k, False)
+def forces(c: Contact, s: Solid) -> tuple[float, float]:
+    """Return the normal force of a contact and the shear force if it stuck [N]."""
+    en, es = rows(c, True)
+    fn, fs = rows(c, False)
     dn = ds = 0.0
     for a in range(UNKNOWNS):
-        dn += en[a] * s.d[c[k].a, a]
-        ds += es[a] * s.d[c[k].a, a]
-        if c[k].pair >= 0:
-            dn += fn[a] * s.d[c[k].b, a]
-            ds += fs[a] * s.d[c[k].b, a]
-    return -c[k].stiffness * (c[k].gap + dn), c[k].memory_shear - c[k].stiffness * ds
+        dn += en[a] * s.d[c.a, a]
+        ds += es[a] * s.d[c.a, a]
+        if c.pair >= 0:
+            dn += fn[a] * s.d[c.b, a]
+            ds += fs[a] * s.d[c.b, a]
+    return -c.stiffness * (c.gap + dn), c.memory_shear - c.stiffness * ds
 
 
 @kernel

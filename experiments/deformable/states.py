@@ -4,35 +4,35 @@ from __future__ import annotations
 
 from rigdda.constants import FLIPS, FRICTION_TOLERANCE, OPEN, OPENING_TOLERANCE, SLIP, STICK
 from rigdda.kernel import kernel
-from rigdda.records import Contacts
+from rigdda.records import Contact
 
 
 @kernel
-def next_state(c: Contacts, k: int, normal: float, shear: float, weight: float) -> bool:
-    """Move contact k to the state that its forces [N] ask for; returns whether it changed.
+def next_state(c: Contact, normal: float, shear: float, weight: float) -> bool:
+    """Move a contact to the state that its forces [N] ask for; returns whether it changed.
 
     Tension opens it, and overlap closes it; it slips where |S| > N tan phi, with the friction of
     the last iteration. One that flipped too often keeps its state.
     """
-    state, tolerance, worn = c[k].state, OPENING_TOLERANCE * weight, c[k].flips >= FLIPS
+    state, tolerance, worn = c.state, OPENING_TOLERANCE * weight, c.flips >= FLIPS
     if state == OPEN:
         if normal <= tolerance or worn:
             return False
-        c[k].state = STICK
+        c.state = STICK
         return True
     if normal < -tolerance:
-        c[k].state = OPEN
-        c[k].flips += 1
+        c.state = OPEN
+        c.flips += 1
         return True
-    c[k].normal = max(normal, 0.0)
-    limit = c[k].friction * c[k].normal
-    c[k].shear = min(max(shear, -limit), limit)
+    c.normal = max(normal, 0.0)
+    limit = c.friction * c.normal
+    c.shear = min(max(shear, -limit), limit)
     if abs(shear) <= limit:
         if state == STICK or worn:
             return False
-        c[k].state = STICK
-        c[k].flips += 1
+        c.state = STICK
+        c.flips += 1
         return True
-    settled = abs(c[k].shear - c[k].lag) <= FRICTION_TOLERANCE * (limit + tolerance)
-    c[k].state, c[k].lag = SLIP, c[k].shear
+    settled = abs(c.shear - c.lag) <= FRICTION_TOLERANCE * (limit + tolerance)
+    c.state, c.lag = SLIP, c.shear
     return state == STICK or not settled

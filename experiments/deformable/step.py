@@ -37,7 +37,7 @@ from rigdda.step import copy_index, detect
 
 @kernel
 def settle(
-    bodies: Bodies, outlines: Outlines, c: Contacts, count: int, s: Solid, m: Matrix, n: int,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, s: Solid, m: Matrix, n: int,
     pairs: int, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Iterate until no contact opens, closes, slips or sticks any more."""
@@ -45,15 +45,15 @@ def settle(
         for a in range(UNKNOWNS):
             s.d[i, a] = p.dt * s.velocity[i, a]
     for _ in range(p.iterations):
-        assemble(bodies, outlines, c, count, s, n, pairs, p)
+        assemble(bodies, outlines, contacts, count, s, n, pairs, p)
         counters[ITERATIONS] += 1
         counters[SOLVES] += 1
         counters[SOLVER_ITERATIONS] += solve_pcg(s, m, n, pairs, p.tolerance)
         moved = 0
         for k in range(count):
-            normal, shear = forces(c, k, s)
-            weight = bodies[c[k].a].mass * p.gravity
-            moved += next_state(c, k, normal, shear, weight)
+            c = contacts[k]
+            normal, shear = forces(c, s)
+            moved += next_state(c, normal, shear, bodies[c.a].mass * p.gravity)
         if moved == 0:
             return
 
@@ -68,22 +68,19 @@ def move_block(bodies: Bodies, outlines: Outlines, s: Solid, i: int, dt: float) 
             s.stress[i, a] += s.elasticity[a, b] * s.d[i, 3 + b]
     u, v, r, ex, ey, g = s.d[i, 0], s.d[i, 1], s.d[i, 2], s.d[i, 3], s.d[i, 4], s.d[i, 5]
     radius = 0.0
-    for k in range(bodies[i].count):
-        x, y = outlines.corner[i, k].x - bodies[i].x, outlines.corner[i, k].y - bodies[i].y
+    body = bodies[i]
+    for k in range(body.count):
+        corner = outlines.corner[i, k]
+        x, y = corner.x - body.x, corner.y - body.y
         moved_x, moved_y = x - y * r + x * ex + 0.5 * y * g, y + x * r + y * ey + 0.5 * x * g
-        outlines.corner[i, k].x = bodies[i].x + u + moved_x
-        outlines.corner[i, k].y = bodies[i].y + v + moved_y
+        corner.x, corner.y = body.x + u + moved_x, body.y + v + moved_y
         radius = max(radius, math.hypot(moved_x, moved_y))
     place_edges(outlines, i)
-    bodies[i].radius = radius
-    bodies[i].x += u
-    bodies[i].y += v
-    bodies[i].theta += r
-    bodies[i].vx, bodies[i].vy, bodies[i].omega = (
-        s.velocity[i, 0],
-        s.velocity[i, 1],
-        s.velocity[i, 2],
-    )
+    body.radius = radius
+    body.x += u
+    body.y += v
+    body.theta += r
+    body.vx, body.vy, body.omega = s.velocity[i, 0], s.velocity[i, 1], s.velocity[i, 2]
 
 
 @kernel
@@ -127,7 +124,7 @@ def advance(
         pairs, _ = pair_blocks(bodies, now, m, work.islands, 0, count)
         settle(bodies, outlines, now, count, s, m, n, pairs, p, counters)
         for k in range(count):
-            keep_memory(now, k, False, False)
+            keep_memory(now[k], False, False)
         for i in range(n):
             move_block(bodies, outlines, s, i, p.dt)
         counters[STEPS] += 1

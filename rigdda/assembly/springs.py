@@ -9,23 +9,23 @@ from __future__ import annotations
 from numpy.typing import NDArray
 
 from rigdda.kernel import kernel
-from rigdda.records import Contacts
+from rigdda.records import Contact
 
 
 @kernel
-def normal_row(c: Contacts, k: int, of_a: bool) -> tuple[float, float, float]:
-    """Return e along the normal of contact k for its body a, or b."""
+def normal_row(c: Contact, of_a: bool) -> tuple[float, float, float]:
+    """Return e along the normal of a contact for its body a, or b."""
     if of_a:
-        return c[k].nx, c[k].ny, c[k].ra_x * c[k].ny - c[k].ra_y * c[k].nx
-    return -c[k].nx, -c[k].ny, -(c[k].rb_x * c[k].ny - c[k].rb_y * c[k].nx)
+        return c.nx, c.ny, c.ra_x * c.ny - c.ra_y * c.nx
+    return -c.nx, -c.ny, -(c.rb_x * c.ny - c.rb_y * c.nx)
 
 
 @kernel
-def shear_row(c: Contacts, k: int, of_a: bool) -> tuple[float, float, float]:
+def shear_row(c: Contact, of_a: bool) -> tuple[float, float, float]:
     """Return e along the normal turned by +90 degrees for body a, or b."""
     if of_a:
-        return -c[k].ny, c[k].nx, c[k].ra_x * c[k].nx + c[k].ra_y * c[k].ny
-    return c[k].ny, -c[k].nx, -(c[k].rb_x * c[k].nx + c[k].rb_y * c[k].ny)
+        return -c.ny, c.nx, c.ra_x * c.nx + c.ra_y * c.ny
+    return c.ny, -c.nx, -(c.rb_x * c.nx + c.rb_y * c.ny)
 
 
 @kernel

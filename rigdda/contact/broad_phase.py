@@ -16,16 +16,16 @@ from rigdda.records import Bodies, Boxes, Parameters, Polygons
 def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> None:
     """Set the box of each body that holds it over the step, however it is deflected, with slack."""
     for i in range(len(bodies)):
-        outline, grow = polygon[i], p.slack
-        if bodies[i].status == AWAKE:
-            bodies[i].lately = max(top_speed(bodies, i), LATELY * bodies[i].lately)
-            bodies[i].path = bodies[i].lately * p.dt
-            grow += bodies[i].path + p.gravity * p.dt * p.dt
+        body, outline, grow = bodies[i], polygon[i], p.slack
+        if body.status == AWAKE:
+            body.lately = max(top_speed(body), LATELY * body.lately)
+            body.path = body.lately * p.dt
+            grow += body.path + p.gravity * p.dt * p.dt
         box = boxes.swept[i]
         box.low_x, box.high_x = outline.low_x - grow, outline.high_x + grow
         box.low_y, box.high_y = outline.low_y - grow, outline.high_y + grow
-        box.body, box.awake = i, bodies[i].status == AWAKE
-        if bodies[i].status == RETIRED or bodies[i].status == HELD:  # nothing overlaps it
+        box.body, box.awake = i, body.status == AWAKE
+        if body.status == RETIRED or body.status == HELD:  # nothing overlaps it
             box.low_y, box.high_y = math.inf, -math.inf
 
 

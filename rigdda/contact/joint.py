@@ -8,27 +8,29 @@ from __future__ import annotations
 
 from rigdda.constants import SAME_FACE
 from rigdda.kernel import kernel
-from rigdda.records import Contacts, Parameters
+from rigdda.records import Contact, Contacts, Parameters
 
 
 @kernel
-def bond_joints(c: Contacts, low: int, high: int, p: Parameters) -> None:
+def bond_joints(contacts: Contacts, low: int, high: int, p: Parameters) -> None:
     """Share the length of each joint of one block among the contacts low:high that are on it."""
     for k in range(low, high):
-        c[k].bond = 0.0
-        if c[k].gap > p.penetration:
+        c = contacts[k]
+        c.bond = 0.0
+        if c.gap > p.penetration:
             continue
         count, least, most = 0, 0.0, 0.0
         for j in range(low, high):
-            same = c[j].nx * c[k].nx + c[j].ny * c[k].ny > SAME_FACE
-            if c[j].b == c[k].b and same and c[j].gap <= p.penetration:
-                along = c[k].nx * (c[j].y - c[k].y) - c[k].ny * (c[j].x - c[k].x)
+            other = contacts[j]
+            same = other.nx * c.nx + other.ny * c.ny > SAME_FACE
+            if other.b == c.b and same and other.gap <= p.penetration:
+                along = c.nx * (other.y - c.y) - c.ny * (other.x - c.x)
                 least, most = min(least, along), max(most, along)
                 count += 1
-        c[k].bond = (most - least) / count
+        c.bond = (most - least) / count
 
 
 @kernel
-def break_joint(c: Contacts, k: int) -> None:
-    """Take the strength from contact k."""
-    c[k].bond = c[k].cohesion = c[k].tension = 0.0
+def break_joint(c: Contact) -> None:
+    """Take the strength from a contact."""
+    c.bond = c.cohesion = c.tension = 0.0

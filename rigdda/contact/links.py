@@ -16,7 +16,7 @@ from rigdda.contact.law import (
     set_velocities,
 )
 from rigdda.kernel import entry_kernel, kernel
-from rigdda.records import Bodies, Contacts, Links, Parameters
+from rigdda.records import Bodies, Body, Contact, Link, Links, Parameters
 
 
 @kernel
@@ -24,22 +24,23 @@ def anchor(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
     """Return the place now of a point given in body coordinates, of the ground if i < 0 [m]."""
     if i < 0:
         return x, y
-    cos, sin = math.cos(bodies[i].theta), math.sin(bodies[i].theta)
-    return bodies[i].x + cos * x - sin * y, bodies[i].y + sin * x + cos * y
+    body = bodies[i]
+    cos, sin = math.cos(body.theta), math.sin(body.theta)
+    return body.x + cos * x - sin * y, body.y + sin * x + cos * y
 
 
 @kernel
-def arm(bodies: Bodies, i: int, x: float, y: float, time: float) -> tuple[float, float]:
+def arm(body: Body, x: float, y: float, time: float) -> tuple[float, float]:
     """Return the arm from the centroid after `time` of a point given in body coordinates [m]."""
-    theta = bodies[i].theta + time * bodies[i].omega
+    theta = body.theta + time * body.omega
     cos, sin = math.cos(theta), math.sin(theta)
     return cos * x - sin * y, sin * x + cos * y
 
 
 @kernel
-def tension(links: Links, q: int, length: float) -> float:
-    """Return the tension of bolt q at a length [N]."""
-    return links[q].prestress + links[q].stiffness * (length - links[q].length)
+def tension(link: Link, length: float) -> float:
+    """Return the tension of a bolt at a length [N]."""
+    return link.prestress + link.stiffness * (length - link.length)
 
 
 @entry_kernel
@@ -47,52 +48,55 @@ def bolt_energy(bodies: Bodies, links: Links) -> float:
     """Return the energy stored in the bolts now [J]."""
     total = 0.0
     for q in range(len(links)):
-        if links[q].kind == BOLT:
-            ax, ay = anchor(bodies, links[q].a, links[q].ax, links[q].ay)
-            bx, by = anchor(bodies, links[q].b, links[q].bx, links[q].by)
-            force = tension(links, q, math.hypot(ax - bx, ay - by))
-            total += 0.5 * force * force / links[q].stiffness
+        link = links[q]
+        if link.kind == BOLT:
+            ax, ay = anchor(bodies, link.a, link.ax, link.ay)
+            bx, by = anchor(bodies, link.b, link.bx, link.by)
+            force = tension(link, math.hypot(ax - bx, ay - by))
+            total += 0.5 * force * force / link.stiffness
     return total
 
 
 @kernel
-def add_link(bodies: Bodies, links: Links, q: int, c: Contacts, k: int, p: Parameters) -> None:
-    """Write support q as contact k."""
-    a, b = links[q].a, links[q].b
-    ax, ay = anchor(bodies, a, links[q].ax, links[q].ay)
-    bx, by = anchor(bodies, b, links[q].bx, links[q].by)
-    c[k].a, c[k].b, c[k].key, c[k].owner, c[k].kind = a, b, -1 - q, 1, links[q].kind
-    c[k].other, c[k].gap, c[k].flips = 0, 0.0, 0
-    c[k].x, c[k].y, c[k].share, c[k].state = ax, ay, 0.5, STICK
-    c[k].memory_normal = c[k].memory_shear = c[k].start_normal = c[k].start_shear = 0.0
-    c[k].friction = c[k].restitution = c[k].passing = c[k].bond = c[k].cohesion = 0.0
-    c[k].ra_x, c[k].ra_y = arm(bodies, a, links[q].ax, links[q].ay, 0.5 * p.dt)
+def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) -> None:
+    """Write support q as a contact."""
+    link = links[q]
+    a, b = link.a, link.b
+    ax, ay = anchor(bodies, a, link.ax, link.ay)
+    bx, by = anchor(bodies, b, link.bx, link.by)
+    c.a, c.b, c.key, c.owner, c.kind = a, b, -1 - q, 1, link.kind
+    c.other, c.gap, c.flips = 0, 0.0, 0
+    c.x, c.y, c.share, c.state = ax, ay, 0.5, STICK
+    c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+    c.friction = c.restitution = c.passing = c.bond = c.cohesion = 0.0
+    c.ra_x, c.ra_y = arm(bodies[a], link.ax, link.ay, 0.5 * p.dt)
     if b >= 0:
-        c[k].rb_x, c[k].rb_y = arm(bodies, b, links[q].bx, links[q].by, 0.5 * p.dt)
-    if links[q].kind == BOLT:
+        c.rb_x, c.rb_y = arm(bodies[b], link.bx, link.by, 0.5 * p.dt)
+    if link.kind == BOLT:
         length = math.hypot(ax - bx, ay - by)
-        c[k].nx, c[k].ny = (ax - bx) / length, (ay - by) / length
-        c[k].kappa = c[k].stiffness = links[q].stiffness
-        c[k].bias = -tension(links, q, length) / links[q].stiffness
-        c[k].tension = links[q].yielding
+        c.nx, c.ny = (ax - bx) / length, (ay - by) / length
+        c.kappa = c.stiffness = link.stiffness
+        c.bias = -tension(link, length) / link.stiffness
+        c.tension = link.yielding
     else:
-        c[k].nx, c[k].ny = 1.0, 0.0
-        c[k].kappa = c[k].stiffness = impact_stiffness(effective_mass(bodies, c, k), p.dt)
-        c[k].tension = math.inf
-        c[k].bias = -PIN_RECOVERY * (ax - bx)
-        c[k].memory_shear = -PIN_RECOVERY * (ay - by) * c[k].kappa
-    set_velocities(bodies, c, k)
-    if links[q].kind == PIN:
-        c[k].un, c[k].us = point_velocity(bodies, a, ax, ay)
+        c.nx, c.ny = 1.0, 0.0
+        c.kappa = c.stiffness = impact_stiffness(effective_mass(bodies, c), p.dt)
+        c.tension = math.inf
+        c.bias = -PIN_RECOVERY * (ax - bx)
+        c.memory_shear = -PIN_RECOVERY * (ay - by) * c.kappa
+    set_velocities(bodies, c)
+    if link.kind == PIN:
+        c.un, c.us = point_velocity(bodies, a, ax, ay)
 
 
 @kernel
 def yield_bolts(bodies: Bodies, links: Links) -> None:
     """Lengthen the bolts whose tension is above yield now: perfectly plastic."""
     for q in range(len(links)):
-        if links[q].kind != BOLT:
+        link = links[q]
+        if link.kind != BOLT:
             continue
-        ax, ay = anchor(bodies, links[q].a, links[q].ax, links[q].ay)
-        bx, by = anchor(bodies, links[q].b, links[q].bx, links[q].by)
-        excess = tension(links, q, math.hypot(ax - bx, ay - by)) - links[q].yielding
-        links[q].length += max(excess, 0.0) / links[q].stiffness
+        ax, ay = anchor(bodies, link.a, link.ax, link.ay)
+        bx, by = anchor(bodies, link.b, link.bx, link.by)
+        excess = tension(link, math.hypot(ax - bx, ay - by)) - link.yielding
+        link.length += max(excess, 0.0) / link.stiffness

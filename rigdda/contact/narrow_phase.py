@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Contacts, Corners, Outlines, Parameters
+from rigdda.records import Bodies, Contact, Contacts, Corners, Outlines, Parameters
 
 NEVER = 2.0
 """Time of entry, over the step, of what does not come nearer or not soon."""
@@ -32,7 +32,8 @@ def axis_gap(
     """Return the least gap of the n corners of body j above a line, and the corner."""
     least, corner = 1e300, 0
     for k in range(n):
-        gap = nx * (corners[j, k].x - x0) + ny * (corners[j, k].y - y0)
+        own = corners[j, k]
+        gap = nx * (own.x - x0) + ny * (own.y - y0)
         if gap < least:
             least, corner = gap, k
     return least, corner
@@ -103,8 +104,8 @@ def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, 
 
     Of edges in one line rounding alone decides which is the best face.
     """
-    nx, ny = outlines.corner[i, edge].normal_x, outlines.corner[i, edge].normal_y
-    x, y = outlines.corner[j, corner].x, outlines.corner[j, corner].y
+    face, over = outlines.corner[i, edge], outlines.corner[j, corner]
+    nx, ny, x, y = face.normal_x, face.normal_y, over.x, over.y
     for _ in range(edges):
         start, end = outlines.corner[i, edge], outlines.corner[i, following(edge, edges)]
         beyond_end = ny * (end.x - x) > nx * (end.y - y)
@@ -122,7 +123,8 @@ def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, 
 @kernel
 def incident_edge(outlines: Outlines, i: int, edge: int, j: int, n: int) -> int:
     """Return the edge of j at its nearest corner that faces edge `edge` of i most squarely."""
-    nx, ny = outlines.corner[i, edge].normal_x, outlines.corner[i, edge].normal_y
+    face = outlines.corner[i, edge]
+    nx, ny = face.normal_x, face.normal_y
     _, corner = axis_gap(nx, ny, 0.0, 0.0, outlines.corner, j, n)
     before = corner - 1 if corner > 0 else n - 1
     after, ahead = outlines.corner[j, corner], outlines.corner[j, before]
@@ -133,18 +135,19 @@ def incident_edge(outlines: Outlines, i: int, edge: int, j: int, n: int) -> int:
 
 @kernel
 def add_contact(
-    c: Contacts, k: int, a: int, b: int, key: int, owner: int, other: int,
+    c: Contact, a: int, b: int, key: int, owner: int, other: int,
     x: float, y: float, nx: float, ny: float, gap: float,
 ) -> None:  # fmt: skip
-    """Write the geometry of contact k."""
-    c[k].a, c[k].b, c[k].key, c[k].owner, c[k].other = a, b, key, owner, other
-    c[k].x, c[k].y, c[k].nx, c[k].ny, c[k].gap = x, y, nx, ny, gap
+    """Write the geometry of a contact."""
+    c.a, c.b, c.key, c.owner, c.other = a, b, key, owner, other
+    c.x, c.y, c.nx, c.ny, c.gap = x, y, nx, ny, gap
 
 
 @inlined
 def clip_contacts(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, edge: int,
-    j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float, beside: float,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
+    edge: int, j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float,
+    beside: float,
 ) -> int:  # fmt: skip
     """Add up to two contacts of bodies a and b where the incident edge lies over the face.
 
@@ -156,17 +159,18 @@ def clip_contacts(
     nx, ny, x0, y0 = face.normal_x, face.normal_y, face.x, face.y
     tx, ty = -ny, nx
     end = following(edge, outlines.polygon[i].count)
-    length = tx * (outlines.corner[i, end].x - x0) + ty * (outlines.corner[i, end].y - y0)
+    next_corner = outlines.corner[i, end]
+    length = tx * (next_corner.x - x0) + ty * (next_corner.y - y0)
     other_end = following(other, outlines.polygon[j].count)
     # along the face, the incident edge runs from its end (s1) to its start (s2)
-    x1, y1 = outlines.corner[j, other_end].x, outlines.corner[j, other_end].y
-    x2, y2 = outlines.corner[j, other].x, outlines.corner[j, other].y
-    s1 = tx * (x1 + shift_x - x0) + ty * (y1 + shift_y - y0)
-    s2 = tx * (x2 + shift_x - x0) + ty * (y2 + shift_y - y0)
-    g1, g2 = nx * (x1 - x0) + ny * (y1 - y0), nx * (x2 - x0) + ny * (y2 - y0)
+    one, two = outlines.corner[j, other_end], outlines.corner[j, other]
+    s1 = tx * (one.x + shift_x - x0) + ty * (one.y + shift_y - y0)
+    s2 = tx * (two.x + shift_x - x0) + ty * (two.y + shift_y - y0)
+    g1 = nx * (one.x - x0) + ny * (one.y - y0)
+    g2 = nx * (two.x - x0) + ny * (two.y - y0)
     # a corner of j that touches the next edge of a notch, too, may be a little beyond the face
     start = -slack if face.reentrant else -beside
-    stop = length + slack if outlines.corner[i, end].reentrant else length + beside
+    stop = length + slack if next_corner.reentrant else length + beside
     low = s1 if s1 >= start else 0.0
     high = s2 if s2 <= stop else length
     if high < low:
@@ -186,15 +190,15 @@ def clip_contacts(
             own_corner = s2 > stop
             corner, other_corner = end, other
         if own_corner:  # a corner of i on the incident edge
-            k = add_corner(bodies, outlines, c, k, a, b, i, corner, i, edge, gap)
+            k = add_corner(bodies, outlines, contacts, k, a, b, i, corner, i, edge, gap)
         else:
-            k = add_corner(bodies, outlines, c, k, a, b, j, other_corner, i, edge, gap)
+            k = add_corner(bodies, outlines, contacts, k, a, b, j, other_corner, i, edge, gap)
     return k
 
 
 @inlined
 def add_corner(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, owner: int,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, owner: int,
     corner: int, i: int, edge: int, gap: float,
 ) -> int:  # fmt: skip
     """Add the contact of a corner of polygon `owner` with the face `edge` of polygon i.
@@ -206,7 +210,7 @@ def add_corner(
     own, face = outlines.corner[owner, corner], outlines.corner[i, edge]
     key = body * outlines.corner.shape[1] + own.number
     add_contact(
-        c, k, a, b, key, 1 if body == a else 0, bodies[b].surface,
+        contacts[k], a, b, key, 1 if body == a else 0, bodies[b].surface,
         own.x, own.y, sign * face.normal_x, sign * face.normal_y, gap,
     )  # fmt: skip
     return k + 1
@@ -214,76 +218,76 @@ def add_corner(
 
 @inlined
 def collide_pair(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, p: Parameters
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, p: Parameters
 ) -> int:  # fmt: skip
     """Add the contacts of bodies a and b to `c` from entry k; returns the new number, or -1."""
     dt = p.dt
-    dx, dy = -bodies[a].vx * dt, -bodies[a].vy * dt
-    path, fall = bodies[a].path, p.gravity * dt * dt
-    if bodies[b].status == AWAKE:
-        dx += bodies[b].vx * dt
-        dy += bodies[b].vy * dt
-        path += bodies[b].path
+    one, two = bodies[a], bodies[b]
+    dx, dy = -one.vx * dt, -one.vy * dt
+    path, fall = one.path, p.gravity * dt * dt
+    if two.status == AWAKE:
+        dx += two.vx * dt
+        dy += two.vy * dt
+        path += two.path
         fall = 0.0
     spread = path + fall + p.slack
-    turning = abs(bodies[a].omega) * bodies[a].radius + abs(bodies[b].omega) * bodies[b].radius
-    beside = 0.5 * dt * turning
-    if bodies[a].parts == 1 and bodies[b].parts == 1:
+    beside = 0.5 * dt * (abs(one.omega) * one.radius + abs(two.omega) * two.radius)
+    if one.parts == 1 and two.parts == 1:
         return collide_parts(
-            bodies, outlines, c, k, a, b, a, b, dx, dy, spread, p.slack, 0.0, beside
+            bodies, outlines, contacts, k, a, b, a, b, dx, dy, spread, p.slack, 0.0, beside
         )
     first = k
     k = collide_all_parts(
-        bodies, outlines, c, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack, beside
+        bodies, outlines, contacts, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack, beside
     )
     if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
-        k = collide_all_parts(bodies, outlines, c, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0)
+        k = collide_all_parts(
+            bodies, outlines, contacts, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0
+        )
     return k
 
 
 @kernel
 def collide_all_parts(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, dx: float,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, dx: float,
     dy: float, spread: float, slack: float, sunk: float, beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
-    first = k
-    for i in range(bodies[a].part, bodies[a].part + bodies[a].parts):
-        for j in range(bodies[b].part, bodies[b].part + bodies[b].parts):
-            if k + 2 > len(c):
+    first, one, two = k, bodies[a], bodies[b]
+    for i in range(one.part, one.part + one.parts):
+        for j in range(two.part, two.part + two.parts):
+            if k + 2 > len(contacts):
                 return -1
             found = collide_parts(
-                bodies, outlines, c, k, a, b, i, j, dx, dy, spread, slack, sunk, beside
+                bodies, outlines, contacts, k, a, b, i, j, dx, dy, spread, slack, sunk, beside
             )
             for new in range(k, found):
-                k = keep_nearest(c, first, k, new)
+                k = keep_nearest(contacts, first, k, new)
     return k
 
 
 @kernel
-def keep_nearest(c: Contacts, first: int, k: int, new: int) -> int:
+def keep_nearest(contacts: Contacts, first: int, k: int, new: int) -> int:
     """Move contact `new` to entry k, or over one of first:k of the same corner with the same face.
 
     Parts that share a corner, or a face that a cut ends at, find the same contact. Returns the new
     number.
     """
-    place = k
+    place, c = k, contacts[new]
     for m in range(first, k):
-        same = c[m].key == c[new].key and c[m].owner == c[new].owner
-        if same and c[m].nx * c[new].nx + c[m].ny * c[new].ny > SAME_FACE:
-            if c[m].gap <= c[new].gap:
+        other = contacts[m]
+        same = other.key == c.key and other.owner == c.owner
+        if same and other.nx * c.nx + other.ny * c.ny > SAME_FACE:
+            if other.gap <= c.gap:
                 return k
             place = m
-    n = c[new]
-    add_contact(
-        c, place, n.a, n.b, n.key, n.owner, n.other, n.x, n.y, n.nx, n.ny, n.gap
-    )  # fmt: skip
+    add_contact(contacts[place], c.a, c.b, c.key, c.owner, c.other, c.x, c.y, c.nx, c.ny, c.gap)
     return max(k, place + 1)
 
 
 @inlined
 def collide_parts(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, j: int,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int, j: int,
     dx: float, dy: float, spread: float, slack: float, sunk: float, beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
@@ -316,7 +320,7 @@ def collide_parts(
             return k
         shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
         found = clip_contacts(
-            bodies, outlines, c, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
+            bodies, outlines, contacts, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
             reach, slack, beside,
         )  # fmt: skip
         if found > k or (shift == 0.0 and not touching):
@@ -326,13 +330,13 @@ def collide_parts(
         else:
             time_i = time_j = 0.0
     face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
-    return deepest_corner(bodies, outlines, c, k, a, b, face, edge, other)
+    return deepest_corner(bodies, outlines, contacts, k, a, b, face, edge, other)
 
 
 @kernel
 def deepest_corner(
-    bodies: Bodies, outlines: Outlines, c: Contacts, k: int, a: int, b: int, i: int, edge: int,
-    j: int,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
+    edge: int, j: int,
 ) -> int:  # fmt: skip
     """Add the contact of the nearest corner of polygon j with the line of an edge of polygon i.
 
@@ -340,7 +344,7 @@ def deepest_corner(
     in a row, where rounding decides which of them is the face.
     """
     n = outlines.polygon[j].count
-    nx, ny = outlines.corner[i, edge].normal_x, outlines.corner[i, edge].normal_y
-    x0, y0 = outlines.corner[i, edge].x, outlines.corner[i, edge].y
+    face = outlines.corner[i, edge]
+    nx, ny, x0, y0 = face.normal_x, face.normal_y, face.x, face.y
     gap, corner = axis_gap(nx, ny, x0, y0, outlines.corner, j, n)
-    return add_corner(bodies, outlines, c, k, a, b, j, corner, i, edge, gap)
+    return add_corner(bodies, outlines, contacts, k, a, b, j, corner, i, edge, gap)

@@ -100,11 +100,11 @@ def along_neighbour(
 
     It slides along that segment.
     """
-    gap = below_segment(ground, s, x, y)
-    sunk = min(gap, 0.0) - gap - (ground.segment[s].normal_x * dx + ground.segment[s].normal_y * dy)
+    one, gap = ground.segment[s], below_segment(ground, s, x, y)
+    sunk = min(gap, 0.0) - gap - (one.normal_x * dx + one.normal_y * dy)
     if sunk <= 0.0 or not over_segment(ground, s, x, y, max(-gap, 0.0)):
         return dx, dy
-    return dx + sunk * ground.segment[s].normal_x, dy + sunk * ground.segment[s].normal_y
+    return dx + sunk * one.normal_x, dy + sunk * one.normal_y
 
 
 @kernel
@@ -118,37 +118,39 @@ def place_of_hit(
     """
     if gap <= p.slack:
         return x, y
-    dx = (bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * p.dt
-    dy = (bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * p.dt
-    if ground.segment[s].turn > 0.0:
+    one, block = ground.segment[s], bodies[a]
+    dx = (block.vx - block.omega * (y - block.y)) * p.dt
+    dy = (block.vy + block.omega * (x - block.x)) * p.dt
+    if one.turn > 0.0:
         dx, dy = along_neighbour(ground, s - 1, x, y, dx, dy)
     if ground.segment[s + 1].turn > 0.0:
         dx, dy = along_neighbour(ground, s + 1, x, y, dx, dy)
-    approach = -(ground.segment[s].normal_x * dx + ground.segment[s].normal_y * dy)
+    approach = -(one.normal_x * dx + one.normal_y * dy)
     time = min(gap / approach, 1.0) if approach > 0.0 else 0.0
     return x + time * dx, y + time * dy
 
 
 @inlined
 def corners_on_segment(
-    bodies: Bodies, outlines: Outlines, ground: Ground, c: Contacts, k: int, first: int, a: int,
-    s: int, p: Parameters,
+    bodies: Bodies, outlines: Outlines, ground: Ground, contacts: Contacts, k: int, first: int,
+    a: int, s: int, p: Parameters,
 ) -> int:  # fmt: skip
     """Add contacts of the corners of block a with segment s; returns the new number."""
-    one = ground.segment[s]
+    one, block = ground.segment[s], bodies[a]
     nx, ny, surface = one.normal_x, one.normal_y, one.surface
-    reach = bodies[a].path + p.gravity * p.dt * p.dt + p.slack
-    concave = bodies[a].parts > 1
-    lowest = below_segment(ground, s, bodies[a].x, bodies[a].y) - bodies[a].radius
+    reach = block.path + p.gravity * p.dt * p.dt + p.slack
+    concave = block.parts > 1
+    lowest = below_segment(ground, s, block.x, block.y) - block.radius
     if lowest > reach:
         return k
-    for vertex in range(bodies[a].count):
+    for vertex in range(block.count):
         key = a * outlines.corner.shape[1] + vertex
-        x, y = outlines.corner[a, vertex].x, outlines.corner[a, vertex].y
+        corner = outlines.corner[a, vertex]
+        x, y = corner.x, corner.y
         gap = below_segment(ground, s, x, y)
-        if gap > reach or gap < -bodies[a].radius:
+        if gap > reach or gap < -block.radius:
             continue
-        if concave and outlines.corner[a, vertex].reentrant:
+        if concave and corner.reentrant:
             continue
         hit_x, hit_y = place_of_hit(bodies, ground, s, a, x, y, gap, p)
         if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0) + reach):
@@ -159,12 +161,13 @@ def corners_on_segment(
             continue
         again = False
         for m in range(first, k):  # one face, cut in two segments
-            if c[m].owner == 1 and c[m].key == key and c[m].nx * nx + c[m].ny * ny > SAME_FACE:
+            c = contacts[m]
+            if c.owner == 1 and c.key == key and c.nx * nx + c.ny * ny > SAME_FACE:
                 again = True
-                if gap < c[m].gap:
-                    add_contact(c, m, a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
+                if gap < c.gap:
+                    add_contact(c, a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
         if not again:
-            add_contact(c, k, a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
+            add_contact(contacts[k], a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
             k += 1
     return k
 
@@ -185,23 +188,24 @@ def bridges(
 
 @inlined
 def edge_on_ridge(
-    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, c: Contacts, k: int, a: int,
-    part: int, corner: int, p: Parameters,
+    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, contacts: Contacts, k: int,
+    a: int, part: int, corner: int, p: Parameters,
 ) -> int:  # fmt: skip
     """Add the contact of a convex terrain corner with an edge of a part of block a, if it has one.
 
     The edge is the last to separate the corner from the block, or about as deep; its normal must
     lie about between those of the two segments, or a corner of the block is in contact instead.
     """
-    x, y = ground.segment[corner].x, ground.segment[corner].y
+    left, right, block = ground.segment[corner - 1], ground.segment[corner], bodies[a]
+    x, y = right.x, right.y
     dt, n = p.dt, outlines.polygon[part].count
-    dx = -(bodies[a].vx - bodies[a].omega * (y - bodies[a].y)) * dt
-    dy = -(bodies[a].vy + bodies[a].omega * (x - bodies[a].x)) * dt
+    dx = -(block.vx - block.omega * (y - block.y)) * dt
+    dy = -(block.vy + block.omega * (x - block.x)) * dt
     if not (box.low_x <= x <= box.high_x and box.low_y <= y <= box.high_y):
         return k
-    left, right, concave = ground.segment[corner - 1], ground.segment[corner], part != a
-    lean = LEAN + abs(bodies[a].omega) * dt
-    reach = bodies[a].path + p.gravity * dt * dt + p.slack
+    concave = part != a
+    lean = LEAN + abs(block.omega) * dt
+    reach = block.path + p.gravity * dt * dt + p.slack
     best, best_time, best_gap = -1, -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
@@ -243,14 +247,14 @@ def edge_on_ridge(
     if gap > 0.0 and (along < 0.0 or along > ex * ex + ey * ey):
         return k
     key = len(bodies) * outlines.corner.shape[1] + corner
-    add_contact(c, k, a, TERRAIN, key, 0, right.surface, x, y, -nx, -ny, gap)
+    add_contact(contacts[k], a, TERRAIN, key, 0, right.surface, x, y, -nx, -ny, gap)
     return k + 1
 
 
 @inlined
 def collide_terrain(
-    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, c: Contacts, k: int, a: int,
-    p: Parameters,
+    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, contacts: Contacts, k: int,
+    a: int, p: Parameters,
 ) -> int:  # fmt: skip
     """Add the contacts of block a with the terrain from entry k; returns the new number.
 
@@ -259,7 +263,7 @@ def collide_terrain(
     bins = len(ground.bin_start) - 1
     if bins == 0:
         return k
-    first = k
+    first, block = k, bodies[a]
     low = int((box.low_x - ground.bin_origin) / ground.bin_width)
     high = int((box.high_x - ground.bin_origin) / ground.bin_width)
     low, high = min(max(low, 0), bins - 1), min(max(high, 0), bins - 1)
@@ -273,11 +277,11 @@ def collide_terrain(
                 continue
             if one.bottom > box.high_y or one.top < box.low_y:
                 continue
-            if k + outlines.corner.shape[1] + bodies[a].parts + 2 > len(c):
+            if k + outlines.corner.shape[1] + block.parts + 2 > len(contacts):
                 return -1
-            k = corners_on_segment(bodies, outlines, ground, c, k, first, a, s, p)
+            k = corners_on_segment(bodies, outlines, ground, contacts, k, first, a, s, p)
             if one.turn < 0.0:
-                for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):
-                    found = edge_on_ridge(bodies, outlines, ground, box, c, k, a, part, s, p)
-                    k = keep_nearest(c, first, k, k) if found > k and part != a else found
+                for part in range(block.part, block.part + block.parts):
+                    found = edge_on_ridge(bodies, outlines, ground, box, contacts, k, a, part, s, p)
+                    k = keep_nearest(contacts, first, k, k) if found > k and part != a else found
     return k

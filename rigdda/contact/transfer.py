@@ -10,48 +10,52 @@ from numpy.typing import NDArray
 
 from rigdda.constants import NEW, OPEN, SAME_FACE, SAME_NORMAL, TERRAIN
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Contacts
+from rigdda.records import Contact, Contacts
 
 
 @kernel
-def fits_another(
-    c: Contacts, k: int, new_low: int, new_high: int, old: Contacts, m: int, cosine: float
-) -> bool:
-    """Return whether another of the new contacts of the corner of k has the normal of old[m]."""
-    for j in range(new_low, new_high):
-        if j == k or c[j].key != c[k].key or c[j].b != c[k].b:
+def fits_another(contacts: Contacts, k: int, low: int, high: int, was: Contact) -> bool:
+    """Return whether of the new contacts low:high of the corner of k another fits `was` better."""
+    c = contacts[k]
+    cosine = abs(c.nx * was.nx + c.ny * was.ny)
+    for j in range(low, high):
+        other = contacts[j]
+        if j == k or other.key != c.key or other.b != c.b:
             continue
-        if abs(c[j].nx * old[m].nx + c[j].ny * old[m].ny) > cosine:
+        if abs(other.nx * was.nx + other.ny * was.ny) > cosine:
             return True
     return False
 
 
 @inlined
 def recall_from(
-    c: Contacts, k: int, new_low: int, new_high: int, old: Contacts, low: int, high: int, b: int,
-    sign: float,
+    contacts: Contacts, k: int, new_low: int, new_high: int, old: Contacts, low: int, high: int,
+    b: int, sign: float,
 ) -> bool:  # fmt: skip
     """Give contact k the memory of the same closed contact among old[low:high], if there is one."""
+    c = contacts[k]
     for m in range(low, high):
-        if old[m].b != b or old[m].key != c[k].key or old[m].state == OPEN:
+        was = old[m]
+        if was.b != b or was.key != c.key or was.state == OPEN:
             continue
-        cosine = sign * (c[k].nx * old[m].nx + c[k].ny * old[m].ny)
+        cosine = sign * (c.nx * was.nx + c.ny * was.ny)
         if cosine < SAME_NORMAL:
             continue
         # where a corner slides into a concave corner, the face ahead is not the one it comes from
-        if cosine < SAME_FACE and fits_another(c, k, new_low, new_high, old, m, cosine):
+        if cosine < SAME_FACE and fits_another(contacts, k, new_low, new_high, was):
             continue
-        c[k].state, c[k].kind = old[m].state, old[m].kind
-        c[k].memory_normal = old[m].memory_normal
-        c[k].memory_shear = old[m].memory_shear
-        c[k].start_normal, c[k].start_shear = old[m].start_normal, old[m].start_shear
-        c[k].stiffness, c[k].bond = old[m].stiffness, old[m].bond
+        c.state, c.kind = was.state, was.kind
+        c.memory_normal, c.memory_shear = was.memory_normal, was.memory_shear
+        c.start_normal, c.start_shear = was.start_normal, was.start_shear
+        c.stiffness, c.bond = was.stiffness, was.bond
         return True
     return False
 
 
 @inlined
-def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray, slack: float) -> None:
+def recall(
+    contacts: Contacts, low: int, high: int, old: Contacts, first: NDArray, slack: float
+) -> None:
     """Give each new contact in low:high its memory; without one it starts OPEN.
 
     A contact that has come apart by more than `slack` starts OPEN, too: it closes by an impact.
@@ -60,30 +64,25 @@ def recall(c: Contacts, low: int, high: int, old: Contacts, first: NDArray, slac
     ways; its forces keep their sign, since normal and shear turn round together.
     """
     for k in range(low, high):
-        c[k].state, c[k].kind = OPEN, NEW
-        c[k].memory_normal = c[k].memory_shear = c[k].stiffness = 0.0
-        c[k].start_normal = c[k].start_shear = c[k].bond = 0.0
-        if c[k].gap > slack:
+        c = contacts[k]
+        c.state, c.kind = OPEN, NEW
+        c.memory_normal = c.memory_shear = c.stiffness = 0.0
+        c.start_normal = c.start_shear = c.bond = 0.0
+        if c.gap > slack:
             continue
-        a, b = c[k].a, c[k].b
-        found = recall_from(c, k, low, high, old, first[a], first[a + 1], b, 1.0)
+        a, b = c.a, c.b
+        found = recall_from(contacts, k, low, high, old, first[a], first[a + 1], b, 1.0)
         if not found and b != TERRAIN:
-            recall_from(c, k, low, high, old, first[b], first[b + 1], a, -1.0)
+            recall_from(contacts, k, low, high, old, first[b], first[b + 1], a, -1.0)
 
 
 @kernel
-def copy_contact(c: Contacts, k: int, old: Contacts, m: int) -> None:
-    """Keep contact m of the last step as contact k: between sleeping bodies nothing changes."""
-    c[k].a, c[k].b, c[k].key, c[k].owner = old[m].a, old[m].b, old[m].key, old[m].owner
-    c[k].other, c[k].x, c[k].y, c[k].nx, c[k].ny = (
-        old[m].other,
-        old[m].x,
-        old[m].y,
-        old[m].nx,
-        old[m].ny,
-    )
-    c[k].gap, c[k].state, c[k].kind = old[m].gap, old[m].state, old[m].kind
-    c[k].memory_normal, c[k].memory_shear = old[m].memory_normal, old[m].memory_shear
-    c[k].start_normal, c[k].start_shear = old[m].start_normal, old[m].start_shear
-    c[k].stiffness, c[k].normal, c[k].shear = old[m].stiffness, old[m].normal, old[m].shear
-    c[k].bond = old[m].bond
+def copy_contact(c: Contact, was: Contact) -> None:
+    """Keep a contact of the last step: between sleeping bodies nothing changes."""
+    c.a, c.b, c.key, c.owner, c.other = was.a, was.b, was.key, was.owner, was.other
+    c.x, c.y, c.nx, c.ny, c.gap = was.x, was.y, was.nx, was.ny, was.gap
+    c.state, c.kind = was.state, was.kind
+    c.memory_normal, c.memory_shear = was.memory_normal, was.memory_shear
+    c.start_normal, c.start_shear = was.start_normal, was.start_shear
+    c.stiffness, c.normal, c.shear = was.stiffness, was.normal, was.shear
+    c.bond = was.bond

@@ -45,7 +45,18 @@ from rigdda.constants import (
     SUBSTEP,
 )
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
-from rigdda.records import Bodies, Contacts, Floats, Ints, Islands, Matrix, Parameters, Rows
+from rigdda.records import (
+    Bodies,
+    Body,
+    Contact,
+    Contacts,
+    Floats,
+    Ints,
+    Islands,
+    Matrix,
+    Parameters,
+    Rows,
+)
 
 # columns of rows.row, first what a visit to an open contact needs: the row of the contact for a and
 # b, times h over the roots of their inertia [(m/N)^1/2]; normal and shear force [N]
@@ -102,85 +113,83 @@ def along_six(e: Floats, a: Floats, b: Floats, first: int) -> float:
 
 
 @kernel
-def is_elastic(c: Contacts, k: int) -> bool:
-    """Return whether contact k is a spring whose stiffness is given."""
-    return c[k].kind == PLAIN or c[k].kind == BOLT or c[k].kind == PIN
+def is_elastic(c: Contact) -> bool:
+    """Return whether a contact is a spring whose stiffness is given."""
+    return c.kind == PLAIN or c.kind == BOLT or c.kind == PIN
 
 
 @kernel
-def set_rigid(
-    row: Floats, c: Contacts, k: int, flexible: float, rolling: float, substeps: int
-) -> None:
-    """Write what a visit needs of contact k, which gives way to nothing in a substep."""
+def set_rigid(row: Floats, c: Contact, flexible: float, rolling: float, substeps: int) -> None:
+    """Write what a visit needs of a contact that gives way to nothing in a substep."""
     row[KEEP], row[GAIN] = 1.0, 1.0 / flexible
     row[KEEP_SHEAR], row[GAIN_SHEAR] = 1.0, 1.0 / rolling
-    row[GAP], row[AIM], row[REBOUND], row[HIT] = c[k].gap, 0.0, -math.inf, -1.0
-    if c[k].kind == IMPACT and c[k].bias > 0.0:
-        row[REBOUND] = c[k].bias / substeps
-    elif c[k].kind == IMPACT:  # a fence that fails lets blocks pass
-        row[AIM] = c[k].bias / substeps
-    elif c[k].kind == REST:  # what pushes penetration out, without the force that is carried over
-        row[AIM] = max(c[k].bias - c[k].memory_normal / c[k].kappa, 0.0) / substeps
+    row[GAP], row[AIM], row[REBOUND], row[HIT] = c.gap, 0.0, -math.inf, -1.0
+    if c.kind == IMPACT and c.bias > 0.0:
+        row[REBOUND] = c.bias / substeps
+    elif c.kind == IMPACT:  # a fence that fails lets blocks pass
+        row[AIM] = c.bias / substeps
+    elif c.kind == REST:  # what pushes penetration out, without the force that is carried over
+        row[AIM] = max(c.bias - c.memory_normal / c.kappa, 0.0) / substeps
 
 
 @inlined
 def set_spring(
-    row: Floats, c: Contacts, k: int, rows: Rows, i: int, j: int, flexible: float, rolling: float,
+    row: Floats, c: Contact, rows: Rows, i: int, j: int, flexible: float, rolling: float,
     substeps: int, h: float,
 ) -> None:  # fmt: skip
-    """Write what a visit needs of the spring of contact k, see contact.law.
+    """Write what a visit needs of the spring of a contact, see contact.law.
 
     In a single substep every contact is one: its displacement is dt times the end velocity, but for
     what its velocity at the start is not that of the bodies along its row. A plain contact is one
     on the displacement of the step, in the law with a factor of 2.
     """
-    normal = shear = c[k].kappa
-    free, slid = c[k].bias, 0.0
+    normal = shear = c.kappa
+    free, slid = c.bias, 0.0
     if substeps == 1:
         a, b = rows.motion[i], rows.motion[j]
-        free += h * c[k].un - along_six(row[NORMAL : NORMAL + 6], a, b, BEFORE)
-        slid += h * c[k].us - along_six(row[SHEAR : SHEAR + 6], a, b, BEFORE)
-    if not is_elastic(c, k):
+        free += h * c.un - along_six(row[NORMAL : NORMAL + 6], a, b, BEFORE)
+        slid += h * c.us - along_six(row[SHEAR : SHEAR + 6], a, b, BEFORE)
+    if not is_elastic(c):
         normal, shear = RELAXATION_STIFFNESS / flexible, RELAXATION_STIFFNESS / rolling
-        free += c[k].memory_normal * (1.0 / normal - 1.0 / c[k].kappa)
-    elif c[k].kind == PLAIN and substeps > 1:
-        normal = shear = 2.0 * c[k].kappa
-        free = 0.5 * c[k].bias
+        free += c.memory_normal * (1.0 / normal - 1.0 / c.kappa)
+    elif c.kind == PLAIN and substeps > 1:
+        normal = shear = 2.0 * c.kappa
+        free = 0.5 * c.bias
     row[KEEP] = normal * flexible / (1.0 + normal * flexible)
     row[KEEP_SHEAR] = shear * rolling / (1.0 + shear * rolling)
     row[GAIN], row[GAIN_SHEAR] = row[KEEP] / flexible, row[KEEP_SHEAR] / rolling
     row[GAP], row[AIM], row[REBOUND] = -free, math.inf, -math.inf
-    row[FREE] = c[k].memory_shear / shear + slid
+    row[FREE] = c.memory_shear / shear + slid
 
 
 @inlined
 def pack_row(
-    c: Contacts, k: int, islands: Islands, rows: Rows, place: int, n: int, substeps: int, h: float
+    c: Contact, islands: Islands, rows: Rows, place: int, n: int, substeps: int, h: float
 ) -> None:
-    """Write contact k as row `place` and add its starting force to the displacements.
+    """Write a contact as row `place` and add its starting force to the displacements.
 
     Slot n stands for bodies without unknowns.
     """
-    row, old = rows.row[place], c[k]
-    i = islands.slot[old.a]
-    j = islands.slot[old.b] if old.pair >= 0 else n
+    row = rows.row[place]
+    i = islands.slot[c.a]
+    j = islands.slot[c.b] if c.pair >= 0 else n
     rows.row_i[place], rows.row_j[place], rows.idle[place] = i, j, 0
-    write_row(row, NORMAL, normal_row(c, k, True), rows.scale[i])
-    write_row(row, NORMAL + 3, normal_row(c, k, False), rows.scale[j])
-    write_row(row, SHEAR, shear_row(c, k, True), rows.scale[i])
-    write_row(row, SHEAR + 3, shear_row(c, k, False), rows.scale[j])
+    write_row(row, NORMAL, normal_row(c, True), rows.scale[i])
+    write_row(row, NORMAL + 3, normal_row(c, False), rows.scale[j])
+    write_row(row, SHEAR, shear_row(c, True), rows.scale[i])
+    write_row(row, SHEAR + 3, shear_row(c, False), rows.scale[j])
     flexible, rolling = product(row, NORMAL, NORMAL), product(row, SHEAR, SHEAR)
-    if substeps == 1 or is_elastic(c, k):
-        set_spring(row, c, k, rows, i, j, flexible, rolling, substeps, h)
+    if substeps == 1 or is_elastic(c):
+        set_spring(row, c, rows, i, j, flexible, rolling, substeps, h)
     else:
-        set_rigid(row, c, k, flexible, rolling, substeps)
+        set_rigid(row, c, flexible, rolling, substeps)
     row[FLEXIBLE], row[CROSS] = flexible, row[GAIN_SHEAR] * product(row, NORMAL, SHEAR)
-    row[FRICTION], row[TENSION] = old.friction, old.tension
-    row[COHESION] = math.inf if old.kind == PIN else old.cohesion
-    row[FORCE], row[FORCE + 1] = old.start_normal, old.start_shear
+    row[FRICTION], row[TENSION] = c.friction, c.tension
+    row[COHESION] = math.inf if c.kind == PIN else c.cohesion
+    row[FORCE], row[FORCE + 1] = c.start_normal, c.start_shear
     row[SUM] = row[SUM + 1] = row[SINCE] = 0.0
-    displace(row, NORMAL, rows.motion, i, j, old.start_normal)
-    displace(row, SHEAR, rows.motion, i, j, old.start_shear)
+    displace(row, NORMAL, rows.motion, i, j, c.start_normal)
+    displace(row, SHEAR, rows.motion, i, j, c.start_shear)
 
 
 @arithmetic_kernel
@@ -267,7 +276,7 @@ def sweep(
 
 
 @kernel
-def sort_by_height(c: Contacts, islands: Islands, rows: Rows, low: int, high: int) -> None:
+def sort_by_height(contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int) -> None:
     """Set the rows of the contacts low:high by height, lowest first: a sweep carries loads through.
 
     A counting sort in as many layers as there is room for: within one the order does not matter.
@@ -277,7 +286,7 @@ def sort_by_height(c: Contacts, islands: Islands, rows: Rows, low: int, high: in
     layers = min(len(layer) - 1, high - low)
     least, most = math.inf, -math.inf
     for q in range(low, high):
-        height[q] = c[islands.contact_item[q]].y
+        height[q] = contacts[islands.contact_item[q]].y
         least, most = min(least, height[q]), max(most, height[q])
     scale = layers / (most - least) * (1.0 - 1e-9) if most > least else 0.0
     for s in range(layers + 1):
@@ -294,17 +303,17 @@ def sort_by_height(c: Contacts, islands: Islands, rows: Rows, low: int, high: in
 
 
 @kernel
-def velocity(bodies: Bodies, i: int) -> tuple[float, float, float]:
-    """Return the velocity of body i at the start of the step."""
-    return bodies[i].vx, bodies[i].vy, bodies[i].omega
+def velocity(body: Body) -> tuple[float, float, float]:
+    """Return the velocity of a body at the start of the step."""
+    return body.vx, body.vy, body.omega
 
 
 @inlined
-def start(bodies: Bodies, m: Matrix, rows: Rows, i: int, s: int, h: float, p: Parameters) -> None:
-    """Set the displacement of block i, slot s, in the first substep without contacts."""
-    v, alpha = velocity(bodies, i), damping_of(bodies, i, p)
+def start(body: Body, m: Matrix, rows: Rows, s: int, h: float, p: Parameters) -> None:
+    """Set the displacement of a block, slot s, in the first substep without contacts."""
+    v, alpha = velocity(body), damping_of(body, p)
     for q in range(3):
-        inertia = bodies[i].inertia if q == 2 else bodies[i].mass
+        inertia = body.inertia if q == 2 else body.mass
         scale = h / math.sqrt(inertia)
         pull = (m.rhs[s, q] - 2.0 * inertia * v[q] / p.dt) / inertia - alpha * v[q]
         rows.scale[s, q] = scale
@@ -334,7 +343,7 @@ def substeps_of(n: int, dt: float) -> int:
 
 @kernel
 def relax_forces(
-    bodies: Bodies, c: Contacts, m: Matrix, islands: Islands, rows: Rows, low: int,
+    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, low: int,
     high: int, first: int, n: int, speed: float, fast: bool, p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
     """Find the forces of an island with contacts low:high, in their rows: see `take_forces`.
@@ -357,14 +366,15 @@ def relax_forces(
         tolerance = min(RELAXATION_SHARE * speed, usual)
     h, motion = p.dt / substeps, rows.motion
     for s in range(n):
-        start(bodies, m, rows, islands.block_item[first + s], s, h, p)
+        start(bodies[islands.block_item[first + s]], m, rows, s, h, p)
     for q in range(3):
         rows.scale[n, q] = 0.0
         motion[n, NOW + q] = motion[n, SO_FAR + q] = motion[n, BEFORE + q] = 0.0
     count = high - low
-    sort_by_height(c, islands, rows, low, high)
+    sort_by_height(contacts, islands, rows, low, high)
     for q in range(low, high):
-        pack_row(c, islands.contact_item[q], islands, rows, rows.place[q], n, substeps, h)
+        c = contacts[islands.contact_item[q]]
+        pack_row(c, islands, rows, rows.place[q], n, substeps, h)
     sweeps = 0
     for number in range(substeps):
         for s in range(n + 1):
@@ -380,7 +390,7 @@ def relax_forces(
                 break
         go_on(motion, n, number == substeps - 1)
     for s in range(n):
-        v = velocity(bodies, islands.block_item[first + s])
+        v = velocity(bodies[islands.block_item[first + s]])
         for q in range(3):
             scale = rows.scale[s, q]
             m.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)
@@ -389,8 +399,8 @@ def relax_forces(
 
 
 @inlined
-def take_forces(c: Contacts, k: int, row: Floats, substeps: int) -> None:
-    """Set the forces of contact k to their means over the step, its starting ones to the last."""
+def take_forces(c: Contact, row: Floats, substeps: int) -> None:
+    """Set the forces of a contact to their means over the step, its starting ones to the last."""
     add_up(row, substeps)
-    c[k].normal, c[k].shear = row[SUM] / substeps, row[SUM + 1] / substeps
-    c[k].start_normal, c[k].start_shear = row[FORCE], row[FORCE + 1]
+    c.normal, c.shear = row[SUM] / substeps, row[SUM + 1] / substeps
+    c.start_normal, c.start_shear = row[FORCE], row[FORCE + 1]

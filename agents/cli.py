@@ -157,9 +157,10 @@ def design(
             done, store = job.study(problem, designer, simulations, seed, verify, folder, tick)
         job.write(done, folder)
     show(tables.designs(done.cases))
-    for wall in done.cases[-1][1].layout:
-        click.echo(describe(wall))
-    resumed = f", {store.resumed} taken from a former run" if store.resumed else ""
+    chosen = done.cases[-1][1]
+    for i, barrier in enumerate(chosen.layout):
+        click.echo(describe(barrier) + tables.failures(barrier, i, chosen.outcomes))
+    resumed = f"; {store.resumed} releases taken from a former run" if store.resumed else ""
     click.echo(
         f"search: {done.result.simulations} releases; verification: {verify} unseen ones each "
         f"(seeds of a stream of their own){resumed}\nlayout.toml, evaluations.csv, profile.png, "

@@ -54,7 +54,7 @@ def profile(path: str | os.PathLike[str], site: Site, panels: Sequence[Panel]) -
             _slope(axes, site, panel)
             axes.set(xlim=(left, right), ylim=(bottom, top))
             axes.label_outer()
-        _key(figure)
+        _key(figure, max(panel.run.times[-1] for panel in panels))
         _save(figure, path)
 
 
@@ -95,13 +95,13 @@ def _slope(axes: Axes, site: Site, panel: Panel) -> None:
     axes.set_title(panel.title, loc="left", fontsize=11)
 
 
-def _key(figure: Figure) -> None:
+def _key(figure: Figure, duration: float) -> None:
     """Write what the colours of a profile mean below it."""
     from matplotlib.patches import Patch
 
     words = {
         "source": START,
-        "blocks at the end": ROCK,
+        f"blocks after {duration:g} s": ROCK,
         "barrier": BARRIER,
         "barriers may stand": ZONE,
         "road": ROAD,
@@ -149,8 +149,8 @@ def _points(axes: Axes, history: History) -> None:
     if searched:
         at, best = history.best_so_far()
         values = [entry.evaluation.objective for entry in searched]
-        axes.plot(at, values, "o", color=SEARCH, markersize=5, label="layout in the search")
-        axes.step(at, best, where="post", color="black", linewidth=1.2, label="best so far")
+        axes.plot(at, values, "o", color=SEARCH, markersize=5, label="layout, by few releases")
+        axes.step(at, best, where="post", color="black", linewidth=1.2, label="best by these")
     if finals:
         mean = np.array([entry.evaluation.objective for entry in finals])
         spread = np.array([entry.evaluation.ci[1] for entry in finals]) - mean
@@ -195,7 +195,7 @@ def front(
         axes = figure.subplots()
         tried = [entry.evaluation for entry in history.stage("search")]
         axes.plot([e.cost for e in tried], [100 * e.debris for e in tried], "o", color=SEARCH,
-                  markersize=3.5, alpha=0.6, label="layout in the search")  # fmt: skip
+                  markersize=3.5, alpha=0.6, label="layout, by few releases")  # fmt: skip
         steps = [e.cost for e in found], [100 * e.debris for e in found]
         axes.step(*steps, where="post", color=BARRIER, linewidth=1.4)
         _crosses(axes, found, "o", BARRIER, "front, on other releases")

@@ -17,7 +17,7 @@ from agents.protocol import Entry
 from envs import Evaluation
 from envs.evaluation import student_interval
 from rigdda import Fence, GravityWall, Layout, Outcome, Site
-from rigdda.barriers import Earthwork, describe, to_tables
+from rigdda.barriers import Barrier, Earthwork, describe, to_tables
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
@@ -150,6 +150,16 @@ def designs(cases: Iterable[tuple[str, Evaluation]]) -> Table:
         debris = f"{100 * e.debris:.1f} ({_span((100 * low, 100 * high), '.1f')})"
         table.add_row(name, debris, f"{e.objective:.3f} ({_span(e.ci, '.3f')})", f"{e.cost:.1f}")
     return table
+
+
+def failures(barrier: Barrier, index: int, results: Sequence[Outcome]) -> str:
+    """Return in how many releases a fence, the barrier of this index of a layout, fails, in words.
+
+    Nothing for what cannot fail.
+    """
+    if not isinstance(barrier, Fence):
+        return ""
+    return f", fails in {np.mean([outcome.barriers[index].failed for outcome in results]):.0%}"
 
 
 def sites(found: Iterable[Site]) -> Table:

@@ -11,12 +11,12 @@ from envs import DesignProblem, Evaluation
 from rigdda import Fence
 
 
-def study(site: str = "quick", releases: int = 16) -> dict[float, Evaluation]:
-    """Return the evaluation of a fence at the toe for each capacity [J], on the same releases."""
+def study(site: str = "quick", x: float = 11.3, releases: int = 16) -> dict[float, Evaluation]:
+    """Return the evaluation of a fence at x for each capacity [J/m], on the same releases."""
     problem = DesignProblem(site)
-    zone, toe = problem.site.barrier_zone, problem.site.slope.toe
+    zone = problem.site.barrier_zone
     return {
-        capacity: problem.evaluate([Fence(toe, zone.max_height, capacity)], range(releases))
+        capacity: problem.evaluate([Fence(x, zone.max_height, capacity)], range(releases))
         for capacity in np.geomspace(zone.min_capacity, zone.max_capacity, 5).tolist()
     }
 
@@ -28,11 +28,11 @@ def main() -> None:
         low, high = (100.0 * share for share in e.debris_ci)
         failed = np.mean([outcome.barriers[0].failed for outcome in e.outcomes])
         print(
-            f"{capacity / 1e3:6.0f} kJ: {100 * e.debris:4.1f} % on the road "
+            f"{capacity / 1e3:6.0f} kJ/m: {100 * e.debris:4.1f} % on the road "
             f"({low:.1f} to {high:.1f} %), fails in {failed:4.0%}, objective {e.objective:.3f}"
         )
     best = min(found, key=lambda capacity: found[capacity].objective)
-    print(f"least objective at {best / 1e3:.0f} kJ")
+    print(f"least objective at {best / 1e3:.0f} kJ/m")
 
 
 if __name__ == "__main__":

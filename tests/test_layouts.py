@@ -128,7 +128,7 @@ def test_what_passes_a_failed_fence_did_not_overtop_it(released):
 def test_every_kind_is_described_and_known():
     assert [barrier.kind for barrier in LAYOUT] == list(KINDS)
     words = [describe(barrier) for barrier in LAYOUT]
-    assert words[2] == "fence at 22.0 m, 2.0 m high, 30 kJ"
+    assert words[2] == "fence at 22.0 m, 2.0 m high, 30 kJ/m"
     assert len(set(words)) == 5
 
 

@@ -117,7 +117,7 @@ def test_a_killed_design_goes_on(designed: tuple[Path, str], tmp_path: Path) -> 
     half = len(lines) // 2
     (tmp_path / "evaluations.jsonl").write_bytes(b"".join(lines[:half]) + lines[half][:40])
     words = run("design", "quick", *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
-    taken = int(re.findall(r"(\d+) taken from a former run", words)[0])
+    taken = int(re.findall(r"(\d+) releases taken from a former run", words)[0])
     assert taken == sum(len(json.loads(line)["evaluation"]["seeds"]) for line in lines[:half])
     for name in ("layout.toml", "evaluations.csv", "evaluations.jsonl"):
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()

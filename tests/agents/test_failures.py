@@ -65,7 +65,7 @@ def test_a_design_that_stops_keeps_its_evaluations_and_goes_on(
     assert len(Path("o/evaluations.csv").read_text().splitlines()) == 4
     left[0] = 1000
     assert cli.main(arguments) == 0
-    assert "3 taken from a former run" in capsys.readouterr().out
+    assert "3 releases taken from a former run" in capsys.readouterr().out
 
 
 def test_a_fault_of_the_programme_is_not_called_bad_input(

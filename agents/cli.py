@@ -110,6 +110,8 @@ def simulate(site: str, layout: str | None, releases: int, seed: int, out: Path 
     """Simulate releases of SITE (a name or a TOML file) and say what reaches the road.
 
     Writes outcomes.csv, run.npz (the first release) and profile.png (the same).
+    The energy of a hit is that of the block just before it touches; a barrier absorbs what its
+    forces take from all blocks, those that lean on it too.
     """
     import rigdda
     from agents import job, pictures, tables

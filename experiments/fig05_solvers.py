@@ -29,7 +29,7 @@ from rigdda import Settings
 from rigdda.kernel import entry_kernel
 from rigdda.linear.pcg import solve_pcg
 from rigdda.linear.sor import solve_sor
-from rigdda.records import Matrix
+from rigdda.records import Matrix, Scratch
 
 STIFFNESS = (0.1, 1.0, 10.0)
 """k_n dt^2 / (2 m) [-]."""
@@ -54,26 +54,26 @@ SOLVERS = {"pcg": ("PCG", BLUE), "sor": (f"SOR {FACTOR:g}", RED), "best": ("SOR 
 
 
 @entry_kernel
-def pcg(m: Matrix, n: int, pairs: int) -> int:
+def pcg(m: Matrix, scratch: Scratch, n: int, pairs: int) -> int:
     """Solve from no displacement by conjugate gradients; returns the iterations."""
     m.d[:] = 0.0
-    return solve_pcg(m, n, pairs, TOLERANCE, False)
+    return solve_pcg(m, scratch, n, pairs, TOLERANCE, False)
 
 
 @entry_kernel
-def sor(m: Matrix, n: int, pairs: int, factor: float) -> int:
+def sor(m: Matrix, scratch: Scratch, n: int, pairs: int, factor: float) -> int:
     """Solve from no displacement by over-relaxation; returns the sweeps."""
     m.d[:] = 0.0
-    return solve_sor(m, n, pairs, TOLERANCE, factor)
+    return solve_sor(m, scratch, n, pairs, TOLERANCE, factor)
 
 
 def row(courses: int, h: float) -> dict[str, Any]:
     """Return iterations and times of both solvers for one pile."""
-    matrix, n, pairs = system(pile(courses), h)
-    sweeps = {factor: sor(matrix, n, pairs, factor) for factor in (*FACTORS, FACTOR)}
+    (matrix, scratch, _), n, pairs = system(pile(courses), h)
+    sweeps = {factor: sor(matrix, scratch, n, pairs, factor) for factor in (*FACTORS, FACTOR)}
     best = min(sweeps, key=lambda factor: sweeps[factor])
     found = matrix.d[:n].copy()
-    steps = pcg(matrix, n, pairs)
+    steps = pcg(matrix, scratch, n, pairs)
     return {
         "h": h,
         "blocks": n,
@@ -81,9 +81,9 @@ def row(courses: int, h: float) -> dict[str, Any]:
         "sor_iterations": sweeps[FACTOR],
         "best_iterations": sweeps[best],
         "best_factor": best,
-        "pcg_us": 1e6 * cpu_time(lambda: pcg(matrix, n, pairs)),
-        "sor_us": 1e6 * cpu_time(lambda: sor(matrix, n, pairs, FACTOR)),
-        "best_us": 1e6 * cpu_time(lambda: sor(matrix, n, pairs, best)),
+        "pcg_us": 1e6 * cpu_time(lambda: pcg(matrix, scratch, n, pairs)),
+        "sor_us": 1e6 * cpu_time(lambda: sor(matrix, scratch, n, pairs, FACTOR)),
+        "best_us": 1e6 * cpu_time(lambda: sor(matrix, scratch, n, pairs, best)),
         "difference": float(np.abs(matrix.d[:n] - found).max() / np.abs(found).max()),
     }
 

@@ -12,7 +12,7 @@ from rigdda.assembly.island import assemble_island
 from rigdda.geometry import polygon_properties
 from rigdda.islands import find_islands, pair_blocks
 from rigdda.kernel import entry_kernel
-from rigdda.records import CONTACTS, Bodies, Contacts, Matrix, Work
+from rigdda.records import CONTACTS, Bodies, Contacts, Matrix, System, Work
 from rigdda.scene import Surface
 from rigdda.validation.scenes import GRAVITY, box
 
@@ -65,7 +65,7 @@ def settings(h: float, **more: object) -> Settings:
     return Settings(dt=DT, penetration=0.5 * GRAVITY * DT**2 / h, sleeping=False, **more)  # type: ignore[arg-type]
 
 
-def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
+def system(scene: Scene, h: float) -> tuple[System, int, int]:
     """Return the simultaneous equations of a step of a pressed scene.
 
     A random force and moment on each block stand for its motion. Without them an even load leaves
@@ -73,8 +73,8 @@ def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
 
     Returns
     -------
-    matrix : Matrix
-        K d = F, block-sparse.
+    system : System
+        Its matrix is K d = F, block-sparse.
     n, pairs : int
         Blocks, and pairs of blocks that touch.
     """
@@ -83,20 +83,21 @@ def system(scene: Scene, h: float) -> tuple[Matrix, int, int]:
     a = sim._arrays
     count = int(sim._counters[CONTACTS])
     a.bodies["vx"] = a.bodies["vy"] = a.bodies["omega"] = 0.0
-    pairs = assemble(a.bodies, sim._now, count, a.matrix, a.work, a.parameters)
+    pairs = assemble(a.bodies, sim._now, count, a.system.matrix, a.work, a.parameters)
     n = len(scene.blocks)
     stir = STIR * np.random.default_rng(n).standard_normal((n, 3))
-    a.matrix.rhs[:n] += stir * np.abs(a.matrix.rhs[:n]).max()
-    return a.matrix, n, pairs
+    rhs = a.system.matrix.rhs
+    rhs[:n] += stir * np.abs(rhs[:n]).max()
+    return a.system, n, pairs
 
 
 @entry_kernel
 def assemble(
-    bodies: Bodies, c: Contacts, count: int, m: Matrix, work: Work, levels: NDArray
+    bodies: Bodies, contacts: Contacts, count: int, m: Matrix, work: Work, levels: NDArray
 ) -> int:
     """Assemble all blocks as one island with their contacts as they are; returns the pairs."""
     p = levels[0]
-    find_islands(bodies, c, work.begin, work.islands, p.blocks, False)
-    pairs, _ = pair_blocks(bodies, c, m, work.islands, 0, count)
-    assemble_island(bodies, c, m, work.islands, 0, pairs, p)
+    find_islands(bodies, contacts, work.begin, work.islands, p.blocks, False)
+    pairs, _ = pair_blocks(bodies, contacts, m, work.islands, 0, count)
+    assemble_island(bodies, contacts, m, work.islands, 0, pairs, p)
     return pairs

@@ -6,7 +6,7 @@ import math
 
 from numpy.typing import NDArray
 
-from rigdda.assembly.island import assemble_blocks, load_moment
+from rigdda.assembly.island import assemble_blocks, damping_of, load_moment
 from rigdda.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.constants import BOLT, IMPACT, MOVING, OPEN, PIN, REST, SHOCK, SHOCK_SPEED, STEADY_RATE
 from rigdda.contact.narrow_phase import following, over_edge
@@ -21,6 +21,7 @@ from rigdda.records import (
     Gauges,
     Islands,
     Matrix,
+    Motion,
     Outlines,
     Parameters,
 )
@@ -87,13 +88,13 @@ def place_edges(outlines: Outlines, row: int) -> None:
 
 
 @kernel
-def move_corners(bodies: Bodies, outlines: Outlines, i: int, m: Matrix, s: int) -> None:
+def move_corners(bodies: Bodies, outlines: Outlines, i: int, motion: Motion, s: int) -> None:
     """Move the corners of body i by the linear displacement function (equation 2) alone.
 
     What the post-correction replaces: body i expands as it turns.
     """
-    u, v = m.d[s, 0] + m.residual[s, 0], m.d[s, 1] + m.residual[s, 1]
-    r = m.d[s, 2] + m.residual[s, 2]
+    d, besides = motion.d[s], motion.besides[s]
+    u, v, r = d[0] + besides[0], d[1] + besides[1], d[2] + besides[2]
     body = bodies[i]
     body.radius = 0.0
     for place in range(polygons(body)):
@@ -108,31 +109,31 @@ def move_corners(bodies: Bodies, outlines: Outlines, i: int, m: Matrix, s: int) 
 
 
 @inlined
-def add_contact_force(c: Contact, m: Matrix, i: int, of_a: bool) -> None:
-    """Add the force of a contact to slot i; m.direction holds the greatest share of its impacts.
+def add_contact_force(c: Contact, motion: Motion, i: int, of_a: bool) -> None:
+    """Add the force of a contact to slot i, in `motion.besides`, and the greatest share of impacts.
 
     An impact that another one forestalls counts, too: its corner stops no later.
     """
     if c.kind == IMPACT:
-        m.direction[i, 0] = max(m.direction[i, 0], c.share)
+        motion.share[i] = max(motion.share[i], c.share)
     if c.state != OPEN:
-        add_force(m.residual[i], c.normal, normal_row(c, of_a))
-        add_force(m.residual[i], c.shear, shear_row(c, of_a))
+        add_force(motion.besides[i], c.normal, normal_row(c, of_a))
+        add_force(motion.besides[i], c.shear, shear_row(c, of_a))
 
 
 @inlined
 def pass_on_shares(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, dt: float
+    bodies: Bodies, contacts: Contacts, share: NDArray, islands: Islands, island: int, dt: float
 ) -> None:
     """Let the time of an impact be that of the blows it sends through an island.
 
     Blocks that are struck through others would else move on for a while, into those that stopped.
     """
     n = islands.block_start[island + 1] - islands.block_start[island]
-    struck, share, parent, slot = False, m.direction, islands.parent, islands.slot
+    struck, parent, slot = False, islands.parent, islands.slot
     for s in range(n):
         parent[s] = s
-        struck = struck or share[s, 0] > 0.0
+        struck = struck or share[s] > 0.0
     if not struck:
         return
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
@@ -144,23 +145,23 @@ def pass_on_shares(
             i, j = root(parent, slot[c.a]), root(parent, slot[c.b])
             first = min(i, j)
             parent[max(i, j)] = first
-            share[first, 0] = max(share[i, 0], share[j, 0])
+            share[first] = max(share[i], share[j])
     for s in range(n):
-        share[s, 0] = share[root(parent, s), 0]
+        share[s] = share[root(parent, s)]
 
 
 @inlined
 def apply_forces(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, relaxed: bool,
-    p: Parameters,
+    bodies: Bodies, contacts: Contacts, m: Matrix, motion: Motion, islands: Islands, island: int,
+    relaxed: bool, p: Parameters,
 ) -> bool:  # fmt: skip
-    """Set m.d and m.residual of an island to the displacement and its impact correction.
+    """Set the displacements of an island and its impact correction.
 
     Forces are applied equal and opposite here, once more and exactly, so that momentum is kept to
     rounding whatever the residual of the solver. A constant force over the step displaces a block
     by dt^2 F / 2M; an impulse that acts for the share s of the step displaces it by s dt^2 F / M.
     The first impact sets the share of all, or the corner that hits first would go on until then.
-    Relaxation in substeps has found the correction: m.late.
+    Relaxation in substeps has found the correction.
 
     Returns whether an impact acted on the island.
     """
@@ -169,58 +170,59 @@ def apply_forces(
     assemble_blocks(bodies, m, islands, b0, b1, p)
     for s in range(b1 - b0):
         for j in range(3):
-            m.residual[s, j] = m.direction[s, j] = 0.0
+            motion.besides[s, j] = 0.0
+        motion.share[s] = 0.0
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
         blow = c.kind == IMPACT or c.kind == SHOCK
         struck = struck or (blow and c.normal > 0.0)
-        add_contact_force(c, m, islands.slot[c.a], True)
+        add_contact_force(c, motion, islands.slot[c.a], True)
         if c.pair >= 0:
-            add_contact_force(c, m, islands.slot[c.b], False)
+            add_contact_force(c, motion, islands.slot[c.b], False)
     if not relaxed:
-        pass_on_shares(bodies, contacts, m, islands, island, p.dt)
+        pass_on_shares(bodies, contacts, motion.share, islands, island, p.dt)
     for s in range(b1 - b0):
         body = bodies[islands.block_item[b0 + s]]
-        share = m.direction[s, 0]
+        share = motion.share[s]
         late = (share - 0.5) * p.dt * p.dt if share > 0.0 else 0.0
         for j in range(3):
-            m.d[s, j] = (m.rhs[s, j] + m.residual[s, j]) / m.diagonal[s, j, j]
+            force = motion.besides[s, j]
+            motion.d[s, j] = (m.rhs[s, j] + force) / m.diagonal[s, j, j]
             inertia = body.inertia if j == 2 else body.mass
-            m.residual[s, j] = m.late[s, j] if relaxed else m.residual[s, j] * late / inertia
+            motion.besides[s, j] = motion.relaxed[s, j] if relaxed else force * late / inertia
     return struck
 
 
 @inlined
-def account_block(body: Body, m: Matrix, s: int, p: Parameters, ledger: NDArray) -> None:
+def account_block(body: Body, motion: Motion, s: int, p: Parameters, ledger: NDArray) -> None:
     """Add the work of damping, loads and supports on a block, slot s, to the ledger."""
-    drag = damping_of_step(m, s, body.mass, p)
-    slow = m.d[s, 0] ** 2 + m.d[s, 1] ** 2
-    slow = body.mass * slow + body.inertia * m.d[s, 2] ** 2
-    ledger[2] -= drag * slow / p.dt
-    ledger[3] += body.force_x * m.d[s, 0] + body.force_y * m.d[s, 1]
-    ledger[3] += load_moment(body) * m.d[s, 2]
-    ledger[3] += body.mass * (p.field_x - p.gravity_x) * m.d[s, 0]
-    ledger[3] += body.mass * (p.field_y - p.gravity_y) * m.d[s, 1]
+    d, besides = motion.d[s], motion.besides[s]
+    slow = body.mass * (d[0] ** 2 + d[1] ** 2) + body.inertia * d[2] ** 2
+    ledger[2] -= damping_of(body, p) * slow / p.dt
+    ledger[3] += body.force_x * d[0] + body.force_y * d[1]
+    ledger[3] += load_moment(body) * d[2]
+    ledger[3] += body.mass * (p.field_x - p.gravity_x) * d[0]
+    ledger[3] += body.mass * (p.field_y - p.gravity_y) * d[1]
     # an impulse that acts early or late in the step lifts or lowers the block
-    lift = p.gravity_x * m.residual[s, 0] + p.gravity_y * m.residual[s, 1]
+    lift = p.gravity_x * besides[0] + p.gravity_y * besides[1]
     ledger[1] -= body.mass * lift
 
 
 @inlined
 def account_contact(
-    c: Contact, m: Matrix, islands: Islands, ledger: NDArray, gauges: Gauges
+    c: Contact, d: NDArray, islands: Islands, ledger: NDArray, gauges: Gauges
 ) -> None:
     """Add the work of a closed contact to the ledger."""
     i = islands.slot[c.a]
-    dn = along(normal_row(c, True), m.d[i])
-    ds = along(shear_row(c, True), m.d[i])
+    dn = along(normal_row(c, True), d[i])
+    ds = along(shear_row(c, True), d[i])
     block, barrier = barrier_contact(gauges, c.a, c.b)
     if barrier >= 0 and block == c.a:
         gauges.target[barrier].absorbed -= c.normal * dn + c.shear * ds
     if c.pair >= 0:
         j = islands.slot[c.b]
-        en = along(normal_row(c, False), m.d[j])
-        es = along(shear_row(c, False), m.d[j])
+        en = along(normal_row(c, False), d[j])
+        es = along(shear_row(c, False), d[j])
         if barrier >= 0 and block != c.a:
             gauges.target[barrier].absorbed -= c.normal * en + c.shear * es
         dn += en
@@ -232,21 +234,16 @@ def account_contact(
         ledger[1] += c.normal * dn
 
 
-@kernel
-def damping_of_step(m: Matrix, s: int, mass: float, p: Parameters) -> float:
-    """Return the damping coefficient that the diagonal of slot s holds [1/s]."""
-    return (m.diagonal[s, 0, 0] - 2.0 * mass / (p.dt * p.dt)) * p.dt / mass
-
-
 @inlined
-def move_block(body: Body, m: Matrix, s: int, dt: float) -> None:
+def move_block(body: Body, motion: Motion, s: int, dt: float) -> None:
     """Move a block, slot s, by its displacement; the velocity is that of constant acceleration."""
-    body.vx = 2.0 * m.d[s, 0] / dt - body.vx
-    body.vy = 2.0 * m.d[s, 1] / dt - body.vy
-    body.omega = 2.0 * m.d[s, 2] / dt - body.omega
-    body.x += m.d[s, 0] + m.residual[s, 0]
-    body.y += m.d[s, 1] + m.residual[s, 1]
-    body.theta += m.d[s, 2] + m.residual[s, 2]
+    d, besides = motion.d[s], motion.besides[s]
+    body.vx = 2.0 * d[0] / dt - body.vx
+    body.vy = 2.0 * d[1] / dt - body.vy
+    body.omega = 2.0 * d[2] / dt - body.omega
+    body.x += d[0] + besides[0]
+    body.y += d[1] + besides[1]
+    body.theta += d[2] + besides[2]
 
 
 @inlined

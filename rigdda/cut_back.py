@@ -15,34 +15,34 @@ from rigdda.assembly.springs import along, normal_row
 from rigdda.constants import AWAKE, BOLT, CUTS, HELD, MOVING_SINKING, PIN, PLAIN, TERRAIN
 from rigdda.contact.transfer import recall
 from rigdda.kernel import inlined, kernel
-from rigdda.records import Bodies, Body, Contact, Contacts, Ints, Islands, Matrix, Parameters
+from rigdda.records import Bodies, Body, Contact, Contacts, Ints, Islands, Motion, Parameters
 
 
 @inlined
 def too_far(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, p: Parameters
+    bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, island: int, p: Parameters
 ) -> float:
     """Return how far an island goes in this step, over how far a step should take it [-].
 
-    Forces are applied: m.d and m.residual are its displacements.
+    Forces are applied: motion.d and motion.besides are its displacements.
     """
-    far = greatest_departure(bodies, m, islands, island, p.dt) / p.displacement_limit
-    far = max(far, greatest_deflection(bodies, m, islands, island, p) / p.deflection_limit)
+    far = greatest_departure(bodies, motion, islands, island, p.dt) / p.displacement_limit
+    far = max(far, greatest_deflection(bodies, motion, islands, island, p) / p.deflection_limit)
     if p.sinking_limit < math.inf:
         blocks = islands.block_start[island + 1] - islands.block_start[island]
         limit = p.sinking_limit * (MOVING_SINKING * blocks if islands.relaxed[0] == 1 else 1.0)
-        far = max(far, greatest_sinking(bodies, contacts, m, islands, island) / limit)
+        far = max(far, greatest_sinking(bodies, contacts, motion, islands, island) / limit)
     return far
 
 
 @inlined
 def greatest_departure(
-    bodies: Bodies, m: Matrix, islands: Islands, island: int, dt: float
+    bodies: Bodies, motion: Motion, islands: Islands, island: int, dt: float
 ) -> float:
     """Return a bound on how far from its straight path any corner of an island ends a step [m]."""
     most, low = 0.0, islands.block_start[island]
     for place in range(low, islands.block_start[island + 1]):
-        d, body = m.d[place - low], bodies[islands.block_item[place]]
+        d, body = motion.d[place - low], bodies[islands.block_item[place]]
         turn = abs(d[2]) * body.radius
         dx, dy = d[0] - dt * body.vx, d[1] - dt * body.vy
         most = max(most, math.sqrt(dx * dx + dy * dy) + turn)
@@ -51,12 +51,12 @@ def greatest_departure(
 
 @inlined
 def greatest_deflection(
-    bodies: Bodies, m: Matrix, islands: Islands, island: int, p: Parameters
+    bodies: Bodies, motion: Motion, islands: Islands, island: int, p: Parameters
 ) -> float:
     """Return how much farther than foreseen any corner of an island goes in a step [m]."""
     most, low = 0.0, islands.block_start[island]
     for place in range(low, islands.block_start[island + 1]):
-        d, body = m.d[place - low], bodies[islands.block_item[place]]
+        d, body = motion.d[place - low], bodies[islands.block_item[place]]
         way = math.sqrt(d[0] * d[0] + d[1] * d[1]) + abs(d[2]) * body.radius
         most = max(most, way - body.path)
     return most - p.gravity * p.dt * p.dt
@@ -64,16 +64,17 @@ def greatest_deflection(
 
 @kernel
 def point_after(
-    body: Body, m: Matrix, s: int, x: float, y: float, cos: float, sin: float
+    body: Body, motion: Motion, s: int, x: float, y: float, cos: float, sin: float
 ) -> tuple[float, float]:
     """Return where a point of a body, in slot s, ends the step; it turns by this angle."""
     x, y = x - body.x, y - body.y
-    u, v = m.d[s, 0] + m.residual[s, 0], m.d[s, 1] + m.residual[s, 1]
+    d, besides = motion.d[s], motion.besides[s]
+    u, v = d[0] + besides[0], d[1] + besides[1]
     return body.x + u + cos * x - sin * y, body.y + v + sin * x + cos * y
 
 
 @kernel
-def gap_after(bodies: Bodies, c: Contact, m: Matrix, islands: Islands) -> float:
+def gap_after(bodies: Bodies, c: Contact, motion: Motion, islands: Islands) -> float:
     """Return the gap of a contact at the end of the step, after the post-correction [m]."""
     nx, ny = c.nx, c.ny
     # the corner, and the point of the face that it is over; the normal points to a
@@ -81,16 +82,16 @@ def gap_after(bodies: Bodies, c: Contact, m: Matrix, islands: Islands) -> float:
     ax, ay = c.x + (1.0 - side) * c.gap * nx, c.y + (1.0 - side) * c.gap * ny
     bx, by = c.x - side * c.gap * nx, c.y - side * c.gap * ny
     s = islands.slot[c.a]
-    turn = m.d[s, 2] + m.residual[s, 2]
+    turn = motion.d[s, 2] + motion.besides[s, 2]
     cos, sin = math.cos(turn), math.sin(turn)
-    ax, ay = point_after(bodies[c.a], m, s, ax, ay, cos, sin)
+    ax, ay = point_after(bodies[c.a], motion, s, ax, ay, cos, sin)
     if c.owner == 0:  # the face turns with a
         nx, ny = cos * nx - sin * ny, sin * nx + cos * ny
     if c.pair >= 0:
         s = islands.slot[c.b]
-        turn = m.d[s, 2] + m.residual[s, 2]
+        turn = motion.d[s, 2] + motion.besides[s, 2]
         cos, sin = math.cos(turn), math.sin(turn)
-        bx, by = point_after(bodies[c.b], m, s, bx, by, cos, sin)
+        bx, by = point_after(bodies[c.b], motion, s, bx, by, cos, sin)
         if c.owner == 1:
             nx, ny = cos * nx - sin * ny, sin * nx + cos * ny
     return nx * (ax - bx) + ny * (ay - by)
@@ -98,48 +99,51 @@ def gap_after(bodies: Bodies, c: Contact, m: Matrix, islands: Islands) -> float:
 
 @kernel
 def greatest_sinking(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int
+    bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, island: int
 ) -> float:
     """Return by how much a contact of an island ends the step deeper than it began it [m]."""
     most = 0.0
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
         if c.kind != BOLT and c.kind != PIN and c.kind != PLAIN:
-            most = max(most, min(c.gap, 0.0) - gap_after(bodies, c, m, islands))
+            most = max(most, min(c.gap, 0.0) - gap_after(bodies, c, motion, islands))
     return most
 
 
 @kernel
 def act_early(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, p: Parameters
+    bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, island: int, p: Parameters
 ) -> bool:
     """Let the velocity of a lone block change so early in the step that its corners do not sink.
 
     A force that stops a corner over a step lets it sink by half of the way that it would have gone.
     A blow stops it at once, also one too slow to pass for an impact beside what gravity adds to the
     speed in a coarse step. What changes by the share s of the step early displaces the block by
-    s dt (v_1 - v_0) besides: m.residual. Returns whether that is what it takes: on the ground it
-    is, from a corner of another body the block may turn into what it does not touch yet.
+    s dt (v_1 - v_0) besides. Returns whether that is what it takes: on the ground it is, from a
+    corner of another body the block may turn into what it does not touch yet.
     """
     low = islands.block_start[island]
-    if islands.block_start[island + 1] - low > 1 or m.direction[0, 0] > 0.0:
+    if islands.block_start[island + 1] - low > 1 or motion.share[0] > 0.0:
         return False
     body, share = bodies[islands.block_item[low]], 0.0
-    m.direction[0, 0] = 2.0 * (m.d[0, 0] - p.dt * body.vx)
-    m.direction[0, 1] = 2.0 * (m.d[0, 1] - p.dt * body.vy)
-    m.direction[0, 2] = 2.0 * (m.d[0, 2] - p.dt * body.omega)
+    d = motion.d[0]
+    ahead = (  # dt (v_1 - v_0)
+        2.0 * (d[0] - p.dt * body.vx),
+        2.0 * (d[1] - p.dt * body.vy),
+        2.0 * (d[2] - p.dt * body.omega),
+    )
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
         if c.kind == BOLT or c.kind == PIN or c.kind == PLAIN:
             continue
-        sinking = min(c.gap, 0.0) - gap_after(bodies, c, m, islands)
+        sinking = min(c.gap, 0.0) - gap_after(bodies, c, motion, islands)
         if sinking > 0.0:
-            push = along(normal_row(c, True), m.direction[0])
+            push = along(normal_row(c, True), ahead)
             if c.b != TERRAIN or c.owner != 1 or push <= 0.0:
                 return False
             share = max(share, sinking / push)
     for j in range(3):  # not before the step
-        m.residual[0, j] = min(share, 0.5) * m.direction[0, j]
+        motion.besides[0, j] = min(share, 0.5) * ahead[j]
     return True
 
 

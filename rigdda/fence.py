@@ -33,22 +33,22 @@ from rigdda.constants import (
 from rigdda.gauges import FAILED, write_event
 from rigdda.kernel import kernel, stage
 from rigdda.open_close import open_close
-from rigdda.records import EVENTS, Bodies, Contacts, Gauges, Islands, Matrix, Parameters, Rows
+from rigdda.records import EVENTS, Bodies, Contacts, Gauges, Islands, Parameters, Rows, System
 from rigdda.sleep import wake_island
 
 
 @kernel
 def work_taken(
-    contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int, fence: int
+    contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int, fence: int
 ) -> float:
     """Return the work that body `fence` takes from the blocks of an island in this step [J]."""
     total = 0.0
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         if c.b == fence and c.state != OPEN:
-            d = m.d[islands.slot[c.a]]
-            total -= c.normal * along(normal_row(c, True), d)
-            total -= c.shear * along(shear_row(c, True), d)
+            own = d[islands.slot[c.a]]
+            total -= c.normal * along(normal_row(c, True), own)
+            total -= c.shear * along(shear_row(c, True), own)
     return total
 
 
@@ -100,7 +100,7 @@ def passed_on(
 
 @stage
 def set_passing(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
     fence: int, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Set c.passing at a fence: the closing velocities as if the fence were not there.
@@ -117,19 +117,19 @@ def set_passing(
     if not struck:
         return
     let_go(contacts, islands, low, high, fence, p.dt)
-    open_close(bodies, contacts, m, islands, rows, island, p, counters)
+    open_close(bodies, contacts, system, islands, rows, island, p, counters)
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         if c.b == fence:
-            dn = along(normal_row(c, True), m.d[islands.slot[c.a]])
+            dn = along(normal_row(c, True), system.motion.d[islands.slot[c.a]])
             c.passing = max(c.un - 2.0 * dn / p.dt, 0.0)
     let_pass(contacts, islands, low, high, fence, 0.0, p.dt)
-    open_close(bodies, contacts, m, islands, rows, island, p, counters)
+    open_close(bodies, contacts, system, islands, rows, island, p, counters)
 
 
 @stage
 def break_through(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
     fence: int, left: float, taken: float, tolerance: float, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Settle an island so that a fence takes what is left of its capacity, where it took more.
@@ -139,7 +139,7 @@ def break_through(
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     if left <= 0.0:
         let_go(contacts, islands, low, high, fence, p.dt)
-        open_close(bodies, contacts, m, islands, rows, island, p, counters)
+        open_close(bodies, contacts, system, islands, rows, island, p, counters)
         return
     # squares of shares with which it takes too much and too little, and by how much
     small, over = 0.0, taken - left
@@ -148,8 +148,8 @@ def break_through(
     square = 1.0 - left / taken
     for _ in range(BREAK_SOLVES):
         let_pass(contacts, islands, low, high, fence, math.sqrt(square), p.dt)
-        open_close(bodies, contacts, m, islands, rows, island, p, counters)
-        off = work_taken(contacts, m, islands, low, high, fence) - left
+        open_close(bodies, contacts, system, islands, rows, island, p, counters)
+        off = work_taken(contacts, system.motion.d, islands, low, high, fence) - left
         off += passed_on(contacts, islands, low, high, fence, p.dt)
         if abs(off) <= tolerance:
             return
@@ -165,7 +165,7 @@ def break_through(
         square = small + (large - small) * over / (over - under)
     if off > 0.0:
         let_go(contacts, islands, low, high, fence, p.dt)
-        open_close(bodies, contacts, m, islands, rows, island, p, counters)
+        open_close(bodies, contacts, system, islands, rows, island, p, counters)
 
 
 @kernel
@@ -180,7 +180,7 @@ def touches(contacts: Contacts, islands: Islands, low: int, high: int, fence: in
 
 @stage
 def limit_fences(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
     gauges: Gauges, time: float, p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Let an island that was settled break the fences that would take more than they can.
@@ -199,9 +199,9 @@ def limit_fences(
         if k < 0:
             continue
         touched = True
-        set_passing(bodies, contacts, m, islands, rows, island, fence, p, counters)
+        set_passing(bodies, contacts, system, islands, rows, island, fence, p, counters)
         left, tolerance = capacity - target.absorbed, BREAK_TOLERANCE * capacity
-        taken = work_taken(contacts, m, islands, low, high, fence)
+        taken = work_taken(contacts, system.motion.d, islands, low, high, fence)
         taken += passed_on(contacts, islands, low, high, fence, p.dt)
         if taken > left + tolerance:
             if bodies[fence].status != RETIRED:
@@ -212,19 +212,9 @@ def limit_fences(
                     c.y - target.ground,
                 )  # fmt: skip
             break_through(
-                bodies,
-                contacts,
-                m,
-                islands,
-                rows,
-                island,
-                fence,
-                left,
-                taken,
-                tolerance,
-                p,
+                bodies, contacts, system, islands, rows, island, fence, left, taken, tolerance, p,
                 counters,
-            )
+            )  # fmt: skip
         target.absorbed += passed_on(contacts, islands, low, high, fence, p.dt)
     return touched
 

@@ -62,21 +62,24 @@ from rigdda.records import (
     Contacts,
     Islands,
     Matrix,
+    Motion,
     Parameters,
     Rows,
+    Scratch,
+    System,
 )
 
 NONE, MOVED, LOCKED = 0, 1, 2
 
 
 @inlined
-def spring_forces(c: Contact, m: Matrix, i: int, j: int, dt: float) -> tuple[float, float, float]:
+def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[float, float, float]:
     """Return normal force, shear force if it stuck [N], and normal velocity after the step."""
-    dn = along(normal_row(c, True), m.d[i])
-    ds = along(shear_row(c, True), m.d[i])
+    dn = along(normal_row(c, True), d[i])
+    ds = along(shear_row(c, True), d[i])
     if j >= 0:
-        dn += along(normal_row(c, False), m.d[j])
-        ds += along(shear_row(c, False), m.d[j])
+        dn += along(normal_row(c, False), d[j])
+        ds += along(shear_row(c, False), d[j])
     after = 2.0 * dn / dt - c.un
     normal = c.kappa * (c.bias - dt * after)
     shear = c.memory_shear - c.kappa * (2.0 * ds - dt * c.us)
@@ -166,7 +169,7 @@ def next_state(c: Contact, normal: float, shear: float, weight: float, coupled: 
 
 @inlined
 def update_states(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int,
+    bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int,
     coupled: bool, one: bool, p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
     """Move every contact of an island to its next state; returns how many moved and are locked.
@@ -178,7 +181,7 @@ def update_states(
         c = contacts[islands.contact_item[item]]
         i = islands.slot[c.a]
         j = islands.slot[c.b] if c.pair >= 0 else -1
-        normal, shear, after = spring_forces(c, m, i, j, p.dt)
+        normal, shear, after = spring_forces(c, d, i, j, p.dt)
         sinking = -after - max(c.gap, 0.0) / p.dt  # what closes a gap is not driven in
         if c.state != OPEN and c.kind == REST and sinking > SHOCK_SPEED:
             set_shock(bodies, c, p)
@@ -196,23 +199,23 @@ def update_states(
 
 
 @kernel
-def solve_island(m: Matrix, n: int, pairs: int, p: Parameters) -> int:
+def solve_island(m: Matrix, scratch: Scratch, n: int, pairs: int, p: Parameters) -> int:
     """Solve for the displacements of an island; returns the iterations, 0 of a direct solution."""
     if p.solver == SOR:
-        return solve_sor(m, n, pairs, p.tolerance, p.relaxation)
+        return solve_sor(m, scratch, n, pairs, p.tolerance, p.relaxation)
     if p.solver == DIRECT or p.solver == AUTO:
-        count = profile(m, n, pairs)
-        longest = len(m.factor) if p.solver == DIRECT else SHORT_PROFILE * 3 * n
-        if count <= min(longest, len(m.factor)):
-            solve_skyline(m, n, pairs, count)
+        count = profile(m, scratch, n, pairs)
+        longest = len(scratch.factor) if p.solver == DIRECT else SHORT_PROFILE * 3 * n
+        if count <= min(longest, len(scratch.factor)):
+            solve_skyline(m, scratch, n, pairs, count)
             return 0
-    return solve_pcg(m, n, pairs, p.tolerance, p.solver == BLOCK_PCG)
+    return solve_pcg(m, scratch, n, pairs, p.tolerance, p.solver == BLOCK_PCG)
 
 
 @kernel
 def solve_states(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, island: int, pairs: int,
-    p: Parameters, counters: NDArray,
+    bodies: Bodies, contacts: Contacts, m: Matrix, scratch: Scratch, islands: Islands, island: int,
+    pairs: int, p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Iterate until no contact of the island changes; returns whether that was reached.
 
@@ -236,12 +239,12 @@ def solve_states(
         if n == 1:
             solve_block(m.diagonal[0], m.rhs[0], m.d[0])
         elif n == 2:
-            solve_two_blocks(m)
+            solve_two_blocks(m, scratch.dense)
         else:
             counters[SOLVES] += 1
-            counters[SOLVER_ITERATIONS] += solve_island(m, n, pairs, p)
+            counters[SOLVER_ITERATIONS] += solve_island(m, scratch, n, pairs, p)
         one = small and iteration >= ONE_BY_ONE
-        moved, locked = update_states(bodies, contacts, m, islands, c0, c1, small, one, p)
+        moved, locked = update_states(bodies, contacts, m.d, islands, c0, c1, small, one, p)
         if moved == 0:
             return locked == 0
         if iteration >= p.iterations - 1 and moved > few:
@@ -251,8 +254,8 @@ def solve_states(
 
 @kernel
 def relax(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
-    p: Parameters, counters: NDArray, speed: float, fast: bool,
+    bodies: Bodies, contacts: Contacts, m: Matrix, motion: Motion, islands: Islands, rows: Rows,
+    island: int, p: Parameters, counters: NDArray, speed: float, fast: bool,
 ) -> None:  # fmt: skip
     """Find the forces of an island by relaxation, from those of the last step."""
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
@@ -260,7 +263,7 @@ def relax(
     assemble_blocks(bodies, m, islands, b0, b1, p)
     counters[RELAXED] += 1
     sweeps, substeps = relax_forces(
-        bodies, contacts, m, islands, rows, c0, c1, b0, b1 - b0, speed, fast, p
+        bodies, contacts, m.rhs, motion, islands, rows, c0, c1, b0, b1 - b0, speed, fast, p
     )
     counters[SWEEPS] += sweeps
     for item in range(c0, c1):
@@ -283,7 +286,7 @@ def relax(
 
 
 @kernel
-def impact_work(contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int) -> float:
+def impact_work(contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int) -> float:
     """Return the work of the contact forces of an island in this step [J], supports left out.
 
     Friction that gives energy counts twice: to rebound out of a wedge a block would be pressed
@@ -296,11 +299,11 @@ def impact_work(contacts: Contacts, m: Matrix, islands: Islands, low: int, high:
             continue
         i = islands.slot[c.a]
         j = islands.slot[c.b] if c.pair >= 0 else -1
-        dn = along(normal_row(c, True), m.d[i])
-        ds = along(shear_row(c, True), m.d[i])
+        dn = along(normal_row(c, True), d[i])
+        ds = along(shear_row(c, True), d[i])
         if j >= 0:
-            dn += along(normal_row(c, False), m.d[j])
-            ds += along(shear_row(c, False), m.d[j])
+            dn += along(normal_row(c, False), d[j])
+            ds += along(shear_row(c, False), d[j])
         total += c.normal * dn + c.shear * ds + max(c.shear * ds, 0.0)
     return total
 
@@ -342,7 +345,7 @@ def let_wait(bodies: Bodies, islands: Islands, low: int, high: int) -> None:
 
 @kernel
 def open_close(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
+    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
     p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Settle the contacts of an island, with less restitution where impacts would gain energy.
@@ -356,6 +359,7 @@ def open_close(
         Whether they settled; a large island that did not is taken as it is.
     """
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    m, motion = system.matrix, system.motion
     pairs, grounded = pair_blocks(bodies, contacts, m, islands, c0, c1)
     bouncing = is_bouncing(contacts, islands, c0, c1)
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
@@ -366,15 +370,17 @@ def open_close(
     fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
     for halving in range(ENERGY_HALVINGS + 2):
         if not relaxing:
-            relaxing = not solve_states(bodies, contacts, m, islands, island, pairs, p, counters)
+            relaxing = not solve_states(
+                bodies, contacts, m, system.scratch, islands, island, pairs, p, counters
+            )
             settled = settled and not (relaxing and small)
             if relaxing and not small:
                 let_wait(bodies, islands, b0, b1)
         if relaxing:
-            relax(bodies, contacts, m, islands, rows, island, p, counters, speed, fast)
+            relax(bodies, contacts, m, motion, islands, rows, island, p, counters, speed, fast)
         # a cluster in flight keeps its angular momentum: its impulses act at one time
         islands.relaxed[0] = int(fast and grounded)
-        if not bouncing or impact_work(contacts, m, islands, c0, c1) <= 0.0:
+        if not bouncing or impact_work(contacts, m.d, islands, c0, c1) <= 0.0:
             return settled
         for item in range(c0, c1):
             c = contacts[islands.contact_item[item]]

@@ -53,9 +53,12 @@ from rigdda.records import (
     Islands,
     Links,
     Matrix,
+    Motion,
     Outlines,
     Rows,
+    Scratch,
     Shaking,
+    System,
     Work,
 )
 from rigdda.run import EVENT
@@ -86,7 +89,7 @@ class Arrays(NamedTuple):
     shaking: Shaking
     now: Contacts
     before: Contacts
-    matrix: Matrix
+    system: System
     work: Work
     gauges: Gauges
     parameters: NDArray[np.void]  # of PARAMETERS: of the step, then of its halves, quarters, ...
@@ -121,7 +124,7 @@ def pack(
         pack_shaking(scene),
         empty_contacts(room),
         empty_contacts(room),
-        empty_matrix(blocks, room),
+        empty_system(blocks, room),
         empty_work(len(bodies), blocks, room),
         pack_gauges(scene, bodies, stations, watch),
         pack_parameters(scene, settings, bodies, interfaces),
@@ -298,17 +301,22 @@ def empty_contacts(room: int) -> Contacts:
 
 
 def empty_matrix(blocks: int, room: int) -> Matrix:
-    """Return space for the system of an island of all blocks."""
+    """Return space for the equations of an island of all blocks."""
     return Matrix(
         np.zeros((blocks, 3, 3)),
         np.zeros((room, 3, 3)),
         np.zeros(room, dtype=np.int64),
         np.zeros(room, dtype=np.int64),
         np.zeros((3, 3)),
-        np.zeros((6, 7)),
         np.zeros((blocks, 3)),
         np.zeros((blocks + 1, 3)),
-        np.zeros((blocks, 3)),
+    )
+
+
+def empty_scratch(blocks: int, room: int) -> Scratch:
+    """Return space for the solvers of these equations."""
+    return Scratch(
+        np.zeros((6, 7)),
         np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
@@ -318,6 +326,13 @@ def empty_matrix(blocks: int, room: int) -> Matrix:
         np.zeros(profile_room(blocks)),
         np.zeros(2 * room, dtype=np.int64),
     )
+
+
+def empty_system(blocks: int, room: int) -> System:
+    """Return space for an island of all blocks."""
+    matrix = empty_matrix(blocks, room)
+    motion = Motion(matrix.d, np.zeros((blocks, 3)), np.zeros((blocks, 3)), np.zeros(blocks))
+    return System(matrix, empty_scratch(blocks, room), motion)
 
 
 def profile_room(blocks: int) -> int:

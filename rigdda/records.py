@@ -278,25 +278,46 @@ class Ground(NamedTuple):
 
 
 class Matrix(NamedTuple):
-    """Block-sparse symmetric system of one island: n blocks, 3x3 each."""
+    """The simultaneous equations K d = F of one island: n blocks, block-sparse, symmetric."""
 
     diagonal: Floats  # (N, 3, 3), N with the gravity walls
     off: Floats  # (pairs, 3, 3) row block pair_i, column block pair_j
     pair_i: Ints
     pair_j: Ints
     lower: Floats  # (3, 3) block below the diagonal of two blocks with friction, unsymmetric
-    dense: Floats  # (6, 7) their matrix and forces
     rhs: Floats  # (N, 3)
     d: Floats  # (N + 1, 3) displacements u0, v0 [m], r0 [rad]; the last of what cannot move
-    residual: Floats  # (N, 3) and the vectors of conjugate gradients
+
+
+class Scratch(NamedTuple):
+    """What the solvers of the equations work on."""
+
+    dense: Floats  # (6, 7) matrix and forces of two blocks
+    residual: Floats  # (N, 3) vectors of the iterations
     direction: Floats
     product: Floats
     scaled: Floats
-    late: Floats  # (N, 3) displacements besides d, where forces act early or late in the step
     first: Ints  # (N,) leftmost block of a row, or head of its chain of neighbours
     row: Ints  # (3 N,) place in `factor` of column 0 of a scalar row
     factor: Floats  # Cholesky factor within the profile
     next: Ints  # (2 pairs,) next entry in a chain of neighbours, -1 at its end
+
+
+class Motion(NamedTuple):
+    """Displacements of the blocks of one island in a step, by slot."""
+
+    d: Floats  # the same array as Matrix.d: by forces that are constant over the step
+    besides: Floats  # (N, 3) since forces act early or late in the step
+    relaxed: Floats  # (N, 3) the same, as relaxation in substeps has found it
+    share: Floats  # (N,) of the step that remains at the first impact on the block, 0 without one
+
+
+class System(NamedTuple):
+    """An island in work."""
+
+    matrix: Matrix
+    scratch: Scratch
+    motion: Motion
 
 
 class Boxes(NamedTuple):

@@ -32,7 +32,7 @@ from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.frames import frame_of, no_frames, pieces
 from rigdda.geometry import polygon_properties
 from rigdda.kernel import Direct
-from rigdda.pack import empty_contacts, empty_matrix, empty_work, pack
+from rigdda.pack import empty_contacts, empty_system, empty_work, pack
 from rigdda.records import (
     BROAD_PHASE,
     CONTACT_TOTAL,
@@ -333,7 +333,7 @@ class Simulation:
                 a.shaking,
                 self._now,
                 self._before,
-                a.matrix,
+                a.system,
                 a.work,
                 a.gauges,
                 a.parameters,
@@ -452,7 +452,7 @@ class Simulation:
         self._now, self._before = grown, empty_contacts(room)
         work, before = empty_work(len(bodies), blocks, room), self._arrays.work
         work.boxes.row[:], work.begin[:] = before.boxes.row, before.begin
-        self._arrays = self._arrays._replace(matrix=empty_matrix(blocks, room), work=work)
+        self._arrays = self._arrays._replace(system=empty_system(blocks, room), work=work)
 
 
 def simulate_many(

@@ -63,11 +63,12 @@ from rigdda.records import (
     Ints,
     Islands,
     Links,
-    Matrix,
+    Motion,
     Outlines,
     Parameters,
     Polygons,
     Shaking,
+    System,
     Work,
 )
 from rigdda.shaking import set_field
@@ -170,19 +171,9 @@ def detect(
             link += 1
         if bodies[a].status == AWAKE:
             count = collide_block(
-                bodies,
-                outlines,
-                ground,
-                interfaces,
-                contacts,
-                count,
-                old,
-                work,
-                a,
-                start,
-                p,
+                bodies, outlines, ground, interfaces, contacts, count, old, work, a, start, p,
                 deepest,
-            )
+            )  # fmt: skip
             if count < 0 or count + link - low_link > len(contacts):
                 return -1
             for q in range(low_link, link):
@@ -208,7 +199,7 @@ def retire(body: Body) -> float:
 
 @stage
 def move_island(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, m: Matrix, islands: Islands,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, motion: Motion, islands: Islands,
     island: int, struck: bool, gauges: Gauges, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
@@ -217,14 +208,14 @@ def move_island(
     bad = -1
     for s in range(b1 - b0):
         block = bodies[islands.block_item[b0 + s]]
+        account_block(block, motion, s, p, ledger)
         block.touching = 0
-        account_block(block, m, s, p, ledger)
     for item in range(c0, c1):
         c = contacts[islands.contact_item[item]]
         keep_memory(c, struck, islands.relaxed[0] == 1)
         if c.state == OPEN:
             continue
-        account_contact(c, m, islands, ledger, gauges)
+        account_contact(c, motion.d, islands, ledger, gauges)
         bodies[c.a].touching = 1
         if c.b >= 0:
             bodies[c.b].touching = 1
@@ -232,7 +223,7 @@ def move_island(
         i = islands.block_item[b0 + s]
         block = bodies[i]
         block.wait = max(block.wait - 1, 0)
-        move_block(block, m, s, p.dt)
+        move_block(block, motion, s, p.dt)
         if not top_speed(block) < SPEED_LIMIT:
             bad = i
         elif block.y < p.floor:
@@ -240,13 +231,13 @@ def move_island(
         if p.post_correction:
             place_corners(bodies, outlines, i)
         else:
-            move_corners(bodies, outlines, i, m, s)
+            move_corners(bodies, outlines, i, motion, s)
     return bad
 
 
 @stage
 def solve_and_move(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, m: Matrix, work: Work,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, system: System, work: Work,
     gauges: Gauges, time: float, p: Parameters, cutting: bool, counters: NDArray,
     ledger: NDArray,
 ) -> tuple[int, float]:  # fmt: skip
@@ -264,7 +255,7 @@ def solve_and_move(
         none.
     """
     since = lap(counters, MOTION, 0, p.timing)
-    islands, rows = work.islands, work.rows
+    islands, rows, m, motion = work.islands, work.rows, system.matrix, system.motion
     found = find_islands(bodies, contacts, work.begin, islands, p.blocks, p.islands)
     bad, excess = -1, 0.0
     for s in range(found):
@@ -272,16 +263,16 @@ def solve_and_move(
         settled, islands.relaxed[0] = True, 0
         if c1 > c0:
             since = lap(counters, MOTION, since, p.timing)
-            settled = open_close(bodies, contacts, m, islands, rows, s, p, counters)
+            settled = open_close(bodies, contacts, system, islands, rows, s, p, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
-        struck = apply_forces(bodies, contacts, m, islands, s, islands.relaxed[0] == 1, p)
+        struck = apply_forces(bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, p)
         if c1 > c0:
             far, early = 0.0, False
             for attempt in range(2 if cutting else 0):
-                far = too_far(bodies, contacts, m, islands, s, p)
+                far = too_far(bodies, contacts, motion, islands, s, p)
                 if far <= 1.0 or attempt == 1 or not settled:
                     break
-                early = act_early(bodies, contacts, m, islands, s, p)
+                early = act_early(bodies, contacts, motion, islands, s, p)
                 if not early:
                     break
             if far > 1.0 or (cutting and not settled):
@@ -291,16 +282,19 @@ def solve_and_move(
                 continue
             if not settled:  # not in a shorter step, either
                 let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
-            if limit_fences(bodies, contacts, m, islands, rows, s, gauges, time, p, counters):
-                struck = apply_forces(bodies, contacts, m, islands, s, islands.relaxed[0] == 1, p)
-                early = early and act_early(bodies, contacts, m, islands, s, p)
+            if limit_fences(bodies, contacts, system, islands, rows, s, gauges, time, p, counters):
+                struck = apply_forces(
+                    bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, p
+                )
+                early = early and act_early(bodies, contacts, motion, islands, s, p)
             struck = struck or early
             if len(gauges.target) > 0:
                 counters[EVENTS] = note_hits(
                     bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
                 )
         bad = max(
-            bad, move_island(bodies, outlines, contacts, m, islands, s, struck, gauges, p, ledger)
+            bad,
+            move_island(bodies, outlines, contacts, motion, islands, s, struck, gauges, p, ledger),
         )
     if p.sleeping:
         watch_quiet(bodies, islands, found, p)
@@ -321,7 +315,7 @@ def rest_all(bodies: Bodies) -> None:
 @entry_kernel
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
-    shaking: Shaking, now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges,
+    shaking: Shaking, now: Contacts, before: Contacts, system: System, work: Work, gauges: Gauges,
     levels: NDArray[np.void], counters: NDArray, ledger: NDArray, deepest: NDArray,
     steps: int, frames: NDArray, stride: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
@@ -371,7 +365,18 @@ def advance(
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         bad, excess = solve_and_move(
-            bodies, outlines, now, count, m, work, gauges, time, p, level == 0, counters, ledger
+            bodies,
+            outlines,
+            now,
+            count,
+            system,
+            work,
+            gauges,
+            time,
+            p,
+            level == 0,
+            counters,
+            ledger,
         )
         yield_bolts(bodies, links)
         part += 1

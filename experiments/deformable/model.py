@@ -60,7 +60,8 @@ class Deformable:
         sim, a = self._sim, self._sim._arrays
         fits, swapped = advance(
             a.bodies, a.outlines, a.ground, a.interfaces, a.links, sim._now, sim._before,
-            a.matrix, a.work, a.gauges, a.parameters, self._counters, sim._deepest, self._solid, n,
+            a.system.matrix, a.work, a.gauges, a.parameters, self._counters, sim._deepest,
+            self._solid, n,
         )  # fmt: skip
         if not fits:
             raise RuntimeError("too many contacts")

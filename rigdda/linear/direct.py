@@ -27,12 +27,12 @@ def solve_block(k: NDArray, f: NDArray, d: NDArray) -> None:
 
 
 @kernel
-def solve_two_blocks(m: Matrix) -> None:
+def solve_two_blocks(m: Matrix, dense: NDArray) -> None:
     """Set the displacements of two blocks, slots 0 and 1, that touch in pair 0 at most.
 
     Gaussian elimination with partial pivoting; `m.lower` is the block below the diagonal.
     """
-    a, first = m.dense, m.pair_i[0]
+    a, first = dense, m.pair_i[0]
     for i in range(3):
         for j in range(3):
             a[i, j], a[3 + i, 3 + j] = m.diagonal[0, i, j], m.diagonal[1, i, j]

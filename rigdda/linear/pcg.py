@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rigdda.kernel import kernel
 from rigdda.linear.direct import solve_block
-from rigdda.records import Matrix
+from rigdda.records import Matrix, Scratch
 
 
 @kernel
@@ -34,25 +34,27 @@ def multiply(m: Matrix, n: int, pairs: int, x: NDArray, y: NDArray) -> None:
 
 
 @kernel
-def precondition(m: Matrix, n: int, by_block: bool) -> float:
+def precondition(m: Matrix, scratch: Scratch, n: int, by_block: bool) -> float:
     """Set scaled = residual / diagonal, entries or 3x3 blocks, and return their product."""
     product = 0.0
     for i in range(n):
         if by_block:
-            solve_block(m.diagonal[i], m.residual[i], m.scaled[i])
+            solve_block(m.diagonal[i], scratch.residual[i], scratch.scaled[i])
             for j in range(3):
-                product += m.residual[i, j] * m.scaled[i, j]
+                product += scratch.residual[i, j] * scratch.scaled[i, j]
             continue
         for j in range(3):
-            r = m.residual[i, j]
+            r = scratch.residual[i, j]
             z = r / m.diagonal[i, j, j]
-            m.scaled[i, j] = z
+            scratch.scaled[i, j] = z
             product += r * z
     return product
 
 
 @kernel
-def solve_pcg(m: Matrix, n: int, pairs: int, tolerance: float, by_block: bool) -> int:
+def solve_pcg(
+    m: Matrix, scratch: Scratch, n: int, pairs: int, tolerance: float, by_block: bool
+) -> int:
     """Solve K d = rhs from the start value in m.d, in place.
 
     Stops when the residual, in the norm of the preconditioner, is below `tolerance` times the
@@ -63,33 +65,33 @@ def solve_pcg(m: Matrix, n: int, pairs: int, tolerance: float, by_block: bool) -
     int
         Iterations used.
     """
-    multiply(m, n, pairs, m.d, m.product)
+    multiply(m, n, pairs, m.d, scratch.product)
     scale = 0.0
     for i in range(n):
         for j in range(3):
-            m.residual[i, j] = m.rhs[i, j] - m.product[i, j]
+            scratch.residual[i, j] = m.rhs[i, j] - scratch.product[i, j]
             scale += m.rhs[i, j] ** 2 / m.diagonal[i, j, j]
-    rho = precondition(m, n, by_block)
+    rho = precondition(m, scratch, n, by_block)
     for i in range(n):
         for j in range(3):
-            m.direction[i, j] = m.scaled[i, j]
+            scratch.direction[i, j] = scratch.scaled[i, j]
     limit = tolerance * tolerance * scale
     iterations = 0
     while rho > limit and iterations < 10 * n + 30:
-        multiply(m, n, pairs, m.direction, m.product)
+        multiply(m, n, pairs, scratch.direction, scratch.product)
         curvature = 0.0
         for i in range(n):
             for j in range(3):
-                curvature += m.direction[i, j] * m.product[i, j]
+                curvature += scratch.direction[i, j] * scratch.product[i, j]
         alpha = rho / curvature
         for i in range(n):
             for j in range(3):
-                m.d[i, j] += alpha * m.direction[i, j]
-                m.residual[i, j] -= alpha * m.product[i, j]
-        before, rho = rho, precondition(m, n, by_block)
+                m.d[i, j] += alpha * scratch.direction[i, j]
+                scratch.residual[i, j] -= alpha * scratch.product[i, j]
+        before, rho = rho, precondition(m, scratch, n, by_block)
         beta = rho / before
         for i in range(n):
             for j in range(3):
-                m.direction[i, j] = m.scaled[i, j] + beta * m.direction[i, j]
+                scratch.direction[i, j] = scratch.scaled[i, j] + beta * scratch.direction[i, j]
         iterations += 1
     return iterations

@@ -53,7 +53,7 @@ from rigdda.records import (
     Floats,
     Ints,
     Islands,
-    Matrix,
+    Motion,
     Parameters,
     Rows,
 )
@@ -309,13 +309,13 @@ def velocity(body: Body) -> tuple[float, float, float]:
 
 
 @inlined
-def start(body: Body, m: Matrix, rows: Rows, s: int, h: float, p: Parameters) -> None:
+def start(body: Body, rhs: Floats, rows: Rows, s: int, h: float, p: Parameters) -> None:
     """Set the displacement of a block, slot s, in the first substep without contacts."""
     v, alpha = velocity(body), damping_of(body, p)
     for q in range(3):
         inertia = body.inertia if q == 2 else body.mass
         scale = h / math.sqrt(inertia)
-        pull = (m.rhs[s, q] - 2.0 * inertia * v[q] / p.dt) / inertia - alpha * v[q]
+        pull = (rhs[s, q] - 2.0 * inertia * v[q] / p.dt) / inertia - alpha * v[q]
         rows.scale[s, q] = scale
         rows.motion[s, BEFORE + q] = h * v[q] / scale
         rows.motion[s, NOW + q] = (h * v[q] + h * h * pull) / scale
@@ -343,15 +343,15 @@ def substeps_of(n: int, dt: float) -> int:
 
 @kernel
 def relax_forces(
-    bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, low: int,
-    high: int, first: int, n: int, speed: float, fast: bool, p: Parameters,
+    bodies: Bodies, contacts: Contacts, rhs: Floats, found: Motion, islands: Islands, rows: Rows,
+    low: int, high: int, first: int, n: int, speed: float, fast: bool, p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
     """Find the forces of an island with contacts low:high, in their rows: see `take_forces`.
 
     In substeps if it is `fast`, else in one that is settled more closely; `speed` is the greatest
-    of the island [m/s]. The matrix holds inertia and weight only. m.d is set to the displacements
-    at constant mean force, m.late to what the blocks move besides, since forces act early or late
-    in the step.
+    of the island [m/s]. `rhs` holds inertia and weight only. found.d is set to the displacements
+    at constant mean force, found.relaxed to what the blocks move besides, since forces act early or
+    late in the step.
 
     Returns
     -------
@@ -366,7 +366,7 @@ def relax_forces(
         tolerance = min(RELAXATION_SHARE * speed, usual)
     h, motion = p.dt / substeps, rows.motion
     for s in range(n):
-        start(bodies[islands.block_item[first + s]], m, rows, s, h, p)
+        start(bodies[islands.block_item[first + s]], rhs, rows, s, h, p)
     for q in range(3):
         rows.scale[n, q] = 0.0
         motion[n, NOW + q] = motion[n, SO_FAR + q] = motion[n, BEFORE + q] = 0.0
@@ -393,8 +393,8 @@ def relax_forces(
         v = velocity(bodies[islands.block_item[first + s]])
         for q in range(3):
             scale = rows.scale[s, q]
-            m.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)
-            m.late[s, q] = motion[s, SO_FAR + q] * scale - m.d[s, q]
+            found.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)
+            found.relaxed[s, q] = motion[s, SO_FAR + q] * scale - found.d[s, q]
     return sweeps, substeps
 
 

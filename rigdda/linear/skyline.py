@@ -9,57 +9,57 @@ from __future__ import annotations
 import math
 
 from rigdda.kernel import kernel
-from rigdda.records import Matrix
+from rigdda.records import Matrix, Scratch
 
 
 @kernel
-def profile(m: Matrix, n: int, pairs: int) -> int:
+def profile(m: Matrix, scratch: Scratch, n: int, pairs: int) -> int:
     """Set first[i], the leftmost block in row i, and return the number of entries of the profile.
 
-    row[r] is the place in m.factor at which scalar row r would have its column 0.
+    row[r] is the place in scratch.factor at which scalar row r would have its column 0.
     """
     for i in range(n):
-        m.first[i] = i
+        scratch.first[i] = i
     for q in range(pairs):
         i, j = m.pair_i[q], m.pair_j[q]
-        m.first[max(i, j)] = min(m.first[max(i, j)], min(i, j))
+        scratch.first[max(i, j)] = min(scratch.first[max(i, j)], min(i, j))
     count = 0
     for r in range(3 * n):
-        low = 3 * m.first[r // 3]
-        m.row[r] = count - low
+        low = 3 * scratch.first[r // 3]
+        scratch.row[r] = count - low
         count += r + 1 - low
     return count
 
 
 @kernel
-def fill(m: Matrix, n: int, pairs: int, count: int) -> None:
+def fill(m: Matrix, scratch: Scratch, n: int, pairs: int, count: int) -> None:
     """Copy the lower half of the block-sparse matrix into the profile."""
     for e in range(count):
-        m.factor[e] = 0.0
+        scratch.factor[e] = 0.0
     for i in range(n):
         for a in range(3):
             for b in range(a + 1):
-                m.factor[m.row[3 * i + a] + 3 * i + b] = m.diagonal[i, a, b]
+                scratch.factor[scratch.row[3 * i + a] + 3 * i + b] = m.diagonal[i, a, b]
     for q in range(pairs):
         i, j = m.pair_i[q], m.pair_j[q]
         for a in range(3):
             for b in range(3):
                 if i > j:
-                    m.factor[m.row[3 * i + a] + 3 * j + b] += m.off[q, a, b]
+                    scratch.factor[scratch.row[3 * i + a] + 3 * j + b] += m.off[q, a, b]
                 else:
-                    m.factor[m.row[3 * j + b] + 3 * i + a] += m.off[q, a, b]
+                    scratch.factor[scratch.row[3 * j + b] + 3 * i + a] += m.off[q, a, b]
 
 
 @kernel
-def solve_skyline(m: Matrix, n: int, pairs: int, count: int) -> None:
+def solve_skyline(m: Matrix, scratch: Scratch, n: int, pairs: int, count: int) -> None:
     """Solve K d = rhs for n blocks whose `profile` has `count` entries; sets m.d."""
-    fill(m, n, pairs, count)
-    factor, row = m.factor, m.row
+    fill(m, scratch, n, pairs, count)
+    factor, row = scratch.factor, scratch.row
     for r in range(3 * n):
-        low = 3 * m.first[r // 3]
+        low = 3 * scratch.first[r // 3]
         total = m.rhs[r // 3, r % 3]
         for s in range(low, r):
-            start = max(low, 3 * m.first[s // 3])
+            start = max(low, 3 * scratch.first[s // 3])
             value = factor[row[r] + s]
             for t in range(start, s):
                 value -= factor[row[r] + t] * factor[row[s] + t]
@@ -74,5 +74,5 @@ def solve_skyline(m: Matrix, n: int, pairs: int, count: int) -> None:
     for r in range(3 * n - 1, -1, -1):
         m.d[r // 3, r % 3] /= factor[row[r] + r]
         value = m.d[r // 3, r % 3]
-        for s in range(3 * m.first[r // 3], r):
+        for s in range(3 * scratch.first[r // 3], r):
             m.d[s // 3, s % 3] -= factor[row[r] + s] * value

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rigdda.kernel import from_python
 from rigdda.linear import direct, pcg, skyline, sor
-from rigdda.pack import empty_matrix
-from rigdda.records import Matrix
+from rigdda.pack import empty_matrix, empty_scratch
+from rigdda.records import Matrix, Scratch
 
 solve_block, solve_two_blocks = map(from_python, (direct.solve_block, direct.solve_two_blocks))
 multiply, solve_pcg = map(from_python, (pcg.multiply, pcg.solve_pcg))
@@ -46,6 +46,11 @@ def system(seed: int, n: int, spread: float = 1.0) -> tuple[Matrix, np.ndarray, 
     return m, dense, len(touching)
 
 
+def scratch(m: Matrix) -> Scratch:
+    """Return what the solvers of a system work on."""
+    return empty_scratch(len(m.diagonal), len(m.off))
+
+
 @given(seeds, st.integers(1, 30))
 def test_multiply(seed, n):
     m, dense, pairs = system(seed, n)
@@ -61,7 +66,7 @@ def test_pcg(seed, n, warm, by_block):
     exact = np.linalg.solve(dense, m.rhs.ravel())
     if warm:
         m.d[:n] = exact.reshape(n, 3) * 1.01
-    iterations = solve_pcg(m, n, pairs, 1e-12, by_block)
+    iterations = solve_pcg(m, scratch(m), n, pairs, 1e-12, by_block)
     assert 0 < iterations < 30 * n + 30
     assert np.abs(m.d[:n].ravel() - exact).max() < 1e-8 * np.abs(exact).max()
 
@@ -69,13 +74,13 @@ def test_pcg(seed, n, warm, by_block):
 def test_pcg_starts_from_the_given_value():
     m, dense, pairs = system(3, 20)
     m.d[:20] = np.linalg.solve(dense, m.rhs.ravel()).reshape(20, 3)
-    assert solve_pcg(m, 20, pairs, 1e-8, False) == 0
+    assert solve_pcg(m, scratch(m), 20, pairs, 1e-8, False) == 0
 
 
 def test_pcg_without_load():
     m, _, pairs = system(4, 5)
     m.rhs[:] = 0.0
-    assert solve_pcg(m, 5, pairs, 1e-9, False) == 0
+    assert solve_pcg(m, scratch(m), 5, pairs, 1e-9, False) == 0
     assert (m.d == 0.0).all()
 
 
@@ -93,9 +98,10 @@ def test_solve_block(symmetric, seed):
 @given(seeds, st.integers(1, 30))
 def test_skyline(seed, n):
     m, dense, pairs = system(seed, n)
-    count = profile(m, n, pairs)
-    assert count <= min(len(m.factor), (3 * n + 1) * 3 * n // 2)
-    solve_skyline(m, n, pairs, count)
+    space = scratch(m)
+    count = profile(m, space, n, pairs)
+    assert count <= min(len(space.factor), (3 * n + 1) * 3 * n // 2)
+    solve_skyline(m, space, n, pairs, count)
     exact = np.linalg.solve(dense, m.rhs.ravel())
     assert np.abs(m.d[:n].ravel() - exact).max() < 1e-9 * np.abs(exact).max()
 
@@ -103,7 +109,7 @@ def test_skyline(seed, n):
 @given(seeds, st.integers(1, 12), st.sampled_from([1.0, 1.5]))
 def test_sor(seed, n, factor):
     m, dense, pairs = system(seed, n, spread=0.3)
-    sweeps = solve_sor(m, n, pairs, 1e-12, factor)
+    sweeps = solve_sor(m, scratch(m), n, pairs, 1e-12, factor)
     assert sweeps < 100 * n + 300
     exact = np.linalg.solve(dense, m.rhs.ravel())
     assert np.abs(m.d[:n].ravel() - exact).max() < 1e-6 * np.abs(exact).max()
@@ -124,5 +130,5 @@ def test_solve_two_blocks(seed, touching, swapped):
     m.off[0], m.lower[:] = (lower, upper) if swapped else (upper, lower)
     m.rhs[:] = rng.normal(size=(2, 3))
     exact = np.linalg.solve(dense, m.rhs.ravel())
-    solve_two_blocks(m)
+    solve_two_blocks(m, scratch(m).dense)
     assert np.abs(m.d[:2].ravel() - exact).max() < 1e-9 * max(np.abs(exact).max(), 1.0)

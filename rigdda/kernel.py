@@ -63,7 +63,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 def inlined(function: Callable[..., Any]) -> Any:
     """Compile a kernel into all that call it: for what is called for every block or contact.
 
-    A call hands over every array of a named tuple in seven words or nine, 145 for `Matrix`, but a
+    A call hands over every array of a named tuple in seven words or nine, 63 for `Matrix`, but a
     record in one. A step of one block took twice as long when calls were handed all of `Work`.
     """
     return numba.njit(forceinline=True, **INSIDE)(function)

@@ -32,7 +32,8 @@ from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.frames import frame_of, no_frames, pieces
 from rigdda.geometry import polygon_properties
 from rigdda.kernel import Direct
-from rigdda.pack import empty_contacts, empty_system, empty_work, pack
+from rigdda.pack import pack
+from rigdda.pack.space import empty_contacts, empty_system, empty_work
 from rigdda.records import (
     BROAD_PHASE,
     CONTACT_TOTAL,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rigdda.kernel import from_python
 from rigdda.linear import direct, pcg, skyline, sor
-from rigdda.pack import empty_matrix, empty_scratch
+from rigdda.pack.space import empty_matrix, empty_scratch
 from rigdda.records import Matrix, Scratch
 
 solve_block, solve_two_blocks = map(from_python, (direct.solve_block, direct.solve_two_blocks))

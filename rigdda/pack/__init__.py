@@ -1,0 +1,81 @@
+"""From a scene to the arrays that the kernels work on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.pack.bodies import free_bodies, pack_bodies, pack_links
+from rigdda.pack.gauges import pack_gauges
+from rigdda.pack.ground import pack_ground, pack_shaking
+from rigdda.pack.parameters import pack_interfaces, pack_parameters
+from rigdda.pack.space import empty_contacts, empty_system, empty_work
+from rigdda.records import (
+    Bodies,
+    Contacts,
+    Gauges,
+    Ground,
+    Interfaces,
+    Links,
+    Outlines,
+    Shaking,
+    System,
+    Work,
+)
+from rigdda.scene import Scene
+from rigdda.settings import Settings
+
+
+class Arrays(NamedTuple):
+    """Everything the step loop needs, for one scene."""
+
+    bodies: Bodies
+    outlines: Outlines
+    ground: Ground
+    interfaces: Interfaces
+    links: Links
+    shaking: Shaking
+    now: Contacts
+    before: Contacts
+    system: System
+    work: Work
+    gauges: Gauges
+    parameters: NDArray[np.void]  # of PARAMETERS: of the step, then of its halves, quarters, ...
+
+
+def pack(
+    scene: Scene,
+    settings: Settings,
+    stations: NDArray[np.float64],
+    watch: tuple[float, float],
+) -> Arrays:
+    """Return the kernels' arrays for a scene at rest at its start.
+
+    Parameters
+    ----------
+    stations : (K,) array
+        Ascending chainages whose first crossings are recorded [m].
+    watch : (float, float)
+        Interval of x in which energies are watched [m].
+    """
+    names = list(scene.surfaces)
+    bodies, outlines = pack_bodies(scene, names)
+    blocks = free_bodies(scene)
+    room = 16 * blocks + 64
+    interfaces = pack_interfaces(scene, names)
+    return Arrays(
+        bodies,
+        outlines,
+        pack_ground(scene, names),
+        interfaces,
+        pack_links(scene, bodies),
+        pack_shaking(scene),
+        empty_contacts(room),
+        empty_contacts(room),
+        empty_system(blocks, room),
+        empty_work(len(bodies), blocks, room),
+        pack_gauges(scene, bodies, stations, watch),
+        pack_parameters(scene, settings, bodies, interfaces),
+    )

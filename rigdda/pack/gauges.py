@@ -1,0 +1,55 @@
+"""What is watched during a run."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.barriers import Fence
+from rigdda.pack.bodies import free_bodies
+from rigdda.records import (
+    STATION,
+    TARGET,
+    WATCHED,
+    Bodies,
+    Gauges,
+)
+from rigdda.run import EVENT
+from rigdda.scene import Scene, Terrain
+
+
+def pack_gauges(
+    scene: Scene, bodies: Bodies, stations: NDArray[np.float64], watch: tuple[float, float]
+) -> Gauges:
+    """Return the gauges, with no station passed that a block starts beyond."""
+    blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.ground
+    station = np.zeros(len(stations), dtype=STATION)
+    station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
+    rock = np.zeros(blocks, dtype=WATCHED)
+    rock["next"] = np.searchsorted(stations, bodies["x"][:blocks], side="right")
+    target = np.zeros(barriers, dtype=TARGET)
+    target["capacity"] = [b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]
+    target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
+    room = event_room(free_bodies(scene), len(stations), barriers)
+    return Gauges(
+        station.view(np.recarray),
+        rock.view(np.recarray),
+        target.view(np.recarray),
+        np.array([-1] * blocks + list(scene.bodies), dtype=np.int64),
+        sum(isinstance(b, Fence) for b in scene.barriers),
+        np.full((free_bodies(scene), barriers), -np.inf),
+        float(watch[0]),
+        float(watch[1]),
+        np.zeros(room, dtype=EVENT).view(np.recarray),
+    )
+
+
+def _ground(terrain: Terrain | None, x: float) -> float:
+    """Return the elevation of the highest ground at x, 0 where there is none [m]."""
+    points = terrain.points[:, 0] if terrain else np.array([np.inf])
+    return terrain.height(x) if terrain and points.min() <= x <= points.max() else 0.0
+
+
+def event_room(blocks: int, stations: int, barriers: int) -> int:
+    """Return the size of an event buffer that holds any two steps."""
+    return 2 * (blocks + 1) * (stations + barriers) + 1

@@ -26,8 +26,7 @@ def too_far(
 
     Forces are applied: motion.d and motion.besides are its displacements.
     """
-    far = greatest_departure(bodies, motion, islands, island, p.dt) / p.displacement_limit
-    far = max(far, greatest_deflection(bodies, motion, islands, island, p) / p.deflection_limit)
+    far = farthest_corner(bodies, motion, islands, island, p)
     if p.sinking_limit < math.inf:
         blocks = islands.block_start[island + 1] - islands.block_start[island]
         limit = p.sinking_limit * (MOVING_SINKING * blocks if islands.relaxed[0] == 1 else 1.0)
@@ -36,30 +35,25 @@ def too_far(
 
 
 @inlined
-def greatest_departure(
-    bodies: Bodies, motion: Motion, islands: Islands, island: int, dt: float
+def farthest_corner(
+    bodies: Bodies, motion: Motion, islands: Islands, island: int, p: Parameters
 ) -> float:
-    """Return a bound on how far from its straight path any corner of an island ends a step [m]."""
-    most, low = 0.0, islands.block_start[island]
+    """Return how far a corner of an island goes, over how far a step should take it [-].
+
+    By a bound on how far from its straight path one ends the step, and on how much farther than
+    foreseen one goes.
+    """
+    departure = deflection = 0.0
+    low = islands.block_start[island]
     for place in range(low, islands.block_start[island + 1]):
         d, body = motion.d[place - low], bodies[islands.block_item[place]]
         turn = abs(d[2]) * body.radius
-        dx, dy = d[0] - dt * body.vx, d[1] - dt * body.vy
-        most = max(most, math.sqrt(dx * dx + dy * dy) + turn)
-    return most
-
-
-@inlined
-def greatest_deflection(
-    bodies: Bodies, motion: Motion, islands: Islands, island: int, p: Parameters
-) -> float:
-    """Return how much farther than foreseen any corner of an island goes in a step [m]."""
-    most, low = 0.0, islands.block_start[island]
-    for place in range(low, islands.block_start[island + 1]):
-        d, body = motion.d[place - low], bodies[islands.block_item[place]]
-        way = math.sqrt(d[0] * d[0] + d[1] * d[1]) + abs(d[2]) * body.radius
-        most = max(most, way - body.path)
-    return most - p.gravity * p.dt * p.dt
+        dx, dy = d[0] - p.dt * body.vx, d[1] - p.dt * body.vy
+        departure = max(departure, math.sqrt(dx * dx + dy * dy) + turn)
+        way = math.sqrt(d[0] * d[0] + d[1] * d[1]) + turn
+        deflection = max(deflection, way - body.path)
+    deflection -= p.gravity * p.dt * p.dt
+    return max(departure / p.displacement_limit, deflection / p.deflection_limit)
 
 
 @kernel

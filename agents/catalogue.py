@@ -83,7 +83,7 @@ def tabulate(problem: DesignProblem, ensemble: Ensemble, locked: bool) -> Catalo
 
 
 def _capacities(zone: BarrierZone, kinds: Sequence[str]) -> list[float]:
-    """Return the capacity of each model that may be built [J]; that of a wall has no end."""
+    """Return the capacity of each model that may be built [J/m]; that of a wall has no end."""
     fences = np.geomspace(zone.min_capacity, zone.max_capacity, CAPACITIES).tolist()
     return [math.inf] * ("wall" in kinds) + fences * ("fence" in kinds)
 

@@ -111,7 +111,7 @@ def simulate(site: str, layout: str | None, releases: int, seed: int, out: Path 
 
     Writes outcomes.csv, run.npz (the first release) and profile.png (the same).
     The energy of a hit is that of the block just before it touches; a barrier absorbs what its
-    forces take from all blocks, those that lean on it too.
+    forces take from all blocks, whether they hit it or lie against it.
     """
     import rigdda
     from agents import job, pictures, tables

@@ -159,7 +159,8 @@ def failures(barrier: Barrier, index: int, results: Sequence[Outcome]) -> str:
     """
     if not isinstance(barrier, Fence):
         return ""
-    return f", fails in {np.mean([outcome.barriers[index].failed for outcome in results]):.0%}"
+    failed = sum(outcome.barriers[index].failed for outcome in results)
+    return f", fails in {failed} of {len(results)} releases"
 
 
 def sites(found: Iterable[Site]) -> Table:

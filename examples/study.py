@@ -1,4 +1,4 @@
-"""How strong must a fence be? Its capacity against the debris on the road, in Python.
+"""How strong must a fence high on the slope be? Its capacity against the debris on the road.
 
 Run it: `python examples/study.py`. It prints one line a capacity, and where the objective is least.
 """
@@ -11,12 +11,12 @@ from envs import DesignProblem, Evaluation
 from rigdda import Fence
 
 
-def study(site: str = "quick", x: float = 11.3, releases: int = 16) -> dict[float, Evaluation]:
-    """Return the evaluation of a fence at x for each capacity [J/m], on the same releases."""
+def study(site: str = "quick", releases: int = 16) -> dict[float, Evaluation]:
+    """Return the evaluation of an upper fence for each capacity [J/m], on the same releases."""
     problem = DesignProblem(site)
-    zone = problem.site.barrier_zone
+    zone = problem.site.barrier_zone  # the fence stands where it starts
     return {
-        capacity: problem.evaluate([Fence(x, zone.max_height, capacity)], range(releases))
+        capacity: problem.evaluate([Fence(zone.start, zone.max_height, capacity)], range(releases))
         for capacity in np.geomspace(zone.min_capacity, zone.max_capacity, 5).tolist()
     }
 

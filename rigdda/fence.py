@@ -225,6 +225,8 @@ def wake_behind(
 ) -> None:
     """Wake what sleeps against a fence that failed in this step."""
     for k in range(count if gauges.fences > 0 else 0):
-        a, b = bodies[contacts[k].a], contacts[k].b
-        if b >= p.blocks and bodies[b].status == RETIRED and a.status == ASLEEP:
-            wake_island(bodies, a.island, p.blocks)
+        c = contacts[k]
+        if c.b < p.blocks or bodies[c.b].status != RETIRED:
+            continue
+        if bodies[c.a].status == ASLEEP:
+            wake_island(bodies, bodies[c.a].island, p.blocks)

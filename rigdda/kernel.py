@@ -63,7 +63,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 def inlined(function: Callable[..., Any]) -> Any:
     """Compile a kernel into all that call it: for what is called for every block or contact.
 
-    A call hands over every array of a named tuple in seven words or nine, 63 for `Matrix`, but a
+    A call hands over every array of a named tuple in seven words to eleven, 63 for `Matrix`, but a
     record in one. A step of one block took twice as long when calls were handed all of `Work`.
     """
     return numba.njit(forceinline=True, **INSIDE)(function)
@@ -101,18 +101,22 @@ class Direct:
 
     numba looks at the type of every array in every call, to choose among what it has compiled; for
     `step.advance` that takes ten times as long as the call itself. Here the first call chooses.
+
+    Attributes
+    ----------
+    call : callable
+        The kernel.
     """
 
     def __init__(self, entry: Any):
-        self._entry, self._chosen = entry, None
+        self._entry = entry
+        self.call: Callable[..., Any] = self._choose
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Call the kernel."""
-        if self._chosen is not None:
-            return self._chosen(*arguments)
+    def _choose(self, *arguments: Any) -> Any:
+        """Call the kernel for the first time, which compiles it."""
         result = self._entry(*arguments)
         for compiled in getattr(self._entry, "overloads", {}).values():  # none where JIT is off
-            self._chosen = compiled.entry_point
+            self.call = compiled.entry_point
         return result
 
 

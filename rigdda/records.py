@@ -306,8 +306,8 @@ class Scratch(NamedTuple):
 class Motion(NamedTuple):
     """Displacements of the blocks of one island in a step, by slot."""
 
-    d: Floats  # the same array as Matrix.d: by forces that are constant over the step
-    besides: Floats  # (N, 3) since forces act early or late in the step
+    d: Floats  # (N + 1, 3) Matrix.d itself: by forces that are constant over the step
+    besides: Floats  # (N, 3) since forces act early or late in the step; first the contact forces
     relaxed: Floats  # (N, 3) the same, as relaxation in substeps has found it
     share: Floats  # (N,) of the step that remains at the first impact on the block, 0 without one
 

@@ -325,7 +325,7 @@ class Simulation:
         stride = steps // max(len(frames), 1)
         while self._counters[STEPS] < target:
             a, before = self._arrays, time.thread_time() if timing else 0.0
-            reason, block, swapped = advance_directly(
+            reason, block, swapped = advance_directly.call(
                 a.bodies,
                 a.outlines,
                 a.ground,

@@ -13,7 +13,7 @@ from rigdda.records import Bodies, Body, Contact, Contacts, Islands, Matrix, Par
 
 @kernel
 def damping_of(body: Body, p: Parameters) -> float:
-    """Return the damping coefficient of block i in this step [1/s]."""
+    """Return the damping coefficient of a block in this step [1/s]."""
     if p.damping_in_contact_only and body.touching == 0:
         return 0.0
     return p.damping
@@ -21,7 +21,7 @@ def damping_of(body: Body, p: Parameters) -> float:
 
 @kernel
 def load_moment(body: Body) -> float:
-    """Return the moment of the dead loads of block i about its centroid [N m]."""
+    """Return the moment of the dead loads of a block about its centroid [N m]."""
     if body.moment_cos == 0.0 and body.moment_sin == 0.0:
         return 0.0
     theta = body.theta

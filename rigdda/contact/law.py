@@ -69,7 +69,7 @@ def carried_weight(mass_a: float, mass_b: float, p: Parameters) -> float:
 
 @kernel
 def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
-    """Return k_n [N/m] for the wanted penetration under the load that it carries.
+    """Return k_n [N/m] for the wanted penetration under the load that a contact carries.
 
     At least for `weight` [N]. It grows with the load unless that comes from pushing out
     penetration, which in a wedged block would go on for ever. It falls only when most of the load
@@ -144,9 +144,9 @@ def set_velocities_at_start(bodies: Bodies, c: Contact, dt: float) -> None:
     bx, by = point_velocity(bodies, c.b, c.x, c.y)
     opening = c.nx * (ax - bx) + c.ny * (ay - by)
     c.us = -c.ny * (ax - bx) + c.nx * (ay - by)
-    body = c.a if c.owner == 0 else c.b
-    face = bodies[body]
-    if body >= 0 and face.status == AWAKE:
+    i = c.a if c.owner == 0 else c.b
+    face = bodies[i]
+    if i >= 0 and face.status == AWAKE:
         opening -= face.omega * c.us * dt
     c.un = min(c.un, opening)
 

@@ -220,7 +220,7 @@ def add_corner(
 def collide_pair(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, p: Parameters
 ) -> int:  # fmt: skip
-    """Add the contacts of bodies a and b to `c` from entry k; returns the new number, or -1."""
+    """Add the contacts of bodies a and b from entry k on; returns the new number, or -1."""
     dt = p.dt
     one, two = bodies[a], bodies[b]
     dx, dy = -one.vx * dt, -one.vy * dt

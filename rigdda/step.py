@@ -365,19 +365,9 @@ def advance(
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         bad, excess = solve_and_move(
-            bodies,
-            outlines,
-            now,
-            count,
-            system,
-            work,
-            gauges,
-            time,
-            p,
-            level == 0,
-            counters,
+            bodies, outlines, now, count, system, work, gauges, time, p, level == 0, counters,
             ledger,
-        )
+        )  # fmt: skip
         yield_bolts(bodies, links)
         part += 1
         if bad < 0 and excess > 0.0:

@@ -11,7 +11,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.assembly.island import assemble_blocks, assemble_island
-from rigdda.assembly.springs import along, normal_row, shear_row
+from rigdda.assembly.springs import relative_displacement
 from rigdda.constants import (
     AUTO,
     BLOCK_PCG,
@@ -75,11 +75,7 @@ NONE, MOVED, LOCKED = 0, 1, 2
 @inlined
 def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[float, float, float]:
     """Return normal force, shear force if it stuck [N], and normal velocity after the step."""
-    dn = along(normal_row(c, True), d[i])
-    ds = along(shear_row(c, True), d[i])
-    if j >= 0:
-        dn += along(normal_row(c, False), d[j])
-        ds += along(shear_row(c, False), d[j])
+    dn, ds = relative_displacement(c, d, i, j)
     after = 2.0 * dn / dt - c.un
     normal = c.kappa * (c.bias - dt * after)
     shear = c.memory_shear - c.kappa * (2.0 * ds - dt * c.us)
@@ -299,11 +295,7 @@ def impact_work(contacts: Contacts, d: NDArray, islands: Islands, low: int, high
             continue
         i = islands.slot[c.a]
         j = islands.slot[c.b] if c.pair >= 0 else -1
-        dn = along(normal_row(c, True), d[i])
-        ds = along(shear_row(c, True), d[i])
-        if j >= 0:
-            dn += along(normal_row(c, False), d[j])
-            ds += along(shear_row(c, False), d[j])
+        dn, ds = relative_displacement(c, d, i, j)
         total += c.normal * dn + c.shear * ds + max(c.shear * ds, 0.0)
     return total
 

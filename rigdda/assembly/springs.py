@@ -50,3 +50,13 @@ def add_force(rhs: NDArray, force: float, e: tuple[float, float, float]) -> None
 def along(e: tuple[float, float, float], d: NDArray) -> float:
     """Return the displacement along e of a block that moves by d."""
     return e[0] * d[0] + e[1] * d[1] + e[2] * d[2]
+
+
+@kernel
+def relative_displacement(c: Contact, d: NDArray, i: int, j: int) -> tuple[float, float]:
+    """Return the normal and shear displacement of a contact of slots i and j (-1: at rest) [m]."""
+    dn, ds = along(normal_row(c, True), d[i]), along(shear_row(c, True), d[i])
+    if j >= 0:
+        dn += along(normal_row(c, False), d[j])
+        ds += along(shear_row(c, False), d[j])
+    return dn, ds

@@ -103,6 +103,10 @@ def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -
     assert max(map(len, words.splitlines()[:8])) <= 80
 
 
+def test_a_fence_is_told_with_its_failures(designed: tuple[Path, str]) -> None:
+    assert re.search(r"fence at .* kJ/m, fails in \d+ of \d+ releases", designed[1])
+
+
 def test_a_design_repeats_for_its_seed(designed: tuple[Path, str], tmp_path: Path) -> None:
     folder, words = designed
     again = run("design", "quick", *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)

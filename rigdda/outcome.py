@@ -78,8 +78,21 @@ class Outcome:
 
     Parameters
     ----------
+    event : str
+        Name of the event.
+    width : float
+        Its width along the road [m].
     released_mass : float
         Mass of all blocks that could move [kg per metre of width].
+    released_volume : float
+        Volume of all blocks that could move, their area times the width [m3].
+    road_volume : float
+        Of this, volume of the blocks whose centroid ever passed the uphill edge of the road [m3].
+    reached : bool
+        Whether any did.
+    reach : (low, high)
+        Chainages between which all blocks stayed, corners included [m]: barriers wholly outside
+        change nothing.
     debris_fraction : float
         Share of the released mass whose centroid ever passed the uphill edge of the road, in the
         air included: what the reward measures.
@@ -99,7 +112,13 @@ class Outcome:
         One for each barrier of the layout.
     """
 
+    event: str
+    width: float
     released_mass: float
+    released_volume: float
+    road_volume: float
+    reached: bool
+    reach: tuple[float, float]
     debris_fraction: float
     debris_on_road: float
     max_energy_on_road: float
@@ -121,8 +140,11 @@ def watch(site: Site) -> tuple[float, float]:
     return site.road.start, site.road.end
 
 
-def measure(site: Site, run: Run) -> Outcome:
-    """Return the outcome of a run that watched `stations` and `watch` of its site and layout."""
+def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
+    """Return the outcome of a run that watched `stations` and `watch` of its site and layout.
+
+    It is one of an event, so wide [m].
+    """
     scene = run.scene
     area, weight, mass = _masses(run)
     lines = stations(site, scene.barriers)
@@ -132,14 +154,21 @@ def measure(site: Site, run: Run) -> Outcome:
     road = (x >= site.road.start) & ~beyond
     reach = [_reach(run, i, x, y) for i in range(len(scene.barriers))]
     held = np.any([np.zeros(len(x), dtype=bool), *reach], axis=0) & ~road & ~beyond
+    came = np.isfinite(passed[site.road.start])
     resting = np.hypot(*run.velocities[-1, :, :2].T) < AT_REST
 
     def share(where: NDArray[np.bool_]) -> float:
         return float(weight[where].sum() / GRAIN)
 
     return Outcome(
+        event=event,
+        width=width,
         released_mass=mass,
-        debris_fraction=share(np.isfinite(passed[site.road.start])),
+        released_volume=width * float(area[weight > 0.0].sum()),
+        road_volume=width * float(area[came].sum()),
+        reached=bool(came.any()),
+        reach=_extent(run),
+        debris_fraction=share(came),
         debris_on_road=float(area[road].sum()),
         max_energy_on_road=float(run.watch_energy.max()),
         run_out=_run_out(x, weight),
@@ -162,6 +191,16 @@ def _masses(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     weight = np.floor(mass / mass.sum() * GRAIN)
     weight[np.argmax(weight)] += GRAIN - weight.sum()
     return area, weight, math.fsum(mass)
+
+
+def _extent(run: Run) -> tuple[float, float]:
+    """Return the least and the greatest chainage that blocks came to in the frames of a run [m]."""
+    size = [
+        np.hypot(*(b.vertices - polygon_properties(b.vertices)[1]).T).max()
+        for b in run.scene.blocks
+    ]
+    x = run.poses[:, :, 0]
+    return float((x - size).min()), float((x + size).max())
 
 
 def _run_out(x: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float, float, float]:

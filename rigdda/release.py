@@ -16,9 +16,13 @@ EVERY = 0.05
 
 
 def release(
-    site: Site, layout: Sequence[Barrier] = (), seed: int = 0, progress: bool = False
+    site: Site,
+    layout: Sequence[Barrier] = (),
+    seed: int = 0,
+    event: str | None = None,
+    progress: bool = False,
 ) -> tuple[Run, Outcome]:
-    """Simulate one release of the source with a layout in place.
+    """Simulate one release of an event, or of one that the seed draws by rate, with a layout.
 
     Returns
     -------
@@ -30,32 +34,31 @@ def release(
     Raises
     ------
     BadInput
-        If the layout does not stand on the slope or the seed is unsound.
+        If the layout does not stand on the slope, there is no such event or the seed is unsound.
     Diverged
         If the simulation diverges.
     """
-    run = _simulate(site, layout, seed, EVERY, progress)
-    return run, measure(site, run)
+    drawn = site.draw(seed, event)
+    scene = site.scene(drawn, site.built(layout, drawn.width))
+    lines = stations(site, scene.barriers)  # not of `layout`, which may be walked through once only
+    simulation = Simulation(scene, site.settings(), lines, watch(site))
+    run = simulation.run(site.motion.duration, EVERY, progress)
+    return run, measure(site, run, drawn.event, drawn.width)
 
 
-def release_outcome(site: Site, layout: Sequence[Barrier] = (), seed: int = 0) -> Outcome:
-    """Return the outcome that `release` gives, in less time: frames on the way are not kept."""
-    return measure(site, _simulate(site, layout, seed, site.motion.duration))
+def release_outcome(
+    site: Site, layout: Sequence[Barrier] = (), seed: int = 0, event: str | None = None
+) -> Outcome:
+    """Return the outcome that `release` gives."""
+    return release(site, layout, seed, event)[1]
 
 
-def release_many(jobs: Sequence[tuple[Site, Sequence[Barrier], int]]) -> list[Outcome]:
-    """Return the outcomes of many releases (site, layout, seed), over all cores in threads.
+def release_many(
+    jobs: Sequence[tuple[Site, Sequence[Barrier], int, str | None]],
+) -> list[Outcome]:
+    """Return the outcomes of many releases (site, layout, seed, event), over all cores in threads.
 
     Each outcome is the one that `release` gives. Raises as `release` does.
     """
     with ThreadPoolExecutor() as pool:
         return list(pool.map(lambda job: release_outcome(*job), jobs))
-
-
-def _simulate(
-    site: Site, layout: Sequence[Barrier], seed: int, every: float, progress: bool = False
-) -> Run:
-    scene = site.realise(layout, seed)
-    lines = stations(site, scene.barriers)  # not of `layout`, which may be walked through once only
-    simulation = Simulation(scene, site.settings(), lines, watch(site))
-    return simulation.run(site.motion.duration, every, progress)

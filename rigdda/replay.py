@@ -25,12 +25,13 @@ import shapely
 from numpy.typing import NDArray
 
 from rigdda import check
-from rigdda.barriers import Ditch, Embankment, GravityWall, describe
+from rigdda.barriers import Ditch, GravityWall, describe
 from rigdda.errors import BadInput, Error
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
 from rigdda.run import CROSSING, Run
 from rigdda.scene import Scene
+from rigdda.states import STANDS, states
 
 Floats = NDArray[np.float64]
 Colour = tuple[int, int, int]
@@ -46,7 +47,8 @@ CAMERA = 1000.0
 """Distance of the camera [m]: one pixel is one metre, and a layer shifts a point by 1e-5."""
 LAYER = {"terrain": 0.0, "barriers": 0.02, "road": 0.04, "blocks": 0.06}
 LABEL = 0.05
-"""Height of a label above the top of its barrier, as a share of the view; every third is as high."""
+"""Height of a label above the top of its barrier, as a share of the view; every third is as
+high."""
 EDGE = 0.01
 """z of a layer, and of an outline above its fill [m]."""
 
@@ -264,7 +266,7 @@ def _log_state(
     left, bottom, right, high = _frame(run.scene)
     lift = LABEL * max(right - left, high - bottom) * (1 + i % 3)
     place = (x, top + lift, LAYER["blocks"] + EDGE)
-    colours = [BARRIER if state == "stands" else FAILED for _, state in changes]
+    colours = [BARRIER if state == STANDS else FAILED for _, state in changes]
     rec.send_columns(
         entity,
         clock([time for time, _ in changes]),
@@ -276,24 +278,6 @@ def _log_state(
             show_labels=[True] * len(changes),
         ),
     )
-
-
-def states(run: Run, i: int) -> list[tuple[float, str]]:
-    """Return the states of barrier `i`, each with the time from which it is in it [s].
-
-    A fence fails, an embankment is pushed, a gravity wall slides or is overturned.
-    """
-    found, barrier = [(float(run.times[0]), "stands")], run.scene.barriers[i]
-    if isinstance(barrier, GravityWall):
-        for frame, time in enumerate(run.times):
-            state = wall_state(run, i, frame)
-            if state not in (found[-1][1], "stands"):
-                found.append((float(time), state))
-        return found
-    failure = run.failure(i)
-    if math.isfinite(failure):
-        found.append((failure, "pushed" if isinstance(barrier, Embankment) else "failed"))
-    return found
 
 
 def _log_motion(

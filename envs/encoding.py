@@ -1,18 +1,23 @@
 """Vectors in [-1, 1] that stand for layouts.
 
-One slot a barrier: station across the zone, height, size, and one score for each kind if there are
-several; the largest wins, the first of equals. Every vector stands for a layout, so that an
-optimiser needs no constraints.
+One slot a barrier: presence (above 0: there is one), station across the zone, height, size, and one
+score for each kind if there are several; the largest wins, the first of equals. Every vector stands
+for a layout that may be built, so that an optimiser needs no constraints. A barrier that may not
+stand where its slot says moves to the nearest place where it may, and is absent if there is none;
+those of earlier slots stay where they are.
 
 ============  ===================================  =============================================
 kind          height                               size
 ============  ===================================  =============================================
-wall          height, 0 to the greatest            thickness, least to greatest
-gravity_wall  height, 0 to the greatest            thickness, least to greatest
-fence         height, 0 to the greatest            capacity, least to greatest, logarithmic
-ditch         depth, 0 to the greatest             width, least to greatest
-embankment    height, 0 to the greatest            width of the crest, in the range of thickness
+fence         height, up to that of its class      energy class, equal parts of the range
+ditch         depth, up to what its sides allow    width, least to greatest
+embankment    height                               width of the crest, in the range of thickness
+gravity_wall  height                               thickness, least to greatest
+wall          height                               thickness, least to greatest
+mesh          not used, nor is the station         option of the site, equal parts of the range
 ============  ===================================  =============================================
+
+Heights and depths run from 0.5 m to the greatest of the zone.
 """
 
 from __future__ import annotations
@@ -20,48 +25,38 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import isotonic_regression
 
-from rigdda import BadInput, Barrier, Layout, check
-from rigdda.barriers import KINDS, as_layout
-from rigdda.site import BarrierZone
+from envs.building import MIN_HEIGHT, TOLERANCE, Room, Span, room
+from rigdda import BadInput, Barrier, Fence, Layout, Mesh
+from rigdda.barriers import FENCE_CLASSES, KINDS
+from rigdda.place import BarrierZone
 
 Floats = NDArray[np.float64]
 
-NUMBERS = 3
+NUMBERS = 4
 """Numbers in a slot, without scores."""
 
-MIN_HEIGHT = 0.5
-"""A lower barrier, or a shallower ditch, is absent [m]."""
-
-MIN_GAP = 2.0
-"""Least distance between a barrier's downhill end and the next one's uphill face [m]."""
-
-TOLERANCE = 1e-9
-"""Rounding that is forgiven at the limits of the zone, so that decoding undoes encoding: share of
-the limit, and of 1 [m or J]."""
+CLASSES = tuple(FENCE_CLASSES)
+"""Energy classes of fences, ascending [kJ]."""
 
 
 class Decision(NamedTuple):
-    """Which parameters of a kind are decided, and the fields of the zone that limit them."""
+    """Which lengths of a kind are decided, and the fields of the zone that limit them."""
 
     height: str
     max_height: str
     size: str
     min_size: str
     max_size: str
-    logarithmic: bool = False
 
 
 DECISIONS = {
-    "wall": Decision("height", "max_height", "thickness", "min_thickness", "max_thickness"),
-    "gravity_wall": Decision("height", "max_height", "thickness", "min_thickness", "max_thickness"),
-    "fence": Decision("height", "max_height", "capacity", "min_capacity", "max_capacity", True),
     "ditch": Decision("depth", "max_depth", "width", "min_width", "max_width"),
     "embankment": Decision("height", "max_height", "width", "min_thickness", "max_thickness"),
+    "gravity_wall": Decision("height", "max_height", "thickness", "min_thickness", "max_thickness"),
+    "wall": Decision("height", "max_height", "thickness", "min_thickness", "max_thickness"),
 }
 
 
@@ -90,154 +85,137 @@ def vector(field: str, value: ArrayLike, size: int) -> Floats:
     return np.clip(array, -1.0, 1.0)
 
 
-def decode(zone: BarrierZone, values: Floats, kinds: Sequence[str] = ("wall",)) -> Layout:
+def decode(place: Room, values: Floats, kinds: Sequence[str]) -> Layout:
     """Return the layout that a vector stands for, sorted downhill.
 
     Parameters
     ----------
-    zone : BarrierZone
-        Where barriers may stand; at least as long as the longest of them.
+    place : Room
+        Where what may be built.
     values : (slot_size n,) array
-        n slots in [-1, 1]. Station: the barrier's uphill face, from the zone's start to where it
-        still stands inside the zone. Height and size: see the module; below `MIN_HEIGHT` the
-        barrier is absent.
+        n slots in [-1, 1], see the module.
     kinds : sequence of str
         Kinds to choose from, in the order of their scores.
 
     Returns
     -------
     tuple of Barrier
-        At most n, `MIN_GAP` apart, whatever the order of the slots.
+        At most n, each of which may be built where it stands.
     """
-    slots = values.reshape(-1, slot_size(kinds))
-    found = []
-    for slot in slots:
+    built: list[Barrier] = []
+    taken: list[Span] = []
+    for slot in values.reshape(-1, slot_size(kinds)):
+        if slot[0] <= 0.0:
+            continue
         kind = kinds[int(np.argmax(slot[NUMBERS:]))] if len(kinds) > 1 else kinds[0]
-        station, height, size = (0.5 * (slot[:NUMBERS] + 1.0)).tolist()
-        barrier = _make(zone, kind, station, height, size)
-        if barrier is not None:
-            found.append(barrier)
-    return _spread(zone, found)
+        station, height, size = (0.5 * (slot[1:NUMBERS] + 1.0)).tolist()
+        if kind == "mesh":
+            if not any(isinstance(barrier, Mesh) for barrier in built):
+                built.append(place.mesh(_part(size, len(place.site.meshes))))
+            continue
+        found = place.nearest(make(place.zone, kind, station, height, size), taken)
+        if found is not None:
+            built.append(found[0])
+            taken.append(found[1])
+    return tuple(sorted(built, key=lambda barrier: barrier.x))
 
 
-def _make(
-    zone: BarrierZone, kind: str, station: float, height: float, size: float
-) -> Barrier | None:
-    """Return the barrier of three shares from 0 to 1, None if it is absent."""
+def make(zone: BarrierZone, kind: str, station: float, height: float, size: float) -> Barrier:
+    """Return the barrier of three shares from 0 to 1, wherever that is; no mesh."""
+    x = zone.start + station * (zone.end - zone.start)
+    if kind == "fence":
+        energy_class = CLASSES[_part(size, len(CLASSES))]
+        tall = _between(MIN_HEIGHT, _tallest(zone), height)
+        return Fence(x, min(tall, FENCE_CLASSES[energy_class].height), energy_class=energy_class)
     decision = DECISIONS[kind]
-    tall = height * getattr(zone, decision.max_height)
-    if tall < MIN_HEIGHT - TOLERANCE:
-        return None
-    low, high = getattr(zone, decision.min_size), getattr(zone, decision.max_size)
-    large = low * (high / low) ** size if decision.logarithmic else low + size * (high - low)
-    values = {decision.height: max(tall, MIN_HEIGHT), decision.size: large}
-    barrier = KINDS[kind](x=zone.start, **values)
-    x = zone.start + station * (zone.end - barrier.extent - zone.start)
-    return msgspec.structs.replace(barrier, x=x)
+    tall = _between(MIN_HEIGHT, getattr(zone, decision.max_height), height)
+    large = _between(getattr(zone, decision.min_size), getattr(zone, decision.max_size), size)
+    return KINDS[kind](**{"x": x, decision.height: tall, decision.size: large})
 
 
-def encode(
-    zone: BarrierZone, layout: Sequence[Barrier], slots: int, kinds: Sequence[str] = ("wall",)
-) -> Floats:
+def encode(place: Room, layout: Layout, slots: int, kinds: Sequence[str]) -> Floats:
     """Return a vector that `decode` turns into `layout`, empty slots last.
+
+    Parameters
+    ----------
+    place : Room
+        Where what may be built.
+    layout : tuple of Barrier
+        Barriers that may be built, of these kinds, at most `slots`.
 
     Raises
     ------
     BadInput
-        If the layout is not one that `decode` can give.
+        If a number that is not decided is not the usual one, or one is too small.
     """
-    barriers = sorted(check_layout(zone, layout), key=lambda barrier: barrier.x)
-    if len(barriers) > slots:
-        raise BadInput("layout", f"{len(barriers)} barriers", f"give at most {slots}")
-    out = np.tile([0.0, -1.0, 0.0] + [0.0] * (slot_size(kinds) - NUMBERS), (slots, 1))
-    for i, barrier in enumerate(barriers):
-        decision = DECISIONS[check.one_of(f"layout[{i}].kind", barrier.kind, kinds)]
-        tall, size = getattr(barrier, decision.height), getattr(barrier, decision.size)
-        check.number(f"layout[{i}].{decision.height}", tall, MIN_HEIGHT - TOLERANCE)
-        _check_rest(i, barrier, decision)
-        before = barriers[i - 1]
-        if i and barrier.x - before.x - before.extent < MIN_GAP - TOLERANCE:
-            mend = f"put it {MIN_GAP:g} m downhill of the barrier before it"
-            raise BadInput(f"layout[{i}].x", barrier.x, mend)
-        low, high = getattr(zone, decision.min_size), getattr(zone, decision.max_size)
-        if decision.logarithmic:
-            size, low, high = np.log(size), np.log(low), np.log(high)
-        shares = (
-            _share(barrier.x, zone.start, zone.end - barrier.extent),
-            tall / getattr(zone, decision.max_height),
-            _share(size, low, high),
-        )
-        out[i, :NUMBERS] = 2.0 * np.array(shares) - 1.0
+    out = np.full((slots, slot_size(kinds)), -1.0)
+    for i, barrier in enumerate(layout):
+        out[i, 0] = 1.0
+        out[i, 1:NUMBERS] = _numbers(place, i, barrier)
         if len(kinds) > 1:
-            out[i, NUMBERS:] = [1.0 if kind == barrier.kind else -1.0 for kind in kinds]
+            out[i, NUMBERS + list(kinds).index(barrier.kind)] = 1.0
     return np.clip(out.ravel(), -1.0, 1.0)
 
 
-def _check_rest(i: int, barrier: Barrier, decision: Decision) -> None:
-    """Check that what is not decided has its default."""
-    defaults = barrier.__struct_defaults__  # of the last fields
-    for name, default in zip(barrier.__struct_fields__[-len(defaults) :], defaults, strict=True):
-        if name in ("x", decision.height, decision.size):
+def _numbers(place: Room, i: int, barrier: Barrier) -> list[float]:
+    """Return station, height and size of a barrier, -1 to 1."""
+    zone = place.zone
+    if isinstance(barrier, Mesh):
+        names = [option.name for option in place.site.meshes]
+        usual: Barrier = place.mesh(names.index(barrier.option))
+        shares = (0.5, 0.0, _middle(names.index(barrier.option), len(names)))
+    else:
+        if isinstance(barrier, Fence):
+            assert barrier.energy_class is not None  # checked
+            number = CLASSES.index(barrier.energy_class)
+            tall, limit, size = barrier.height, _tallest(zone), _middle(number, len(CLASSES))
+        else:
+            decision = DECISIONS[barrier.kind]
+            tall, limit = getattr(barrier, decision.height), getattr(zone, decision.max_height)
+            low, high = getattr(zone, decision.min_size), getattr(zone, decision.max_size)
+            size = _share(getattr(barrier, decision.size), low, high)
+        shares = (_share(barrier.x, zone.start, zone.end), _share(tall, MIN_HEIGHT, limit), size)
+        if tall < MIN_HEIGHT - TOLERANCE:
+            mend = f"give a number of at least {MIN_HEIGHT:g}"
+            raise BadInput(f"layout[{i}].height", tall, mend)
+        clipped = np.clip(shares, 0.0, 1.0).tolist()
+        usual = place.put(make(zone, barrier.kind, *clipped), barrier.x) or barrier
+    _check_usual(f"layout[{i}]", barrier, usual)
+    return [2.0 * share - 1.0 for share in shares]
+
+
+def _check_usual(where: str, barrier: Barrier, usual: Barrier) -> None:
+    """Check that a barrier is the one that its numbers stand for."""
+    for name in barrier.__struct_fields__:
+        value, decided = getattr(barrier, name), getattr(usual, name)
+        if value == decided:
             continue
-        value = getattr(barrier, name)
-        if value != default:
-            raise BadInput(f"layout[{i}].{name}", value, f"leave it at {default:g}")
+        if isinstance(value, float) and isinstance(decided, float):
+            if abs(value - decided) <= 1e-6 * max(1.0, abs(decided)):
+                continue
+        raise BadInput(f"{where}.{name}", value, f"give {decided!r}: no vector stands for another")
 
 
-def check_layout(zone: BarrierZone, layout: Sequence[Barrier]) -> Layout:
-    """Return `layout` as a tuple if each barrier is inside the zone and its limits.
-
-    Raises
-    ------
-    BadInput
-        If one is not.
-    """
-    barriers = as_layout(layout)
-    for i, barrier in enumerate(barriers):
-        decision = DECISIONS[barrier.kind]
-        limits = {
-            "x": (zone.start, zone.end - barrier.extent),
-            decision.height: (0.0, getattr(zone, decision.max_height)),
-            decision.size: (getattr(zone, decision.min_size), getattr(zone, decision.max_size)),
-        }
-        for name, (low, high) in limits.items():
-            low, high = low - TOLERANCE * max(1.0, low), high + TOLERANCE * max(1.0, high)
-            check.number(f"layout[{i}].{name}", getattr(barrier, name), low, high)
-    return barriers
+def _tallest(zone: BarrierZone) -> float:
+    """Return the greatest height of a fence [m]."""
+    return min(zone.max_height, max(row.height for row in FENCE_CLASSES.values()))
 
 
-def longest(zone: BarrierZone, kinds: Sequence[str]) -> float:
-    """Return the greatest length along the slope of a barrier that a vector may stand for [m]."""
-    largest = [_make(zone, kind, 0.0, 1.0, 1.0) for kind in kinds]
-    return max(barrier.extent for barrier in largest if barrier is not None)
+def _between(low: float, high: float, share: float) -> float:
+    return low + share * (high - low)
 
 
 def _share(value: float, low: float, high: float) -> float:
     return (value - low) / (high - low) if high > low else 0.5
 
 
-def _spread(zone: BarrierZone, barriers: Sequence[Barrier]) -> Layout:
-    """Return barriers sorted by x and at least `MIN_GAP` apart.
-
-    The lowest are dropped until the rest fits into the zone; the rest moves as little as possible,
-    uphill and downhill alike (least squares, so continuous in x).
-    """
-    length = zone.end - zone.start
-    rest = sorted(barriers, key=lambda b: (b.x, _height(b), b.extent, b.kind))
-    while sum(b.extent for b in rest) + MIN_GAP * (len(rest) - 1) > length + TOLERANCE:
-        rest.remove(min(rest, key=_height))
-    if not rest:
-        return ()
-    taken = np.cumsum([b.extent + MIN_GAP for b in rest])
-    before = np.concatenate([[0.0], taken[:-1]])
-    free = np.array([b.x for b in rest]) - before  # barriers and gaps taken out: must not fall
-    if (np.diff(free) < 0.0).any():
-        last = zone.end - (taken[-1] - MIN_GAP)
-        x = before + np.clip(isotonic_regression(free).x, zone.start, last)
-        rest = [msgspec.structs.replace(b, x=at) for b, at in zip(rest, x.tolist(), strict=True)]
-    return tuple(rest)
+def _part(share: float, parts: int) -> int:
+    """Return in which of some equal parts of 0 to 1 a share is."""
+    return min(int(share * parts), parts - 1)
 
 
-def _height(barrier: Barrier) -> float:
-    """Return the height of a barrier, or the depth of a ditch [m]."""
-    return float(getattr(barrier, DECISIONS[barrier.kind].height))
+def _middle(part: int, parts: int) -> float:
+    return (part + 0.5) / parts
+
+
+__all__ = ["CLASSES", "NUMBERS", "decode", "encode", "make", "room", "slot_size", "vector"]

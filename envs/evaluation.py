@@ -1,20 +1,13 @@
-"""What a layout is worth on some releases, with intervals."""
+"""What a layout is worth on some releases: its cost a year and the parts of it, with intervals."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.special import stdtrit
 
-from rigdda import Layout, Outcome
-
-Interval = tuple[float, float]
-
-CONFIDENCE = 0.95
-"""Probability of every interval."""
+from envs.intervals import Estimate, Interval
+from rigdda import BadInput, Layout, Outcome
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,40 +19,73 @@ class Evaluation:
     layout : tuple of Barrier
         The barriers.
     seeds : tuple of int
-        Seed of each release.
-    objective, debris : float
-        Means over the releases of the objective and of the debris fraction [-].
-    ci, debris_ci : (float, float)
-        Their 95 % intervals by Student's t; for one release (-inf, inf) and (0, 1). That of the
-        debris fraction is cut to [0, 1]. Equal outcomes give an interval without width.
+        Seed of each release, in the order of `outcomes`; empty where they are not kept.
+    objective, ci : float, (float, float)
+        Z and its 95 % interval [EUR per metre of road and year].
+    capital, harm, repair : float
+        The parts of Z: what the barriers cost a year, what rock on the road costs, what mending and
+        emptying the barriers costs.
+    harm_ci, repair_ci : (float, float)
+        Their 95 % intervals.
     cost : float
-        Price of the layout, without the charge above the limit.
+        Price of the layout [EUR per metre of road].
+    debris, debris_ci : float, (float, float)
+        Expected volume that comes onto the road [m3 per metre of road and year].
+    debris_share : float
+        The same over what comes onto it without barriers [-]; 0 where nothing does.
+    reach, failure : dict of str to Estimate
+        For each event the probability that a block comes onto the road, and that a barrier fails.
+    by_event : dict of str to float
+        What each event adds to Z, harm and repair [EUR per metre of road and year].
+    targets : {"met", "missed", "undecided"} or None
+        Whether the layout meets what is asked of it; None if nothing is.
     outcomes : tuple of Outcome
-        One for each seed.
+        One for each release; empty where they are not kept.
+    releases, simulated : int
+        Releases that it rests on, and how many of these were simulated for it; what the others
+        give was known.
+    seconds : float
+        Processor time of the simulations [s].
     """
 
     layout: Layout
     seeds: tuple[int, ...]
     objective: float
-    debris: float
     ci: Interval
-    debris_ci: Interval
+    capital: float
+    harm: float
+    harm_ci: Interval
+    repair: float
+    repair_ci: Interval
     cost: float
+    debris: float
+    debris_ci: Interval
+    debris_share: float
+    reach: dict[str, Estimate]
+    failure: dict[str, Estimate]
+    by_event: dict[str, float]
+    targets: str | None
     outcomes: tuple[Outcome, ...]
+    releases: int
+    simulated: int = 0
+    seconds: float = 0.0
 
     @property
-    def typical(self) -> int:
-        """Seed of the release whose debris fraction is nearest the mean, the first of equals."""
-        fractions = np.array([outcome.debris_fraction for outcome in self.outcomes])
-        return self.seeds[int(np.argmin(np.abs(fractions - self.debris)))]
+    def typical(self) -> tuple[int, str]:
+        """Seed and event of a release that stands for the others.
 
+        Of the event that adds most to Z the one that brings nearly the event's mean volume onto the
+        road, the first of equals.
 
-def student_interval(values: ArrayLike) -> Interval:
-    """Return the 95 % interval of the mean of independent values; one alone tells nothing."""
-    sample = np.asarray(values, dtype=np.float64)
-    if len(sample) < 2:
-        return -math.inf, math.inf
-    quantile = float(stdtrit(len(sample) - 1, 0.5 * (1.0 + CONFIDENCE)))
-    half = quantile * float(sample.std(ddof=1)) / math.sqrt(len(sample))
-    mean = float(sample.mean())
-    return mean - half, mean + half
+        Raises
+        ------
+        BadInput
+            If the evaluation was made without its seeds, or its outcomes are not kept.
+        """
+        if not self.outcomes or len(self.seeds) != len(self.outcomes):
+            raise BadInput("seeds", self.seeds, "evaluate with the seeds of the releases")
+        seen = {outcome.event for outcome in self.outcomes}
+        event = max(seen, key=lambda name: (self.by_event[name], name))
+        own = [i for i, outcome in enumerate(self.outcomes) if outcome.event == event]
+        volume = np.array([self.outcomes[i].road_volume for i in own])
+        return self.seeds[own[int(np.argmin(np.abs(volume - volume.mean())))]], event

@@ -19,9 +19,9 @@ FAST_DT = 1.25e-2
 def at(site: Site, fidelity: str) -> Site:
     """Return the site to simulate.
 
-    "full": as it is; "fast": with fewer, larger blocks and a longer step. Blocks that a site
-    gives one by one stay as they are. The bias and the gain are measured by `rigdda calibrate` and
-    told in docs/fidelity.md.
+    "full": as it is; "fast": with fewer, larger blocks of jointed masses and a longer step. Other
+    blocks stay as they are. The bias and the gain are measured by `rigdda fidelity` and told in
+    docs/fidelity.md.
 
     Raises
     ------
@@ -30,7 +30,9 @@ def at(site: Site, fidelity: str) -> Site:
     """
     if check.one_of("fidelity", fidelity, FIDELITIES) == "full":
         return site
-    replace, source, motion = msgspec.structs.replace, site.source, site.motion
-    if not source.blocks:
-        source = replace(source, block_area=COARSER * source.block_area)
-    return replace(site, source=source, motion=replace(motion, dt=max(motion.dt, FAST_DT)))
+    replace, motion = msgspec.structs.replace, site.motion
+    sources = tuple(
+        replace(s, block_area=min(COARSER * s.block_area, s.area)) if s.polygon else s
+        for s in site.sources
+    )
+    return replace(site, sources=sources, motion=replace(motion, dt=max(motion.dt, FAST_DT)))

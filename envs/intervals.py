@@ -205,13 +205,13 @@ def quantile(freedom: int) -> float:
 
 
 def total(parts: Iterable[Mean]) -> Mean:
-    """Return the sum of independent means, by the distances of their ends (Zou and Donner)."""
+    """Return the sum of independent means of costs, by the distances of their ends."""
     value = below = above = 0.0
     for part in parts:
         value += part.value
         below += (part.value - part.low) ** 2
         above += (part.high - part.value) ** 2
-    return Mean(value, value - math.sqrt(below), value + math.sqrt(above))
+    return Mean(value, max(value - math.sqrt(below), 0.0), value + math.sqrt(above))
 
 
 def pair(one: Mean, two: Mean, correlation: float) -> Mean:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import OrderedDict
 from collections.abc import Hashable, Iterable, Mapping
 from threading import Lock
@@ -16,8 +17,8 @@ Value = TypeVar("Value")
 
 
 def fingerprint(site: Site) -> bytes:
-    """Return a key for a site: the whole of it as JSON, in which numbers survive exactly."""
-    return msgspec.json.encode(site)
+    """Return a key for a site: a hash of the whole of it as JSON, in which numbers are exact."""
+    return hashlib.sha256(msgspec.json.encode(site)).digest()[:16]
 
 
 class Memory(Generic[Key, Value]):

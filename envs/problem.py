@@ -3,95 +3,109 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from envs import baseline, encoding
-from envs.evaluation import Evaluation, student_interval
-from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
+from envs import encoding, ensemble, estimator, fidelity, plan, reuse
+from envs.building import Room, check_gaps, room
+from envs.evaluation import Evaluation
+from envs.memory import fingerprint
+from envs.reuse import Sample
+from envs.targets import Targets
+from rigdda import BadInput, Barrier, Layout, Mesh, Outcome, Site, check
 from rigdda.barriers import KINDS as ALL_KINDS
-from rigdda.barriers import Earthwork
+from rigdda.barriers import as_layout
+from rigdda.place import BarrierZone
 
 Floats = NDArray[np.float64]
+Ask = tuple[Layout, Mapping[str, Sequence[int]]]
 
-KINDS = ("fence",)
-"""Kinds of barrier that are designed if none are named: fences, whose capacity is a decision. What
-nothing can break, a wall, makes sizes trivial."""
-
-OVERRUN = 10.0
-"""How many times the cost above the limit is charged. Soft, so that a search sees a way back."""
+KINDS = ("fence", "ditch", "embankment", "gravity_wall")
+"""Kinds of barrier that are designed if none are named, and mesh where a site has options. Not the
+rigid wall, which nothing moves: it is for experiments."""
 
 MOST_BARRIERS = 100
 """Most slots of a layout; a site has room for a few."""
 
-LEAST, MOST = 1e-12, 1e12
-"""Bounds of prices, weights and the limit: between them no objective, nor its square, overflows."""
-
 
 @dataclass(frozen=True, slots=True, init=False)
 class DesignProblem:
-    """Where to put which barriers on a site.
+    """Which barriers to put where on a site, so that a year costs least.
 
-    objective = risk_weight * debris fraction + cost_weight * charged cost / cost_limit, to be
-    made small. The cost is charged tenfold above the limit.
+    Z [EUR per metre of road and year] = what the barriers cost a year + expected harm on the road +
+    expected repair, see `envs.estimator`.
 
     Parameters
     ----------
     site : str, path or Site
-        Name of a built-in site, a TOML file or the site itself.
+        Name of a built-in or generated site, a TOML file or the site itself.
     max_barriers : int
         Slots for barriers; each may be empty.
-    kinds : sequence of str
-        Kinds of barrier to choose from: "wall", "gravity_wall", "fence", "ditch", "embankment".
-    risk_weight, cost_weight : float
-        Weights in the objective [-].
-    cost_limit : float, optional
-        Budget in the units of the site's costs; None: the site's own.
+    kinds : sequence of str, optional
+        Kinds of barrier to choose from: "fence", "ditch", "embankment", "gravity_wall", "mesh",
+        "wall"; None: all but the last, mesh where the site has options.
+    targets : Targets, optional
+        What is asked of the design events beside a low cost.
+    fidelity : {"full", "fast"}
+        At "fast" a cheaper site stands for it, see `envs.fidelity`.
+    zone : (start, end), optional
+        Chainages between which barriers may stand [m], inside the site's own zone.
+
+    Attributes
+    ----------
+    site : Site
+        The site as it is simulated.
+    zone : BarrierZone
+        Where barriers may stand.
 
     Raises
     ------
     BadInput
-        If there is no such site, a number is outside its range or the zone is too short.
+        If there is no such site, or an argument is outside its range.
     """
 
     site: Site
     max_barriers: int
     kinds: tuple[str, ...]
-    risk_weight: float
-    cost_weight: float
-    cost_limit: float
+    targets: Targets
+    fidelity: str
+    zone: BarrierZone
+    place: Room = field(compare=False, repr=False)
+    key: bytes = field(compare=False, repr=False)
 
     def __init__(
         self,
         site: str | os.PathLike[str] | Site,
         max_barriers: int = 3,
-        kinds: Sequence[str] = KINDS,
-        risk_weight: float = 1.0,
-        cost_weight: float = 0.2,
-        cost_limit: float | None = None,
+        kinds: Sequence[str] | None = None,
+        targets: Targets | None = None,
+        fidelity: str = "full",
+        zone: tuple[float, float] | None = None,
     ):
-        where, names = _site(site), _kinds(kinds)
-        _room(where, names)
-        limit = where.costs.limit if cost_limit is None else cost_limit
+        where = _site(site, fidelity)
+        limits = _zone(where, zone)
         values = {
             "site": where,
             "max_barriers": check.integer("max_barriers", max_barriers, 1, MOST_BARRIERS),
-            "kinds": names,
-            "risk_weight": check.number("risk_weight", risk_weight, 0.0, MOST),
-            "cost_weight": check.number("cost_weight", cost_weight, 0.0, MOST),
-            "cost_limit": check.number("cost_limit", limit, LEAST, MOST, open_low=True),
+            "kinds": _kinds(where, kinds),
+            "targets": _targets(where, targets),
+            "fidelity": fidelity,
+            "zone": limits,
+            "place": Room(where, limits),
+            "key": fingerprint(where),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     @property
     def size(self) -> int:
-        """Numbers in a vector: 3 max_barriers, and a score for each kind if there are several."""
+        """Numbers in a vector: 4 a slot, and a score for each kind if there are several."""
         return encoding.slot_size(self.kinds) * self.max_barriers
 
     @property
@@ -100,10 +114,9 @@ class DesignProblem:
         return np.full(self.size, -1.0), np.full(self.size, 1.0)
 
     def decode(self, vector: ArrayLike) -> Layout:
-        """Return the layout that a (size,) vector stands for, see `encoding.decode`.
+        """Return the layout that a (size,) vector stands for, see `envs.encoding`.
 
-        Every vector has one: entries beyond [-1, 1] are clipped; ditches and embankments that do
-        not fit the slope, or reach beyond the zone, are absent.
+        Every vector has one, that may be built; entries beyond [-1, 1] are clipped.
 
         Raises
         ------
@@ -111,22 +124,7 @@ class DesignProblem:
             If the shape is wrong or an entry is not a number.
         """
         values = encoding.vector("vector", vector, self.size)
-        return self._fitting(encoding.decode(self.site.barrier_zone, values, self.kinds))
-
-    def _fitting(self, layout: Layout) -> Layout:
-        """Return the barriers of a layout that fit the slope, sorted downhill."""
-        ground, kept = self.site.profile, []
-        for barrier in layout:
-            if isinstance(barrier, Earthwork):
-                try:
-                    moved, changed = barrier.build(ground, self.site.slope.surface)
-                except BadInput:
-                    continue
-                if moved[:, 0].max() > self.site.barrier_zone.end + encoding.TOLERANCE:
-                    continue
-                ground = changed
-            kept.append(barrier)
-        return tuple(kept)
+        return encoding.decode(self.place, values, self.kinds)
 
     def encode(self, layout: Sequence[Barrier]) -> Floats:
         """Return a (size,) vector that `decode` turns into `layout`.
@@ -136,26 +134,78 @@ class DesignProblem:
         BadInput
             If the layout is not one that `decode` can give.
         """
-        return encoding.encode(self.site.barrier_zone, layout, self.max_barriers, self.kinds)
+        return encoding.encode(self.place, self.check(layout), self.max_barriers, self.kinds)
 
-    def penalised(self, cost: float) -> float:
-        """Return the cost that is charged: as it is up to the limit, tenfold above it."""
-        return cost + (OVERRUN - 1.0) * max(cost - self.cost_limit, 0.0)
+    def check(self, layout: Sequence[Barrier]) -> Layout:
+        """Return a layout sorted downhill, if it may be built.
 
-    def objective(self, debris: float, cost: float) -> float:
-        """Return the objective of a debris fraction [-] and a cost."""
-        charged = self.penalised(cost) / self.cost_limit
-        return self.risk_weight * debris + self.cost_weight * charged
+        Raises
+        ------
+        BadInput
+            If it has more barriers than slots or other kinds than allowed, or one is too large,
+            outside the zone, on ground that is too steep, too near the road or the next one.
+        """
+        barriers = tuple(sorted(as_layout(layout), key=lambda barrier: barrier.x))
+        if len(barriers) > self.max_barriers:
+            mend = f"give at most {self.max_barriers}"
+            raise BadInput("layout", f"{len(barriers)} barriers", mend)
+        rooms = []
+        for i, barrier in enumerate(barriers):
+            where = f"layout[{i}]"
+            check.one_of(f"{where}.kind", barrier.kind, self.kinds)
+            if isinstance(barrier, Mesh):
+                self.place.check_mesh(where, barrier)
+            else:
+                rooms.append((where, barrier, room(barrier, self.place.check(where, barrier))))
+        if len(barriers) - len(rooms) > 1:
+            raise BadInput("layout", "several meshes", "give at most one: choose another option")
+        check_gaps(rooms)
+        return barriers
+
+    def fits(self, layout: Sequence[Barrier]) -> bool:
+        """Tell whether a layout may be built, see `check`."""
+        try:
+            self.check(layout)
+        except BadInput:
+            return False
+        return True
+
+    def allocation(self, releases: int, seed: int = 0) -> dict[str, int]:
+        """Return how many of some releases each event has, in proportion to what it tells.
+
+        With at least two releases an event each has two or more; with fewer it is by chance, which
+        `seed` decides.
+        """
+        seeds = range(seed, seed + check.integer("releases", releases, 1))
+        count = Counter(self.plan(seeds))
+        return {name: count[name] for name in self.site.event_names}
+
+    def plan(self, seeds: Sequence[int]) -> tuple[str, ...]:
+        """Return the event of each release, see `envs.plan`; a part of the seeds has a part."""
+        return plan.events(self._known.shares, seeds)
+
+    @property
+    def _known(self) -> ensemble.Ensemble:
+        return ensemble.of(self.site, self.key)
+
+    @property
+    def nothing(self) -> Evaluation:
+        """The layout without barriers, known once a site; its outcomes are not kept."""
+        found = self._known.nothing
+        return replace(found, targets=self._state(found))
 
     def evaluate(
-        self, layout: Sequence[Barrier], seeds: Sequence[int], executor: Executor | None = None
+        self,
+        layout: Sequence[Barrier] | ArrayLike,
+        seeds: Sequence[int],
+        executor: Executor | None = None,
     ) -> Evaluation:
-        """Simulate a layout in one release for each seed.
+        """Simulate a layout in one release for each seed, spread over the events.
 
         Parameters
         ----------
-        layout : sequence of Barrier
-            Of any kind, inside the zone and its limits; too dear a layout is simulated too.
+        layout : sequence of Barrier, or (size,) array
+            What may be built, see `check`, or a vector, see `decode`.
         seeds : sequence of int
             At least one whole number of at least 0.
         executor : Executor, optional
@@ -165,71 +215,149 @@ class DesignProblem:
         Raises
         ------
         BadInput
-            If the layout is not inside the zone or does not fit, or the seeds are unsound.
+            If the layout may not be built, or the seeds are unsound.
         Diverged
             If a simulation diverges.
         """
-        standing = encoding.check_layout(self.site.barrier_zone, layout)
-        drawn = _seeds(seeds)
-        found = baseline.outcomes([(self.site, standing, seed) for seed in drawn], executor)
-        return self.judge(standing, drawn, tuple(found))
+        standing, drawn = self._standing(layout), _seeds("seeds", seeds)
+        pairs = zip(drawn, self.plan(drawn), strict=True)
+        jobs = [(self.site, standing, seed, event) for seed, event in pairs]
+        return self.judge(standing, reuse.outcomes(jobs, executor).outcomes, drawn)
+
+    def sample(
+        self,
+        layout: Sequence[Barrier],
+        seeds: Mapping[str, Sequence[int]],
+        executor: Executor | None = None,
+    ) -> Sample:
+        """Return the outcomes of releases of chosen events, in the order of `seeds`.
+
+        Raises
+        ------
+        BadInput
+            If the layout may not be built, there is no such event or a seed is unsound.
+        Diverged
+            If a simulation diverges.
+        """
+        return self.sample_many([(self.check(layout), seeds)], executor)[0]
+
+    def sample_many(self, asks: Sequence[Ask], executor: Executor | None = None) -> list[Sample]:
+        """Return what `sample` does of several layouts, simulated together.
+
+        The processor time is shared out by the releases that were simulated.
+        """
+        jobs, ends = [], [0]
+        for layout, chosen in asks:
+            standing = self.check(layout)
+            for event, seeds in chosen.items():
+                self.site.event(event)
+                drawn = _seeds(f"seeds[{event!r}]", seeds, 0)
+                jobs += [(self.site, standing, seed, event) for seed in drawn]
+            ends.append(len(jobs))
+        return reuse.outcomes(jobs, executor).split(ends)
 
     def judge(
-        self, layout: Layout, seeds: tuple[int, ...], outcomes: tuple[Outcome, ...]
+        self, layout: Layout, outcomes: Sequence[Outcome], seeds: Sequence[int] = ()
     ) -> Evaluation:
-        """Return what a layout is worth that had these outcomes, one for each seed."""
-        cost = self.site.cost(layout)
-        debris = np.array([outcome.debris_fraction for outcome in outcomes])
-        low, high = student_interval(debris)
-        return Evaluation(
-            layout=layout,
-            seeds=seeds,
-            objective=self.objective(float(debris.mean()), cost),
-            debris=float(debris.mean()),
-            ci=student_interval([self.objective(d, cost) for d in debris.tolist()]),
-            debris_ci=(max(low, 0.0), min(high, 1.0)),
-            cost=cost,
-            outcomes=outcomes,
+        """Return what a layout is worth that had these outcomes.
+
+        Parameters
+        ----------
+        layout : tuple of Barrier
+            What stood.
+        outcomes : sequence of Outcome
+            At least one of every event; fewer than two an event on the average must be those of a
+            `plan`. Of a `Sample` it is told how many were simulated, and in what time.
+        seeds : sequence of int
+            Seed of each, kept beside them.
+
+        Raises
+        ------
+        BadInput
+            If there are no outcomes, or none of an event that happens.
+        """
+        known = self._known
+        found = estimator.judge(self.site, layout, outcomes, known.facts, known.shares)
+        without = known.nothing.debris
+        return replace(
+            found,
+            seeds=tuple(seeds),
+            debris_share=found.debris / without if without else 0.0,
+            targets=self._state(found),
+            simulated=getattr(outcomes, "simulated", len(outcomes)),
+            seconds=getattr(outcomes, "seconds", 0.0),
         )
 
+    def reward(self, evaluation: Evaluation) -> float:
+        """Return the fall of Z over Z of nothing; without prices the share of debris kept off.
 
-def _site(site: object) -> Site:
+        Of a slope from which nothing comes onto the road it is 0, and -1 of whatever is built.
+        """
+        nothing = self._known.nothing
+        if nothing.objective > 0.0:
+            return (nothing.objective - evaluation.objective) / nothing.objective
+        if evaluation.objective > 0.0:
+            return -1.0
+        return 1.0 - evaluation.debris_share if nothing.debris else 0.0
+
+    def _state(self, found: Evaluation) -> str | None:
+        design = [event.name for event in self.site.events if event.design]
+        return self.targets.state(design, found.reach, found.failure)
+
+    def _standing(self, layout: Sequence[Barrier] | ArrayLike) -> Layout:
+        """Return the layout of a vector, or one that was checked."""
+        if isinstance(layout, np.ndarray):
+            return self.decode(layout)
+        members = list(layout) if isinstance(layout, Sequence) else layout
+        if isinstance(members, list) and members and isinstance(members[0], int | float):
+            return self.decode(members)
+        return self.check(members)  # type: ignore[arg-type]  # it says what is wrong
+
+
+def _site(site: object, cheaper: str) -> Site:
     if isinstance(site, str | os.PathLike):
         site = Site.load(site)
     if not isinstance(site, Site):
         raise BadInput("site", site, "give a name, a TOML file or a rigdda.Site")
-    if not {"concrete", "rock"} & site.surfaces.keys():
-        mend = "define concrete, of which barriers are, or rock instead"
-        raise BadInput("surfaces", sorted(site.surfaces), mend)
-    for name, price in msgspec.structs.asdict(site.costs).items():
-        check.number(f"costs.{name}", price, 0.0, MOST)
-    return site
+    return fidelity.at(site, cheaper)
 
 
-def _room(site: Site, kinds: tuple[str, ...]) -> None:
-    """Check that every barrier has room in the zone."""
-    zone = site.barrier_zone
-    longest = encoding.longest(zone, kinds)
-    if zone.end - zone.start < longest:
-        what = "max_thickness" if longest == zone.max_thickness else "the length of a barrier"
-        mend = f"put it at least {what} {longest:g} beyond the zone's start"
-        raise BadInput("barrier_zone.end", zone.end, mend)
+def _zone(site: Site, zone: object) -> BarrierZone:
+    own = site.barrier_zone
+    if zone is None:
+        return own
+    start, end = check.interval("zone", zone, own.start, own.end)
+    return msgspec.structs.replace(own, start=start, end=end)
 
 
-def _seeds(seeds: Sequence[int]) -> tuple[int, ...]:
-    try:
-        drawn = tuple(check.integer(f"seeds[{i}]", seed, 0) for i, seed in enumerate(seeds))
-    except TypeError:
-        raise BadInput("seeds", seeds, "give a sequence of whole numbers") from None
-    if not drawn:
-        raise BadInput("seeds", drawn, "give at least one")
-    return drawn
-
-
-def _kinds(kinds: Sequence[str]) -> tuple[str, ...]:
+def _kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
+    if kinds is None:
+        return (*KINDS, "mesh") if site.meshes else KINDS
     if not isinstance(kinds, Sequence) or isinstance(kinds, str):
         raise BadInput("kinds", kinds, "give a sequence of names")
     names = tuple(check.one_of("kinds", kind, ALL_KINDS) for kind in kinds)
     if not names or len(set(names)) < len(names):
         raise BadInput("kinds", kinds, "name each kind once")
+    if "mesh" in names and not site.meshes:
+        raise BadInput("kinds", kinds, f"leave mesh out: {site.name} has no options of it")
     return names
+
+
+def _targets(site: Site, targets: Targets | None) -> Targets:
+    if targets is None:
+        return Targets()
+    if not isinstance(targets, Targets):
+        raise BadInput("targets", targets, "give envs.Targets(reach=..., failure=...)")
+    if not any(event.design for event in site.events):
+        raise BadInput("targets", targets, f"mark an event of {site.name} with design = true")
+    return targets
+
+
+def _seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int, ...]:
+    try:
+        drawn = tuple(check.integer(f"{name}[{i}]", seed, 0) for i, seed in enumerate(seeds))
+    except TypeError:
+        raise BadInput(name, seeds, "give a sequence of whole numbers") from None
+    if len(drawn) < least:
+        raise BadInput(name, drawn, "give at least one")
+    return drawn

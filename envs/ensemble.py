@@ -1,0 +1,190 @@
+"""What falls without barriers: the cost of nothing, and how releases spread over events.
+
+Known once a site, and kept on disk in the user's cache: every reward is measured against it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+import rigdda
+from envs import reuse
+from envs.estimator import Facts, account, judge
+from envs.evaluation import Evaluation
+from envs.intervals import Known
+from envs.memory import Memory, fingerprint
+from rigdda import Outcome, Site
+from rigdda.files import atomic
+from rigdda.kernel import cache_directory
+
+SEEDS = 2**33
+"""First seed of the releases without barriers that a site is known by. Episodes score releases of
+seeds below 2**31, envelopes look at some from 2**32 on."""
+
+FIRST, ALL = 32, 2048
+"""Releases of each event from which the spread of its cost is judged, and of all together."""
+
+FLOOR = 0.2
+"""Least share of an event, over an equal share: one that costs nothing without barriers, or happens
+seldom, is looked at, too."""
+
+OWN_TIME = 1.0
+"""Processor time of a release beyond that of its blocks, over that of a block [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ensemble:
+    """What is known of a site without barriers.
+
+    Parameters
+    ----------
+    nothing : Evaluation
+        Of the layout without barriers; its outcomes are not kept.
+    facts : dict of str to Facts
+        What is known of each event.
+    shares : dict of str to float
+        Share of the releases for each event; they add up to 1.
+    """
+
+    nothing: Evaluation
+    facts: dict[str, Facts]
+    shares: dict[str, float]
+
+
+memory: Memory[bytes, Ensemble] = Memory(4096)
+"""Ensembles by site, about 3 kB each."""
+
+
+def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
+    """Return what is known of a site without barriers, simulated if it is not kept.
+
+    Parameters
+    ----------
+    site, key : Site, bytes
+        The site and its `fingerprint`.
+    executor : Executor, optional
+        Where to simulate; None: in threads over all cores.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    known = memory.recall([key]).get(key)
+    if known is None:
+        known = _read(key)
+        if known is None:
+            known = _simulate(site, executor)
+            _write(key, known)
+        memory.remember({key: known})
+    return known
+
+
+def _simulate(site: Site, executor: Executor | None) -> Ensemble:
+    """Simulate releases: at first as many of each event, then where they tell most."""
+    names = site.event_names
+    first = _releases(site, {name: range(SEEDS, SEEDS + FIRST) for name in names}, executor)
+    wanted = _shared(_shares(site, _facts(site, first.outcomes)), ALL)
+    more = {name: range(SEEDS + FIRST, SEEDS + max(wanted[name], FIRST)) for name in names}
+    second = _releases(site, more, executor)
+    outcomes = [*first.outcomes, *second.outcomes]
+    facts = _facts(site, outcomes)
+    found = replace(
+        judge(site, (), outcomes, {}, {}),
+        outcomes=(),
+        simulated=first.simulated + second.simulated,
+        seconds=first.seconds + second.seconds,
+    )
+    return Ensemble(found, facts, _shares(site, facts))
+
+
+def _releases(
+    site: Site, seeds: Mapping[str, range], executor: Executor | None
+) -> reuse.Batch:
+    jobs = [(site, (), seed, name) for name, drawn in seeds.items() for seed in drawn]
+    return reuse.outcomes(jobs, executor)
+
+
+def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:
+    """Return what releases without barriers tell of each event."""
+    found, out = account(site, (), outcomes), {}
+    for name in site.event_names:
+        own = found.event == name
+        came = own & found.reached
+        harm, volume = found.harm[came], found.volume[came]
+        if not came.any():  # as if all came
+            volume = np.array([outcomes[i].released_volume for i in np.flatnonzero(own)])
+            harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
+        blocks = [len(site.draw(seed, name).blocks) for seed in range(SEEDS, SEEDS + FIRST)]
+        known = (_known(harm), _known(volume))
+        out[name] = Facts(int(own.sum()), int(came.sum()), *known, float(np.mean(blocks)))
+    return out
+
+
+def _known(values: np.ndarray) -> Known:
+    mean = float(values.mean())
+    return Known(mean, float(values.std() / mean) if mean > 0.0 else 0.0)
+
+
+def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
+    """Return the share of the releases for each event.
+
+    In proportion to rate x spread / root of the time of a release (Neyman's allocation), and at
+    least `FLOOR` times an equal share. The spread is the greatest that a layout can give the cost
+    of the event which lets it onto the road at most as often as nothing does: barriers make sure
+    harm a matter of chance.
+    """
+    free = all(fact.harm.mean == 0.0 for fact in facts.values())  # then debris is what counts
+    weight = {}
+    for name, fact in facts.items():
+        dear = fact.volume if free else fact.harm
+        chance = min((fact.reached + 0.5) / (fact.releases + 1.0), 0.5)
+        spread = dear.mean * math.sqrt(chance * (1.0 - chance) + chance * dear.variation**2)
+        weight[name] = site.rate(name, ()) * spread / math.sqrt(OWN_TIME + fact.blocks)
+    whole = sum(weight.values())
+    equal = 1.0 / len(weight)
+    raised = {n: max(w / whole if whole else equal, FLOOR * equal) for n, w in weight.items()}
+    return {name: share / sum(raised.values()) for name, share in raised.items()}
+
+
+def _shared(shares: Mapping[str, float], releases: int) -> dict[str, int]:
+    return {name: math.ceil(share * releases) for name, share in shares.items()}
+
+
+@lru_cache(maxsize=1)
+def _sources() -> str:
+    """Return a hash of all that decides what is kept: the mechanics and the estimator."""
+    own = [Path(__file__).parent / f"{n}.py" for n in ("ensemble", "estimator", "intervals")]
+    digest = hashlib.sha256()
+    for path in [*sorted(Path(rigdda.__file__).parent.rglob("*.py")), *own]:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _path(key: bytes) -> Path:
+    """Return the file of a site, beside the compiled kernels."""
+    kernels = cache_directory()
+    return kernels.parent / f"nothing-{_sources()}-{kernels.name[-16:]}" / f"{key.hex()}.msgpack"
+
+
+def _read(key: bytes) -> Ensemble | None:
+    """Return what is kept on disk, None if that is nothing or no longer sound."""
+    with suppress(OSError, msgspec.DecodeError):
+        return msgspec.msgpack.decode(_path(key).read_bytes(), type=Ensemble)
+    return None
+
+
+def _write(key: bytes, known: Ensemble) -> None:
+    """Keep it on disk; a disk that is full costs time later, no result now."""
+    with suppress(OSError), atomic(_path(key)) as part:
+        part.write_bytes(msgspec.msgpack.encode(known))

@@ -1,0 +1,253 @@
+"""Outcomes of releases, many at once; what need not be simulated again is not.
+
+A release without barriers whose blocks never come to where a layout stands is that of the layout,
+too. And a single fence that held what one block brought holds the same block in any class above
+what it took: the flight up to the fence does not depend on it, and its height falls in releases of
+several blocks only.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import rigdda
+from envs.crew import Workers
+from envs.memory import Memory, fingerprint
+from rigdda import BarrierOutcome, Ditch, Fence, Layout, Mesh, Outcome, Site
+from rigdda.barriers import earthworks
+from rigdda.resistance import resistance
+
+Job = tuple[Site, Layout, int, str]
+"""A site, what stands on it, the seed of a release and the name of its event."""
+
+Span = tuple[float, float]
+
+MARGIN = 0.1
+"""Distance from a barrier beyond which blocks are sure not to touch it [m]."""
+
+
+class Key(NamedTuple):
+    """A release: on which site, with what but mesh, and which one.
+
+    Of a single fence without its class `layout` is its x, height and thickness [m].
+    """
+
+    site: bytes
+    layout: tuple[Any, ...]
+    seed: int
+    event: str
+
+
+class Sample(tuple[Outcome, ...]):
+    """Outcomes of releases, and what they took.
+
+    Attributes
+    ----------
+    ran : tuple of bool
+        Whether each was simulated; of equal releases one was.
+    seconds : float
+        Processor time of the simulations [s].
+    """
+
+    ran: tuple[bool, ...]
+    seconds: float
+
+    def __new__(
+        cls, outcomes: Iterable[Outcome] = (), ran: Sequence[bool] = (), seconds: float = 0.0
+    ) -> Sample:
+        """Make one; without `ran` nothing was simulated."""
+        made = super().__new__(cls, outcomes)
+        made.ran = tuple(ran) if ran else (False,) * len(made)
+        made.seconds = seconds
+        return made
+
+    def __getnewargs__(self) -> tuple[tuple[Outcome, ...], tuple[bool, ...], float]:
+        """Return what makes it anew."""
+        return tuple(self), self.ran, self.seconds
+
+    def __add__(self, other: object) -> Sample:  # type: ignore[override]
+        """Return both, one after the other."""
+        if not isinstance(other, Sample):
+            return NotImplemented
+        both = (*self, *other), (*self.ran, *other.ran)
+        return Sample(*both, self.seconds + other.seconds)
+
+    @property
+    def simulated(self) -> int:
+        """How many were simulated."""
+        return sum(self.ran)
+
+    def split(self, ends: Sequence[int]) -> list[Sample]:
+        """Return the parts between ends, the time shared out by what was simulated."""
+        each = self.seconds / max(self.simulated, 1)
+        parts = [(self[a:b], self.ran[a:b]) for a, b in pairwise(ends)]
+        return [Sample(outcomes, ran, each * sum(ran)) for outcomes, ran in parts]
+
+
+free: Memory[Key, Outcome] = Memory(1 << 16)
+"""Outcomes without barriers, about 1 kB each."""
+
+held: Memory[Key, Outcome] = Memory(1 << 16)
+"""Outcomes of single fences that held one block, by the fence without its class."""
+
+spans: Memory[tuple[bytes, tuple[Any, ...]], tuple[Span, ...]] = Memory(1 << 12)
+"""Where the barriers of a layout are on a site."""
+
+
+def outcomes(jobs: Sequence[Job], workers: Workers | None = None) -> Sample:
+    """Return the outcome of every job; equal jobs are simulated once.
+
+    Parameters
+    ----------
+    jobs : sequence of (Site, Layout, int, str)
+        Releases.
+    workers : Workers, optional
+        Where to simulate; None: in threads over all cores.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `rigdda.release` does.
+    """
+    prints = {id(site): fingerprint(site) for site, *_ in jobs}
+    keys = [
+        Key(prints[id(site)], tuple(b for b in layout if not isinstance(b, Mesh)), seed, event)
+        for site, layout, seed, event in jobs
+    ]
+    known = _recall(keys, jobs)
+    new = {key: job for key, job in zip(keys, jobs, strict=True) if key not in known}
+    found, seconds = _simulate(list(new.values()), workers)
+    fresh = dict(zip(new, found, strict=True))
+    _remember(fresh, new)
+    known |= fresh
+    ran = []
+    for key in keys:
+        ran.append(key in new)
+        new.pop(key, None)
+    return Sample([known[key] for key in keys], ran, seconds)
+
+
+def _simulate(jobs: list[Job], workers: Workers | None) -> tuple[list[Outcome], float]:
+    """Return outcomes and the processor time that they took [s]."""
+    if workers is not None:
+        timed = list(workers.map(_timed, jobs))
+        return [outcome for outcome, _ in timed], sum(seconds for _, seconds in timed)
+    start = time.process_time()
+    found = rigdda.release_many(jobs) if jobs else []
+    return found, time.process_time() - start
+
+
+def _timed(job: Job) -> tuple[Outcome, float]:
+    """Return an outcome and its processor time; at module level, for process pools to find it."""
+    start = time.process_time()
+    (outcome,) = rigdda.release_many([job])
+    return outcome, time.process_time() - start
+
+
+def _recall(keys: Sequence[Key], jobs: Sequence[Job]) -> dict[Key, Outcome]:
+    """Return the outcomes that follow from what was simulated before."""
+    sites = {key.site: job[0] for key, job in zip(keys, jobs, strict=True)}
+    wanted = set(keys)
+    bare = free.recall({key._replace(layout=()) for key in wanted})
+    fences = {key: _place(sites[key.site], key) for key in wanted}
+    stood = held.recall({place for place in fences.values() if place is not None})
+    known: dict[Key, Outcome] = {}
+    for key, place in fences.items():
+        without = bare.get(key._replace(layout=()))
+        before = stood.get(place) if place is not None else None
+        if without is not None and not _touches(sites[key.site], key, without):
+            found = replace(without, barriers=_untouched(sites[key.site], key, without.width))
+        else:
+            found = before and _of_class(key.layout[0], before)
+        if found is not None:
+            known[key] = found
+    return known
+
+
+def _remember(fresh: Mapping[Key, Outcome], jobs: Mapping[Key, Job]) -> None:
+    """Keep what later releases may follow from."""
+    bare, stood = {}, {}
+    for key, outcome in fresh.items():
+        site = jobs[key][0]
+        if not _touches(site, key, outcome):
+            bare[key._replace(layout=())] = replace(outcome, barriers=())
+        place = _place(site, key)
+        if place is not None and not outcome.barriers[0].failed:
+            stood[place] = outcome
+    free.remember(bare)
+    held.remember(stood)
+
+
+def _touches(site: Site, key: Key, outcome: Outcome) -> bool:
+    """Tell whether blocks come near a barrier of a layout."""
+    low, high = outcome.reach
+    spans = _spans(site, key) if key.layout else ()
+    return any(low < end + MARGIN and high > start - MARGIN for start, end in spans)
+
+
+def _spans(site: Site, key: Key) -> tuple[Span, ...]:
+    """Return the chainages between which each barrier changes something [m]."""
+    name = key.site, key.layout
+    known = spans.recall([name]).get(name)
+    if known is None:
+        _, moved = earthworks(site.profile, key.layout, site.soil)
+        ends = {b: (float(m[:, 0].min()), float(m[:, 0].max())) for b, m in moved.items()}
+        known = tuple(ends.get(b, (b.x, b.x + b.extent)) for b in key.layout)
+        spans.remember({name: known})
+    return known
+
+
+def _untouched(site: Site, key: Key, width: float) -> tuple[BarrierOutcome, ...]:
+    """Return what happens to barriers that no block comes near: nothing."""
+    if not key.layout:
+        return ()
+    built = [barrier.for_width(width) for barrier in key.layout]
+    scene = None
+    if not all(isinstance(barrier, Fence | Ditch) for barrier in built):  # what bears by friction
+        drawn = site.draw(key.seed, key.event)
+        scene = site.scene(drawn._replace(blocks=drawn.blocks[:1]), built)
+    return tuple(
+        BarrierOutcome(
+            hits=0,
+            max_energy=0.0,
+            total_energy=0.0,
+            absorbed_energy=0.0,
+            impact_heights=(),
+            overtopped=0,
+            failed=False,
+            caught=0.0,
+            state="stands",
+            displacement=0.0,
+            thrust=0.0,
+            resistance=resistance(scene, i) if scene else getattr(barrier, "resistance", math.inf),
+            left_height=0.0 if isinstance(barrier, Ditch) else barrier.height,
+        )
+        for i, barrier in enumerate(built)
+    )
+
+
+def _place(site: Site, key: Key) -> Key | None:
+    """Return a release with a single fence without its class, None of any other release."""
+    if len(key.layout) != 1 or not isinstance(key.layout[0], Fence):
+        return None
+    event = site.event(key.event)
+    source = site.source(event.source)
+    single = event.number == (1, 1) if source.band is not None else len(source.blocks) == 1
+    fence = key.layout[0]
+    return key._replace(layout=(fence.x, fence.height, fence.thickness)) if single else None
+
+
+def _of_class(fence: Fence, before: Outcome) -> Outcome | None:
+    """Return the outcome of a fence where another class held the block, None if it may not."""
+    own, took = fence.for_width(before.width), before.barriers[0]
+    assert own.capacity is not None
+    if took.absorbed_energy > own.capacity or took.thrust > own.resistance:
+        return None
+    left = own.left_height(took.absorbed_energy)
+    mine = replace(took, resistance=own.resistance, left_height=left)
+    return replace(before, barriers=(mine,))

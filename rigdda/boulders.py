@@ -38,14 +38,14 @@ Line = tuple[list[float], list[float]]
 def draw(
     rng: np.random.Generator, source: Source, event: Event, ground: Line
 ) -> tuple[list[float], list[Block]]:
-    """Return areas [m2] and blocks of an event of a band, clear of the ground and of one another."""
+    """Return areas [m2] and blocks of an event of a band, clear of ground and one another."""
     assert source.band is not None
     low, high = event.number
     count = low if low == high else low + int(rng.random() * (high - low + 1))
     numbers = rng.random((count, DRAWN + source.corners[1])).tolist()
     shapes = [_shape(u, source, event) for u in numbers]
     start, end = source.band
-    row = 1
+    row = 1  # so many lie side by side
     if count > 1:
         length = SPREAD * math.sqrt(sum(area for area, _ in shapes) / count * source.aspect[1])
         row = min(max(1, int((end - start) / length)), count)
@@ -116,24 +116,20 @@ def _area(u: float, least: float, greatest: float, power: float) -> float:
     return (high + u * (low - high)) ** (-1.0 / power)
 
 
-def _height(x: float, ground: Line) -> float:
-    """Return the elevation of a line at a chainage [m]."""
-    xs, ys = ground
-    i = min(max(bisect_right(xs, x), 1), len(xs) - 1)
-    run = xs[i] - xs[i - 1]
-    if run <= 0.0:
-        return max(ys[i], ys[i - 1])
-    return ys[i - 1] + (ys[i] - ys[i - 1]) * (x - xs[i - 1]) / run
-
-
 def _lift(corners: list[Point], ground: Line) -> float:
     """Return how far a block must be lifted to rest on the ground [m]."""
-    lift = max([_height(x, ground) - y for x, y in corners])
     xs, ys = ground
     first = bisect_right(xs, min(corners)[0])
     last = bisect_right(xs, max(corners)[0])
-    for i in range(first, last):  # corners of the ground below the block
-        lift = max(lift, ys[i] - min(_crossings(corners, xs[i])))
+    lift = -math.inf
+    for i in range(first, last + 1):  # each piece of the ground that is below it
+        (x, y), (end, low) = (xs[i - 1], ys[i - 1]), (xs[i], ys[i])
+        if end > x:
+            rise = (low - y) / (end - x)
+            pieces = [y + rise * (a - x) - b for a, b in corners if x <= a <= end]
+            lift = max(lift, max(pieces, default=lift))
+        if i < last:  # and each corner of it
+            lift = max(lift, low - min(_crossings(corners, end)))
     return lift
 
 

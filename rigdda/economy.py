@@ -9,6 +9,7 @@ over barriers b and events k. All prices are orders of magnitude and a user's to
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
@@ -209,6 +210,18 @@ def capitals(site: Site, layout: Layout) -> list[float]:
     """
     _, moved = earthworks(site.profile, layout, site.soil)
     return [_price(site, b, moved.get(b)) * site.access(b.x) for b in layout]
+
+
+def rate(site: Site, event: str, layout: Sequence[Barrier]) -> float:
+    """Return how often an event happens with the mesh of a layout, see `Site.rate`."""
+    often, used = site.event(event).rate / 100.0, set()
+    for barrier in layout:
+        if isinstance(barrier, Mesh):
+            if barrier.option in used:
+                raise BadInput("mesh option", barrier.option, "hang each option once")
+            used.add(barrier.option)
+            often *= site.mesh(barrier).factors.get(event, 1.0)
+    return often
 
 
 def bill(site: Site, layout: Layout, outcome: Outcome) -> Bill:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import msgspec
 
 from rigdda import check
@@ -74,15 +76,13 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """
         cuts = {x for stretch in self.surfaces for x in (stretch.start, stretch.end)}
         points, names = [self.points[0]], []
-        for (ax, ay), (bx, by) in zip(self.points, self.points[1:], strict=False):
+        for (ax, ay), (bx, by) in pairwise(self.points):
             inner = sorted((x for x in cuts if min(ax, bx) < x < max(ax, bx)), reverse=bx < ax)
             for x in inner:
                 points.append((x, ay + (by - ay) * (x - ax) / (bx - ax)))
             points.append((bx, by))
             ends = [ax, *inner, bx]
-            names += [
-                self.surface_at(0.5 * (a + b)) for a, b in zip(ends, ends[1:], strict=False)
-            ]
+            names += [self.surface_at(0.5 * (a + b)) for a, b in pairwise(ends)]
         return tuple(points), tuple(names)
 
 

@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
-import numpy as np
 import tomli_w
 
-from rigdda import boulders, check, economy, sites
+from rigdda import economy, realisation, sites
 from rigdda.barriers import Barrier, Built, Mesh, MeshOption, as_layout
 from rigdda.economy import Bill, Consequences, Prices
 from rigdda.errors import BadInput
 from rigdda.events import Drawn, Event
 from rigdda.files import atomic, read
 from rigdda.place import BarrierZone, Interface, Motion, Road, Scatter, Slope, Stretch
-from rigdda.scene import Block, Scene, Surface
+from rigdda.scene import Scene, Surface
 from rigdda.settings import Settings
 from rigdda.soundness import check_site
 from rigdda.source import Point, Source
@@ -27,9 +26,6 @@ from rigdda.terrain import Terrain
 
 if TYPE_CHECKING:
     from rigdda.outcome import Outcome
-
-STEEPEST_DEG = 85.0
-"""Friction angle up to which scatter may raise that of a surface [deg]."""
 
 STEEP_SIDES, FLAT_SIDE = {"rock": 0.25}, 0.67
 """Side slope of a ditch, run over rise [-], by the surface that it is cut in: 4:1 stands in rock;
@@ -164,9 +160,10 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         BadInput
             If there is none.
         """
-        return self.events[self._index(name)]
+        return self.events[self.index(name)]
 
-    def _index(self, name: str) -> int:
+    def index(self, name: str) -> int:
+        """Return the place of an event among the events. Raises as `event` does."""
         for i, event in enumerate(self.events):
             if event.name == name:
                 return i
@@ -191,9 +188,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     def pick(self, seed: int) -> str:
         """Return the name of the event that a seed draws by rate."""
-        rates = np.array([event.rate for event in self.events])
-        rng = np.random.default_rng([check.integer("seed", seed, 0), len(rates)])
-        return self.events[rng.choice(len(rates), p=rates / rates.sum())].name
+        return realisation.pick(self, seed)
 
     @property
     def rooms(self) -> tuple[tuple[float, float], ...]:
@@ -201,23 +196,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
         Around a band so much is left out as its largest block reaches beyond it.
         """
-        start, end = self.barrier_zone.start, self.barrier_zone.end
-        found = []
-        for low, high in sorted(self._taken()):
-            if start < min(low, end):
-                found.append((start, min(low, end)))
-            start = max(start, high)
-        return (*found, (start, end)) if start < end else tuple(found)
-
-    def _taken(self) -> list[tuple[float, float]]:
-        """Return the intervals that loose blocks of bands may take up [m]."""
-        found = []
-        for source in self.sources:
-            if source.band is not None:
-                reaches = (boulders.reach(source, event) for event in self.events_of(source))
-                reach = max(reaches, default=0.0)
-                found.append((source.band[0] - reach, source.band[1] + reach))
-        return found
+        return realisation.rooms(self)
 
     def settings(self) -> Settings:
         """Return the numerical settings of this site's releases."""
@@ -231,21 +210,21 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         BadInput
             If there is no such event, or the seed is not a whole number >= 0.
         """
-        seed = check.integer("seed", seed, 0)
-        name = self.pick(seed) if event is None else event
-        index = self._index(name)
-        what = self.events[index]
-        rock = self.source(what.source)
-        if rock.band is None:
-            normal, blocks = _cut(msgspec.json.encode(rock), seed, index)
-            width = what.width_of([])
-        else:
-            rng = np.random.default_rng([seed, index])
-            normal = rng.standard_normal()
-            ground = boulders.line(self.slope.points)
-            areas, drawn = boulders.draw(rng, rock, what, ground)
-            blocks, width = tuple(drawn), what.width_of(areas)
-        return Drawn(name, blocks, width, normal * self.scatter.friction_deg)
+        return realisation.draw(self, seed, event)
+
+    def built(self, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
+        """Return what stands of a layout, as it resists an event of this width [m].
+
+        Raises
+        ------
+        BadInput
+            If a barrier stands where loose rock lies, or a mesh is not one of the options.
+        """
+        return realisation.built(self, layout, width)
+
+    def scene(self, drawn: Drawn, barriers: Sequence[Built] = ()) -> Scene:
+        """Return the scene of what was drawn, with barriers as `built` gives them."""
+        return realisation.scene(self, drawn, barriers)
 
     def realise(
         self, layout: Sequence[Barrier] = (), seed: int = 0, event: str | None = None
@@ -262,52 +241,6 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         """
         drawn = self.draw(seed, event)
         return self.scene(drawn, self.built(layout, drawn.width))
-
-    def built(self, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
-        """Return what stands of a layout, as it resists an event of this width [m].
-
-        Raises
-        ------
-        BadInput
-            If a barrier stands where loose rock lies, or a mesh is not one of the options.
-        """
-        standing: list[Built] = []
-        taken = self._taken()
-        for i, barrier in enumerate(as_layout(layout)):
-            if isinstance(barrier, Mesh):
-                self.mesh(barrier)
-                continue
-            for low, high in taken:
-                if barrier.x < high and barrier.x + barrier.extent > low:
-                    mend = f"put it outside x = {low:.2f} to {high:.2f}, where loose rock lies"
-                    raise BadInput(f"barriers[{i}].x", barrier.x, mend)
-            standing.append(barrier.for_width(width))
-        return tuple(standing)
-
-    def scene(self, drawn: Drawn, barriers: Sequence[Built] = ()) -> Scene:
-        """Return the scene of what was drawn, with barriers as `built` gives them."""
-        shift = drawn.friction_deg
-        return Scene(
-            terrain=self.profile,
-            blocks=drawn.blocks,
-            surfaces={name: _shifted(s, shift) for name, s in self.surfaces.items()},
-            interfaces={pair: _shifted(s, shift) for pair, s in self.pairs().items()},
-            barriers=tuple(barriers),
-            damping=self.motion.damping,
-            damping_when=self.motion.damping_when,
-        )
-
-    def pairs(self) -> dict[tuple[str, str], Surface]:
-        """Return the surfaces of contacts: of rock with the ground the ground's, unless said."""
-        grounds = {self.slope.surface, *(s.surface for s in self.slope.surfaces)}
-        if "soil" in self.surfaces:
-            grounds.add("soil")  # embankments are ground
-        rocks = {source.surface for source in self.sources}
-        found = {(r, g): self.surfaces[g] for r in sorted(rocks) for g in sorted(grounds) if r != g}
-        for pair in self.interfaces:
-            found.pop((pair.second, pair.first), None)
-            found[pair.first, pair.second] = pair.surface
-        return found
 
     @property
     def soil(self) -> str:
@@ -349,14 +282,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         BadInput
             If there is no such event or mesh option, or an option is there twice.
         """
-        rate, used = self.event(event).rate / 100.0, set()
-        for barrier in layout:
-            if isinstance(barrier, Mesh):
-                if barrier.option in used:
-                    raise BadInput("mesh option", barrier.option, "hang each option once")
-                used.add(barrier.option)
-                rate *= self.mesh(barrier).factors.get(event, 1.0)
-        return rate
+        return economy.rate(self, event, layout)
 
     def capital(self, layout: Sequence[Barrier]) -> float:
         """Return what a layout costs to build [EUR per metre of road].
@@ -393,23 +319,3 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 def _ground(points: tuple[Point, ...], surface: str, stretches: tuple[Stretch, ...]) -> Terrain:
     """Return the terrain of a slope; it is asked for several times in every episode."""
     return Terrain(*Slope(points, 0.0, surface, stretches).chain())
-
-
-@lru_cache(maxsize=4096)
-def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]]:
-    """Return what a seed draws of a mass, as JSON: a standard normal number and its blocks.
-
-    Cutting takes as long as simulating a small release, and a search asks for the same releases
-    again and again; one takes about 10 kB.
-    """
-    rng, rock = np.random.default_rng([seed, event]), msgspec.json.decode(source, type=Source)
-    normal = rng.standard_normal()
-    return normal, tuple(Block(c, rock.density, rock.surface) for c in rock.cut(rng))
-
-
-def _shifted(surface: Surface, shift: float) -> Surface:
-    """Return a surface whose friction angle is shifted [deg]."""
-    if shift == 0.0:
-        return surface
-    angle = min(surface.friction_deg + shift, max(surface.friction_deg, STEEPEST_DEG))
-    return msgspec.structs.replace(surface, friction_deg=max(angle, 0.0))

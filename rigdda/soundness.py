@@ -145,9 +145,7 @@ def _check_source(site: Site, source: Source) -> None:
         _check_piece(site, where, piece, ground)
 
 
-def _check_piece(
-    site: Site, where: str, piece: tuple[Point, ...], ground: shapely.Polygon
-) -> None:
+def _check_piece(site: Site, where: str, piece: tuple[Point, ...], ground: shapely.Polygon) -> None:
     rock = shapely.Polygon(piece)
     left, _, right, _ = rock.bounds
     crest = site.slope.points[0][0]

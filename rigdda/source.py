@@ -1,4 +1,4 @@
-"""The loose rock of a site: blocks that lie in a band, a mass cut by joint sets, or given blocks."""
+"""The loose rock of a site: blocks of a band, a mass cut by joint sets, or blocks as they are."""
 
 from __future__ import annotations
 

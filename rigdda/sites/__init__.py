@@ -14,7 +14,11 @@ if TYPE_CHECKING:
 FAMILIES = ("verge", "bench", "talus", "narrow", "cliff", "shu-hwa")
 """Families of sites to design on, each with a built-in site of its name."""
 
-SPLITS = {"train": range(1200), "validation": range(10**6, 10**6 + 60), "test": range(10**9, 10**9 + 60)}
+SPLITS = {
+    "train": range(1200),
+    "validation": range(10**6, 10**6 + 60),
+    "test": range(10**9, 10**9 + 60),
+}
 """Numbers of the generated sites to learn from, to choose by, and that nothing is chosen by. So
 many to learn from that none can be learnt by heart, and few enough that what falls without barriers
 need not be simulated again and again."""

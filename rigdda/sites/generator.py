@@ -1,3 +1,202 @@
-"""stub"""
-def generate(name, family, number):
-    raise NotImplementedError
+"""Sites around the built-in ones: each family has as many instances as there are numbers.
+
+An instance is the family's built-in site with its ground stretched: heights and lengths by common
+factors and each piece of the ground by one of its own; all chainages go along, so that bands, zone
+and surfaces stay where they belong. Sizes, rates, strength, closure and prices vary beside. The
+ranges are chosen, not measured: wide enough that the best layout of one is not that of another,
+narrow enough that a family keeps its character.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import msgspec
+import numpy as np
+
+from rigdda import check
+from rigdda.barriers import MeshOption
+from rigdda.economy import Consequences, Prices
+from rigdda.events import Event
+from rigdda.place import BarrierZone, Road, Slope, Stretch
+from rigdda.scene import Surface
+from rigdda.site import Site
+from rigdda.sites import FAMILIES, load
+from rigdda.source import Point, Source
+
+replace = msgspec.structs.replace
+
+FALLEN, SHARE = 10.0, 1.0 / 3.0
+"""Barriers may stand where rock has fallen this far [m], or this share of its way to the road."""
+
+MARGIN = 0.05
+"""Distance by which a zone begins further downhill than that [m]."""
+
+
+class Ground:
+    """A built-in site's ground, stretched.
+
+    Parameters
+    ----------
+    site : Site
+        The built-in site.
+    rng : numpy.random.Generator
+        Draws the factors.
+    """
+
+    def __init__(self, site: Site, rng: np.random.Generator):
+        points = np.array(site.slope.points)
+        high = rng.uniform(0.8, 1.25)
+        wide = high * rng.uniform(0.93, 1.07)
+        runs, drops = np.diff(points[:, 0]), np.diff(points[:, 1])
+        on_slope = points[1:, 0] <= site.slope.toe
+        wide_of = np.where(on_slope, wide, rng.uniform(0.85, 1.2))
+        high_of = np.where(on_slope, high, 1.0)
+        self.x_factor = wide_of * rng.uniform(0.94, 1.06, len(runs))
+        self.y_factor = high_of * rng.uniform(0.96, 1.04, len(runs))
+        road = (points[:-1, 0] >= site.road.start) & (points[1:, 0] <= site.road.end)
+        self.x_factor[road] = rng.uniform(7.0, 11.0) / (site.road.end - site.road.start)
+        # beyond the road nothing is stretched: the ground must go on far enough
+        self.x_factor[points[:-1, 0] >= site.road.end] = 1.0
+        x = points[0, 0] + np.concatenate([[0.0], np.cumsum(runs * self.x_factor)])
+        y = np.concatenate([[0.0], np.cumsum(drops * self.y_factor)])
+        foot = int(np.searchsorted(points[:, 0], site.slope.toe))
+        self.old = points
+        self.new = np.column_stack([x, y - y[foot]])
+
+    def x(self, at: float) -> float:
+        """Return where a chainage of the built-in site has come to [m]."""
+        return millimetres(np.interp(at, self.old[:, 0], self.new[:, 0]))
+
+    def points(self) -> tuple[Point, ...]:
+        """Return the corners of the ground."""
+        return tuple((millimetres(x), millimetres(y)) for x, y in self.new)
+
+    def mass(self, source: Source) -> Source:
+        """Return a jointed mass, stretched as the face that its middle lies on.
+
+        So its base stays on the face, and its joints keep their place in it.
+        """
+        corners = np.array(source.polygon)
+        piece = int(np.searchsorted(self.old[:, 0], corners[:, 0].mean())) - 1
+        factor = np.array([self.x_factor[piece], self.y_factor[piece]])
+        moved = self.new[piece] + (corners - self.old[piece]) * factor
+        steeper = factor[1] / factor[0]
+        joints = tuple(
+            replace(
+                joint,
+                dip_deg=math.degrees(math.atan(math.tan(math.radians(joint.dip_deg)) * steeper)),
+            )
+            for joint in source.joints
+        )
+        moved[:, 1] += 2e-3  # clear of the face whatever the rounding to millimetres
+        polygon = tuple((millimetres(x), millimetres(y)) for x, y in moved)
+        return replace(source, polygon=polygon, joints=joints)
+
+
+def generate(name: str, family: str, number: int) -> Site:
+    """Return an instance of a family, "random" for one after the other, always the same."""
+    base = load(FAMILIES[number % len(FAMILIES)] if family == "random" else family)
+    rng = np.random.default_rng([FAMILIES.index(base.name), number])
+    ground = Ground(base, rng)
+    size = float(np.exp(rng.uniform(-0.35, 0.35)))
+    sources = tuple(_source(source, ground) for source in base.sources)
+    stretches = tuple(
+        Stretch(ground.x(s.start), ground.x(s.end), s.surface) for s in base.slope.surfaces
+    )
+    slope = Slope(ground.points(), ground.x(base.slope.toe), base.slope.surface, stretches)
+    return replace(
+        base,
+        name=name,
+        description=f"Instance {number} of the family {base.name}. {base.description}",
+        slope=slope,
+        sources=sources,
+        events=tuple(_event(event, size, rng) for event in base.events),
+        road=Road(ground.x(base.road.start), ground.x(base.road.end)),
+        barrier_zone=_zone(base, slope, sources, ground),
+        surfaces=_surfaces(base, rng),
+        prices=_prices(base.prices, rng),
+        consequences=_consequences(base.consequences, rng),
+        meshes=tuple(_mesh(option, ground, rng) for option in base.meshes),
+    )
+
+
+def fallen(slope: Slope, sources: tuple[Source, ...]) -> float:
+    """Return the chainage from which on rock has fallen at least 10 m or a third of its way [m].
+
+    From the top of the highest source; the way ends at the toe.
+    """
+    x, y = np.array(slope.points).T
+    tops = [float(np.interp(s.band[0], x, y)) for s in sources if s.band is not None]
+    tops += [float(np.interp(min(s.polygon)[0], x, y)) for s in sources if s.polygon]
+    top = max(tops)
+    level = top - min(FALLEN, SHARE * (top - float(np.interp(slope.toe, x, y))))
+    for (ax, ay), (bx, by) in pairwise(slope.points):
+        if by <= level < ay:
+            return ax + (bx - ax) * (ay - level) / (ay - by)
+    return slope.toe
+
+
+def _source(source: Source, ground: Ground) -> Source:
+    if source.band is None:
+        return ground.mass(source)
+    return replace(source, band=(ground.x(source.band[0]), ground.x(source.band[1])))
+
+
+def _event(event: Event, size: float, rng: np.random.Generator) -> Event:
+    """Return an event with another rate, and another size of blocks."""
+    rate = round(event.rate * float(np.exp(rng.uniform(-0.5, 0.5))), 4)
+    if event.area is None:
+        return replace(event, rate=rate)
+    low, high = (round(area * size, 4) for area in event.area)
+    return replace(event, rate=rate, area=(low, high))
+
+
+def _zone(base: Site, slope: Slope, sources: tuple[Source, ...], ground: Ground) -> BarrierZone:
+    """Return the zone: moved along, and no higher up than rock has fallen far enough."""
+    zone = base.barrier_zone
+    start = max(ground.x(zone.start), fallen(slope, sources) + MARGIN)
+    return replace(zone, start=millimetres(start), end=ground.x(zone.end))
+
+
+def _surfaces(base: Site, rng: np.random.Generator) -> dict[str, Surface]:
+    shift, factor = rng.uniform(-2.0, 2.0), rng.uniform(0.75, 1.25)
+    return {
+        name: replace(
+            surface,
+            friction_deg=round(surface.friction_deg + shift, 2),
+            restitution=round((surface.restitution or 0.0) * factor, 3),
+        )
+        for name, surface in base.surfaces.items()
+    }
+
+
+def _prices(prices: Prices, rng: np.random.Generator) -> Prices:
+    """Return prices that vary kind by kind."""
+    fence, ditch, fill, concrete = np.exp(rng.uniform(-0.25, 0.25, 4)).tolist()
+    return replace(
+        prices,
+        fence={name: round(price * fence, 1) for name, price in prices.fence.items()},
+        ditch={name: round(price * ditch, 1) for name, price in prices.ditch.items()},
+        embankment=round(prices.embankment * fill, 1),
+        concrete=round(prices.concrete * concrete, 1),
+        access=round(rng.uniform(1.0, 2.5), 2),
+    )
+
+
+def _consequences(what: Consequences, rng: np.random.Generator) -> Consequences:
+    """Return another road: the more traffic, the dearer a day of closure."""
+    return replace(what, closure=round(what.closure * float(np.exp(rng.uniform(-0.4, 0.4))), -2))
+
+
+def _mesh(option: MeshOption, ground: Ground, rng: np.random.Generator) -> MeshOption:
+    """Return a mesh over a face that is so much higher or lower, at another price."""
+    high = float(ground.new[:, 1].max() / (ground.old[:, 1].max() or 1.0))
+    price = check.number("mesh price", option.price * rng.uniform(0.85, 1.2), 0.0)
+    return replace(option, area=round(option.area * high, 2), price=round(price, 1))
+
+
+def millimetres(value: float) -> float:
+    """Return a length rounded to millimetres [m]."""
+    return round(float(value), 3)

@@ -10,8 +10,8 @@ STATE = ("kinetic", "potential", "elastic")
 
 
 def measure(lab: Lab) -> tuple[Measured]:
-    """Release the site shu-hwa for 25 s; the change of state must be the work done."""
-    sim = lab.simulate(Site.load("shu-hwa").realise(seed=lab.seed))
+    """Release the site shu-hwa-paper for 25 s; the change of state must be the work done."""
+    sim = lab.simulate(Site.load("shu-hwa-paper").realise(seed=lab.seed))
     start = sim.energy()
     sim.step(lab.steps(25.0))
     end = sim.energy()

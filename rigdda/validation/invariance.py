@@ -104,12 +104,13 @@ def measure_turn(lab: Lab) -> tuple[Measured]:
 def measure_balance(lab: Lab) -> tuple[Measured, Measured]:
     """Release the site `quick` with its blocks in two orders: no mass is lost or gained."""
     site = Site.load("quick")
-    scene = site.realise(seed=lab.seed)
+    drawn = site.draw(lab.seed, "mass")
+    scene = site.scene(drawn)
     total, mass = [], []
     for step in (1, -1):
         new = Scene(scene.terrain, scene.blocks[::step], scene.surfaces, damping=scene.damping)
         sim = Metered(lab, new, Settings(dt=lab.dt), stations=stations(site, ()), watch=watch(site))
-        outcome = outcome_of(site, sim.run(site.motion.duration))
+        outcome = outcome_of(site, sim.run(site.motion.duration), drawn.event, drawn.width)
         total.append(
             outcome.slope_fraction
             + outcome.held_fraction

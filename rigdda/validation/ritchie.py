@@ -66,7 +66,7 @@ def pushed(site: Site, rng: np.random.Generator) -> tuple[Block, float]:
     )
     corners += np.array(crest) - corners.min(axis=0) + 0.05
     velocity = (rng.uniform(0.5, 1.5), 0.0, 0.0)
-    return Block(corners, site.source.density, velocity=velocity), 2.0 * radius
+    return Block(corners, site.sources[0].density, velocity=velocity), 2.0 * radius
 
 
 def descend(lab: Lab, site: Site, rng: np.random.Generator) -> Descent:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from agents.limits import RELEASES
+
+if TYPE_CHECKING:
+    from rigdda import Layout
+
+layout_option = click.option(
+    "--layout", type=click.Path(), help="Barriers: a TOML or JSON file, as `design` writes."
+)
 
 
 def out_option(default: str) -> Callable[..., Any]:
@@ -30,3 +37,16 @@ def count_option(name: str, least: int, default: int, words: str) -> Callable[..
     """Return an option that counts, releases for example."""
     kind = click.IntRange(least, RELEASES)
     return click.option(name, type=kind, default=default, show_default=True, help=words)
+
+
+def read_layout(path: str | None) -> Layout:
+    """Return the layout of a file, no barriers without one.
+
+    Raises
+    ------
+    BadInput
+        If the file is missing or not sound.
+    """
+    from rigdda import load_layout
+
+    return () if path is None else load_layout(path)

@@ -1,8 +1,7 @@
-"""Pictures of a design: the slope with what stays where, and how the search went."""
+"""What pictures share, and the picture of cost against risk."""
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,216 +9,133 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agents.protocol import History
 from envs import Evaluation
-from envs.picture import BARRIER, ROAD, ROCK, draw
-from rigdda import Ditch, Run, Site
-from rigdda.barriers import Standing
+from envs.picture import GROUND, ROAD
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-START, ZONE, SEARCH, RULE, NOTHING = "#e0c3a4", "#9dc3e6", "#9aa5b1", "#8a5fb5", "#c0392b"
+__all__ = ["BARRIER", "DPI", "FONT", "GROUND", "ROAD", "ZONE", "Point", "colours", "cost", "save"]
+
+BARRIER, ZONE, TRIED, EQUAL = "#14213d", "#9dc3e6", "#9aa5b1", "#c8ccd0"
+EVENTS = ("#0072b2", "#d0312d", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b4fb0", "#6b4226")
+"""Colours of events, told apart by the colour-blind as far as eight can be."""
+
+MARKERS = ("o", "^", "s", "D", "P", "X")
 FONT: dict[Any, Any] = {"font.size": 11, "axes.spines.top": False, "axes.spines.right": False}
 DPI = 120
 
+SHEDS = 1.6
+"""A reference dearer than this many times all else is told at the edge, not drawn to scale."""
+
 
 @dataclass(frozen=True, slots=True)
-class Panel:
-    """One slope of a picture: its title and a release on it."""
+class Point:
+    """What a named layout costs, in EUR per metre of road and year.
 
-    title: str
-    run: Run
-
-
-def profile(path: str | os.PathLike[str], site: Site, panels: Sequence[Panel]) -> None:
-    """Write a PNG of releases, one above the other, to scale and on the same axes.
-
-    Shown are the slope, the road, the barrier zone, the barriers, and the blocks at the start
-    (pale) and at the end.
+    Parameters
+    ----------
+    name : str
+        What it is.
+    capital : float
+        What its capital costs a year.
+    risk : float
+        Expected harm and repair of a year.
+    interval : (float, float)
+        95 % interval of `risk`.
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
 
-    left, right, bottom, top = _window(site)
-    scale = min(9.5 / (right - left), 5.2 / (top - bottom))  # inches a metre
-    width = max((right - left) * scale + 1.2, 8.5)  # room for the words
-    size = width, ((top - bottom) * scale + 0.7) * len(panels) + 0.8
-    with rc_context(FONT):
-        figure = Figure(size, dpi=DPI, layout="constrained")
-        grid = figure.subplots(len(panels), sharex=True, squeeze=False)
-        for axes, panel in zip(grid[:, 0], panels, strict=True):
-            _slope(axes, site, panel)
-            axes.set(xlim=(left, right), ylim=(bottom, top))
-            axes.label_outer()
-        _key(figure, max(panel.run.times[-1] for panel in panels))
-        _save(figure, path)
+    name: str
+    capital: float
+    risk: float
+    interval: tuple[float, float]
+
+    @classmethod
+    def of(cls, name: str, evaluation: Evaluation) -> Point:
+        """Return the point of an evaluation; its capital is known, so all doubt is of the risk."""
+        risk, capital = evaluation.harm + evaluation.repair, evaluation.capital
+        low, high = (max(end - capital, 0.0) for end in evaluation.ci)
+        return cls(name, capital, risk, (min(low, risk), max(high, risk)))
 
 
-def _window(site: Site) -> tuple[float, float, float, float]:
-    """Return left, right, bottom, top of what matters: from the source to beyond the road [m]."""
-    source = site.source.outline
-    x, y = np.array(site.slope.points).T
-    reach = site.road.end - source[:, 0].min()
-    left = max(source[:, 0].min() - 0.05 * reach, x[0])
-    right = min(site.road.end + 0.2 * reach, x[-1])
-    return left, right, y.min() - 0.04 * np.ptp(y), source[:, 1].max() + 0.05 * np.ptp(y)
+def colours(count: int) -> list[str]:
+    """Return the colours of so many events of a site, in its order."""
+    return [EVENTS[i % len(EVENTS)] for i in range(count)]
 
 
-def _slope(axes: Axes, site: Site, panel: Panel) -> None:
-    """Draw one panel; what is drawn first is covered by the ground and the final blocks."""
-    run, road, zone, terrain = panel.run, site.road, site.barrier_zone, site.profile
-    inner = [x for x, _ in site.slope.points if zone.start < x < zone.end]
-    reach = [zone.start, *inner, zone.end]
-    ground = [terrain.height(x) for x in reach]
-    axes.plot(reach, ground, color=ZONE, linewidth=7, zorder=0.5, solid_capstyle="butt")
-    for block in run.scene.blocks:
-        axes.fill(*block.vertices.T, facecolor=START, edgecolor="white", linewidth=0.2)
-    for i, barrier in enumerate(run.scene.barriers):
-        outline = run.outline(i)
-        if isinstance(barrier, Standing) and not math.isfinite(run.failure(i)):
-            axes.fill(*outline.T, facecolor=BARRIER, edgecolor=BARRIER, linewidth=2.5)
-        size = barrier.depth if isinstance(barrier, Ditch) else barrier.height
-        axes.annotate(
-            f"{size:.1f} m",
-            outline[np.argmax(outline[:, 1])],
-            xytext=(16, 26),
-            textcoords="offset points",
-            color=BARRIER,
-            fontweight="bold",
-            arrowprops={"arrowstyle": "-", "color": BARRIER, "linewidth": 0.8},
-        )
-    draw(axes, run, (road.start, road.end))
-    axes.set_title(panel.title, loc="left", fontsize=11)
-
-
-def _key(figure: Figure, duration: float) -> None:
-    """Write what the colours of a profile mean below it."""
-    from matplotlib.patches import Patch
-
-    words = {
-        "source": START,
-        f"blocks after {duration:g} s": ROCK,
-        "barrier": BARRIER,
-        "barriers may stand": ZONE,
-        "road": ROAD,
-    }
-    patches = [Patch(color=colour, label=label) for label, colour in words.items()]
-    figure.legend(handles=patches, loc="outside lower center", ncols=len(words), frameon=False)
-
-
-def search(
-    path: str | os.PathLike[str], history: History, references: Sequence[tuple[str, Evaluation]]
+def cost(
+    path: str | os.PathLike[str], tried: Sequence[Evaluation], points: Sequence[Point]
 ) -> None:
-    """Write a PNG of the objective of every layout against the simulations.
+    """Write a PNG of what layouts cost a year against the risk that they leave.
 
     Parameters
     ----------
     path : path
         The PNG.
-    history : History
-        What the designer evaluated.
-    references : sequence of (str, Evaluation)
-        Verified layouts, no barrier first, drawn as lines with their 95 % intervals.
+    tried : sequence of Evaluation
+        What a search evaluated, each by few releases.
+    points : sequence of Point
+        Verified layouts and references, with intervals; Z is the same along the thin lines.
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
+    near = [point for point in points if point.capital <= _reach(points)]
+    right = 1.15 * max([point.capital for point in near] + [1.0])
+    top = 1.2 * max(point.interval[1] for point in points)
     with rc_context(FONT):
-        figure = Figure((9.0, 5.4), dpi=DPI, layout="constrained")
+        figure = Figure((9.0, 6.2), dpi=DPI, layout="constrained")
         axes = figure.subplots()
-        colours = (NOTHING, RULE, BARRIER)
-        for (name, evaluation), colour in zip(references, colours, strict=False):
-            low, high = np.nan_to_num(evaluation.ci, posinf=evaluation.objective)
-            axes.axhspan(low, high, color=colour, alpha=0.13, linewidth=0)
-            axes.axhline(evaluation.objective, color=colour, linewidth=1.4, label=name)
-        _points(axes, history)
-        axes.set(xlabel="simulated releases", ylabel="objective (risk and cost, less is better)")
-        axes.set_ylim(bottom=0.0)
-        axes.grid(alpha=0.25)
-        figure.legend(loc="outside lower center", ncols=3, frameon=False)
-        _save(figure, path)
+        _equal(axes, right, top)
+        axes.plot([e.capital for e in tried], [e.harm + e.repair for e in tried], ".", color=TRIED,
+                  markersize=4, alpha=0.6, zorder=2,
+                  label=f"layout of the search, by few releases ({len(tried):,})")  # fmt: skip
+        for i, point in enumerate(near):
+            _named(axes, point, MARKERS[i % len(MARKERS)], EVENTS[i % len(EVENTS)])
+        for point in points:
+            if point not in near:
+                axes.annotate(
+                    f"{point.name}: {point.capital:,.0f} a year, {point.risk:,.0f} of risk",
+                    (0.995, 0.01), xycoords="axes fraction", ha="right", va="bottom", fontsize=10,
+                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8},
+                )  # fmt: skip
+        axes.set(xlim=(-0.02 * right, right), ylim=(0.0, top))
+        axes.set(xlabel="capital and upkeep [EUR per metre of road and year]",
+                 ylabel="harm and repair to expect [EUR per metre of road and year]")  # fmt: skip
+        figure.legend(loc="outside lower center", ncols=2, frameon=False)
+        save(figure, path)
 
 
-def _points(axes: Axes, history: History) -> None:
-    """Draw the layouts of the search, the best so far, and the finalists with their intervals."""
-    searched, finals = history.stage("search"), history.stage("final")
-    if searched:
-        at, best = history.best_so_far()
-        values = [entry.evaluation.objective for entry in searched]
-        axes.plot(at, values, "o", color=SEARCH, markersize=5, label="layout, by few releases")
-        axes.step(at, best, where="post", color="black", linewidth=1.2, label="best by these")
-    if finals:
-        mean = np.array([entry.evaluation.objective for entry in finals])
-        spread = np.array([entry.evaluation.ci[1] for entry in finals]) - mean
-        spread[~np.isfinite(spread) | (spread < 0.0)] = 0.0  # one release; equal ones, rounded
-        axes.errorbar(
-            [entry.simulations for entry in finals],
-            mean,
-            yerr=spread,
-            fmt="D",
-            color="black",
-            markersize=5,
-            capsize=3,
-            linewidth=1.0,
-            label="finalist on other releases",
-        )
+def _reach(points: Sequence[Point]) -> float:
+    """Return the dearest capital that is drawn to scale [EUR per metre and year]."""
+    least = min(point.capital + point.risk for point in points)
+    return SHEDS * max(least, *(p.risk for p in points), sorted(p.capital for p in points)[-2])
 
 
-def front(
-    path: str | os.PathLike[str],
-    history: History,
-    found: Sequence[Evaluation],
-    points: Sequence[tuple[str, Evaluation]],
-) -> None:
-    """Write a PNG of cost against debris: all layouts of a search, the front, and named layouts.
+def _equal(axes: Axes, right: float, top: float) -> None:
+    """Draw lines of equal Z, which is the sum of both axes, and write their value."""
+    from matplotlib.ticker import MaxNLocator
 
-    Parameters
-    ----------
-    path : path
-        The PNG.
-    history : History
-        What the search evaluated.
-    found : sequence of Evaluation
-        The front, the cheapest first, drawn with its 95 % intervals.
-    points : sequence of (str, Evaluation)
-        Verified layouts to show beside it, with theirs.
-    """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    with rc_context(FONT):
-        figure = Figure((9.0, 5.4), dpi=DPI, layout="constrained")
-        axes = figure.subplots()
-        tried = [entry.evaluation for entry in history.stage("search")]
-        axes.plot([e.cost for e in tried], [100 * e.debris for e in tried], "o", color=SEARCH,
-                  markersize=3.5, alpha=0.6, label="layout, by few releases")  # fmt: skip
-        steps = [e.cost for e in found], [100 * e.debris for e in found]
-        axes.step(*steps, where="post", color=BARRIER, linewidth=1.4)
-        _crosses(axes, found, "o", BARRIER, "front, on other releases")
-        for i, (name, e) in enumerate(points):
-            _crosses(axes, [e], "Ds^v<>pX"[i % 8], f"C{i}", name)
-        axes.set(xlabel="cost per metre of slope width", ylabel="debris past the road's edge [%]")
-        axes.set_ylim(bottom=0.0)
-        axes.grid(alpha=0.25)
-        figure.legend(loc="outside lower center", ncols=3, frameon=False)
-        _save(figure, path)
+    levels = [z for z in MaxNLocator(9).tick_values(0.0, right + top) if 0.0 < z < right + top]
+    for z in levels:
+        axes.plot([0.0, z], [z, 0.0], color=EQUAL, linewidth=0.8, zorder=1)
+        x = z - 0.985 * top if z > top else 0.0
+        if x < 0.9 * right:
+            axes.annotate(f"Z = {z:,.0f}", (x, z - x), xytext=(3, 2), textcoords="offset points",
+                          fontsize=8, color="#80868b", zorder=1, va="bottom")  # fmt: skip
 
 
-def _crosses(
-    axes: Axes, evaluations: Sequence[Evaluation], marker: str, colour: str, label: str
-) -> None:
-    """Draw costs and debris of evaluations with the intervals of the debris."""
-    debris = np.array([e.debris for e in evaluations])
-    spread = np.abs(np.array([e.debris_ci for e in evaluations]) - debris[:, None]).T
-    cost = [e.cost for e in evaluations]
-    axes.errorbar(cost, 100 * debris, 100 * spread, fmt=marker, color=colour, markersize=6,
-                  capsize=3, linewidth=1.0, label=label)  # fmt: skip
+def _named(axes: Axes, point: Point, marker: str, colour: str) -> None:
+    """Draw a named layout with the interval of its risk."""
+    spread = np.abs(np.array(point.interval) - point.risk)[:, None]
+    axes.errorbar(point.capital, point.risk, spread, fmt=marker, color=colour, markersize=9,
+                  capsize=4, linewidth=1.6, zorder=4,
+                  label=f"{point.name}: Z = {point.capital + point.risk:,.0f}")  # fmt: skip
 
 
-def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure as PNG, whole or not at all."""
     with atomic(path) as part:
         figure.savefig(part, format="png")

@@ -14,17 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from agents.protocol import Entry
-from envs import Evaluation
-from envs.evaluation import student_interval
+from agents.wording import short, standing
+from envs.intervals import estimate, student_interval
 from rigdda import Fence, GravityWall, Layout, Outcome, Site
-from rigdda.barriers import Barrier, Earthwork, describe, to_tables
+from rigdda.barriers import Earthwork, Embankment, to_tables
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 OUTCOME = {
-    "debris_fraction": ("debris past the road's edge", "%", 100.0),
+    "road_volume": ("volume that comes onto the road", "m3", 1.0),
+    "debris_fraction": ("share of the rock that comes onto it", "%", 100.0),
     "debris_on_road": ("debris on the road at the end", "m2", 1.0),
     "max_energy_on_road": ("largest energy on the road", "kJ/m", 1e-3),
     "slope_fraction": ("at the end on the slope", "%", 100.0),
@@ -39,26 +40,33 @@ HIT = {
     "max_energy": ("largest energy of a hit", "kJ/m", 1e-3),
     "total_energy": ("energy of all hits", "kJ/m", 1e-3),
     "absorbed_energy": ("energy absorbed", "kJ/m", 1e-3),
+    "thrust": ("largest thrust, mean over a second", "kN/m", 1e-3),
     "overtopped": ("blocks that passed", "-", 1.0),
-    "caught": ("mass at rest behind or in it", "%", 100.0),
+    "caught": ("share of the rock at rest behind or in it", "%", 100.0),
     "failed": ("failed", "%", 100.0),
     "displacement": ("displacement", "m", 1.0),
 }
 """The same of a barrier."""
 
-ONLY = {"failed": Fence, "displacement": GravityWall}
-"""Kind of which alone a field of a barrier says anything."""
+ONLY = {
+    "failed": (Fence, GravityWall, Embankment),
+    "thrust": (Fence, GravityWall, Embankment),
+    "displacement": (GravityWall,),
+}
+"""Kinds of which alone a field of a barrier says anything."""
 
 
 class EvaluationsFile:
     """A CSV file with one row an evaluated layout, written as they come.
 
-    `barriers` is a JSON list of tables as in a layout file. Usable as a context manager.
+    Money is in EUR per metre of road and year, `cost` in EUR per metre; `barriers` is a JSON list
+    of tables as in a layout file. Usable as a context manager.
     """
 
     FIELDS = (
         "simulations", "stage", "releases", "objective", "objective_low", "objective_high",
-        "debris", "debris_low", "debris_high", "cost", "barriers",
+        "capital", "harm", "repair", "cost", "debris", "debris_share", "targets", "seconds",
+        "barriers",
     )  # fmt: skip
 
     def __init__(self, path: str | os.PathLike[str]):
@@ -75,9 +83,12 @@ class EvaluationsFile:
     def add(self, entry: Entry) -> None:
         """Write one row and flush it."""
         e = entry.evaluation
-        barriers = json.dumps(to_tables(e.layout))
-        numbers = (len(e.seeds), e.objective, *e.ci, e.debris, *e.debris_ci, e.cost)
-        self._rows.writerow((entry.simulations, entry.stage, *numbers, barriers))
+        row = (
+            entry.simulations, entry.stage, e.releases, e.objective, *e.ci, e.capital, e.harm,
+            e.repair, e.cost, e.debris, e.debris_share, e.targets or "", e.seconds,
+            json.dumps(to_tables(e.layout)),
+        )  # fmt: skip
+        self._rows.writerow(row)
         self._file.flush()
 
 
@@ -93,7 +104,8 @@ def write_outcomes(
 
 def outcome_row(outcome: Outcome) -> dict[str, Any]:
     """Return an outcome, and what each barrier took, as columns of a CSV file."""
-    row: dict[str, Any] = {"released_mass": outcome.released_mass}
+    row: dict[str, Any] = {"event": outcome.event, "width": outcome.width}
+    row |= {"released_volume": outcome.released_volume, "reached": outcome.reached}
     row |= {name: getattr(outcome, name) for name in OUTCOME}
     row |= zip(("run_out_50", "run_out_95", "run_out_100"), outcome.run_out, strict=True)
     for i, barrier in enumerate(outcome.barriers):
@@ -125,16 +137,19 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
         interval = np.clip(student_interval(sample), low, 100.0 if unit == "%" else None)
         table.add_row(f"{words} [{unit}]", f"{sample.mean():.4g}", _span(interval, ".4g"))
 
+    chance = estimate(sum(outcome.reached for outcome in results), len(results))
+    ends = 100.0 * chance.low, 100.0 * chance.high
+    head = "a block comes onto the road [%]"
+    table.add_row(head, f"{100.0 * chance.probability:.4g}", _span(ends, ".4g"))
     for name, (words, unit, factor) in OUTCOME.items():
         add(words, unit, factor, [getattr(outcome, name) for outcome in results])
     run_out = [outcome.run_out[1] for outcome in results]
-    add("run-out of 95 % of the mass", "m", 1.0, run_out, -math.inf)
-    for i, barrier in enumerate(layout):
+    add("run-out of 95 % of the rock", "m", 1.0, run_out, -math.inf)
+    for i, barrier in enumerate(standing(layout)):
         table.add_section()
-        table.add_row(describe(barrier))
-        earthwork = isinstance(barrier, Earthwork)
+        table.add_row(f"{short(barrier)}, at {barrier.x:.1f} m")
         for name, (words, unit, factor) in HIT.items():
-            if earthwork and name not in ("overtopped", "caught"):
+            if isinstance(barrier, Earthwork) and name not in ("overtopped", "caught", *ONLY):
                 continue
             if not isinstance(barrier, ONLY.get(name, object)):
                 continue
@@ -142,36 +157,20 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
     return table
 
 
-def designs(cases: Iterable[tuple[str, Evaluation]]) -> Table:
-    """Return the table of verified layouts, at most 80 characters wide."""
-    table = empty_table(("layout", "debris [%] (95 %)", "objective (95 %)", "cost"))
-    for name, e in cases:
-        low, high = e.debris_ci
-        debris = f"{100 * e.debris:.1f} ({_span((100 * low, 100 * high), '.1f')})"
-        table.add_row(name, debris, f"{e.objective:.3f} ({_span(e.ci, '.3f')})", f"{e.cost:.1f}")
-    return table
-
-
-def failures(barrier: Barrier, index: int, results: Sequence[Outcome]) -> str:
-    """Return in how many releases a fence, the barrier of this index of a layout, fails, in words.
-
-    Nothing for what cannot fail.
-    """
-    if not isinstance(barrier, Fence):
-        return ""
-    failed = sum(outcome.barriers[index].failed for outcome in results)
-    return f", fails in {failed} of {len(results)} releases"
-
-
 def sites(found: Iterable[Site]) -> Table:
-    """Return the table of sites."""
-    table = empty_table(("site", "height [m]", "blocks", "road [m]", "description"))
+    """Return the table of sites: what they are, and the events that come down."""
+    table = empty_table(("site", "family", "height [m]", "events (1/year per 100 m)", "zone [m]"))
     for site in found:
         heights = [y for _, y in site.slope.points]
-        road = f"{site.road.start:g} to {site.road.end:g}"
-        blocks = str(len(site.realise().blocks))
-        words = shorten(site.description, 120, placeholder=" ...")
-        table.add_row(site.name, f"{max(heights) - min(heights):g}", blocks, road, words)
+        zone = site.barrier_zone
+        events = ", ".join(f"{event.name} {event.rate:g}" for event in site.events)
+        table.add_row(
+            site.name,
+            site.family or "-",
+            f"{max(heights) - min(heights):.0f}",
+            shorten(events, 160, placeholder=" ..."),
+            f"{zone.start:g} to {zone.end:g}",
+        )
     return table
 
 
@@ -182,8 +181,13 @@ def empty_table(head: Sequence[str]) -> Table:
 
     table = Table(box=SIMPLE_HEAD)
     for i, name in enumerate(head):
-        table.add_column(name, justify="left" if i == 0 or name == "description" else "right")
+        left = i == 0 or name in WORDS
+        table.add_column(name, justify="left" if left else "right")
     return table
+
+
+WORDS = ("description", "family", "layout", "events (1/year per 100 m)")
+"""Columns of words."""
 
 
 def _span(interval: Iterable[float], form: str) -> str:

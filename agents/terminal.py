@@ -6,6 +6,7 @@ import os
 import re
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,9 @@ FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
 
 LONGEST = 200
 """Bytes of the name of a folder; systems take 255."""
+
+PAUSE = 15.0
+"""Least time between two lines about progress where there is no terminal [s]."""
 
 
 class Stopped(Exception):
@@ -93,17 +97,35 @@ def _stamps(folder: Path) -> set[tuple[str, tuple[int, int, int]]]:
 
 @contextmanager
 def progress(total: int) -> Iterator[Callable[[int, str], None]]:
-    """Show a progress bar on standard error if that is a terminal; yield how to move it."""
+    """Yield how to tell on standard error how far a job is.
+
+    A bar where that is a terminal, else a line now and then.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
     from rich.progress import TimeRemainingColumn as Remaining
 
     console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _lines(total)
+        return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Remaining())
-    off = not console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=off) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting", total=total)
         yield lambda done, words: bar.update(task, completed=done, description=words)
+
+
+def _lines(total: int) -> Callable[[int, str], None]:
+    """Return how to write a line on standard error, at most one in `PAUSE` seconds."""
+    told = time.monotonic()
+
+    def tell(done: int, words: str) -> None:
+        nonlocal told
+        if time.monotonic() - told >= PAUSE:
+            told = time.monotonic()
+            click.echo(f"{words}: {done:,} of {total:,}", err=True)
+
+    return tell
 
 
 def show(table: RenderableType) -> None:

@@ -1,0 +1,94 @@
+"""What a design says beyond its numbers: what limits it, what fails, what is undecided."""
+
+from __future__ import annotations
+
+from agents.protocol import DesignResult
+from agents.wording import euros, percent, span
+from envs import DesignProblem, Evaluation
+from rigdda import Site
+
+SURE = 0.05
+"""Share of its design events in which a barrier may fail without a word: its upper bound."""
+
+PART = 1 / 3
+"""Share of what is left from which on an event is said to make it."""
+
+
+def worst(evaluation: Evaluation) -> str | None:
+    """Return the event that makes most of what is left of the risk, None if nothing is left."""
+    left = evaluation.by_event
+    most = max(left, key=lambda name: left[name], default=None)
+    return most if most is not None and left[most] > 0.0 else None
+
+
+def limits(result: DesignResult, nothing: Evaluation, chosen: Evaluation, left: str) -> str:
+    """Return one line that says what limits the answer.
+
+    Parameters
+    ----------
+    result : DesignResult
+        What the designer found.
+    nothing, chosen : Evaluation
+        No barrier and the found layout, verified.
+    left : str
+        What is left of the risk, in words.
+    """
+    parts = [_pays(nothing, chosen)]
+    if chosen.layout and result.on_bound:
+        parts.append(f"the layout lies on a bound: {', '.join(result.on_bound)}")
+    return "; ".join(filter(None, [*parts, left]))
+
+
+def _pays(nothing: Evaluation, chosen: Evaluation) -> str:
+    """Return in words that no layout pays, or that none is shown to pay; else nothing."""
+    if not chosen.layout:
+        return "nothing pays: no layout that was tried costs less a year than it saves"
+    if chosen.ci[1] < nothing.ci[0]:
+        return ""
+    return (
+        f"nothing pays as far as {chosen.releases:,} releases tell: Z is {span(chosen.ci)} with "
+        f"the layout and {span(nothing.ci)} without"
+    )
+
+
+def left_over(evaluation: Evaluation) -> str:
+    """Return in words what is left of the risk, and which event makes most of it."""
+    left, most = evaluation.by_event, worst(evaluation)
+    if most is None:
+        return "nothing is left of the risk in these releases"
+    total = sum(left.values())
+    words = f"what is left is {euros(total)} EUR per metre and year"
+    if len(left) == 1:
+        return words
+    if left[most] < PART * total:
+        return f"{words}, of which no event makes more than {percent(left[most] / total)}"
+    return f"{words}, of which the event {most!r} {euros(left[most])}"
+
+
+def failing(site: Site, evaluation: Evaluation) -> list[str]:
+    """Return lines that say how often barriers fail in design events, if that may be above 5 %."""
+    lines = []
+    for event in design_events(site) if evaluation.layout else ():
+        chance = evaluation.failure[event]
+        if chance.releases and chance.bound > SURE:
+            lines.append(
+                f"a barrier fails in {percent(chance.probability)} of the releases of the design "
+                f"event {event!r} (at most {percent(chance.bound)})"
+            )
+    return lines
+
+
+def design_events(site: Site) -> tuple[str, ...]:
+    """Return the names of the design events."""
+    return tuple(event.name for event in site.events if event.design)
+
+
+def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
+    """Return in words whether the targets are met; nothing without targets."""
+    asked = problem.targets
+    if asked is None or evaluation.targets is None:
+        return ""
+    pairs = (("reach", asked.reach), ("failure", asked.failure))
+    words = " and ".join(f"P({name}) <= {percent(p)}" for name, p in pairs if p is not None)
+    more = ": more releases (--verify) would tell" if evaluation.targets == "undecided" else ""
+    return f"target {words} in every design event: {evaluation.targets}{more}"

@@ -17,8 +17,10 @@ class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Parameters
     ----------
-    start, end : float
-        Chainages [m].
+    start : float
+        Chainage where it begins [m].
+    end : float
+        Chainage where it ends [m].
     surface : str
         Name of its surface.
     """
@@ -91,8 +93,10 @@ class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Parameters
     ----------
-    start, end : float
-        Chainages of its uphill and its downhill edge [m].
+    start : float
+        Chainage of its uphill edge [m].
+    end : float
+        Chainage of its downhill edge [m].
     """
 
     start: float
@@ -104,16 +108,22 @@ class BarrierZone(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Parameters
     ----------
-    start, end : float
-        Chainages [m]. No barrier stands in a band of loose rock within: see `Site.rooms`.
+    start : float
+        Chainage where it begins [m]. No barrier stands in a band of loose rock within the zone.
+    end : float
+        Chainage where it ends, at the road at the latest [m].
     max_height : float
         Greatest height of all kinds but ditches [m].
-    min_thickness, max_thickness : float
-        Thickness of walls, the width of an embankment's crest included [m].
+    min_thickness : float
+        Least thickness of walls, the width of an embankment's crest included [m].
+    max_thickness : float
+        Greatest of these [m].
     max_depth : float
         Greatest depth of ditches [m].
-    min_width, max_width : float
-        Width of ditches [m].
+    min_width : float
+        Least width of ditches [m].
+    max_width : float
+        Greatest width of ditches [m].
 
     Raises
     ------
@@ -150,8 +160,10 @@ class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Parameters
     ----------
-    first, second : str
-        Names of the two surfaces.
+    first : str
+        Name of the one surface.
+    second : str
+        Name of the other.
     friction_deg : float
         Coulomb friction angle [deg].
     cohesion, tension : float

@@ -37,9 +37,9 @@ def check_site(site: Site) -> None:
     _check_surfaces(site)
     _check_slope(site)
     _check_events(site)
-    _check_zone(site)
     for source in site.sources:
         _check_source(site, source)
+    _check_zone(site)
     _check_meshes(site)
     motion = site.motion
     if motion.damping and motion.damping_when == "always" and site.family != "paper":

@@ -13,13 +13,13 @@ from rigdda.geometry import overlap
 from rigdda.joints import JointSet, cut
 
 SQUARE = shapely.Polygon([(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)])
-SITE = Site.load("shu-hwa")
+(ROCK,) = Site.load("shu-hwa-paper").sources
 
 
 def cut_site(seed: int) -> list[np.ndarray]:
     rng = np.random.default_rng(seed)
-    source = shapely.Polygon(SITE.source.polygon)
-    return cut(source, SITE.source.joints, SITE.source.block_area, rng)
+    source = shapely.Polygon(ROCK.polygon)
+    return cut(source, ROCK.joints, ROCK.block_area, rng)
 
 
 def check(source: shapely.Polygon, blocks: list[np.ndarray], block_area: float) -> None:
@@ -45,8 +45,8 @@ def check(source: shapely.Polygon, blocks: list[np.ndarray], block_area: float) 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_site(seed):
-    source = shapely.Polygon(SITE.source.polygon)
-    check(source, cut_site(seed), SITE.source.block_area)
+    source = shapely.Polygon(ROCK.polygon)
+    check(source, cut_site(seed), ROCK.block_area)
 
 
 @given(

@@ -10,16 +10,30 @@ import shapely
 from rigdda import BadInput, Simulation, Site, Surface, sites
 from rigdda.geometry import overlap
 from rigdda.outcome import measure, stations, watch
-from rigdda.site import Scatter
+from rigdda.place import Scatter
+from rigdda.sites.generator import fallen
 from rigdda.validation import toppling
 
 NAMES = sites.names()
+EVENTS = [(name, event) for name in NAMES for event in Site.load(name).event_names]
 RITCHIE = [name for name in NAMES if name.startswith("ritchie-")]
 
 
 def test_promised_sites_are_there():
-    promised = {"quick", "ritchie-35", "ritchie-60", "ritchie-80", "shu-hwa", "toppling"}
-    assert promised <= set(NAMES)
+    paper = {"ritchie-35", "ritchie-60", "ritchie-80", "shu-hwa-paper", "toppling"}
+    assert {"quick", *paper, *sites.design_names()} == set(NAMES)
+    assert len(sites.design_names()) == 6
+    assert all(Site.load(name).family == "paper" for name in paper)
+    assert all(Site.load(name).family == name for name in sites.design_names())
+
+
+@pytest.mark.parametrize("name", sites.design_names())
+def test_design_sites_begin_their_zone_where_rock_has_speed(name):
+    site = Site.load(name)
+    assert site.barrier_zone.start >= fallen(site.slope, site.sources)
+    assert any(event.design for event in site.events)
+    assert any(event.number[1] > 1 or event.name == "mass" for event in site.events)
+    assert site.motion.damping_when == "contact"
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -34,32 +48,34 @@ def test_saved_site_is_the_same(name, tmp_path):
     assert Site.load(tmp_path / "site.toml") == site
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("name", "event"), EVENTS)
 @pytest.mark.parametrize("seed", range(3))
-def test_blocks_start_clear_of_the_ground_and_of_each_other(name, seed):
+def test_blocks_start_clear_of_the_ground_and_of_each_other(name, event, seed):
     site = Site.load(name)
-    scene = site.realise(seed=seed)
+    scene, source = site.realise((), seed, event), site.source(site.event(event).source)
     chain = scene.terrain.points
     ground = shapely.Polygon([*chain, (chain[-1, 0], -999.0), (chain[0, 0], -999.0)])
     rocks = [shapely.Polygon(b.vertices) for b in scene.blocks]
-    scale = site.source.mean_block_area
+    scale = shapely.area(rocks).mean()
     assert max(overlap(rock, ground) for rock in rocks) < 1e-6 * scale
     first, second = shapely.STRtree(rocks).query(rocks, predicate="intersects")
     pairs = [(rocks[i], rocks[j]) for i, j in zip(first, second, strict=True) if i < j]
-    assert max(overlap(a, b) for a, b in pairs) < 1e-6 * scale
-    assert shapely.area(rocks).sum() == pytest.approx(site.source.area, rel=1e-9)
-    assert shapely.union_all(rocks).within(shapely.Polygon(site.source.outline).buffer(1e-6))
+    assert max((overlap(a, b) for a, b in pairs), default=0.0) < 1e-6 * scale
+    if source.band is None:
+        assert shapely.area(rocks).sum() == pytest.approx(source.area, rel=1e-9)
+        assert shapely.union_all(rocks).within(shapely.Polygon(source.outline).buffer(1e-6))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_rock_comes_down_and_is_accounted_for(name):
+@pytest.mark.parametrize(("name", "event"), EVENTS)
+def test_rock_comes_down_and_is_accounted_for(name, event):
     site = Site.load(name)
-    sim = Simulation(site.realise(seed=1), site.settings(), stations(site, ()), watch(site))
+    drawn = site.draw(1, event)
+    sim = Simulation(site.scene(drawn), site.settings(), stations(site, ()), watch(site))
     run = sim.run(4.0)
     assert sim.diagnostics.penetration < 0.1
     fell = run.poses[0, :, 1] - run.poses[-1, :, 1]
     assert (fell > 1.0).mean() > 0.4  # below a joint that dips into the slope some blocks stay
-    outcome = measure(site, run)
+    outcome = measure(site, run, drawn.event, drawn.width)
     assert outcome.slope_fraction + outcome.road_fraction + outcome.beyond_fraction == 1.0
 
 
@@ -73,7 +89,7 @@ def test_slopes_of_ritchie_have_the_angle_of_their_name(name):
 def test_sites_of_ritchie_differ_in_their_angle_only():
     first, *others = map(Site.load, RITCHIE)
     for other in others:
-        for part in ("source", "surfaces", "motion", "costs"):
+        for part in ("sources", "surfaces", "motion", "prices"):
             assert getattr(other, part) == getattr(first, part)
         assert other.road.start - other.slope.toe == pytest.approx(
             first.road.start - first.slope.toe
@@ -107,31 +123,31 @@ def test_toppling_site_falls_below_the_limiting_friction(friction_deg, stands):
 
 def columns(**change):
     """Return the source of the toppling site with other fields."""
-    return msgspec.structs.replace(Site.load("toppling").source, **change)
+    return msgspec.structs.replace(Site.load("toppling").sources[0], **change)
 
 
 def test_a_source_is_a_jointed_mass_or_blocks():
-    jointed = Site.load("quick").source
+    jointed = Site.load("quick").source("mass")
     with pytest.raises(BadInput) as caught:
         columns(polygon=jointed.polygon)
-    assert caught.value.field == "source.blocks"
+    assert caught.value.field == "sources.mass.blocks"
     with pytest.raises(BadInput) as caught:
         columns(blocks=())
-    assert caught.value.field == "source.polygon"
+    assert caught.value.field == "sources.mass.polygon"
 
 
 def test_blocks_of_a_source_do_not_overlap():
-    blocks = Site.load("toppling").source.blocks
+    blocks = Site.load("toppling").sources[0].blocks
     shifted = tuple((x + 0.1, y) for x, y in blocks[3])
     with pytest.raises(BadInput) as caught:
         columns(blocks=(*blocks[:3], shifted, *blocks[4:]))
-    assert caught.value.field == "source.blocks[3]"
+    assert caught.value.field == "sources.mass.blocks[3]"
     assert "in block 2" in caught.value.mend
 
 
 def test_blocks_of_a_source_are_out_of_the_ground():
     site = Site.load("toppling")
-    sunk = tuple((x, y - 0.1) for x, y in site.source.blocks[0])
+    sunk = tuple((x, y - 0.1) for x, y in site.sources[0].blocks[0])
     with pytest.raises(BadInput) as caught:
-        msgspec.structs.replace(site, source=columns(blocks=(sunk,)))
-    assert caught.value.field.startswith("source.blocks[0]")
+        msgspec.structs.replace(site, sources=(columns(blocks=(sunk,)),))
+    assert caught.value.field.startswith("sources.mass.blocks[0]")

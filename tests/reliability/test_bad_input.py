@@ -178,10 +178,10 @@ CASES = {
     "scenes": (lambda _: simulate_many([None]), "scenes[0]"),
     "for ever": (lambda _: Simulation(scene()).run(1e14), "duration"),
     "no site": (lambda _: Site.load(None), "site"),
-    "price of numbers": (lambda _: Site.load("quick").cost([5]), "layout[0]"),
+    "price of numbers": (lambda _: Site.load("quick").capital([5]), "layout[0]"),
     "layout of numbers": (lambda folder: save_layout([5], folder / "l.toml"), "layout[0]"),
-    "dust": (site("block_area = ", "block_area = 1e-9 # "), "source.block_area"),
-    "one block": (site("block_area = ", "block_area = 1e9 # "), "source.block_area"),
+    "dust": (site("block_area = ", "block_area = 1e-9 # "), "sources.mass.block_area"),
+    "one block": (site("block_area = ", "block_area = 1e9 # "), "sources.mass.block_area"),
     "spacing": (site("spacing = 1.4", "spacing = 1e-300"), "joint set: spacing"),
     "rock in the zone": (site("start = 11.3", "start = 2.0"), "barrier_zone.start"),
     "latin-1": (lambda folder: Site.load(latin(folder / "site.toml")), "site file"),
@@ -189,10 +189,10 @@ CASES = {
     "deep nesting": (lambda folder: Site.load(nested(folder / "site.toml")), "site file"),
     "one joint set": (
         site("{ dip_deg = -45.0, spacing = 1.4, scatter = 0.15 },", ""),
-        "source.joints",
+        "sources.mass.joints",
     ),
-    "source in the ground": (site("[7.5, 36.67]", "[7.5, 36.5]"), "source.polygon[1]"),
-    "zone on the road": (site("end = 32.8", "end = 40.0"), "barrier_zone.end"),
+    "source in the ground": (site("[7.5, 36.67]", "[7.5, 36.5]"), "sources.mass.polygon[1]"),
+    "zone on the road": (site("end = 34.3", "end = 40.0"), "barrier_zone.end"),
 }
 
 

@@ -1,0 +1,228 @@
+"""What a site file may say, and what it must not."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+import shapely
+
+from rigdda import (
+    BadInput,
+    Ditch,
+    DoubtfulInput,
+    Event,
+    Mesh,
+    Site,
+    Source,
+    Surface,
+    Wall,
+    boulders,
+    sites,
+)
+from rigdda.place import Interface, Motion, Slope, Stretch
+
+QUICK = Site.load("quick")
+VERGE = Site.load("verge")
+replace = msgspec.structs.replace
+
+
+def refused(folder, name: str, old: str, new: str) -> BadInput:
+    """Return the error of a built-in site with a piece of its file changed."""
+    text = sites.text(name)
+    assert old in text
+    path = folder / "site.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(BadInput) as caught:
+        Site.load(path)
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("toe = 5.0", "toe = 5.0\nnonsense = 1"),
+        ("{ start = 5.0,", "{ nonsense = 1, start = 5.0,"),
+        ("band = [1.0, 2.8]", "band = [1.0, 2.8]\nnonsense = 1"),
+        ("rate = 2.0", "rate = 2.0\nnonsense = 1"),
+        ("max_height = 5.0", "max_height = 5.0\nnonsense = 1"),
+        ("friction_deg = 30.0", "friction_deg = 30.0\nnonsense = 1"),
+        ("embankment = 110.0", "nonsense = 110.0"),
+        ("price = 80.0", "price = 80.0\nnonsense = 1"),
+        ("damping = 0.3", "nonsense = 0.3"),
+        ("[motion]", "[consequences]\nnonsense = 1\n\n[motion]"),
+        ("[motion]", "[scatter]\nnonsense = 1\n\n[motion]"),
+        ("[motion]", '[[interfaces]]\nfirst="rock"\nsecond="soil"\nnonsense=1\n[motion]'),
+    ],
+)
+def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
+    assert "nonsense" in str(refused(tmp_path, "verge", old, new))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "mend"),
+    [
+        ("rate = 2.0", "rate = true", "site file", "float"),
+        ("rate = 2.0", "rate = [2.0]", "site file", "float"),
+        ("rate = 2.0", "rate = -1.0", "events.small, face.rate", "at least 0"),
+        ("rate = 2.0", "rate = 36500.0", "events.small, face.rate", "at most 1000"),
+        ("friction_deg = 30.0", "friction_deg = 0.577", "surfaces.rock.friction_deg", "degrees"),
+        ("band = [1.0, 2.8]", "band = [2.8, 1.0]", "sources.face.band", "lesser number first"),
+        (
+            "band = [1.0, 2.8]",
+            "band = [1.0, 2.8]\ndensity = 2.65",
+            "sources.face.density",
+            "kg/m3",
+        ),
+        ("[61.0, -3.0]", "[45.0, -3.0]", "slope.surfaces[1].end", "at most 45"),
+        ("area = [0.05, 0.3]", "", "events.small, face.area", "band face"),
+        ("width = 4.0", "", "events.group.width", "several blocks"),
+        ('source = "face"', 'source = "fall"', "events.small, face.source", "crest, face"),
+        ('name = "crest"', 'name = "face"', "sources[1].name", "of its own"),
+        ("block = 0.7", "blocks = 0.7", "meshes.face.factors", "block, group"),
+        ("embankment = 110.0", "interest = 3.0", "prices.interest", "at most 0.5"),
+        ("embankment = 110.0", "fence = { 750 = 300.0 }", "prices.fence", "1000"),
+        ("band = [1.0, 2.8]", "band = [1.0, 11.5]", "sources.face.band", "clear of the road"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(old, new, field, mend, tmp_path):
+    error = refused(tmp_path, "verge", old, new)
+    assert error.field == field
+    assert mend in str(error)
+
+
+def test_ground_that_ends_too_early_is_told(tmp_path):
+    error = refused(tmp_path, "quick", "[80.0, -2.0]", "[60.0, -2.0]")
+    assert error.field == "slope.points[10]"
+    assert "to x = 74.8 at least, 30 m beyond the road" in error.mend
+
+
+@pytest.mark.parametrize("value", [True, np.True_, np.array(5.0), np.array([5.0])])
+def test_booleans_and_arrays_are_no_numbers(value):
+    for make in (
+        lambda: Event("block", value),
+        lambda: Surface(value),
+        lambda: Motion(damping=value),
+        lambda: Wall(value, 1.0),
+    ):
+        with pytest.raises(BadInput, match="give a number"):
+            make()
+
+
+def test_damping_in_flight_is_warned_of_but_in_scenes_of_publications():
+    always = Motion(0.3, "always")
+    with pytest.warns(DoubtfulInput, match="four to ten times too low"):
+        replace(QUICK, motion=always)
+    assert Site.load("shu-hwa-paper").motion == Motion(0.6, "always", 30.0)
+
+
+def test_closure_in_thousands_is_warned_of():
+    with pytest.warns(DoubtfulInput, match="not thousands"):
+        replace(QUICK, consequences=replace(QUICK.consequences, closure=50.0))
+
+
+def test_without_events_each_mass_comes_down_once_a_year():
+    assert Site.load("toppling").events == (Event("mass", 1.0, "mass"),)
+    with pytest.raises(BadInput, match="the least and the greatest area"):
+        replace(QUICK, events=())
+
+
+def test_a_stretch_of_the_slope_has_its_own_surface():
+    slope = Slope(((0.0, 10.0), (10.0, 0.0), (50.0, 0.0)), 10.0, "rock", (Stretch(4, 20, "soil"),))
+    points, names = slope.chain()
+    assert points == ((0, 10), (4, 6), (10, 0), (20, 0), (50, 0))
+    assert names == ("rock", "soil", "soil", "rock")
+    with pytest.raises(BadInput, match=r"surfaces\[1\].start"):
+        replace(slope, surfaces=(Stretch(4, 20, "soil"), Stretch(19, 30, "rock")))
+
+
+def test_the_surface_of_the_ground_decides():
+    scene = VERGE.realise((), 1, "block")
+    assert scene.interface("rock", "soil") == VERGE.surfaces["soil"]
+    assert scene.interface("soil", "rock").restitution == 0.25
+    pair = Interface("soil", "rock", 12.0, restitution=0.01)
+    other = replace(VERGE, interfaces=(pair,)).realise((), 1, "block")
+    assert other.interface("rock", "soil") == pair.surface
+    stiff = replace(VERGE, surfaces={**VERGE.surfaces, "soil": Surface(40.0, restitution=0.9)})
+    assert stiff.realise((), 1, "block").interface("rock", "soil").restitution == 0.9
+
+
+def test_a_release_is_the_same_whatever_the_layout():
+    for event in QUICK.event_names:
+        one, other = (QUICK.realise(layout, 5, event) for layout in ((), (Ditch(30.0, 1.0, 3.0),)))
+        for a, b in zip(one.blocks, other.blocks, strict=True):
+            assert (a.vertices == b.vertices).all() and a.velocity == b.velocity
+
+
+def test_events_come_as_often_as_their_rates_say():
+    drawn = [QUICK.pick(seed) for seed in range(3000)]
+    rates = {event.name: event.rate for event in QUICK.events}
+    for name, rate in rates.items():
+        share = rate / sum(rates.values())
+        error = math.sqrt(share * (1.0 - share) / 3000)
+        assert drawn.count(name) / 3000 == pytest.approx(share, abs=4.0 * error)
+
+
+def test_blocks_of_a_band_are_as_the_event_says():
+    event, source = QUICK.event("block"), QUICK.source("face")
+    least, greatest = event.area
+    areas, power = [], -1.5 * event.exponent
+    for seed in range(2000):
+        drawn = QUICK.draw(seed, "block")
+        (block,) = drawn.blocks
+        rock = shapely.Polygon(block.vertices)
+        areas.append(rock.area)
+        assert 5 <= len(block.vertices) <= 8 and rock.exterior.is_ccw
+        assert rock.convex_hull.area == pytest.approx(rock.area)
+        assert drawn.width == pytest.approx(math.sqrt(rock.area))
+        vx, vy, spin = block.velocity
+        assert 0.2 <= vx <= 1.0 and vy == 0.0 and abs(spin) <= 0.5
+        left, _, right, _ = rock.bounds
+        reach = boulders.reach(source, event)
+        assert source.band[0] - reach < left < right < source.band[1] + reach
+    assert least <= min(areas) * (1 + 1e-9) and max(areas) <= greatest * (1 + 1e-9)
+    for middle in (0.5, 1.0):  # N(> V) ~ V^-b, truncated
+        above = (middle**power - greatest**power) / (least**power - greatest**power)
+        assert np.mean(np.array(areas) > middle) == pytest.approx(above, abs=0.045)
+
+
+def test_groups_have_their_number_and_width():
+    counts = {len(QUICK.draw(seed, "group").blocks) for seed in range(60)}
+    assert counts == {4, 5, 6}
+    assert QUICK.draw(0, "group").width == 6.0
+
+
+def test_barriers_do_not_stand_where_loose_rock_lies():
+    bench = Site.load("bench")
+    (start, low), (high, end) = bench.rooms
+    assert start == bench.barrier_zone.start and end == bench.barrier_zone.end
+    assert low < 18.5 and high > 21.5
+    bench.realise((Wall(low - 1.0, 1.0), Wall(high, 1.0)), 0, "small")
+    for x in (low - 0.5, 20.0, high - 0.1):
+        with pytest.raises(BadInput, match="where loose rock lies"):
+            bench.realise((Wall(x, 1.0),), 0, "small")
+    with pytest.raises(BadInput, match="leave room"):
+        replace(bench, barrier_zone=replace(bench.barrier_zone, start=18.5, end=21.5))
+
+
+def test_a_band_needs_ground_without_overhangs():
+    site = Site.load("toppling")
+    band = Source(name="top", band=(20.0, 30.0))
+    event = Event("block", 1.0, "top", area=(1.0, 2.0))
+    with pytest.raises(BadInput, match="overhangs"):
+        replace(site, sources=(band,), events=(event,))
+
+
+def test_a_source_is_one_of_three():
+    with pytest.raises(BadInput, match="give one of band"):
+        Source(band=(0.0, 1.0), polygon=((0, 0), (1, 0), (0, 1)))
+    with pytest.raises(BadInput, match="its blocks are given"):
+        replace(QUICK, events=(Event("mass", 1.0, "mass", number=(2, 3)),))
+
+
+def test_mesh_is_no_part_of_a_scene():
+    assert QUICK.realise((Mesh(5.0, "face"),), 1, "block").barriers == ()
+    with pytest.raises(BadInput, match="choose one of face"):
+        QUICK.realise((Mesh(5.0, "net"),), 1, "block")

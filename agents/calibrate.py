@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.special import stdtrit
-
-import rigdda
+from agents import constant, rule
 from agents.seeds import release_seeds
 from agents.tables import empty_table, write_rows
-from envs import DesignProblem, fidelity
-from envs.evaluation import CONFIDENCE, Interval, student_interval
+from agents.wording import euros, short, span
+from envs import DesignProblem, Evaluation, fidelity
+from envs.evaluation import Interval
 from rigdda import Layout, Site
-from rigdda.barriers import describe
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-Floats = NDArray[np.float64]
-
-FENCES = ((0.5, 0.5, 0.6), (-0.3, 0.5, 0.6))
-"""Slots of the fences that are compared, none, the first and both: at three quarters and at a third
-of the zone, of three quarters of the greatest height and, in the default limits, 2.3 MJ."""
+LOOKED = 512
+"""Releases that the rule may look at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,54 +29,54 @@ class Calibration:
 
     Parameters
     ----------
-    layout : tuple of Barrier
-        What stood.
-    full, fast : (releases,) array
-        Debris fraction of every release [-].
-    seconds_full, seconds_fast : float
-        Processor time of a release, cutting its blocks left out [s].
+    name : str
+        What it is.
+    full, fast : Evaluation
+        What it is worth at each, on releases of the same seeds.
     """
 
-    layout: Layout
-    full: Floats
-    fast: Floats
-    seconds_full: float
-    seconds_fast: float
+    name: str
+    full: Evaluation
+    fast: Evaluation
 
     @property
     def bias(self) -> float:
-        """Mean debris fraction of "fast" less that of "full" [-]."""
-        return float(self.fast.mean() - self.full.mean())
+        """Z at "fast" less that at "full" [EUR per metre of road and year]."""
+        return self.fast.objective - self.full.objective
 
     @property
     def bias_ci(self) -> Interval:
-        """95 % interval of the bias, by Welch's t."""
-        n = len(self.full)
-        parts = [float(sample.var(ddof=1)) / n for sample in (self.fast, self.full)]
-        total = sum(parts)
-        if total == 0.0:
-            return self.bias, self.bias
-        freedom = total**2 / sum(part**2 / (n - 1) for part in parts)
-        half = float(stdtrit(freedom, 0.5 * (1.0 + CONFIDENCE))) * math.sqrt(total)
-        return self.bias - half, self.bias + half
+        """95 % interval of the bias, by the ends of both intervals (Zou and Donner 2008)."""
+        full, fast = self.full, self.fast
+        below = math.hypot(fast.objective - fast.ci[0], full.ci[1] - full.objective)
+        above = math.hypot(fast.ci[1] - fast.objective, full.objective - full.ci[0])
+        return self.bias - below, self.bias + above
 
     @property
     def gain(self) -> float:
-        """How many times less processor time "fast" takes."""
-        return self.seconds_full / self.seconds_fast
+        """How many times less processor time a release takes at "fast"."""
+        return _each(self.full) / _each(self.fast)
 
 
-def layouts(site: Site) -> tuple[Layout, ...]:
-    """Return the layouts that are compared: nothing, one fence, two fences."""
-    problem = DesignProblem(site, len(FENCES), ("fence",))
-    slots = [np.concatenate([*FENCES[:n], *[(0.0, -1.0, 0.0)] * (2 - n)]) for n in range(3)]
-    return tuple(problem.decode(vector) for vector in slots)
+def _each(evaluation: Evaluation) -> float:
+    """Return the processor time of a simulated release [s], not a number if none was."""
+    return evaluation.seconds / evaluation.simulated if evaluation.simulated else math.nan
+
+
+def layouts(site: Site, seed: int) -> dict[str, Layout]:
+    """Return the layouts that are compared: nothing, the constant and what the rule builds."""
+    problem = DesignProblem(site)
+    return {
+        "nothing": (),
+        "constant": constant.design(problem, 2 * len(site.events), seed).layout,
+        "rule": rule.design(problem, LOOKED, seed).layout,
+    }
 
 
 def calibrate(
     site: Site, releases: int, seed: int, tick: Callable[[int, str], None]
 ) -> list[Calibration]:
-    """Simulate every layout at both fidelities, `releases` times each, over all cores.
+    """Evaluate every layout at both fidelities, on `releases` releases each.
 
     Raises
     ------
@@ -94,62 +85,41 @@ def calibrate(
     """
     seeds = release_seeds("verification", seed, releases)
     out, done = [], 0
-    rigdda.release_outcome(site, (), seeds[0])  # loads the kernels: no release is to pay for that
-    for layout in layouts(site):
+    for name, layout in layouts(site, seed).items():
         found = {}
-        for name in fidelity.FIDELITIES:
-            tick(done, f"{name}: {_words(layout)}")
-            found[name] = _sample(fidelity.at(site, name), layout, seeds)
+        for level in fidelity.FIDELITIES:
+            tick(done, f"{level}: {name}")
+            found[level] = DesignProblem(site, fidelity=level).evaluate(layout, seeds)
             done += releases
-        (fast, cheap), (full, dear) = found["fast"], found["full"]
-        out.append(Calibration(layout, full, fast, dear, cheap))
+        out.append(Calibration(name, found["full"], found["fast"]))
     return out
 
 
-def _sample(site: Site, layout: Layout, seeds: Sequence[int]) -> tuple[Floats, float]:
-    """Return the debris fraction of every release and the mean processor time of one [s]."""
-
-    def one(seed: int) -> tuple[float, float]:
-        site.realise(layout, seed)  # cuts the blocks, as searches do once for many layouts
-        before = time.thread_time()
-        debris = rigdda.release_outcome(site, layout, seed).debris_fraction
-        return debris, time.thread_time() - before
-
-    with ThreadPoolExecutor() as pool:
-        debris, seconds = np.array(list(pool.map(one, seeds))).T
-    return debris, float(seconds.mean())
-
-
 def write(path: Path, site: Site, found: Sequence[Calibration]) -> None:
-    """Write a CSV file with one row a layout."""
+    """Write a CSV file with one row a layout; money is in EUR per metre of road and year."""
     rows = []
     for c in found:
-        row = {"site": site.name, "layout": _words(c.layout), "releases": len(c.full)}
-        for name, sample in (("full", c.full), ("fast", c.fast)):
-            low, high = student_interval(sample)
-            row |= {f"debris_{name}": sample.mean(), f"{name}_low": low, f"{name}_high": high}
+        row: dict[str, Any] = {"site": site.name, "case": c.name, "releases": c.full.releases}
+        row["layout"] = "; ".join(map(short, c.full.layout)) or "no barrier"
+        for name, e in (("full", c.full), ("fast", c.fast)):
+            row |= {f"z_{name}": e.objective, f"{name}_low": e.ci[0], f"{name}_high": e.ci[1]}
         low, high = c.bias_ci
         row |= {"bias": c.bias, "bias_low": low, "bias_high": high}
-        row |= {"seconds_full": c.seconds_full, "seconds_fast": c.seconds_fast, "gain": c.gain}
+        row |= {"seconds_full": _each(c.full), "seconds_fast": _each(c.fast), "gain": c.gain}
         rows.append(row)
     write_rows(path, rows)
 
 
 def table(found: Sequence[Calibration]) -> Table:
     """Return the table of a calibration, at most 80 characters wide."""
-    out = empty_table(("layout", "full [%]", "fast [%]", "fast - full (95 %)", "CPU [ms]", "gain"))
+    out = empty_table(("layout", "Z full", "Z fast", "fast - full (95 %)", "CPU [ms]", "gain"))
     for c in found:
-        low, high = (100.0 * value for value in c.bias_ci)
         out.add_row(
-            ("no barrier", "one fence", "two fences")[len(c.layout)],
-            f"{100 * c.full.mean():.1f}",
-            f"{100 * c.fast.mean():.1f}",
-            f"{100 * c.bias:+.1f} ({low:+.1f} to {high:+.1f})",
-            f"{1e3 * c.seconds_full:.0f} / {1e3 * c.seconds_fast:.0f}",
+            c.name,
+            euros(c.full.objective),
+            euros(c.fast.objective),
+            f"{c.bias:+.3g} ({span(c.bias_ci)})",
+            f"{1e3 * _each(c.full):.2f} / {1e3 * _each(c.fast):.2f}",
             f"{c.gain:.1f}",
         )
     return out
-
-
-def _words(layout: Layout) -> str:
-    return "; ".join(describe(barrier) for barrier in layout) or "no barrier"

@@ -48,15 +48,15 @@ def claim(folder: Path, problem: DesignProblem, *files: str) -> None:
 def posed(problem: DesignProblem) -> dict[str, Any]:
     """Return all that makes a problem another one, as plain values.
 
-    `content` is a hash of the site with its prices, rates and the zone.
+    `content` is a hash of the site with its prices and rates.
     """
-    zone = problem.site.barrier_zone
     return {
         "site": problem.site.name,
         "kinds": list(problem.kinds),
-        "zone": [zone.start, zone.end],
+        "zone": [problem.zone.start, problem.zone.end],
         "targets": msgspec.to_builtins(problem.targets),
         "max_barriers": problem.max_barriers,
+        "fidelity": problem.fidelity,
         "content": hashlib.sha256(msgspec.json.encode(problem.site)).hexdigest()[:16],
     }
 

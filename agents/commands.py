@@ -20,19 +20,20 @@ from agents.terminal import Stopped, folder_for, kept, progress, show
 def study(file: str, seed: int, out: Path | None) -> None:
     """Simulate every layout of STUDY.toml in the same releases: one row each in study.csv.
 
-    The file names a `site`, how many `releases`, and `layouts`: tables with a `name` and either
-    `barriers`, as in a layout file, or the `file` that holds them. A study that was killed goes on
-    from its study.csv.
+    The file names a `site`, how many `releases` of each event, and `layouts`: tables with a `name`
+    and either `barriers`, as in a layout file, or the `file` that holds them. A study that was
+    killed goes on from its study.csv.
     """
-    from agents import studies
+    from agents import studies, study_file
 
-    asked = studies.load(file)
+    asked = study_file.load(file)
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
     with kept(folder), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
+    click.echo("Z and its parts in EUR per metre of road and year; to build in EUR per metre")
     show(studies.table(asked, folder / "study.csv"))
     words = f", {resumed} taken from a former run" if resumed else ""
-    click.echo(f"{asked.size} releases{words}; study.csv is in {folder}")
+    click.echo(f"{asked.size:,} releases{words}; study.csv is in {folder}")
 
 
 @click.command()

@@ -92,7 +92,8 @@ def _pose(
     zone: tuple[float, float] | None,
 ) -> DesignProblem:
     """Return the problem that was asked."""
-    from envs import DesignProblem, Targets
+    from envs import DesignProblem
+    from envs.targets import Targets
 
     asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None}
     if target is not None or failure is not None:

@@ -86,7 +86,7 @@ def design_events(site: Site) -> tuple[str, ...]:
 def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
     """Return in words whether the targets are met; nothing without targets."""
     asked = problem.targets
-    if asked is None or evaluation.targets is None:
+    if evaluation.targets is None:
         return ""
     pairs = (("reach", asked.reach), ("failure", asked.failure))
     words = " and ".join(f"P({name}) <= {percent(p)}" for name, p in pairs if p is not None)

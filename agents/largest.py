@@ -24,14 +24,14 @@ HOLDS = 0.5
 
 def tried(problem: DesignProblem) -> tuple[Layout, ...]:
     """Return layouts of one barrier as large as the zone and its kind allow, at several places."""
-    zone = problem.site.barrier_zone
+    zone = problem.zone
     places = np.linspace(zone.start, zone.end, STATIONS + 2)[:-1].tolist()
     return tuple((b,) for x in places for b in _largest(problem, x) if problem.fits((b,)))
 
 
 def _largest(problem: DesignProblem, x: float) -> Iterator[Barrier]:
     """Yield the largest barrier of each kind at a place; one that cannot be built there is left."""
-    zone = problem.site.barrier_zone
+    zone = problem.zone
     top = max(FENCE_CLASSES)
     makers = {
         "fence": lambda: Fence(

@@ -47,7 +47,7 @@ def _section(done: Study, path: Path, seed: int) -> None:
     layout = chosen.evaluation.layout
     if layout:
         panels.append(Panel(f"With the layout: {_words(chosen)}", layout, _all(site, layout, seed)))
-    section(path, site, panels, nothing)
+    section(path, site, done.problem.zone, panels, nothing)
 
 
 def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:

@@ -18,6 +18,7 @@ from agents.pictures import BARRIER, DPI, FONT, GROUND, ROAD, ZONE, colours, sav
 from agents.wording import short, standing
 from rigdda import Barrier, Ditch, Fence, Layout, Site
 from rigdda.barriers import earthworks
+from rigdda.place import BarrierZone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,7 +41,11 @@ class Panel:
 
 
 def section(
-    path: str | os.PathLike[str], site: Site, panels: Sequence[Panel], envelopes: Sequence[Flights]
+    path: str | os.PathLike[str],
+    site: Site,
+    zone: BarrierZone,
+    panels: Sequence[Panel],
+    envelopes: Sequence[Flights],
 ) -> None:
     """Write the PNG of a slope.
 
@@ -50,6 +55,8 @@ def section(
         The PNG.
     site : Site
         Where.
+    zone : BarrierZone
+        Where barriers may stand.
     panels : sequence of Panel
         Slopes, side by side or one above the other, to scale.
     envelopes : sequence of Flights
@@ -69,11 +76,13 @@ def section(
         upper, lower = figure.subfigures(2, height_ratios=[rows * (tall + 0.5) + 0.4, 4.4])
         grid = upper.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes, panel in zip(grid.flat, panels, strict=True):
-            _slope(axes, site, panel, bottom)
+            _slope(axes, site, zone, panel, bottom)
             axes.set(xlim=(left, right), ylim=(bottom, top))
             axes.label_outer()
         heights, energies = lower.subplots(1, 2, sharex=True)
         heights.set_xlim(left, right)
+        for axes in (heights, energies):
+            axes.axvspan(zone.start, zone.end, color=ZONE, alpha=0.25, lw=0)
         _envelopes(heights, energies, site, panels[-1].layout, envelopes)
         _key(lower, site, envelopes)
         save(figure, path)
@@ -99,7 +108,7 @@ def released(
     after = [fly(site, layout, name, seeds, stations) for name in names] if layout else nothing
     count = sum(flights.releases for flights in after)
     title = f"{site.name}: {count} releases, by event" if event is None else f"{event}: {count}"
-    section(path, site, [Panel(title, layout, after)], nothing)
+    section(path, site, site.barrier_zone, [Panel(title, layout, after)], nothing)
 
 
 def _window(site: Site) -> tuple[float, float, float, float]:
@@ -114,12 +123,11 @@ def _window(site: Site) -> tuple[float, float, float, float]:
     return left, right, low - 0.1 * (high - low), high + 0.05 * (high - low)
 
 
-def _slope(axes: Axes, site: Site, panel: Panel, bottom: float) -> None:
+def _slope(axes: Axes, site: Site, zone: BarrierZone, panel: Panel, bottom: float) -> None:
     """Draw one slope: its ground, zone, road and sources, the ways of blocks, what stands."""
     built, moved = earthworks(site.profile, standing(panel.layout), site.slope.surface)
     x, y = built.points.T
     axes.fill_between(x, y, bottom, color=GROUND, linewidth=0, zorder=2)
-    zone = site.barrier_zone
     axes.plot(*_along(site, zone.start, zone.end), color=ZONE, linewidth=5, zorder=2.5,
               solid_capstyle="butt")  # fmt: skip
     axes.plot(*_along(site, site.road.start, site.road.end), color=ROAD, linewidth=5, zorder=3,
@@ -181,7 +189,6 @@ def _envelopes(
         heights.plot(flights.stations, flights.height, color=colour, linewidth=1.6)
         energies.plot(flights.stations, flights.energy / 1e3, color=colour, linewidth=1.6)
     for axes in (heights, energies):
-        axes.axvspan(site.barrier_zone.start, site.barrier_zone.end, color=ZONE, alpha=0.25, lw=0)
         axes.axvspan(site.road.start, site.road.end, color=ROAD, alpha=0.2, lw=0)
         axes.grid(alpha=0.25)
         axes.set_xlabel("x [m]")

@@ -1,4 +1,7 @@
-"""Scripted studies: every layout of a file in the same releases, one row each in a CSV file."""
+"""Scripted studies: every layout of a file in the same releases, one row each in a CSV file.
+
+Of every event there are as many releases; money is weighed by the events' rates.
+"""
 
 from __future__ import annotations
 
@@ -6,110 +9,37 @@ import csv
 import hashlib
 import io
 import math
-import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
-import numpy as np
 
 import rigdda
-from agents import limits
 from agents.store import mechanics
+from agents.study_file import Study
 from agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
-from envs.evaluation import student_interval
-from rigdda import BadInput, Layout, Outcome, Site, check
-from rigdda.barriers import from_table
-from rigdda.files import read
+from agents.wording import euros, span, standing
+from envs import intervals
+from rigdda import BadInput, Layout, Outcome, Site
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 Tick = Callable[[int, str], None]
+Job = tuple[str, str, int]
+"""Name of a layout, event and seed of one release."""
 
-_NUMBERS = ("released_mass", *OUTCOME, "run_out_50", "run_out_95", "run_out_100")
-"""Columns of an outcome, without what each barrier took."""
+CHUNK = 64
+"""Releases that are simulated together, before their rows are written."""
 
+_NUMBERS = (
+    "width", "released_volume", "reached", *OUTCOME, "run_out_50", "run_out_95", "run_out_100",
+)  # fmt: skip
+"""Columns of an outcome that hold numbers, without what each barrier took."""
 
-@dataclass(frozen=True, slots=True)
-class Study:
-    """Named layouts on one site.
-
-    Parameters
-    ----------
-    site : Site
-        Where.
-    releases : int
-        Releases of each layout.
-    layouts : dict of str to Layout
-        What stands, by its name.
-    """
-
-    site: Site
-    releases: int
-    layouts: dict[str, Layout]
-
-    @property
-    def size(self) -> int:
-        """Releases in all."""
-        return self.releases * len(self.layouts)
-
-
-class _LayoutTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    name: str
-    barriers: tuple[dict[str, Any], ...] = ()
-    file: str | None = None
-
-
-class _StudyFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    site: str
-    layouts: tuple[_LayoutTable, ...]
-    releases: int = 16
-
-
-def load(path: str | os.PathLike[str]) -> Study:
-    """Read a study from a TOML file; files that it names lie relative to it.
-
-    Raises
-    ------
-    BadInput
-        If the file is missing, a field is unknown or a value is outside its range.
-    """
-    file = Path(path)
-    if not file.is_file():
-        raise BadInput("study", str(path), "name an existing TOML file")
-    try:
-        data = msgspec.toml.decode(read("study", file), type=_StudyFile)
-    except msgspec.ValidationError as error:
-        raise BadInput("study", str(path), str(error)) from None
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise BadInput("study", str(path), f"mend its TOML: {error}") from None
-    near = file.parent / data.site
-    site = Site.load(near if near.suffix == ".toml" else data.site)
-    layouts: dict[str, Layout] = {}
-    for i, table in enumerate(data.layouts):
-        if table.name in layouts:
-            raise BadInput(f"layouts[{i}].name", table.name, "give each layout a name of its own")
-        layouts[table.name] = _layout(f"layouts[{i}]", table, file.parent)
-        site.realise(layouts[table.name])  # what cannot be built is said before all
-        check.number(f"cost of layouts[{i}]", site.cost(layouts[table.name]))
-    if not layouts:
-        raise BadInput("layouts", 0, "give at least one table [[layouts]]")
-    releases = check.integer("releases", data.releases, 1, limits.RELEASES // len(layouts))
-    return Study(site, releases, layouts)
-
-
-def _layout(field: str, table: _LayoutTable, folder: Path) -> Layout:
-    """Return the layout of one table."""
-    if table.file is None:
-        rows = enumerate(table.barriers)
-        return tuple(from_table(f"{field}.barriers[{i}]", row) for i, row in rows)
-    if table.barriers:
-        raise BadInput(f"{field}.file", table.file, "give either a file or barriers, not both")
-    return rigdda.load_layout(folder / table.file)
+_MONEY = ("harm", "repair")
+"""What a release costs [EUR per occurrence of its event]."""
 
 
 def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
@@ -126,49 +56,56 @@ def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
     Diverged
         If a simulation diverges.
     """
-    jobs = {_key(study, name, s): (name, s) for name, s in _jobs(study, seed)}
+    jobs = {_key(study, *job): job for job in _jobs(study, seed)}
     fields = _fields(study)
     found = {row["key"]: row for row in _read(path, fields)}
     rows = {key: row for key, row in found.items() if key in jobs and _sound(row, study, jobs[key])}
     known = len(rows)
     write_rows(path, list(rows.values()), fields)
-    todo = {key: job for key, job in jobs.items() if key not in rows}
-    with path.open("a", newline="", encoding="utf-8") as file, ThreadPoolExecutor() as pool:
+    todo = [(key, job) for key, job in jobs.items() if key not in rows]
+    with path.open("a", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, fields, restval="")
-        outcomes = pool.map(lambda job: _release(study, *job), todo.values())
-        for (key, (name, s)), outcome in zip(todo.items(), outcomes, strict=True):
-            cost = study.site.cost(study.layouts[name])
-            rows[key] = {"layout": name, "seed": s, "cost": cost} | outcome_row(outcome)
-            rows[key]["key"] = key
-            table.writerow(rows[key])
+        for start in range(0, len(todo), CHUNK):
+            part = todo[start : start + CHUNK]
+            asked = [(study.site, study.layouts[n], s, e) for _, (n, e, s) in part]
+            for (key, job), outcome in zip(part, rigdda.release_many(asked), strict=True):
+                rows[key] = _row(study, job, outcome) | {"key": key}
+                table.writerow(rows[key])
             file.flush()
-            tick(len(rows), name)
+            tick(len(rows), part[-1][1][0])
     write_rows(path, [rows[key] for key in jobs], fields)
     return known
 
 
-def _jobs(study: Study, seed: int) -> Iterator[tuple[str, int]]:
-    """Yield the name of the layout and the seed of every release."""
+def _jobs(study: Study, seed: int) -> Iterator[Job]:
+    """Yield the name of the layout, the event and the seed of every release."""
     for name in study.layouts:
-        for s in range(seed, seed + study.releases):
-            yield name, s
+        for event in study.site.event_names:
+            for s in range(seed, seed + study.releases):
+                yield name, event, s
 
 
-def _release(study: Study, name: str, seed: int) -> Outcome:
-    return rigdda.release_outcome(study.site, study.layouts[name], seed)
+def _row(study: Study, job: Job, outcome: Outcome) -> dict[str, Any]:
+    """Return the row of a release, without its key."""
+    layout = study.layouts[job[0]]
+    bill = study.site.bill(layout, outcome)
+    row: dict[str, Any] = {"layout": job[0], "seed": job[2]}
+    row |= {"capital": study.site.capital(layout), "harm": bill.harm, "repair": bill.repair}
+    return row | outcome_row(outcome)
 
 
-def _key(study: Study, name: str, seed: int) -> str:
+def _key(study: Study, name: str, event: str, seed: int) -> str:
     """Return a hash of all that a row depends on."""
-    asked = [rigdda.__version__, mechanics(), study.site, name, list(study.layouts[name]), seed]
+    built = list(study.layouts[name])
+    asked = [rigdda.__version__, mechanics(), study.site, name, built, event, seed]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:16]
 
 
 def _fields(study: Study) -> list[str]:
     """Return the columns: those of the layout with most barriers."""
-    most = max(map(len, study.layouts.values()))
+    most = max(len(standing(layout)) for layout in study.layouts.values())
     barriers = [f"barrier_{i}_{name}" for i in range(most) for name in HIT]
-    return ["layout", "seed", "cost", *_NUMBERS, *barriers, "key"]
+    return ["layout", "event", "seed", "capital", *_MONEY, *_NUMBERS, *barriers, "key"]
 
 
 def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
@@ -204,18 +141,18 @@ def _lines(text: str) -> Iterator[list[str]]:
             return
 
 
-def _sound(row: dict[str, Any], study: Study, job: tuple[str, int]) -> bool:
-    """Return whether a row is of this layout and seed, with a number wherever one belongs."""
-    name, seed = job
+def _sound(row: dict[str, Any], study: Study, job: Job) -> bool:
+    """Return whether a row is of this release, with a number wherever one belongs."""
+    name, event, seed = job
     layout = study.layouts[name]
-    if (row["layout"], row["seed"]) != (name, str(seed)):
+    if (row["layout"], row["event"], row["seed"]) != (name, event, str(seed)):
         return False
-    if _number(row["cost"]) != study.site.cost(layout):
+    if _number(row["capital"]) != study.site.capital(layout):
         return False
-    mine = {f"barrier_{i}_{hit}" for i in range(len(layout)) for hit in HIT}
+    mine = {f"barrier_{i}_{hit}" for i in range(len(standing(layout))) for hit in HIT}
     said = {field for field, text in row.items() if field.startswith("barrier_") and text}
-    numbers = [text for field, text in row.items() if field in mine or field in _NUMBERS]
-    return said == mine and all(math.isfinite(_number(text)) for text in numbers)
+    wanted = {*mine, *_NUMBERS, *_MONEY}
+    return said == mine and all(math.isfinite(_number(row[field])) for field in wanted)
 
 
 def _number(text: str) -> float:
@@ -227,14 +164,31 @@ def _number(text: str) -> float:
 
 
 def table(study: Study, path: Path) -> Table:
-    """Return the table of means over releases with their 95 % intervals."""
-    out = empty_table(("layout", "cost", "debris [%] (95 %)", "largest energy on the road [kJ/m]"))
+    """Return the table of what each layout costs [EUR per metre of road and year]."""
+    out = empty_table(("layout", "Z (95 %)", "capital", "harm", "repair", "to build"))
     rows = _read(path, _fields(study))
     for name, layout in study.layouts.items():
         own = [row for row in rows if row["layout"] == name]
-        debris = 100.0 * np.array([float(row["debris_fraction"]) for row in own])
-        low, high = np.clip(student_interval(debris), 0.0, 100.0)
-        energy = max(float(row["max_energy_on_road"]) for row in own) / 1e3
-        words = f"{debris.mean():.1f} ({low:.1f} to {high:.1f})"
-        out.add_row(name, f"{study.site.cost(layout):.1f}", words, f"{energy:.0f}")
+        annual = study.site.annual(layout)
+        harm, repair, both = (_year(study.site, layout, own, which) for which in PARTS)
+        words = f"{euros(annual + both.value)} ({span([annual + end for end in both.interval])})"
+        parts = map(euros, (annual, harm.value, repair.value, study.site.capital(layout)))
+        out.add_row(name, words, *parts)
     return out
+
+
+PARTS = (("harm",), ("repair",), _MONEY)
+"""What is summed for a table."""
+
+
+def _year(
+    site: Site, layout: Layout, rows: list[dict[str, Any]], parts: tuple[str, ...]
+) -> intervals.Mean:
+    """Return what releases cost a year [EUR per metre of road and year]."""
+    means = []
+    for event in site.event_names:
+        own = [row for row in rows if row["event"] == event]
+        bills = [sum(float(row[part]) for part in parts) for row in own]
+        dear = [_number(row["reached"]) > 0.0 or float(row["repair"]) > 0.0 for row in own]
+        means.append(intervals.cost(bills, dear).times(site.rate(event, layout)))
+    return intervals.total(means)

@@ -27,7 +27,7 @@ def short(barrier: Barrier) -> str:
 def strength(fence: Fence) -> str:
     """Return what a fence withstands, in words: its energy class, or its capacity per metre."""
     if fence.energy_class is not None:
-        return f"{fence.energy_class:,} kJ"
+        return f"{fence.energy_class:,g} kJ"
     assert fence.capacity is not None
     return f"{fence.capacity / 1e3:,.0f} kJ/m"
 

@@ -83,26 +83,33 @@ class Room:
 
     def _held(self, option: MeshOption) -> Span:
         """Return the chainages of the sources whose events an option of mesh makes rarer [m]."""
-        names = {event.source for event in self.site.events if option.factors.get(event.name, 1) < 1}
+        names = {
+            event.source for event in self.site.events if option.factors.get(event.name, 1) < 1
+        }
         rock = [source for source in self.site.sources if source.name in names or not names]
         ends = [s.band if s.band is not None else s.outline[:, 0].tolist() for s in rock]
         return min(min(x) for x in ends), max(max(x) for x in ends)
 
-    def works(self, where: str, barrier: Barrier) -> Span:
+    def works(self, barrier: Barrier) -> Span:
         """Return the chainages between which a barrier takes up the ground [m].
 
-        Raises
-        ------
-        BadInput
-            If it does not fit the ground.
+        Of an embankment up to where its downhill side meets the ground; to the end of the ground if
+        it does not.
         """
-        if isinstance(barrier, Ditch | Embankment):
-            try:
-                moved, _ = barrier.build(self.site.profile, self.site.soil)
-            except BadInput as bad:
-                raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
-            return float(moved[:, 0].min()), float(moved[:, 0].max())
-        return barrier.x, barrier.x + barrier.extent
+        if not isinstance(barrier, Embankment):
+            return barrier.x, barrier.x + barrier.extent
+        top = float(self.level(np.array([barrier.x]))[0]) + barrier.height
+        ahead = self._x > barrier.end
+        x = np.concatenate([[barrier.end], self._x[ahead]])
+        ground = np.concatenate([self.level(x[:1]), self._y[ahead]])
+        over = top - (x - barrier.end) / barrier.side_slope - ground
+        k = int(np.argmax(over <= 0.0))  # the first corner below which the side is
+        if over[k] > 0.0:
+            return barrier.x, float(x[-1])
+        if k == 0:
+            return barrier.x, barrier.end
+        share = over[k - 1] / (over[k - 1] - over[k])
+        return barrier.x, float(x[k - 1] + share * (x[k] - x[k - 1]))
 
     def check_mesh(self, where: str, mesh: Mesh) -> None:
         """Check that mesh is an option of the site, over the rock that it holds.
@@ -125,7 +132,7 @@ class Room:
             If it may not; the message begins with `where`.
         """
         self._check_size(where, barrier)
-        start, end = self.works(where, barrier)
+        start, end = self.works(barrier)
         self._check_place(where, barrier, start, end)
         steepest = STEEPEST.get(barrier.kind)
         if steepest is not None:
@@ -133,6 +140,11 @@ class Room:
             if angle > steepest + TOLERANCE:
                 mend = f"put it where the ground is at most {steepest:g} deg steep, not {angle:.1f}"
                 raise BadInput(f"{where}.x", barrier.x, mend)
+        if isinstance(barrier, Ditch | Embankment):
+            try:
+                barrier.build(self.site.profile, self.site.soil)
+            except BadInput as bad:
+                raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
         return start, end
 
     def _check_size(self, where: str, barrier: Barrier) -> None:
@@ -215,12 +227,14 @@ class Room:
         there = self.put(barrier, x)
         if there is None:
             return None
+        span = room(there, self.works(there))
+        if any(_meet(span, other) for other in taken):
+            return None
         try:
-            start, end = self.check("barrier", there)
+            self.check("barrier", there)
         except BadInput:
             return None
-        span = room(there, (start, end))
-        return None if any(_meet(span, other) for other in taken) else (there, span)
+        return there, span
 
     def _places(self, barrier: Barrier, taken: Sequence[Span]) -> list[float]:
         """Return where it may stand as far as is seen without building it, the nearest first."""

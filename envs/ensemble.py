@@ -94,23 +94,16 @@ def _simulate(site: Site, executor: Executor | None) -> Ensemble:
     """Simulate releases: at first as many of each event, then where they tell most."""
     names = site.event_names
     first = _releases(site, {name: range(SEEDS, SEEDS + FIRST) for name in names}, executor)
-    wanted = _shared(_shares(site, _facts(site, first.outcomes)), ALL)
+    wanted = _shared(_shares(site, _facts(site, first)), ALL)
     more = {name: range(SEEDS + FIRST, SEEDS + max(wanted[name], FIRST)) for name in names}
-    second = _releases(site, more, executor)
-    outcomes = [*first.outcomes, *second.outcomes]
-    facts = _facts(site, outcomes)
-    found = replace(
-        judge(site, (), outcomes, {}, {}),
-        outcomes=(),
-        simulated=first.simulated + second.simulated,
-        seconds=first.seconds + second.seconds,
-    )
+    both = first + _releases(site, more, executor)
+    facts = _facts(site, both)
+    bare = judge(site, (), both, {}, {})
+    found = replace(bare, outcomes=(), simulated=both.simulated, seconds=both.seconds)
     return Ensemble(found, facts, _shares(site, facts))
 
 
-def _releases(
-    site: Site, seeds: Mapping[str, range], executor: Executor | None
-) -> reuse.Batch:
+def _releases(site: Site, seeds: Mapping[str, range], executor: Executor | None) -> reuse.Sample:
     jobs = [(site, (), seed, name) for name, drawn in seeds.items() for seed in drawn]
     return reuse.outcomes(jobs, executor)
 

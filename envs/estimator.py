@@ -150,9 +150,7 @@ def judge(
     )
 
 
-def _stratified(
-    site: Site, layout: Layout, found: Account, facts: Mapping[str, Facts]
-) -> Sums:
+def _stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, Facts]) -> Sums:
     """Return sums in which each event's mean counts with its rate."""
     parts: list[tuple[Mean, ...]] = []
     mend = _mending(site, layout)

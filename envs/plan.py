@@ -43,7 +43,9 @@ def _order(shares: tuple[float, ...], releases: int) -> tuple[int, ...]:
     out = [*range(number), *range(number)]
     counts = [2] * number
     while len(out) < releases:
-        lacks = [share * (len(out) + 1) - count for share, count in zip(shares, counts, strict=True)]
+        lacks = [
+            share * (len(out) + 1) - count for share, count in zip(shares, counts, strict=True)
+        ]
         most = lacks.index(max(lacks))
         counts[most] += 1
         out.append(most)

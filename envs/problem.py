@@ -222,7 +222,7 @@ class DesignProblem:
         standing, drawn = self._standing(layout), _seeds("seeds", seeds)
         pairs = zip(drawn, self.plan(drawn), strict=True)
         jobs = [(self.site, standing, seed, event) for seed, event in pairs]
-        return self.judge(standing, reuse.outcomes(jobs, executor).outcomes, drawn)
+        return self.judge(standing, reuse.outcomes(jobs, executor), drawn)
 
     def sample(
         self,

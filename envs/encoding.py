@@ -25,12 +25,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from envs.building import MIN_HEIGHT, TOLERANCE, Room, Span, room
+from envs.building import Room
+from envs.rules import MIN_HEIGHT, TOLERANCE, Span
 from rigdda import BadInput, Barrier, Fence, Layout, Mesh
-from rigdda.barriers import FENCE_CLASSES, KINDS
+from rigdda.barriers import FENCE_CLASSES, Built
 from rigdda.place import BarrierZone
 
 Floats = NDArray[np.float64]
@@ -130,7 +132,8 @@ def make(zone: BarrierZone, kind: str, station: float, height: float, size: floa
     decision = DECISIONS[kind]
     tall = _between(MIN_HEIGHT, getattr(zone, decision.max_height), height)
     large = _between(getattr(zone, decision.min_size), getattr(zone, decision.max_size), size)
-    return KINDS[kind](**{"x": x, decision.height: tall, decision.size: large})
+    sizes = {"x": x, decision.height: tall, decision.size: large}
+    return msgspec.convert({"kind": kind, **sizes}, Built)
 
 
 def encode(place: Room, layout: Layout, slots: int, kinds: Sequence[str]) -> Floats:
@@ -216,6 +219,3 @@ def _part(share: float, parts: int) -> int:
 
 def _middle(part: int, parts: int) -> float:
     return (part + 0.5) / parts
-
-
-__all__ = ["CLASSES", "NUMBERS", "decode", "encode", "make", "room", "slot_size", "vector"]

@@ -19,10 +19,11 @@ import numpy as np
 
 import rigdda
 from envs import reuse
-from envs.estimator import Facts, account, judge
-from envs.evaluation import Evaluation
+from envs.estimator import account, judge
+from envs.evaluation import Evaluation, Facts
 from envs.intervals import Known
-from envs.memory import Memory, fingerprint
+from envs.memory import Memory
+from envs.samples import Sample
 from rigdda import Outcome, Site
 from rigdda.files import atomic
 from rigdda.kernel import cache_directory
@@ -103,7 +104,7 @@ def _simulate(site: Site, executor: Executor | None) -> Ensemble:
     return Ensemble(found, facts, _shares(site, facts))
 
 
-def _releases(site: Site, seeds: Mapping[str, range], executor: Executor | None) -> reuse.Sample:
+def _releases(site: Site, seeds: Mapping[str, range], executor: Executor | None) -> Sample:
     jobs = [(site, (), seed, name) for name, drawn in seeds.items() for seed in drawn]
     return reuse.outcomes(jobs, executor)
 
@@ -116,7 +117,7 @@ def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:
         came = own & found.reached
         harm, volume = found.harm[came], found.volume[came]
         if not came.any():  # as if all came
-            volume = np.array([outcomes[i].released_volume for i in np.flatnonzero(own)])
+            volume = np.array([o.released_volume for o in outcomes if o.event == name])
             harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
         blocks = [len(site.draw(seed, name).blocks) for seed in range(SEEDS, SEEDS + FIRST)]
         known = (_known(harm), _known(volume))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from envs.evaluation import Evaluation
+from envs.evaluation import Evaluation, Facts
 from envs.intervals import Estimate, Known, Mean, cost, estimate, pair, total
 from rigdda import BadInput, Layout, Outcome, Site
 from rigdda.economy import PANEL, capitals
@@ -29,27 +29,6 @@ differ little beyond the panel or element that is mended at least."""
 
 FAIL = ("fence", "gravity_wall", "embankment")
 """Kinds of barrier that can fail."""
-
-
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """What is known of an event from releases without barriers.
-
-    Parameters
-    ----------
-    releases, reached : int
-        How many there were, and in how many a block came onto the road.
-    harm, volume : Known
-        Harm [EUR] and volume [m3] where one did; where none ever did, of all that is released.
-    blocks : float
-        Mean number of blocks.
-    """
-
-    releases: int
-    reached: int
-    harm: Known
-    volume: Known
-    blocks: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +55,14 @@ class Account:
 
     def of(self, which: Bools) -> Account:
         """Return the account of some of the releases."""
-        parts = (self.event, self.harm, self.repair, self.volume, self.reached, self.failed)
-        return Account(*(part[which] for part in parts))
+        return Account(
+            self.event[which],
+            self.harm[which],
+            self.repair[which],
+            self.volume[which],
+            self.reached[which],
+            self.failed[which],
+        )
 
 
 def account(site: Site, layout: Layout, outcomes: Sequence[Outcome]) -> Account:

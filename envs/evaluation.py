@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from envs.intervals import Estimate, Interval
+from envs.intervals import Estimate, Interval, Known
 from rigdda import BadInput, Layout, Outcome
 
 
@@ -89,3 +89,24 @@ class Evaluation:
         own = [i for i, outcome in enumerate(self.outcomes) if outcome.event == event]
         volume = np.array([self.outcomes[i].road_volume for i in own])
         return self.seeds[own[int(np.argmin(np.abs(volume - volume.mean())))]], event
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What is known of an event from releases without barriers.
+
+    Parameters
+    ----------
+    releases, reached : int
+        How many there were, and in how many a block came onto the road.
+    harm, volume : Known
+        Harm [EUR] and volume [m3] where one did; where none ever did, of all that is released.
+    blocks : float
+        Mean number of blocks.
+    """
+
+    releases: int
+    reached: int
+    harm: Known
+    volume: Known
+    blocks: float

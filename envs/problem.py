@@ -8,27 +8,20 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from envs import encoding, ensemble, estimator, fidelity, plan, reuse
-from envs.building import Room, check_gaps, room
+from envs import encoding, ensemble, estimator, plan, posing, reuse
+from envs.building import Room
 from envs.evaluation import Evaluation
 from envs.memory import fingerprint
-from envs.reuse import Sample
+from envs.samples import Sample
 from envs.targets import Targets
-from rigdda import BadInput, Barrier, Layout, Mesh, Outcome, Site, check
-from rigdda.barriers import KINDS as ALL_KINDS
-from rigdda.barriers import as_layout
+from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
 from rigdda.place import BarrierZone
 
 Floats = NDArray[np.float64]
 Ask = tuple[Layout, Mapping[str, Sequence[int]]]
-
-KINDS = ("fence", "ditch", "embankment", "gravity_wall")
-"""Kinds of barrier that are designed if none are named, and mesh where a site has options. Not the
-rigid wall, which nothing moves: it is for experiments."""
 
 MOST_BARRIERS = 100
 """Most slots of a layout; a site has room for a few."""
@@ -88,13 +81,13 @@ class DesignProblem:
         fidelity: str = "full",
         zone: tuple[float, float] | None = None,
     ):
-        where = _site(site, fidelity)
-        limits = _zone(where, zone)
+        where = posing.site(site, fidelity)
+        limits = posing.zone(where, zone)
         values = {
             "site": where,
             "max_barriers": check.integer("max_barriers", max_barriers, 1, MOST_BARRIERS),
-            "kinds": _kinds(where, kinds),
-            "targets": _targets(where, targets),
+            "kinds": posing.kinds(where, kinds),
+            "targets": posing.targets(where, targets),
             "fidelity": fidelity,
             "zone": limits,
             "place": Room(where, limits),
@@ -118,10 +111,7 @@ class DesignProblem:
 
         Every vector has one, that may be built; entries beyond [-1, 1] are clipped.
 
-        Raises
-        ------
-        BadInput
-            If the shape is wrong or an entry is not a number.
+        Raises BadInput if the shape is wrong or an entry is not a number.
         """
         values = encoding.vector("vector", vector, self.size)
         return encoding.decode(self.place, values, self.kinds)
@@ -129,10 +119,7 @@ class DesignProblem:
     def encode(self, layout: Sequence[Barrier]) -> Floats:
         """Return a (size,) vector that `decode` turns into `layout`.
 
-        Raises
-        ------
-        BadInput
-            If the layout is not one that `decode` can give.
+        Raises BadInput if the layout is not one that `decode` can give.
         """
         return encoding.encode(self.place, self.check(layout), self.max_barriers, self.kinds)
 
@@ -142,25 +129,10 @@ class DesignProblem:
         Raises
         ------
         BadInput
-            If it has more barriers than slots or other kinds than allowed, or one is too large,
-            outside the zone, on ground that is too steep, too near the road or the next one.
+            If barriers are too many, not of the kinds allowed or too large, outside the zone, on
+            ground that is too steep, or too near the road or one another.
         """
-        barriers = tuple(sorted(as_layout(layout), key=lambda barrier: barrier.x))
-        if len(barriers) > self.max_barriers:
-            mend = f"give at most {self.max_barriers}"
-            raise BadInput("layout", f"{len(barriers)} barriers", mend)
-        rooms = []
-        for i, barrier in enumerate(barriers):
-            where = f"layout[{i}]"
-            check.one_of(f"{where}.kind", barrier.kind, self.kinds)
-            if isinstance(barrier, Mesh):
-                self.place.check_mesh(where, barrier)
-            else:
-                rooms.append((where, barrier, room(barrier, self.place.check(where, barrier))))
-        if len(barriers) - len(rooms) > 1:
-            raise BadInput("layout", "several meshes", "give at most one: choose another option")
-        check_gaps(rooms)
-        return barriers
+        return self.place.check_layout(layout, self.kinds, self.max_barriers)
 
     def fits(self, layout: Sequence[Barrier]) -> bool:
         """Tell whether a layout may be built, see `check`."""
@@ -202,15 +174,8 @@ class DesignProblem:
     ) -> Evaluation:
         """Simulate a layout in one release for each seed, spread over the events.
 
-        Parameters
-        ----------
-        layout : sequence of Barrier, or (size,) array
-            What may be built, see `check`, or a vector, see `decode`.
-        seeds : sequence of int
-            At least one whole number of at least 0.
-        executor : Executor, optional
-            Where to simulate, for example a process pool; None: in threads over all cores. The
-            numbers are the same.
+        The layout is one that may be built, see `check`, or a (size,) vector. An executor, for
+        example a process pool, gives the same numbers as the threads that are used without.
 
         Raises
         ------
@@ -219,7 +184,7 @@ class DesignProblem:
         Diverged
             If a simulation diverges.
         """
-        standing, drawn = self._standing(layout), _seeds("seeds", seeds)
+        standing, drawn = self._standing(layout), posing.seeds("seeds", seeds)
         pairs = zip(drawn, self.plan(drawn), strict=True)
         jobs = [(self.site, standing, seed, event) for seed, event in pairs]
         return self.judge(standing, reuse.outcomes(jobs, executor), drawn)
@@ -232,12 +197,7 @@ class DesignProblem:
     ) -> Sample:
         """Return the outcomes of releases of chosen events, in the order of `seeds`.
 
-        Raises
-        ------
-        BadInput
-            If the layout may not be built, there is no such event or a seed is unsound.
-        Diverged
-            If a simulation diverges.
+        Raises as `evaluate`, and if there is no such event.
         """
         return self.sample_many([(self.check(layout), seeds)], executor)[0]
 
@@ -251,7 +211,7 @@ class DesignProblem:
             standing = self.check(layout)
             for event, seeds in chosen.items():
                 self.site.event(event)
-                drawn = _seeds(f"seeds[{event!r}]", seeds, 0)
+                drawn = posing.seeds(f"seeds[{event!r}]", seeds, 0)
                 jobs += [(self.site, standing, seed, event) for seed in drawn]
             ends.append(len(jobs))
         return reuse.outcomes(jobs, executor).split(ends)
@@ -261,15 +221,8 @@ class DesignProblem:
     ) -> Evaluation:
         """Return what a layout is worth that had these outcomes.
 
-        Parameters
-        ----------
-        layout : tuple of Barrier
-            What stood.
-        outcomes : sequence of Outcome
-            At least one of every event; fewer than two an event on the average must be those of a
-            `plan`. Of a `Sample` it is told how many were simulated, and in what time.
-        seeds : sequence of int
-            Seed of each, kept beside them.
+        There is at least one of every event; fewer than two an event on the average must be those
+        of a `plan`. `seeds` are kept beside them.
 
         Raises
         ------
@@ -312,52 +265,3 @@ class DesignProblem:
         if isinstance(members, list) and members and isinstance(members[0], int | float):
             return self.decode(members)
         return self.check(members)  # type: ignore[arg-type]  # it says what is wrong
-
-
-def _site(site: object, cheaper: str) -> Site:
-    if isinstance(site, str | os.PathLike):
-        site = Site.load(site)
-    if not isinstance(site, Site):
-        raise BadInput("site", site, "give a name, a TOML file or a rigdda.Site")
-    return fidelity.at(site, cheaper)
-
-
-def _zone(site: Site, zone: object) -> BarrierZone:
-    own = site.barrier_zone
-    if zone is None:
-        return own
-    start, end = check.interval("zone", zone, own.start, own.end)
-    return msgspec.structs.replace(own, start=start, end=end)
-
-
-def _kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
-    if kinds is None:
-        return (*KINDS, "mesh") if site.meshes else KINDS
-    if not isinstance(kinds, Sequence) or isinstance(kinds, str):
-        raise BadInput("kinds", kinds, "give a sequence of names")
-    names = tuple(check.one_of("kinds", kind, ALL_KINDS) for kind in kinds)
-    if not names or len(set(names)) < len(names):
-        raise BadInput("kinds", kinds, "name each kind once")
-    if "mesh" in names and not site.meshes:
-        raise BadInput("kinds", kinds, f"leave mesh out: {site.name} has no options of it")
-    return names
-
-
-def _targets(site: Site, targets: Targets | None) -> Targets:
-    if targets is None:
-        return Targets()
-    if not isinstance(targets, Targets):
-        raise BadInput("targets", targets, "give envs.Targets(reach=..., failure=...)")
-    if not any(event.design for event in site.events):
-        raise BadInput("targets", targets, f"mark an event of {site.name} with design = true")
-    return targets
-
-
-def _seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int, ...]:
-    try:
-        drawn = tuple(check.integer(f"{name}[{i}]", seed, 0) for i, seed in enumerate(seeds))
-    except TypeError:
-        raise BadInput(name, seeds, "give a sequence of whole numbers") from None
-    if len(drawn) < least:
-        raise BadInput(name, drawn, "give at least one")
-    return drawn

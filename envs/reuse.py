@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import rigdda
 from envs.crew import Workers
 from envs.memory import Memory, fingerprint
+from envs.samples import Sample
 from rigdda import BarrierOutcome, Ditch, Fence, Layout, Mesh, Outcome, Site
 from rigdda.barriers import earthworks
 from rigdda.resistance import resistance
@@ -41,52 +41,6 @@ class Key(NamedTuple):
     layout: tuple[Any, ...]
     seed: int
     event: str
-
-
-class Sample(tuple[Outcome, ...]):
-    """Outcomes of releases, and what they took.
-
-    Attributes
-    ----------
-    ran : tuple of bool
-        Whether each was simulated; of equal releases one was.
-    seconds : float
-        Processor time of the simulations [s].
-    """
-
-    ran: tuple[bool, ...]
-    seconds: float
-
-    def __new__(
-        cls, outcomes: Iterable[Outcome] = (), ran: Sequence[bool] = (), seconds: float = 0.0
-    ) -> Sample:
-        """Make one; without `ran` nothing was simulated."""
-        made = super().__new__(cls, outcomes)
-        made.ran = tuple(ran) if ran else (False,) * len(made)
-        made.seconds = seconds
-        return made
-
-    def __getnewargs__(self) -> tuple[tuple[Outcome, ...], tuple[bool, ...], float]:
-        """Return what makes it anew."""
-        return tuple(self), self.ran, self.seconds
-
-    def __add__(self, other: object) -> Sample:  # type: ignore[override]
-        """Return both, one after the other."""
-        if not isinstance(other, Sample):
-            return NotImplemented
-        both = (*self, *other), (*self.ran, *other.ran)
-        return Sample(*both, self.seconds + other.seconds)
-
-    @property
-    def simulated(self) -> int:
-        """How many were simulated."""
-        return sum(self.ran)
-
-    def split(self, ends: Sequence[int]) -> list[Sample]:
-        """Return the parts between ends, the time shared out by what was simulated."""
-        each = self.seconds / max(self.simulated, 1)
-        parts = [(self[a:b], self.ran[a:b]) for a, b in pairwise(ends)]
-        return [Sample(outcomes, ran, each * sum(ran)) for outcomes, ran in parts]
 
 
 free: Memory[Key, Outcome] = Memory(1 << 16)
@@ -160,10 +114,11 @@ def _recall(keys: Sequence[Key], jobs: Sequence[Job]) -> dict[Key, Outcome]:
     for key, place in fences.items():
         without = bare.get(key._replace(layout=()))
         before = stood.get(place) if place is not None else None
+        found: Outcome | None
         if without is not None and not _touches(sites[key.site], key, without):
             found = replace(without, barriers=_untouched(sites[key.site], key, without.width))
         else:
-            found = before and _of_class(key.layout[0], before)
+            found = _of_class(key.layout[0], before) if before is not None else None
         if found is not None:
             known[key] = found
     return known

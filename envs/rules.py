@@ -1,0 +1,234 @@
+"""What may be built where on a site."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, Layout, Mesh, Site, check
+from rigdda.barriers import MeshOption, as_layout
+from rigdda.place import BarrierZone
+
+Floats = NDArray[np.float64]
+Span = tuple[float, float]
+
+STEEPEST = {"ditch": 30.0, "embankment": 25.0, "gravity_wall": 30.0, "wall": 30.0}
+"""Greatest mean inclination of the ground under a barrier [deg]. On steeper ground fill slides,
+and what is dug or founded there starts a fall itself. Fences stand on posts, anywhere."""
+
+MIN_HEIGHT = 0.5
+"""Least height of a barrier that is designed, and depth of a ditch [m]."""
+
+MIN_GAP = 0.5
+"""Least distance between the works of two barriers [m]."""
+
+TOLERANCE = 1e-9
+"""Rounding that is forgiven at limits: share of the limit, and of 1 [m]."""
+
+
+class Rules:
+    """What may be built where, on the ground of a site.
+
+    Parameters
+    ----------
+    site : Site
+        Its ground, road and sources.
+    zone : BarrierZone
+        Where barriers may stand, and how large they may be.
+
+    Attributes
+    ----------
+    parts : list of (start, end)
+        Parts of the zone that are free of loose rock [m].
+
+    Raises
+    ------
+    BadInput
+        If there are none.
+    """
+
+    def __init__(self, site: Site, zone: BarrierZone):
+        self.site, self.zone = site, zone
+        cut = [(max(low, zone.start), min(high, zone.end)) for low, high in site.rooms]
+        self.parts = [(low, high) for low, high in cut if low < high]
+        if not self.parts:
+            mend = f"leave room in {site.rooms}: elsewhere loose rock lies"
+            raise BadInput("zone", (zone.start, zone.end), mend)
+        self._x, self._y = site.profile.points.T
+
+    def level(self, x: Floats) -> Floats:
+        """Return the elevation of the natural ground at chainages [m]."""
+        return np.interp(x, self._x, self._y)
+
+    def held(self, option: MeshOption) -> Span:
+        """Return the chainages of the sources whose events an option of mesh makes rarer [m]."""
+        names = {
+            event.source for event in self.site.events if option.factors.get(event.name, 1) < 1
+        }
+        rock = [source for source in self.site.sources if source.name in names or not names]
+        ends = [s.band if s.band is not None else s.outline[:, 0].tolist() for s in rock]
+        return min(min(x) for x in ends), max(max(x) for x in ends)
+
+    def works(self, barrier: Barrier) -> Span:
+        """Return the chainages between which a barrier takes up the ground [m].
+
+        Of an embankment up to where its downhill side meets the ground; to the end of the ground if
+        it does not.
+        """
+        if not isinstance(barrier, Embankment):
+            return barrier.x, barrier.x + barrier.extent
+        top = float(self.level(np.array([barrier.x]))[0]) + barrier.height
+        ahead = self._x > barrier.end
+        x = np.concatenate([[barrier.end], self._x[ahead]])
+        ground = np.concatenate([self.level(x[:1]), self._y[ahead]])
+        over = top - (x - barrier.end) / barrier.side_slope - ground
+        k = int(np.argmax(over <= 0.0))  # the first corner below which the side is
+        if over[k] > 0.0:
+            return barrier.x, float(x[-1])
+        if k == 0:
+            return barrier.x, barrier.end
+        share = over[k - 1] / (over[k - 1] - over[k])
+        return barrier.x, float(x[k - 1] + share * (x[k] - x[k - 1]))
+
+    def check_layout(self, layout: Sequence[Barrier], kinds: Sequence[str], most: int) -> Layout:
+        """Return a layout of some kinds and at most so many barriers, sorted downhill.
+
+        Raises
+        ------
+        BadInput
+            If it may not be built.
+        """
+        barriers = tuple(sorted(as_layout(layout), key=lambda barrier: barrier.x))
+        if len(barriers) > most:
+            raise BadInput("layout", f"{len(barriers)} barriers", f"give at most {most}")
+        rooms = []
+        for i, barrier in enumerate(barriers):
+            where = f"layout[{i}]"
+            check.one_of(f"{where}.kind", barrier.kind, kinds)
+            if isinstance(barrier, Mesh):
+                self.check_mesh(where, barrier)
+            else:
+                rooms.append((where, barrier, room(barrier, self.check(where, barrier))))
+        if len(barriers) - len(rooms) > 1:
+            raise BadInput("layout", "several meshes", "give at most one: choose another option")
+        _check_gaps(rooms)
+        return barriers
+
+    def check_mesh(self, where: str, mesh: Mesh) -> None:
+        """Check that mesh is an option of the site, over the rock that it holds.
+
+        Raises
+        ------
+        BadInput
+            If it is not.
+        """
+        options = {option.name: option for option in self.site.meshes}
+        check.one_of(f"{where}.option", mesh.option, options)
+        check.number(f"{where}.x", mesh.x, *self.held(options[mesh.option]))
+
+    def check(self, where: str, barrier: Barrier) -> Span:
+        """Return the works of a barrier that may be built where it stands.
+
+        Raises
+        ------
+        BadInput
+            If it may not; the message begins with `where`.
+        """
+        self._check_size(where, barrier)
+        start, end = self.works(barrier)
+        self._check_place(where, barrier, start, end)
+        steepest = STEEPEST.get(barrier.kind)
+        if steepest is not None:
+            angle = self.inclination(start, end)
+            if angle > steepest + TOLERANCE:
+                mend = f"put it where the ground is at most {steepest:g} deg steep, not {angle:.1f}"
+                raise BadInput(f"{where}.x", barrier.x, mend)
+        if isinstance(barrier, Ditch | Embankment):
+            try:
+                barrier.build(self.site.profile, self.site.soil)
+            except BadInput as bad:
+                raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
+        return start, end
+
+    def _check_size(self, where: str, barrier: Barrier) -> None:
+        for name, (low, high) in limits(self.zone, barrier).items():
+            value = getattr(barrier, name)
+            slack = TOLERANCE * max(1.0, high)
+            if not low - slack <= value <= high + slack:
+                mend = f"give a number of at least {low:g} and at most {high:g}"
+                raise BadInput(f"{where}.{name}", value, mend)
+        if isinstance(barrier, Fence) and barrier.energy_class is None:
+            mend = "give its energy class instead of a capacity"
+            raise BadInput(f"{where}.capacity", barrier.capacity, mend)
+        if isinstance(barrier, Ditch):
+            least = self.site.ditch_side(barrier.x, barrier.width)
+            if barrier.side_slope < least - TOLERANCE:
+                mend = f"give at least {least:g}, at which a cut in this ground stands"
+                raise BadInput(f"{where}.side_slope", barrier.side_slope, mend)
+
+    def _check_place(self, where: str, barrier: Barrier, start: float, end: float) -> None:
+        """Check that it is in a part of the zone, and its distance from the road."""
+        slack = TOLERANCE * max(1.0, abs(self.zone.end))
+        if not any(low - slack <= start and end <= high + slack for low, high in self.parts):
+            rooms = " or ".join(f"{low:g} to {high:g} m" for low, high in self.parts)
+            mend = f"keep all of it, up to {end:g} m, within {rooms}"
+            raise BadInput(f"{where}.x", barrier.x, mend)
+        road = self.site.road.start
+        give = room(barrier, (0.0, 0.0))[1]
+        if isinstance(barrier, Fence) and end + give > road + slack:
+            most = road - give - barrier.thickness
+            mend = f"put it at {most:g} or uphill: it gives way by {give:g} m"
+            raise BadInput(f"{where}.x", barrier.x, f"{mend}, and the road begins at {road:g}")
+
+    def inclination(self, start: float, end: float) -> float:
+        """Return the mean inclination of the ground between two chainages [deg]."""
+        high, low = self.level(np.array([start, end])).tolist()
+        return math.degrees(math.atan2(abs(high - low), end - start))
+
+
+def room(barrier: Barrier, works: Span) -> Span:
+    """Return the chainages that a barrier needs: its works, and where a fence gives way to [m]."""
+    start, end = works
+    gives = barrier.elongation if isinstance(barrier, Fence) else None
+    return start, end + (gives or 0.0)
+
+
+def meet(one: Span, two: Span) -> bool:
+    """Tell whether two barriers are nearer than `MIN_GAP`."""
+    return one[0] < two[1] + MIN_GAP - TOLERANCE and two[0] < one[1] + MIN_GAP - TOLERANCE
+
+
+def _check_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> None:
+    """Check that no two barriers meet.
+
+    Parameters
+    ----------
+    rooms : sequence of (str, Barrier, (start, end))
+        What messages call each, each, and the room that it needs [m].
+
+    Raises
+    ------
+    BadInput
+        If two do.
+    """
+    ordered = sorted(rooms, key=lambda item: item[2])
+    for (_, before, one), (where, barrier, two) in pairwise(ordered):
+        if meet(one, two):
+            mend = f"put it {MIN_GAP:g} m beyond {one[1]:g}, up to where the {before.words} needs"
+            raise BadInput(f"{where}.x", barrier.x, mend)
+
+
+def limits(zone: BarrierZone, barrier: Barrier) -> dict[str, tuple[float, float]]:
+    """Return the fields of a barrier that the zone limits, with least and greatest value [m]."""
+    if isinstance(barrier, Ditch):
+        return {"depth": (0.0, zone.max_depth), "width": (zone.min_width, zone.max_width)}
+    own: dict[str, tuple[float, float]] = {"height": (0.0, zone.max_height)}
+    if isinstance(barrier, Embankment):
+        return own | {"width": (zone.min_thickness, zone.max_thickness)}
+    if isinstance(barrier, Fence):
+        return own
+    return own | {"thickness": (zone.min_thickness, zone.max_thickness)}

@@ -40,7 +40,7 @@ def walk(items):
 
 
 def test_what_can_be_walked_through_once_is_kept():
-    assert QUICK.cost(walk(BARRIERS)) == QUICK.cost(BARRIERS) > 0.0
+    assert QUICK.capital(walk(BARRIERS)) == QUICK.capital(BARRIERS) > 0.0
     assert release(QUICK, walk(BARRIERS), 1)[1] == release(QUICK, BARRIERS, 1)[1]
     scene = Scene(Terrain(FLAT), [box(0.0, 0.5, velocity=(9.0, 0.0, 0.0))], rock())
     runs = simulate_many(walk([scene, scene]), None, 0.5, stations=walk([1.0]))

@@ -16,15 +16,24 @@ from rigdda.barriers.layout import (
     section,
     to_tables,
 )
-from rigdda.barriers.standing import Fence, GravityWall, Standing, Wall
+from rigdda.barriers.standing import (
+    FENCE_CLASSES,
+    Fence,
+    FenceClass,
+    GravityWall,
+    Standing,
+    Wall,
+)
 
 __all__ = [
+    "FENCE_CLASSES",
     "KINDS",
     "Barrier",
     "Ditch",
     "Earthwork",
     "Embankment",
     "Fence",
+    "FenceClass",
     "GravityWall",
     "Layout",
     "Standing",

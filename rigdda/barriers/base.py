@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Self
 
 import msgspec
 import numpy as np
@@ -21,6 +22,10 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
     """What every barrier has; written as a table with its `kind`."""
 
     x: float
+
+    def for_width(self, width: float) -> Self:
+        """Return the barrier of a scene that is so wide out of plane [m]: itself, in most kinds."""
+        return self
 
     @property
     def kind(self) -> str:

@@ -159,11 +159,9 @@ SMALL_ISLAND = 2
 ENERGY_HALVINGS = 4
 """Times restitution is halved when an eccentric impact would gain energy; then it is plastic."""
 
-BREAK_TOLERANCE = 1e-4
-"""Share of its capacity by which a failing fence may miss it [-]."""
-
-BREAK_SOLVES = 8
-"""Most solutions for the speed with which blocks pass a failing fence; a centred hit takes one."""
+CHAIN = 8
+"""Most blocks through which a blow is followed to a fence: each but the first adds its mass, and
+passes on what its contacts turn aside least of."""
 
 SAME_NORMAL = 0.7
 """Least cosine between the normals of one vertex's contact in two steps that share memory [-]."""
@@ -246,7 +244,7 @@ OPEN, STICK, SLIP = 0, 1, 2
 # kind of a contact in one step
 REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN = 0, 1, 2, 3, 4, 5, 6, 7
 # why the step loop returned
-DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE = 0, 1, 2, 3
+DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE, GROUND_MOVED = 0, 1, 2, 3, 4
 # solver
 AUTO, PCG, BLOCK_PCG, SOR, DIRECT = 0, 1, 2, 3, 4
 TERRAIN = -1

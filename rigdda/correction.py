@@ -217,6 +217,8 @@ def account_contact(
     dn = along(normal_row(c, True), d[i])
     ds = along(shear_row(c, True), d[i])
     block, barrier = barrier_contact(gauges, c.a, c.b)
+    if barrier >= 0 and gauges.target[barrier].capacity < math.inf:
+        barrier = -1  # a fence is charged otherwise
     if barrier >= 0 and block == c.a:
         gauges.target[barrier].absorbed -= c.normal * dn + c.shear * ds
     if c.pair >= 0:

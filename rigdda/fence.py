@@ -1,15 +1,25 @@
-"""Fences: they fail when the energy that they took would exceed their capacity.
+r"""Fences: what a step takes of their capacity, and what comes through if that is not left.
 
-An impact on a fence is plastic. If the work of its contact forces in a step would be more than
-what is left of its capacity, the blocks pass through it with a share s of their closing velocities:
-the contacts aim at the velocity -s u_c instead of 0. For impacts in proportion the impulse is then
-1 - s and the mean velocity 1 + s times that of the plastic impact, so that
+A block that hits a fence is stopped: the fence takes the work of the impact. Blocks that rest
+against it cost it nothing, but pass blows on to it: within a step blow and support act at once,
+nothing moves and no work is done. One after the other, block j strikes block i with the closing
+speed u, both go on together, and the fence takes what of that is directed at it,
 
-    W(s) = (1 - s^2) W(0).
+.. math:: W = \frac{1}{2} \frac{m_j^2}{m_j + m_i} u^2 (n_q \cdot n)^2 ,
 
-The s for which W(s) is what is left is found from there by regula falsi in s^2, since friction and
-neighbours bend the law (Dowell and Jarratt 1971, BIT 11, 168-174). Blocks at rest against the fence
-pass blows on to it: see `passed_on`.
+with n_q and n the directions of the blow and of the push on the fence. Through a chain of blocks
+m_i is their mass, and each contact on the way passes on its own share. With the impulse P of the
+blow for m_j u this holds for eccentric blows, too; what more than m_j u passes through a contact in
+a step is thrust, or another blow, which counts for itself. So the charge is a sum over the blows:
+it does not matter how many of them fall into one step.
+
+If it is more than is left, the blocks come through with a share s of the velocities that they would
+have without the fence. Impulses in proportion to 1 - s then take
+
+.. math:: W(s) = A (1 - s) - (A - W) (1 - s)^2 ,
+
+with A their first-order work, the sum of impulse times velocity at the start: 2 W without friction,
+for which W(s) = (1 - s^2) W.
 """
 
 from __future__ import annotations
@@ -19,204 +29,219 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.assembly.springs import along, normal_row, shear_row
-from rigdda.constants import (
-    ASLEEP,
-    BREAK_SOLVES,
-    BREAK_TOLERANCE,
-    IMPACT,
-    OPEN,
-    RETIRED,
-    SHOCK,
-    SPEED_LIMIT,
-    STICK,
-)
+from rigdda.constants import ASLEEP, CHAIN, IMPACT, OPEN, RETIRED, SPEED_LIMIT, STICK
+from rigdda.correction import place_corners
 from rigdda.gauges import FAILED, write_event
-from rigdda.kernel import kernel, stage
+from rigdda.kernel import inlined, kernel, stage
+from rigdda.motion import kinetic_energy
 from rigdda.open_close import open_close
-from rigdda.records import EVENTS, Bodies, Contacts, Gauges, Islands, Parameters, Rows, System
+from rigdda.records import (
+    EVENTS,
+    Bodies,
+    Contact,
+    Contacts,
+    Gauges,
+    Islands,
+    Outlines,
+    Parameters,
+    Rows,
+    System,
+)
 from rigdda.sleep import wake_island
 
 
 @kernel
-def work_taken(
-    contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int, fence: int
-) -> float:
-    """Return the work that body `fence` takes from the blocks of an island in this step [J]."""
-    total = 0.0
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        if c.b == fence and c.state != OPEN:
-            own = d[islands.slot[c.a]]
-            total -= c.normal * along(normal_row(c, True), own)
-            total -= c.shear * along(shear_row(c, True), own)
-    return total
+def strength(way: NDArray) -> float:
+    """Return how well a block passes blows on: the share of their direction over the mass [1/kg].
 
-
-@kernel
-def let_pass(
-    contacts: Contacts, islands: Islands, low: int, high: int, fence: int, s: float, dt: float
-) -> None:
-    """Make the contacts with a fence impacts after which a share s of c.passing is left."""
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        if c.b == fence:
-            c.kind, c.state, c.flips = IMPACT, STICK, 0
-            c.memory_normal = c.memory_shear = 0.0
-            c.start_normal = c.start_shear = 0.0
-            c.bias = -dt * s * c.passing
-
-
-@kernel
-def let_go(
-    contacts: Contacts, islands: Islands, low: int, high: int, fence: int, dt: float
-) -> None:
-    """Keep the contacts with a fence from closing in this step, whatever comes."""
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        if c.b == fence:
-            c.kind, c.state = IMPACT, OPEN
-            c.memory_normal = c.memory_shear = 0.0
-            c.start_normal = c.start_shear = 0.0
-            c.bias = -dt * SPEED_LIMIT
-
-
-@kernel
-def passed_on(
-    contacts: Contacts, islands: Islands, low: int, high: int, fence: int, dt: float
-) -> float:
-    """Return the energy of blows that blocks at rest against a fence pass on to it [J].
-
-    Blow and support act within one step, so that the block does not move and the fence does no
-    work. One after the other, the block would come at the fence with c.passing instead of -u_0,
-    and the impulse would take half their product.
+    `way` is the mass between the blow and the fence, 0 if the block does not lean on it [kg], and
+    the direction in which a push on the block is one on the fence, its length the root of the
+    share that arrives [-].
     """
-    total = 0.0
+    return (way[1] ** 2 + way[2] ** 2) / way[0] if way[0] > 0.0 else 0.0
+
+
+@kernel
+def share_along(c: Contact, way: NDArray, on_a: bool) -> float:
+    """Return the root of the share that a push through a contact on its body a, or b, passes on."""
+    along_way = c.nx * way[1] + c.ny * way[2]
+    return max(along_way if on_a else -along_way, 0.0)
+
+
+@kernel
+def lean(c: Contact, ways: NDArray, near: int, far: int, mass: float, on_a: bool) -> bool:
+    """Let slot `far`, of such a mass [kg], lean on `near`, if that is better than what it has."""
+    share = share_along(c, ways[near], on_a)
+    through = ways[near, 0] + mass
+    if share * share <= strength(ways[far]) * through * (1.0 + 1e-9):
+        return False
+    sign = share if on_a else -share
+    ways[far, 0], ways[far, 1], ways[far, 2] = through, sign * c.nx, sign * c.ny
+    return True
+
+
+@kernel
+def find_ways(
+    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, fence: int, ways: NDArray
+) -> bool:
+    """Set how each block of an island leans on a fence, (n, 3) see `strength`; whether any does."""
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
+    reached = False
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
-        if c.b == fence and c.state != OPEN:
-            total += 0.5 * dt * c.normal * max(c.passing + min(c.un, 0.0), 0.0)
-    return total
+        if c.b != fence or c.state == OPEN:
+            continue
+        if not reached:
+            for s in range(islands.block_start[island + 1] - islands.block_start[island]):
+                ways[s, 0] = ways[s, 1] = ways[s, 2] = 0.0
+        s, reached = islands.slot[c.a], True
+        ways[s, 0], ways[s, 1], ways[s, 2] = bodies[c.a].mass, -c.nx, -c.ny
+    for _ in range(CHAIN if reached else 0):
+        changed = False
+        for item in range(low, high):
+            c = contacts[islands.contact_item[item]]
+            if c.pair >= 0 and c.state != OPEN:
+                i, j = islands.slot[c.a], islands.slot[c.b]
+                changed = lean(c, ways, i, j, bodies[c.b].mass, True) or changed
+                changed = lean(c, ways, j, i, bodies[c.a].mass, False) or changed
+        if not changed:
+            break
+    return reached
+
+
+@inlined
+def hit(c: Contact, mass: float, d: NDArray, dt: float) -> tuple[float, float]:
+    """Return work and first-order work of an impact of a block of such a mass on a fence [J]."""
+    share = min(-mass * c.un / (c.normal * dt), 1.0)
+    work = c.normal * along(normal_row(c, True), d) + c.shear * along(shear_row(c, True), d)
+    return -share * work, -share * dt * (c.normal * c.un + c.shear * c.us)
+
+
+@inlined
+def blow(bodies: Bodies, c: Contact, islands: Islands, ways: NDArray, dt: float) -> float:
+    """Return the energy that a blow of one block on another passes on to a fence [J]."""
+    a, b = islands.slot[c.a], islands.slot[c.b]
+    on_a = strength(ways[a]) >= strength(ways[b])
+    struck, mass = (a, bodies[c.b].mass) if on_a else (b, bodies[c.a].mass)
+    impulse = min(c.normal * dt, -mass * c.un)
+    share = share_along(c, ways[struck], on_a)
+    return -0.5 * impulse * c.un * share * share * mass / (mass + ways[struck, 0])
 
 
 @stage
-def set_passing(
-    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
-    fence: int, p: Parameters, counters: NDArray,
-) -> None:  # fmt: skip
-    """Set c.passing at a fence: the closing velocities as if the fence were not there.
+def charge(
+    bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, island: int, fence: int,
+    ways: NDArray, dt: float,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Return what a step of an island takes of a fence.
 
-    Where blocks of the island hit each other it is settled without the fence first.
+    Returns
+    -------
+    total, first : float
+        Work, and that to first order in the impulses [J].
+    k : int
+        The contact through which most came, or -1.
     """
-    low, high = islands.contact_start[island], islands.contact_start[island + 1]
-    struck = False
-    for item in range(low, high):
+    total = first = most = 0.0
+    k = -1
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
-        blow = c.kind == IMPACT or c.kind == SHOCK
-        struck = struck or (blow and 0 <= c.b < p.blocks and c.normal > 0.0)
-        c.passing = max(-c.un, 0.0)
-    if not struck:
-        return
-    let_go(contacts, islands, low, high, fence, p.dt)
-    open_close(bodies, contacts, system, islands, rows, island, p, counters)
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
+        if c.kind != IMPACT or c.state == OPEN or c.normal <= 0.0 or c.un >= 0.0:
+            continue
+        work = work_first = 0.0
         if c.b == fence:
-            dn = along(normal_row(c, True), system.motion.d[islands.slot[c.a]])
-            c.passing = max(c.un - 2.0 * dn / p.dt, 0.0)
-    let_pass(contacts, islands, low, high, fence, 0.0, p.dt)
-    open_close(bodies, contacts, system, islands, rows, island, p, counters)
+            work, work_first = hit(c, bodies[c.a].mass, d[islands.slot[c.a]], dt)
+        elif c.pair >= 0:
+            work = blow(bodies, c, islands, ways, dt)
+            work_first = 2.0 * work
+        total += work
+        first += work_first
+        if work > most:
+            most, k = work, islands.contact_item[item]
+    return total, min(max(first, total), 2.0 * total), k
 
 
 @stage
 def break_through(
     bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
-    fence: int, left: float, taken: float, tolerance: float, p: Parameters, counters: NDArray,
+    fence: int, share: float, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
-    """Settle an island so that a fence takes what is left of its capacity, where it took more.
+    """Settle an island whose blocks come through a fence with a share of their velocities.
 
-    If no share s does, it takes less or nothing: never more than is left and `tolerance` [J].
+    Without the fence first, which gives the velocities of which that is the share. Contacts that
+    it had not reached in this step stay open.
     """
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
-    if left <= 0.0:
-        let_go(contacts, islands, low, high, fence, p.dt)
+    for attempt in range(2):
+        for item in range(low, high):
+            c = contacts[islands.contact_item[item]]
+            if c.b != fence:
+                continue
+            speed = SPEED_LIMIT
+            if attempt == 0:
+                c.met, c.state = int(c.state != OPEN), OPEN
+            elif c.met == 1:
+                dn = along(normal_row(c, True), system.motion.d[islands.slot[c.a]])
+                speed, c.state = share * max(c.un - 2.0 * dn / p.dt, 0.0), STICK
+            c.kind, c.flips = IMPACT, 0
+            c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+            c.bias = -p.dt * speed
         open_close(bodies, contacts, system, islands, rows, island, p, counters)
-        return
-    # squares of shares with which it takes too much and too little, and by how much
-    small, over = 0.0, taken - left
-    large, under = 1.0, -left
-    side = 0
-    square = 1.0 - left / taken
-    for _ in range(BREAK_SOLVES):
-        let_pass(contacts, islands, low, high, fence, math.sqrt(square), p.dt)
-        open_close(bodies, contacts, system, islands, rows, island, p, counters)
-        off = work_taken(contacts, system.motion.d, islands, low, high, fence) - left
-        off += passed_on(contacts, islands, low, high, fence, p.dt)
-        if abs(off) <= tolerance:
-            return
-        # regula falsi after Illinois: an end that stays counts half from its second time on
-        if off > 0.0:
-            small, over = square, off
-            under *= 0.5 if side > 0 else 1.0
-            side = 1
-        else:
-            large, under = square, off
-            over *= 0.5 if side < 0 else 1.0
-            side = -1
-        square = small + (large - small) * over / (over - under)
-    if off > 0.0:
-        let_go(contacts, islands, low, high, fence, p.dt)
-        open_close(bodies, contacts, system, islands, rows, island, p, counters)
-
-
-@kernel
-def touches(contacts: Contacts, islands: Islands, low: int, high: int, fence: int) -> int:
-    """Return a closed contact of an island with a fence, -1 if there is none."""
-    for item in range(low, high):
-        k = islands.contact_item[item]
-        if contacts[k].b == fence and contacts[k].state != OPEN:
-            return k
-    return -1
 
 
 @stage
-def limit_fences(
+def charge_fences(
     bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
     gauges: Gauges, time: float, p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
-    """Let an island that was settled break the fences that would take more than they can.
+    """Charge the fences that an island leans on, which was settled, and break what that exceeds.
 
-    Returns whether there are fences that it touches, so that it was settled again.
+    Returns whether a fence broke, so that the island was settled again.
     """
-    if gauges.fences == 0:
-        return False
-    touched = False
-    low, high = islands.contact_start[island], islands.contact_start[island + 1]
-    for fence in range(p.blocks, len(bodies)):
+    broke, ways = False, system.scratch.residual
+    for fence in range(p.blocks, len(bodies) if gauges.fences > 0 else p.blocks):
         barrier = gauges.barrier[fence]
         target = gauges.target[barrier]
-        capacity = target.capacity
-        k = touches(contacts, islands, low, high, fence) if capacity < math.inf else -1
-        if k < 0:
+        if target.capacity == math.inf:
             continue
-        touched = True
-        set_passing(bodies, contacts, system, islands, rows, island, fence, p, counters)
-        left, tolerance = capacity - target.absorbed, BREAK_TOLERANCE * capacity
-        taken = work_taken(contacts, system.motion.d, islands, low, high, fence)
-        taken += passed_on(contacts, islands, low, high, fence, p.dt)
-        if taken > left + tolerance:
-            if bodies[fence].status != RETIRED:
-                bodies[fence].status = RETIRED
-                c = contacts[k]
-                counters[EVENTS] = write_event(
-                    gauges, counters[EVENTS], time, FAILED, bodies[c.a], c.a, barrier, c.x, c.y,
-                    c.y - target.ground,
-                )  # fmt: skip
-            break_through(
-                bodies, contacts, system, islands, rows, island, fence, left, taken, tolerance, p,
-                counters,
+        if not find_ways(bodies, contacts, islands, island, fence, ways):
+            continue
+        total, first, k = charge(
+            bodies, contacts, system.motion.d, islands, island, fence, ways, p.dt
+        )
+        left = target.capacity - target.absorbed
+        if total <= left:
+            target.absorbed += total
+            continue
+        target.absorbed = target.capacity
+        if bodies[fence].status != RETIRED:  # not by another island in this step
+            bodies[fence].status = RETIRED
+            c = contacts[k]
+            i = (
+                c.a
+                if c.b == fence or kinetic_energy(bodies[c.a]) > kinetic_energy(bodies[c.b])
+                else c.b
+            )
+            counters[EVENTS] = write_event(
+                gauges, counters[EVENTS], time, FAILED, bodies[i], i, barrier, c.x, c.y,
+                c.y - target.ground,
             )  # fmt: skip
-        target.absorbed += passed_on(contacts, islands, low, high, fence, p.dt)
-    return touched
+        root = math.sqrt(max(first * first - 4.0 * (first - total) * left, 0.0))
+        share = max(1.0 - 2.0 * left / (first + root), 0.0)
+        break_through(bodies, contacts, system, islands, rows, island, fence, share, p, counters)
+        broke = True
+    return broke
+
+
+@stage
+def lower_fences(bodies: Bodies, outlines: Outlines, gauges: Gauges, p: Parameters) -> None:
+    """Lower the top of each fence by what it has lost of its height since the last step."""
+    for fence in range(p.blocks, len(bodies) if gauges.fences > 0 else p.blocks):
+        target = gauges.target[gauges.barrier[fence]]
+        top = target.top - target.sag * target.absorbed
+        if target.sag > 0.0 and outlines.local[fence, 2].y > top:
+            outlines.local[fence, 2].y = outlines.local[fence, 3].y = top
+            place_corners(bodies, outlines, fence)
 
 
 @kernel

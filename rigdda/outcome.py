@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.barriers import Barrier, Ditch, Embankment, GravityWall
+from rigdda.barriers import Barrier, Ditch, Embankment, Fence, GravityWall
 from rigdda.geometry import polygon_properties
+from rigdda.resistance import resistance
 from rigdda.run import Run
 from rigdda.site import Site
 
@@ -21,6 +22,9 @@ GRAIN = 2.0**40
 SLID = 0.1
 """Displacement beyond which a gravity wall has slid [m]: what its contacts give under load is a
 hundredth of it."""
+
+GONE = ("failed", "overturned", "pushed")
+"""States in which a barrier holds nothing."""
 
 AT_REST = 0.1
 """Speed below which a caught block is at rest [m/s], as in replays."""
@@ -41,8 +45,9 @@ class BarrierOutcome:
         Largest and summed energy of the hits, of translation and rotation just before the first
         touch [J].
     absorbed_energy : float
-        Work that contact forces of the barrier took from the blocks [J]; of a fence also what
-        blocks at rest against it passed on of blows on them.
+        Work that contact forces of the barrier took from the blocks [J]; of a fence that of
+        impacts, and what blocks that rest against it passed on of blows on them. One that failed
+        by energy took its capacity.
     impact_heights : tuple of float
         Height of each hit above the ground at the barrier's uphill face at the start [m].
     overtopped : int
@@ -50,14 +55,23 @@ class BarrierOutcome:
         downhill face, the downhill edge of a ditch or of an embankment's crest. A gravity wall
         counts as where it stood at the start.
     failed : bool
-        Whether it failed; only fences do.
+        Whether it no longer stands as it was built.
     caught : float
         Share of the released mass at rest at the end that it holds, or that is in the ditch.
-    state : {"stands", "failed", "slid", "overturned"}
-        At the end. A gravity wall has slid if it is more than 0.1 m away from its place,
-        and is overturned if it is turned beyond the angle of its diagonal.
+    state : {"stands", "failed", "slid", "overturned", "pushed"}
+        At the end. A fence failed, a gravity wall has slid if it is more than 0.1 m away from its
+        place, and is overturned if it is turned beyond the angle of its diagonal; an embankment was
+        pushed away.
     displacement : float
         Distance of its centroid at the end from where it was at the start [m].
+    thrust : float
+        Greatest mean over a second of the horizontal force on it, downhill [N/m]: of a fence that
+        of contacts at rest, of a ditch none.
+    resistance : float
+        Thrust that it bears [N/m], inf where none can move it, see `rigdda.resistance`.
+    left_height : float
+        Height that is left of it [m]: none of what failed, was overturned or pushed away, nor of a
+        ditch.
     """
 
     hits: int
@@ -70,6 +84,9 @@ class BarrierOutcome:
     caught: float
     state: str
     displacement: float
+    thrust: float
+    resistance: float
+    left_height: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +240,7 @@ def _reach(
 ) -> NDArray[np.bool_]:
     """Return which centroids (x, y) a barrier holds at the end, as `Outcome` says."""
     scene, barrier = run.scene, run.scene.barriers[index]
-    if state_of(run, index) in ("failed", "overturned"):
+    if state_of(run, index) in GONE:
         return np.zeros(len(x), dtype=bool)
     rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
     corners = run.outline(index)
@@ -241,7 +258,7 @@ def state_of(run: Run, index: int) -> str:
     """Return the state of a barrier at the end."""
     barrier = run.scene.barriers[index]
     if math.isfinite(run.failure(index)):
-        return "failed"
+        return "pushed" if isinstance(barrier, Embankment) else "failed"
     if isinstance(barrier, GravityWall):
         diagonal = math.atan2(barrier.thickness, barrier.height)
         if abs(run.barrier_poses[-1, index, 2]) > diagonal:
@@ -260,7 +277,7 @@ def _displacement(run: Run, index: int) -> float:
 def _barrier(run: Run, index: int, passed: NDArray[np.float64], caught: float) -> BarrierOutcome:
     hits = run.hits(index)
     uphill = run.poses[0, :, 0] < run.scene.barriers[index].x
-    failure = run.failure(index)
+    failure, state = run.failure(index), state_of(run, index)
     return BarrierOutcome(
         hits=len(hits),
         max_energy=float(hits["energy"].max(initial=0.0)),
@@ -268,8 +285,21 @@ def _barrier(run: Run, index: int, passed: NDArray[np.float64], caught: float) -
         absorbed_energy=float(run.absorbed[index]),
         impact_heights=tuple(float(h) for h in hits["height"]),
         overtopped=int((uphill & np.isfinite(passed) & (passed < failure)).sum()),
-        failed=math.isfinite(failure),
+        failed=state != "stands",
         caught=caught,
-        state=state_of(run, index),
+        state=state,
         displacement=_displacement(run, index),
+        thrust=float(run.thrust[index]),
+        resistance=resistance(run.scene, index),
+        left_height=_left_height(run, index, state),
     )
+
+
+def _left_height(run: Run, index: int, state: str) -> float:
+    """Return the height that is left of a barrier at the end [m]."""
+    barrier = run.scene.barriers[index]
+    if state in GONE or isinstance(barrier, Ditch):
+        return 0.0
+    if isinstance(barrier, Fence):
+        return barrier.left_height(float(run.absorbed[index]))
+    return barrier.height

@@ -59,6 +59,7 @@ CONTACT = _record(
     state=np.int32,  # OPEN, STICK, SLIP
     kind=np.int32,  # REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN
     flips=np.int32,
+    met=np.int32,  # 1 if it met a fence that breaks in this step
     pair=np.int32,  # off-diagonal block of the pair of bodies, -1: no coupling
     x=float,  # the vertex [m]
     y=float,
@@ -76,7 +77,6 @@ CONTACT = _record(
     bond=float,  # length of joint that the contact stands for and that is not broken [m]
     cohesion=float,  # shear force that it bears without normal force [N]
     tension=float,  # tension that it, or a bolt before it yields, bears [N]
-    passing=float,  # closing velocity if the fence it is with were not there [m/s]
     stiffness=float,  # of the contact at rest [N/m]
     kappa=float,  # in this step [N/m]
     bias=float,  # displacement at which the spring is free [m], see contact.law
@@ -146,9 +146,21 @@ WATCHED = _record(
 """What is known of a block."""
 
 TARGET = _record(
-    capacity=float,  # energy that it absorbs before it fails [J], inf: it does not
+    capacity=float,  # energy that a fence absorbs before it fails [J], inf: it is no fence
     absorbed=float,  # [J]
     ground=float,  # elevation from which impact heights count [m]
+    top=float,  # of a fence at the start, above its centroid [m]
+    sag=float,  # height that it loses by what it absorbs [m/J]
+    low=float,  # interval of an embankment [m], empty for what is not one
+    high=float,
+    push=float,  # impulse of its contacts in this step, downhill [N s]
+    most=float,  # greatest thrust of a contact in it [N]
+    block=int,  # whose it is
+    x=float,  # and where [m]
+    y=float,
+    mean=float,  # thrust, mean over the last second [N]
+    thrust=float,  # its greatest so far [N]
+    limit=float,  # of the mean, beyond which it fails; inf: it does not, or has [N]
 )
 """What is known of a barrier."""
 
@@ -375,7 +387,8 @@ class Gauges(NamedTuple):
     rock: NDArray[np.void]  # (N,) of WATCHED
     target: NDArray[np.void]  # (B,) of TARGET
     barrier: Ints  # (M,) barrier that a body is, -1: rock
-    fences: int  # barriers that can fail
+    fences: int  # their number
+    impulse: Floats  # (B, K) impulses of the last K steps, which are a second [N s]
     last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
     watch_low: float  # interval of x [m]
     watch_high: float

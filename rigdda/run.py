@@ -63,6 +63,8 @@ class Run:
         Hits and crossings in order of time, see `EVENT`.
     absorbed : (B,) array
         Energy that each barrier took from the blocks [J], as `BarrierOutcome` says.
+    thrust : (B,) array
+        Greatest mean over a second of the thrust on each barrier [N], as `BarrierOutcome` says.
     watch_energy : (N,) array
         Largest kinetic energy of each block while its centroid was in the watched interval [J].
     barrier_poses : (T, B, 3) array
@@ -75,6 +77,7 @@ class Run:
     velocities: NDArray[np.float64]
     events: NDArray[np.void]
     absorbed: NDArray[np.float64]
+    thrust: NDArray[np.float64]
     watch_energy: NDArray[np.float64]
     barrier_poses: NDArray[np.float64]
 
@@ -87,6 +90,7 @@ class Run:
             "velocities": (t, n, 3),
             "events": self.events.shape[:1],
             "absorbed": (b,),
+            "thrust": (b,),
             "watch_energy": (n,),
             "barrier_poses": (t, b, 3),
         }
@@ -134,6 +138,7 @@ class Run:
                 velocities=self.velocities,
                 events=self.events,
                 absorbed=self.absorbed,
+                thrust=self.thrust,
                 watch_energy=self.watch_energy,
                 barrier_poses=self.barrier_poses,
             )

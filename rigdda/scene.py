@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
@@ -15,7 +15,17 @@ from shapely.validation import explain_validity
 
 from rigdda import check
 from rigdda.apart import check_apart, deepest
-from rigdda.barriers import Barrier, Built, Earthwork, GravityWall, Layout, Mesh, Wall, earthworks
+from rigdda.barriers import (
+    Barrier,
+    Built,
+    Earthwork,
+    Fence,
+    GravityWall,
+    Layout,
+    Mesh,
+    Wall,
+    earthworks,
+)
 from rigdda.errors import BadInput
 from rigdda.geometry import edges, is_convex
 from rigdda.loads import Load
@@ -252,8 +262,11 @@ class Scene:
         if self.terrain is None:
             raise BadInput("barriers", self.barriers, "give the scene a terrain to stand on")
         self._known("barrier surface", self.barrier_surface)
-        fill = "soil" if "soil" in self.surfaces else self.barrier_surface
-        ground, moved = earthworks(self.terrain, self.barriers, fill)
+        for i, barrier in enumerate(self.barriers):
+            if isinstance(barrier, Fence) and barrier.capacity is None:
+                mend = "give fence.for_width(width): a scene is a metre wide"
+                raise BadInput(f"barriers[{i}].energy_class", barrier.energy_class, mend)
+        ground, moved = earthworks(self.terrain, self.barriers, self.fill)
         object.__setattr__(self, "ground", ground)
         object.__setattr__(self, "_moved", moved)
         for i in range(len(self.barriers)):
@@ -329,6 +342,17 @@ class Scene:
         if name not in self.surfaces:
             known = ", ".join(self.surfaces)
             raise BadInput(where, name, f"define it in surfaces or use one of {known}")
+
+    def ground_without(self, gone: Collection[int]) -> Terrain:
+        """Return the ground after some of the barriers, embankments, were pushed away."""
+        assert self.terrain is not None
+        left = [b for i, b in enumerate(self.barriers) if i not in gone]
+        return earthworks(self.terrain, left, self.fill)[0]
+
+    @property
+    def fill(self) -> str:
+        """Name of the surface of embankments."""
+        return "soil" if "soil" in self.surfaces else self.barrier_surface
 
     @property
     def barrier_surface(self) -> str:

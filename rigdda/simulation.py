@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.constants import (
+    ASLEEP,
+    AWAKE,
     BAD_STATE,
     BOLT,
     CONTACTS_FULL,
     EVENTS_FULL,
     FIXED,
+    GROUND_MOVED,
     OPEN,
     PIN,
     PLAIN,
@@ -26,13 +29,16 @@ from rigdda.constants import (
     REST,
     SLACK_RATIO,
     SOFT,
+    TERRAIN,
 )
 from rigdda.contact.links import bolt_energy
 from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.frames import frame_of, no_frames, pieces
+from rigdda.gauges import FAILED
 from rigdda.geometry import polygon_properties
 from rigdda.kernel import Direct
 from rigdda.pack import pack
+from rigdda.pack.ground import pack_ground
 from rigdda.pack.space import empty_contacts, empty_system, empty_work
 from rigdda.records import (
     BROAD_PHASE,
@@ -353,6 +359,8 @@ class Simulation:
                 self._drain_events()
             elif reason == CONTACTS_FULL:
                 self._grow()
+            elif reason == GROUND_MOVED:
+                self._move_ground()
             elif reason == BAD_STATE:
                 raise Diverged(self._divergence(block))
 
@@ -436,6 +444,7 @@ class Simulation:
             frames[:, :n, 3:].copy(),
             events,
             gauges.target["absorbed"].copy(),
+            gauges.target["thrust"].copy(),
             gauges.rock["energy"].copy(),
             barrier_poses,
         )
@@ -444,6 +453,19 @@ class Simulation:
         n = self._counters[EVENTS]
         self._events.append(self._arrays.gauges.event[:n].copy())
         self._counters[EVENTS] = 0
+
+    def _move_ground(self) -> None:
+        """Take the embankments that were pushed away off the ground, and wake what sleeps."""
+        self._drain_events()
+        failed = np.concatenate(self._events)
+        gone = failed["target"][failed["kind"] == FAILED]
+        ground = pack_ground(self.scene.ground_without(gone), list(self.scene.surfaces))
+        self._arrays = self._arrays._replace(ground=ground)
+        bodies, contacts = self._arrays.bodies, self._now
+        bodies["quiet"][bodies["status"] == ASLEEP] = 0.0
+        bodies["status"][bodies["status"] == ASLEEP] = AWAKE
+        # its corners have other numbers now
+        contacts["state"][(contacts["b"] == TERRAIN) & (contacts["owner"] == 0)] = OPEN
 
     def _grow(self) -> None:
         room, bodies = 2 * len(self._now), self._arrays.bodies

@@ -13,6 +13,7 @@ from rigdda.constants import (
     CONTACTS_FULL,
     DONE,
     EVENTS_FULL,
+    GROUND_MOVED,
     HELD,
     OPEN,
     RETIRED,
@@ -36,7 +37,7 @@ from rigdda.correction import (
     place_corners,
 )
 from rigdda.cut_back import act_early, hold_others, level_for, mark_cut, release_all, too_far
-from rigdda.fence import limit_fences, wake_behind
+from rigdda.fence import charge_fences, lower_fences, wake_behind
 from rigdda.frames import keep_frame
 from rigdda.gauges import barrier_contact, note_hits, note_passage
 from rigdda.islands import find_islands
@@ -73,6 +74,7 @@ from rigdda.records import (
 )
 from rigdda.shaking import set_field
 from rigdda.sleep import wake_neighbours, watch_quiet
+from rigdda.thrust import note_thrust, watch_thrust
 
 
 @kernel
@@ -282,7 +284,7 @@ def solve_and_move(
                 continue
             if not settled:  # not in a shorter step, either
                 let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
-            if limit_fences(bodies, contacts, system, islands, rows, s, gauges, time, p, counters):
+            if charge_fences(bodies, contacts, system, islands, rows, s, gauges, time, p, counters):
                 struck = apply_forces(
                     bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, p
                 )
@@ -333,7 +335,7 @@ def advance(
     Returns
     -------
     reason : int
-        DONE, CONTACTS_FULL, EVENTS_FULL or BAD_STATE; anything but DONE stops early.
+        DONE, CONTACTS_FULL, EVENTS_FULL, GROUND_MOVED or BAD_STATE; anything but DONE stops early.
     block : int
         The block that went bad, else -1.
     swapped : bool
@@ -369,6 +371,8 @@ def advance(
             ledger,
         )  # fmt: skip
         yield_bolts(bodies, links)
+        note_thrust(bodies, now, count, gauges, level == 0, p)
+        pushed = False
         part += 1
         if bad < 0 and excess > 0.0:
             hold_others(bodies, now, count, before, work.first, p)
@@ -380,9 +384,15 @@ def advance(
             counters[EVENTS] = note_passage(
                 bodies, gauges, counters[EVENTS], counters[STEPS] * levels[0].dt
             )
+            counters[EVENTS], pushed = watch_thrust(
+                bodies, gauges, counters[EVENTS], counters[STEPS], time, levels[0]
+            )
+            lower_fences(bodies, outlines, gauges, p)
             steps -= 1
             if bad < 0 and len(frames) > 0 and steps % stride == 0:
                 keep_frame(bodies, frames[len(frames) - 1 - steps // stride])
         if bad >= 0:
             return BAD_STATE, bad, swapped
+        if pushed:
+            return GROUND_MOVED, -1, swapped
     return DONE, -1, swapped

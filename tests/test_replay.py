@@ -60,7 +60,7 @@ def run() -> Run:
     )
     at_wall = np.tile([27.5, 2.0, 0.0], (FRAMES, 1, 1))
     taken, energies = np.array([12.5]), np.array([0.0, 0.1, 7.0])
-    return Run(scene, times, poses, velocities, events, taken, energies, at_wall)
+    return Run(scene, times, poses, velocities, events, taken, np.zeros(1), energies, at_wall)
 
 
 @pytest.fixture

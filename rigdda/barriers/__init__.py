@@ -18,9 +18,17 @@ from rigdda.barriers.layout import (
     to_tables,
 )
 from rigdda.barriers.mesh import Mesh, MeshOption
-from rigdda.barriers.standing import Fence, GravityWall, Standing, Wall
+from rigdda.barriers.standing import (
+    FENCE_CLASSES,
+    Fence,
+    FenceClass,
+    GravityWall,
+    Standing,
+    Wall,
+)
 
 __all__ = [
+    "FENCE_CLASSES",
     "KINDS",
     "Barrier",
     "Built",
@@ -28,6 +36,7 @@ __all__ = [
     "Earthwork",
     "Embankment",
     "Fence",
+    "FenceClass",
     "GravityWall",
     "Layout",
     "Mesh",

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Self
+
+import msgspec
 import numpy as np
 
 from rigdda.barriers.base import BarrierBase, Floats
@@ -80,7 +83,9 @@ class Ditch(BarrierBase, frozen=True, tag="ditch"):
 class Embankment(BarrierBase, frozen=True, tag="embankment"):
     """A dam of earth with a level crest, raised on the terrain.
 
-    Its surface is "soil" where the scene defines it, else that of the other barriers.
+    Its surface is "soil" where the scene defines it, else that of the other barriers. If the thrust
+    of what lies and strikes on it, as a mean over a second, exceeds its weight times the friction
+    of its base, it is pushed away, and gone.
 
     Parameters
     ----------
@@ -93,6 +98,8 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
     side_slope : float
         Run over rise of its sides [-]; 0.5 is usual for reinforced earth. The downhill side goes
         on until it meets the ground.
+    density : float
+        Density [kg/m3]; 1900 is compacted soil.
 
     Raises
     ------
@@ -103,10 +110,21 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
     height: float
     width: float = 1.0
     side_slope: float = 0.5
+    density: float = 1900.0
 
     def __post_init__(self) -> None:
         self._check("height", "width")
         self._check_number("side_slope", LEAST_SLOPE, FLATTEST_SLOPE)
+        self._check_number("density", 0.0)
+
+    def for_width(self, width: float) -> Self:
+        """Return the embankment that resists what is so wide [m].
+
+        It resists over the width and its height on either side, into which the load spreads at 45
+        degrees.
+        """
+        factor = (width + 2.0 * self.height) / width
+        return msgspec.structs.replace(self, density=self.density * factor)
 
     @property
     def end(self) -> float:

@@ -122,5 +122,7 @@ def describe(barrier: Barrier, digits: int = 1) -> str:
         case Embankment():
             return f"{head}, {metres(barrier.height)} high, crest {metres(barrier.width)} wide"
         case Fence():
-            return f"{head}, {metres(barrier.height)} high, {barrier.capacity / 1e3:.0f} kJ/m"
+            capacity, named = barrier.capacity, barrier.energy_class
+            takes = f"{named} kJ" if capacity is None else f"{capacity / 1e3:.0f} kJ/m"
+            return f"{head}, {metres(barrier.height)} high, {takes}"
     return f"{head}, {metres(barrier.height)} high, {metres(barrier.thickness)} thick"

@@ -68,7 +68,7 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) ->
     c.other, c.gap, c.flips = 0, 0.0, 0
     c.x, c.y, c.share, c.state = ax, ay, 0.5, STICK
     c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
-    c.friction = c.restitution = c.passing = c.bond = c.cohesion = 0.0
+    c.friction = c.restitution = c.bond = c.cohesion = 0.0
     c.ra_x, c.ra_y = arm(bodies[a], link.ax, link.ay, 0.5 * p.dt)
     if b >= 0:
         c.rb_x, c.rb_y = arm(bodies[b], link.bx, link.by, 0.5 * p.dt)

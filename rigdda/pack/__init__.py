@@ -68,7 +68,7 @@ def pack(
     return Arrays(
         bodies,
         outlines,
-        pack_ground(scene, names),
+        pack_ground(scene.ground, names),
         interfaces,
         pack_links(scene, bodies),
         pack_shaking(scene),
@@ -76,6 +76,6 @@ def pack(
         empty_contacts(room),
         empty_system(blocks, room),
         empty_work(len(bodies), blocks, room),
-        pack_gauges(scene, bodies, stations, watch),
+        pack_gauges(scene, bodies, stations, watch, settings.dt),
         pack_parameters(scene, settings, bodies, interfaces),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.barriers import Fence
+from rigdda.barriers import Embankment, Fence
 from rigdda.pack.bodies import free_bodies
 from rigdda.records import (
     STATION,
@@ -14,14 +14,23 @@ from rigdda.records import (
     Bodies,
     Gauges,
 )
+from rigdda.resistance import resistance
 from rigdda.run import EVENT
 from rigdda.scene import Scene, Terrain
 
 
 def pack_gauges(
-    scene: Scene, bodies: Bodies, stations: NDArray[np.float64], watch: tuple[float, float]
+    scene: Scene,
+    bodies: Bodies,
+    stations: NDArray[np.float64],
+    watch: tuple[float, float],
+    dt: float,
 ) -> Gauges:
-    """Return the gauges, with no station passed that a block starts beyond."""
+    """Return the gauges, with no station passed that a block starts beyond; `dt` is the step [s].
+
+    Fences sag in scenes of several blocks: a release of one block is the same for all capacities
+    that are not exceeded.
+    """
     blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.ground
     station = np.zeros(len(stations), dtype=STATION)
     station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
@@ -30,6 +39,16 @@ def pack_gauges(
     target = np.zeros(barriers, dtype=TARGET)
     target["capacity"] = [b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]
     target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
+    target["low"], target["high"], target["limit"] = np.inf, -np.inf, np.inf
+    for i, barrier in enumerate(scene.barriers):
+        if isinstance(barrier, Fence | Embankment):
+            target["limit"][i] = resistance(scene, i)
+        corners = scene.outline(i)
+        if isinstance(barrier, Embankment):
+            target["low"][i], target["high"][i] = corners[:, 0].min(), corners[:, 0].max()
+        if isinstance(barrier, Fence):
+            target["top"][i] = 0.5 * np.ptp(corners[:, 1])
+            target["sag"][i] = barrier.sag if _several(scene) else 0.0
     room = event_room(free_bodies(scene), len(stations), barriers)
     return Gauges(
         station.view(np.recarray),
@@ -37,11 +56,17 @@ def pack_gauges(
         target.view(np.recarray),
         np.array([-1] * blocks + list(scene.bodies), dtype=np.int64),
         sum(isinstance(b, Fence) for b in scene.barriers),
+        np.zeros((barriers, max(1, round(1.0 / dt)))),
         np.full((free_bodies(scene), barriers), -np.inf),
         float(watch[0]),
         float(watch[1]),
         np.zeros(room, dtype=EVENT).view(np.recarray),
     )
+
+
+def _several(scene: Scene) -> bool:
+    """Return whether more than one block is free to move."""
+    return sum(not block.fixed for block in scene.blocks) > 1
 
 
 def _ground(terrain: Terrain | None, x: float) -> float:

@@ -11,15 +11,15 @@ from rigdda.records import (
     Ground,
     Shaking,
 )
-from rigdda.scene import Scene
+from rigdda.scene import Scene, Terrain
 
 
-def pack_ground(scene: Scene, names: list[str]) -> Ground:
+def pack_ground(ground: Terrain | None, names: list[str]) -> Ground:
     """Return the terrain segments and the bins that find them by x."""
-    if scene.ground is None:
+    if ground is None:
         none, start = np.zeros(1, dtype=SEGMENT), np.zeros(1, dtype=np.int64)
         return Ground(none.view(np.recarray), start, start[:0], 0.0, 1.0)
-    points = scene.ground.points
+    points = ground.points
     step = np.diff(points, axis=0)
     length = np.hypot(step[:, 0], step[:, 1])
     tangent = step / length[:, None]
@@ -44,7 +44,7 @@ def pack_ground(scene: Scene, names: list[str]) -> Ground:
         "normal_x": -tangent[:, 1],
         "normal_y": tangent[:, 0],
         "length": length,
-        "surface": [names.index(s) for s in scene.ground.surfaces],
+        "surface": [names.index(s) for s in ground.surfaces],
         "left": left,
         "right": right,
         "bottom": bottom,

@@ -1,145 +1,150 @@
-"""Designers side by side: what the layout that each would give is worth, as it simulates more.
+"""Designers by their distance from the reference, against the releases that they may use.
 
-`python -m experiments.designers [--quick] [--out DIR]`: on 20 random sites that no training sees;
-with `--site NAME`, repeatable, on those instead, with several seeds of the search. All at fidelity
-"fast". What a designer would give at a budget is its best layout so far; all of these are verified
-on releases that no designer sees.
+`python -m experiments.designers [--quick] [--out DIR]`, after `python -m experiments.reference`. On
+every built-in design site each designer searches with several seeds at several budgets. What it
+gives is verified on fresh releases, the reference and no barriers on the same ones. The distance is
+(Z - Z of the reference) / (Z of nothing - Z of the reference): 0 is as good, 1 gains nothing.
 
-Writes designers.csv (one row a site, seed, designer and budget), summary.csv (means over them with
-95 % intervals) and designers.png. Goes on where it was stopped.
+Writes designers.csv, a row a search, and designers.png. Goes on where it was stopped.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import csv
+import statistics
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import click
+from matplotlib.figure import Figure
 
-from agents import cma, exam, extra
-from agents.names import DESIGNERS
-from agents.protocol import Designer, DesignResult
-from agents.store import Store
-from agents.tables import write_rows
-from agents.terminal import progress, show
+from agents import extra
+from agents.protocol import DEFAULT_RELEASES
+from agents.store import Store, mechanics
 from agents.verify import verify
-from envs import DesignProblem, fidelity
-from experiments import designers_curves as curves
-from rigdda import BadInput, Layout, Site
+from envs import DesignProblem
+from experiments import reference
+from experiments.script import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    RESULTS,
+    Number,
+    draw,
+    main,
+    say,
+    write,
+)
+from rigdda import BadInput, sites
+from rigdda.barriers import describe
 
-RESULTS = Path("experiments/results/designers")
-WARM = "cma from policy"
-FIRST_BUDGET = 25
-
-
-class Case(NamedTuple):
-    """A problem and the seed of the searches on it."""
-
-    problem: DesignProblem
-    seed: int
-
-
-class Budget(NamedTuple):
-    """Releases that a designer may simulate, and unseen ones that a layout is verified on."""
-
-    simulations: int
-    verify: int
-
-    def steps(self) -> list[int]:
-        """Return the budgets at which a search is looked at, doubled up to the whole."""
-        out, step = [], FIRST_BUDGET
-        while step < self.simulations:
-            out.append(step)
-            step *= 2
-        return [*out, self.simulations]
-
-
-def contestants(names: Sequence[str]) -> dict[str, Designer]:
-    """Return designers by their names."""
-    return {name: cma.warm_started if name == WARM else extra.module(name).design for name in names}
+COLOURS = {
+    "race": RED, "random": GREY, "constant": "black", "rule": ORANGE, "cma": BLUE, "tpe": GREEN,
+    "convex": "#9467bd",
+}  # fmt: skip
+FREE = ("constant", "rule")
+"""Designers that search nothing: one budget and one seed tell all."""
+SEEDS, QUICK_SEEDS = 5, 1
+BUDGETS, QUICK_BUDGETS = (DEFAULT_RELEASES // 10, DEFAULT_RELEASES), (600,)
+VERIFY, QUICK_VERIFY = 20_000, 800
+TARGET = 0.05
+"""Distance of the default designer at its default budget that is asked for, on five sites of six."""
 
 
-def incumbents(found: DesignResult, budgets: Sequence[int]) -> Iterator[tuple[int, Layout]]:
-    """Yield the layout that a designer would give at each budget: its best so far, then its last.
-
-    Nothing, as long as it has evaluated nothing.
-    """
-    entries = found.history.stage("search") or found.history.entries
-    for budget in budgets:
-        seen = [entry.evaluation for entry in entries if entry.simulations <= budget]
-        best = min(seen, key=lambda e: e.objective).layout if seen else ()
-        yield budget, found.layout if budget >= found.simulations else best
+def cases(quick: bool) -> Iterator[tuple[str, int, int]]:
+    """Yield designer, budget and seed of every search on a site."""
+    budgets, seeds = (QUICK_BUDGETS, QUICK_SEEDS) if quick else (BUDGETS, SEEDS)
+    for name in COLOURS:
+        for budget in budgets[-1:] if name in FREE else budgets:
+            for seed in range(1 if name in FREE else seeds):
+                yield name, budget, seed
 
 
-def compete(
-    case: Case, designers: dict[str, Designer], budget: Budget, folder: Path
-) -> Iterator[dict[str, Any]]:
-    """Yield the rows of one case; what was simulated is kept in a file of `folder`."""
-    posed, seed = case
-    store = Store(folder / f"{posed.site.name}-{seed}.jsonl")
-    nothing = verify(posed, (), budget.verify, seed, store)
-    for name, design in designers.items():
-        found = design(posed, budget.simulations, seed, None, store)
-        for at, layout in incumbents(found, budget.steps()):
-            e = verify(posed, layout, budget.verify, seed, store)
-            yield {
-                "site": posed.site.name, "seed": seed, "designer": name, "budget": at,
-                "simulations": min(at, found.simulations), "nothing": nothing.objective,
-                "objective": e.objective, "gain": nothing.objective - e.objective,
-                "debris": e.debris, "cost": e.cost, "barriers": len(e.layout),
-            }  # fmt: skip
+def compete(site: str, recorded: list[Any], quick: bool, known: set[Any]) -> Iterator[Any]:
+    """Yield the rows of a site that are not known yet."""
+    problem, store, n = DesignProblem(site), Store(), QUICK_VERIFY if quick else VERIFY
+    best = next(r for r in recorded if r["site"] == site and r["what"] == reference.BEST)
+    todo = [case for case in cases(quick) if (site, *case) not in known]
+    if not todo:
+        return
+    least = verify(problem, reference.layout_of(best), n, 0, store)
+    nothing = verify(problem, (), n, 0, store)
+    for name, budget, seed in todo:
+        say(f"{site}: {name}, {budget} releases, seed {seed}")
+        found = extra.module(name).design(problem, budget, seed)
+        e = verify(problem, found.layout, n, 0, store)
+        gain = nothing.objective - least.objective
+        yield {
+            "site": site, "designer": name, "budget": budget, "seed": seed,
+            "releases": found.simulations, "cpu_s": found.seconds, "z": e.objective,
+            "z_low": e.ci[0], "z_high": e.ci[1], "reported": found.evaluation.objective,
+            "reported_low": found.evaluation.ci[0], "reported_high": found.evaluation.ci[1],
+            "z_reference": least.objective, "z_nothing": nothing.objective,
+            "distance": (e.objective - least.objective) / gain, "origin": found.origin,
+            "on_bound": "; ".join(found.on_bound), "mechanics": mechanics(),
+            "layout": "; ".join(map(describe, found.layout)),
+        }  # fmt: skip
 
 
-def cases(named: Sequence[str], sites: int, seeds: int) -> list[Case]:
-    """Return the cases: named sites with several seeds, or unseen random sites."""
-    if not named:
-        return [Case(problem, 0) for problem in exam.unseen(sites)]
-    fast = [DesignProblem(fidelity.at(Site.load(name), "fast")) for name in named]
-    return [Case(problem, seed) for problem in fast for seed in range(seeds)]
+def medians(rows: list[Any], name: str, budget: int) -> dict[str, float]:
+    """Return the median distance of a designer over its seeds, by site."""
+    own = [r for r in rows if r["designer"] == name and int(r["budget"]) == budget]
+    return {
+        site: statistics.median(float(r["distance"]) for r in own if r["site"] == site)
+        for site in dict.fromkeys(r["site"] for r in own)
+    }
 
 
-@click.command()
-@click.option("--quick", is_flag=True, help="Minutes: 2 sites, 100 simulations, 8 to verify.")
-@click.option("--site", "named", multiple=True, help="A site instead of the unseen ones.")
-@click.option("--sites", default=20, show_default=True, help="Unseen sites.")
-@click.option("--seeds", default=8, show_default=True, help="Seeds of the searches on a --site.")
-@click.option("--designer", "names", multiple=True, type=click.Choice([*DESIGNERS, WARM]),
-              help="Some instead of all.")  # fmt: skip
-@click.option("--simulations", default=400, show_default=True, help="Releases of a search.")
-@click.option("--verify", default=32, show_default=True, help="Unseen releases of a layout.")
-@click.option("--out", type=click.Path(path_type=Path), help=f"Folder to write into: {RESULTS}.")
-def main(
-    quick: bool, named: Sequence[str], sites: int, seeds: int, names: Sequence[str],
-    simulations: int, verify: int, out: Path | None,
-) -> None:  # fmt: skip
-    """Compare the designers, see the module."""
-    if quick:
-        sites, seeds, simulations, verify = min(sites, 2), 2, min(simulations, 100), 8
-    folder = out or (RESULTS / "quick" if quick else RESULTS)
-    try:
-        designers = contestants(names or [*DESIGNERS, WARM])
-        drawn = cases(named, sites, seeds)
-    except BadInput as error:
-        raise click.UsageError(str(error)) from None
-    (folder / "evaluations").mkdir(parents=True, exist_ok=True)
-    rows: list[dict[str, Any]] = []
-    with progress(len(drawn) * len(designers)) as tick:
-        for case in drawn:
-            for row in compete(
-                case, designers, Budget(simulations, verify), folder / "evaluations"
-            ):
-                rows.append(row)
-                tick(
-                    len({(r["site"], r["seed"], r["designer"]) for r in rows}),
-                    case.problem.site.name,
-                )
-            write_rows(folder / "designers.csv", rows)
-    table = curves.summary(rows)
-    write_rows(folder / "summary.csv", table)
-    curves.picture(folder / "designers.png", rows)
-    show(curves.table(table))
+def picture(figure: Figure, rows: list[Any]) -> None:
+    """Draw the distance of every search against its releases, site by site."""
+    names = list(dict.fromkeys(r["site"] for r in rows))
+    grid = figure.subplots(2, (len(names) + 1) // 2, squeeze=False, sharey=True).ravel()
+    for axes, site in zip(grid, names, strict=False):
+        for name, colour in COLOURS.items():
+            own = [r for r in rows if r["site"] == site and r["designer"] == name]
+            x, y = ([float(r[k]) for r in own] for k in ("releases", "distance"))
+            axes.plot(x, y, "o", color=colour, alpha=0.6, label=name)
+        axes.axhline(0.0, color="0.8", zorder=0)
+        axes.axhline(1.0, color="0.8", zorder=0, linestyle=":")
+        axes.set(xscale="log", title=site, xlabel="releases", ylim=(-0.1, 1.5))
+    grid[0].set_ylabel("distance from the reference [-]")
+    grid[0].legend(fontsize=8)
+    for axes in grid[len(names) :]:
+        axes.set_visible(False)
+
+
+def load(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a former run that were made by the mechanics of today."""
+    if not path.is_file():
+        return []
+    with path.open(newline="") as file:
+        return [r for r in csv.DictReader(file) if r["mechanics"] == mechanics()]
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Write designers.csv and designers.png."""
+    path = out / "reference.csv"
+    recorded = reference.load(path) or reference.load(RESULTS / "reference.csv")
+    if not recorded:
+        raise BadInput("reference", str(path), "run python -m experiments.reference first")
+    rows: list[Any] = load(out / "designers.csv")
+    known = {(r["site"], r["designer"], int(r["budget"]), int(r["seed"])) for r in rows}
+    for site in sites.design_names():
+        for row in compete(site, recorded, quick, known):
+            rows.append(row)
+            write(out / "designers.csv", rows)
+    draw(out / "designers.png", (14.0, 8.0), lambda figure: picture(figure, rows))
+    budget = (QUICK_BUDGETS if quick else BUDGETS)[-1]
+    note = "\n".join(
+        f"{name}: " + ", ".join(f"{s} {d:.2f}" for s, d in medians(rows, name, budget).items())
+        for name in COLOURS
+    )
+    fifth = sorted(medians(rows, "race", budget).values())[-2]
+    what = "median distance of `race` from the reference, the second greatest of the sites"
+    return Number(what, fifth, high=2.0 if quick else TARGET, note=note)
 
 
 if __name__ == "__main__":
-    main()
+    main(run)

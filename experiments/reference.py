@@ -1,0 +1,231 @@
+"""The reference of each built-in design site: a catalogue of all kinds, raced on unseen releases.
+
+`python -m experiments.reference [--quick] [--out DIR]`. All singles of every kind and size over some
+24 stations race first, then pairs of what came next, then neighbours of the best. The best of every
+kind, the best for single blocks alone and the constants of `agents.constant` are verified on fresh
+releases, until half the 95 % interval of the best is below 1 % of Z of nothing.
+
+Writes reference.csv, a row a layout, and reference.png. Goes on where it was stopped: a site whose
+rows were made by the kernels of today is not computed again.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import time
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+from msgspec.structs import replace
+
+from agents.arms import Arm
+from agents.constant import CONSTANTS, place
+from agents.menu import Menu
+from agents.protocol import Ledger
+from agents.race import foretold, nearby
+from agents.racing import Track
+from agents.store import Store, mechanics
+from agents.verify import verify
+from envs import DesignProblem, Evaluation
+from experiments.script import BLUE, GREY, RED, Number, draw, main, say, write
+from rigdda import Barrier, Layout, Site, sites
+from rigdda.barriers import describe, from_table, to_tables
+
+STATIONS, QUICK_STATIONS = 24, 6
+"""Chainages across the zone at which singles are tried."""
+FIRST, QUICK_FIRST = 30, 4
+"""Releases an event, on average, before a candidate is dropped."""
+BUDGET, QUICK_BUDGET = 400_000, 6_000
+"""Releases of the search for the reference of a site; a fifth as many for single blocks alone."""
+KEPT = 24
+"""Singles, pairs and neighbours that a race keeps."""
+PAIRS = 300
+"""Pairs that are raced, the most promising."""
+WANTED, QUICK_WANTED = 0.01, 0.2
+"""Half of the interval of a reference over Z of nothing that ends its verification [-]."""
+LEAST, MOST, QUICK_MOST = 2_000, 64_000, 1_000
+"""Releases of a layout in the verification: the first, and the most."""
+BEST = "best"
+SINGLE = "for single blocks"
+
+Row = Mapping[str, Any]
+
+
+def kinds_of(layout: Layout) -> str:
+    """Return the kinds of a layout in words, each once."""
+    return " + ".join(sorted({barrier.words for barrier in layout})) or "nothing"
+
+
+def catalogue(menu: Menu, stations: int) -> list[Layout]:
+    """Return all singles of a problem over so many of its stations, kind by kind."""
+    own = menu.stations[:: max(1, len(menu.stations) // stations)].tolist()
+    singles: list[Barrier] = []
+    for kind in menu.problem.kinds:
+        found = menu.lone(kind)
+        ends = {b.x for b in found} - set(menu.stations.tolist())
+        singles += [b for b in found if kind == "mesh" or b.x in ends or b.x in own]
+    return [(barrier,) for barrier in singles]
+
+
+def contenders(problem: DesignProblem, budget: int, stations: int, first: int) -> list[Layout]:
+    """Return the best layouts of every combination of kinds, two each, the best first."""
+    menu, track = Menu(problem), Track(Ledger(problem, budget, 0, None, Store()))
+    releases = first * len(problem.site.events)
+    track.race(catalogue(menu, stations), budget // 2, releases, keep=KEPT)
+    lone = list(track.seen.values())
+    pairs = foretold(problem, lone, lone, PAIRS)
+    best = track.race(pairs, budget // 4, releases, keep=KEPT // 4)
+    singles = sorted(lone, key=lambda arm: arm.key())[: KEPT // 4]
+    nearby(track, menu, [*best, *singles], lone, track.ledger.left, releases)
+    return best_by_kind(track.seen.values())
+
+
+def best_by_kind(arms: Iterable[Arm]) -> list[Layout]:
+    """Return the two best layouts of every combination of kinds, the best first."""
+    kept: dict[str, list[Layout]] = {}
+    for arm in sorted(arms, key=lambda arm: arm.objective()):
+        own = kept.setdefault(kinds_of(arm.layout), [])
+        if len(own) < 2:
+            own.append(arm.layout)
+    return [layout for group in kept.values() for layout in group]
+
+
+def of_single_blocks(site: Site) -> Site:
+    """Return a site on which nothing but single blocks comes down."""
+    events = tuple(e for e in site.events if single(site, e.name))
+    return replace(site, name=f"{site.name}, single blocks", events=events)
+
+
+def single(site: Site, event: str) -> bool:
+    """Return whether an event is of one block."""
+    return len(site.draw(0, event).blocks) == 1 and site.event(event).number[1] == 1
+
+
+def settle(
+    problem: DesignProblem, layouts: Iterable[Layout], wanted: float, most: int
+) -> dict[Layout, Evaluation]:
+    """Verify layouts on the same fresh releases, as many as tell the best to `wanted` of nothing.
+
+    Of those that the releases so far tell apart from the best, the numbers stay as they are.
+    """
+    store, half = Store(), wanted * problem.nothing.objective
+    found: dict[Layout, Evaluation] = {}
+    alive, n = list(dict.fromkeys(layouts)), min(LEAST, most)
+    while alive:
+        found |= {layout: verify(problem, layout, n, 0, store) for layout in alive}
+        best = min(found.values(), key=lambda e: e.objective)
+        if n >= most or 0.5 * (best.ci[1] - best.ci[0]) <= half:
+            break
+        alive = [layout for layout in alive if found[layout].ci[0] <= best.ci[1]]
+        n = min(2 * n, most)
+    return found
+
+
+def study(name: str, quick: bool) -> list[dict[str, Any]]:
+    """Return the rows of a site: nothing, the best, the best of each kind, and what to beat."""
+    begun, problem = time.process_time(), DesignProblem(name)
+    stations, first = (QUICK_STATIONS, QUICK_FIRST) if quick else (STATIONS, FIRST)
+    budget = QUICK_BUDGET if quick else BUDGET
+    say(f"{name}: racing")
+    field = contenders(problem, budget, stations, first)
+    blocks = DesignProblem(of_single_blocks(problem.site))
+    alone = contenders(blocks, budget // 5, stations, first)
+    wanted, most = (QUICK_WANTED, QUICK_MOST) if quick else (WANTED, MOST)
+    say(f"{name}: single blocks alone")
+    for_blocks = min(settle(blocks, alone, wanted, most).values(), key=lambda e: e.objective).layout
+    menu = Menu(problem)
+    constants = [place(menu, barrier, share) for barrier, share in CONSTANTS]
+    say(f"{name}: verifying {len(field)} layouts")
+    found = settle(problem, [(), *field, for_blocks, *constants], wanted, most)
+    labels = {"nothing": (), SINGLE: for_blocks}
+    labels |= {f"constant {i}": layout for i, layout in enumerate(constants)}
+    labels[BEST] = min(found, key=lambda layout: found[layout].objective)
+    for layout in sorted(found, key=lambda layout: found[layout].objective):
+        labels.setdefault(kinds_of(layout), layout)
+    seconds = time.process_time() - begun
+    return [row(problem, what, found[layout], seconds) for what, layout in labels.items()]
+
+
+def row(problem: DesignProblem, what: str, e: Evaluation, seconds: float) -> dict[str, Any]:
+    """Return the row of one layout; money in EUR per metre of road and year, capital EUR/m."""
+    base = problem.nothing.objective
+    groups = sum(v for k, v in problem.nothing.by_event.items() if not single(problem.site, k))
+    return {
+        "site": problem.site.name, "what": what, "kinds": kinds_of(e.layout),
+        "z": e.objective, "z_low": e.ci[0], "z_high": e.ci[1], "capital": e.capital,
+        "harm": e.harm, "repair": e.repair, "cost": e.cost, "debris_share": e.debris_share,
+        "releases": e.releases, "z_nothing": base, "groups_share": groups / base,
+        "cpu_s": seconds, "mechanics": mechanics(),
+        "layout": json.dumps(to_tables(e.layout)),
+    }  # fmt: skip
+
+
+def load(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a recorded reference, none where there is none."""
+    if not path.is_file():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def layout_of(recorded: Row) -> Layout:
+    """Return the layout of a recorded row."""
+    tables = json.loads(recorded["layout"])
+    return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))
+
+
+def picture(figure: Figure, rows: list[Row]) -> None:
+    """Draw, site by site, the best of every kind against nothing and the constants."""
+    names = list(dict.fromkeys(str(r["site"]) for r in rows))
+    grid = figure.subplots(2, (len(names) + 1) // 2, squeeze=False).ravel()
+    for axes, name in zip(grid, names, strict=False):
+        own = [r for r in rows if r["site"] == name and r["what"] != SINGLE]
+        base = float(own[0]["z_nothing"])
+        own = sorted(own, key=lambda r: float(r["z"]))
+        own = [r for r in own if float(r["z"]) < 1.3 * base][:12]
+        for y, r in enumerate(reversed(own)):
+            z, low, high = (float(r[k]) / base for k in ("z", "z_low", "z_high"))
+            colour = RED if r["what"] == BEST else GREY if "constant" in r["what"] else BLUE
+            axes.errorbar(z, y, xerr=[[z - low], [high - z]], fmt="o", color=colour, capsize=2)
+        axes.set_yticks(range(len(own)), [words(r) for r in reversed(own)], fontsize=7)
+        axes.axvline(1.0, color="0.8", zorder=0)
+        axes.set(title=f"{name}: nothing {base:.0f} EUR/(m a)", xlabel="Z over that of nothing [-]")
+        axes.set_xlim(left=0.0)
+    for axes in grid[len(names) :]:
+        axes.set_visible(False)
+
+
+def words(recorded: Row) -> str:
+    """Return what a row is, in a line or two."""
+    layout = layout_of(recorded)
+    head = "best: " if recorded["what"] == BEST else ""
+    head = f"{recorded['what']}: " if "constant" in recorded["what"] else head
+    return head + ("\n".join(describe(barrier) for barrier in layout) or "nothing")
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Write reference.csv and reference.png."""
+    path, rows = out / "reference.csv", []
+    known = [r for r in load(path) if r["mechanics"] == mechanics()]
+    for name in sites.design_names():
+        own: list[Any] = [r for r in known if r["site"] == name]
+        rows += own or study(name, quick)
+        write(path, rows)
+    draw(out / "reference.png", (17.0, 9.0), lambda figure: picture(figure, rows))
+    best = [r for r in rows if r["what"] == BEST]
+    half = [0.5 * (float(r["z_high"]) - float(r["z_low"])) / float(r["z_nothing"]) for r in best]
+    note = "\n".join(
+        f"{r['site']}: {words(r)!r}, {float(r['z']):.1f} of {float(r['z_nothing']):.1f} EUR/(m a)"
+        for r in best
+    )
+    return Number(
+        "greatest half interval of a reference over Z of nothing",
+        max(half), high=QUICK_WANTED if quick else WANTED, note=note,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(run)

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from msgspec.structs import replace as changed
 
 from experiments.bench.cases import rockfall_scene
 from experiments.script import BLUE, GREY, RED, Number, draw, main, say, write
@@ -48,7 +49,7 @@ def _load(scene: Scene) -> Scene:
 
 
 def _cohesion(scene: Scene) -> Scene:
-    bonded = {name: replace(s, cohesion=1e-9) for name, s in scene.surfaces.items()}
+    bonded = {name: changed(s, cohesion=1e-9) for name, s in scene.surfaces.items()}
     return replace(scene, surfaces=bonded)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,7 +18,7 @@ from rigdda.errors import SoftContacts
 from rigdda.geometry import polygon_properties
 from rigdda.outcome import Outcome
 
-SITE = Site.load("shu-hwa")
+SITE = Site.load("shu-hwa-paper")
 
 ALPHA = SITE.motion.damping
 """Damping coefficient of the paper, 0.6 1/s."""
@@ -39,7 +38,7 @@ ZONES = ("slope", "toe", "road", "beyond")
 
 def variant(contact: str, alpha: float = ALPHA) -> Site:
     """Return the site with this contact and damping coefficient [1/s]."""
-    surfaces = {k: replace(s, restitution=CONTACTS[contact]) for k, s in SITE.surfaces.items()}
+    surfaces = {k: changed(s, restitution=CONTACTS[contact]) for k, s in SITE.surfaces.items()}
     motion = changed(SITE.motion, damping=alpha, duration=DURATION)
     valley = (RUN_OUT, SITE.slope.points[-1][1])  # without damping blocks leave the site's ground
     slope = changed(SITE.slope, points=(*SITE.slope.points, valley))

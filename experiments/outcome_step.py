@@ -2,7 +2,8 @@
 
 On `ramp`, a plane of 51 degrees above level ground, ten blocks slide down as one train, and the
 same corner hits the ground in every release: what a step makes of that blow is not averaged out.
-`quick` is the site of that name, whose releases differ. Judged by the greatest difference from the
+`quick` is the mass of the site of that name, whose releases differ. Judged by the greatest
+difference from the
 shortest step on either, over the 95 % interval of the difference.
 """
 
@@ -17,17 +18,21 @@ from msgspec.structs import replace
 from experiments.script import BLUE, RED, Number, draw, interval, main, say, write
 from rigdda import Settings, Site, Surface
 from rigdda.joints import JointSet
+from rigdda.place import BarrierZone, Motion, Road, Slope
 from rigdda.release import release_many
-from rigdda.site import BarrierZone, Motion, Road, Slope, Source
+from rigdda.source import Source
 
 RAMP = Site(
     name="ramp",
     description="A plane of 51 degrees, 25 m high, with a road 3 m from its toe.",
     slope=Slope(points=((-10.0, 25.0), (0.0, 25.0), (20.0, 0.0), (70.0, 0.0)), toe=20.0),
-    source=Source(
-        polygon=((1.0, 23.75), (7.0, 16.25), (9.0, 18.5), (4.0, 24.5)),
-        joints=(JointSet(51.0), JointSet(-39.0)),
-        block_area=2.5,
+    sources=(
+        Source(
+            name="mass",
+            polygon=((1.0, 23.75), (7.0, 16.25), (9.0, 18.5), (4.0, 24.5)),
+            joints=(JointSet(51.0), JointSet(-39.0)),
+            block_area=2.5,
+        ),
     ),
     road=Road(23.0, 31.0),
     barrier_zone=BarrierZone(10.0, 22.0),
@@ -52,7 +57,7 @@ def row(name: str, dt: float, releases: int) -> dict[str, float | str]:
     """Return the mean share of a site at a step [s] with its 95 % half interval."""
     site = SITES[name]
     site = replace(site, motion=replace(site.motion, dt=dt))
-    found = release_many([(site, (), seed) for seed in range(releases)])
+    found = release_many([(site, (), seed, "mass") for seed in range(releases)])
     share, half = interval(outcome.debris_fraction for outcome in found)
     return {"site": name, "dt_s": dt, "releases": releases, "share": share, "half_interval": half}
 

@@ -146,16 +146,17 @@ def deepest(scene: Scene, times: Floats, poses: Floats) -> float:
 
 
 def rockfall_scene(count: int, seed: int) -> Scene:
-    """Return about `count` blocks of 2 m2 above the slope with benches of the site shu-hwa.
+    """Return about `count` blocks of 2 m2 above the slope with benches of the scene shu-hwa-paper.
 
     Its source has about 120. A smaller one has the same shape; a larger one is thicker, as long as
     the slope below it.
     """
-    site = Site.load("shu-hwa")
+    site = Site.load("shu-hwa-paper")
     crest, edge = np.array(site.slope.points[1:3])
     along = (edge - crest) / np.hypot(*(edge - crest))
     out = np.array([-along[1], along[0]])
-    source = np.array(site.source.polygon) - crest
+    (rock,) = site.sources
+    source = np.array(rock.polygon) - crest
     share = count / 120.0
     length = min(math.sqrt(share), 1.0)
     s, n = source @ along, source @ out
@@ -165,7 +166,7 @@ def rockfall_scene(count: int, seed: int) -> Scene:
     change = msgspec.structs.replace
     return change(
         site,
-        source=change(site.source, polygon=tuple(map(tuple, corners.tolist()))),
+        sources=(change(rock, polygon=tuple(map(tuple, corners.tolist()))),),
         slope=change(site.slope, points=(*site.slope.points, valley)),
     ).realise(seed=seed)
 

@@ -26,7 +26,8 @@ from rigdda.validation.scenes import masses
 
 Floats = NDArray[np.float64]
 
-SITE = Site.load("shu-hwa")
+SITE = Site.load("shu-hwa-paper")
+(ROCK,) = SITE.sources
 BARRIER = SITE.slope.toe
 """Chainage of the barrier: at the toe [m]."""
 
@@ -53,7 +54,7 @@ class Budget(NamedTuple):
     duration: float
 
 
-FULL = Budget(300, 50, 30, SITE.source.block_area, (4.0, 2.0, 0.5), SITE.motion.duration)
+FULL = Budget(300, 50, 30, ROCK.block_area, (4.0, 2.0, 0.5), SITE.motion.duration)
 QUICK = Budget(12, 6, 4, 8.0, (2.0,), 20.0)
 
 
@@ -85,7 +86,7 @@ def scene(area: float, seed: int) -> Scene:
     valley = (RUN_OUT, SITE.slope.points[-1][1])
     return change(
         SITE,
-        source=change(SITE.source, block_area=area),
+        sources=(change(ROCK, block_area=area),),
         slope=change(SITE.slope, points=(*SITE.slope.points, valley)),
     ).realise(seed=seed)
 

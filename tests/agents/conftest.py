@@ -9,13 +9,12 @@ from valley import Valley
 from envs import DesignProblem
 from experiments.outcome_step import RAMP
 from rigdda import Site
-from rigdda.site import BarrierZone, Costs, Motion
+from rigdda.place import BarrierZone, Motion
 
 SITE = replace(
     RAMP,
     name="chute",
     barrier_zone=BarrierZone(10.0, 22.0, max_height=5.0),
-    costs=Costs(limit=40.0),
     motion=Motion(damping=0.2, duration=4.0, dt=0.01),
 )
 

@@ -6,7 +6,8 @@ import pytest
 
 from rigdda import Site, Surface
 from rigdda.joints import JointSet
-from rigdda.site import BarrierZone, Costs, Motion, Road, Slope, Source
+from rigdda.place import BarrierZone, Motion, Road, Slope
+from rigdda.source import Source
 
 
 @pytest.fixture(scope="session")
@@ -14,15 +15,17 @@ def ramp() -> Site:
     return Site(
         name="ramp",
         description="A plane ramp of 51 degrees, 25 m high, with a road 4 m from its toe.",
-        slope=Slope(points=((-10.0, 25.0), (0.0, 25.0), (20.0, 0.0), (60.0, 0.0)), toe=20.0),
-        source=Source(
-            polygon=((1.0, 23.75), (7.0, 16.25), (9.0, 18.5), (4.0, 24.5)),
-            joints=(JointSet(51.0), JointSet(-39.0)),
-            block_area=2.5,
+        slope=Slope(points=((-10.0, 25.0), (0.0, 25.0), (20.0, 0.0), (70.0, 0.0)), toe=20.0),
+        sources=(
+            Source(
+                name="mass",
+                polygon=((1.0, 23.75), (7.0, 16.25), (9.0, 18.5), (4.0, 24.5)),
+                joints=(JointSet(51.0), JointSet(-39.0)),
+                block_area=2.5,
+            ),
         ),
         road=Road(24.0, 32.0),
         barrier_zone=BarrierZone(10.0, 22.0),
         surfaces={"rock": Surface(25.0)},
-        costs=Costs(limit=20.0),
         motion=Motion(damping=0.3, duration=4.0, dt=0.01),
     )

@@ -55,7 +55,7 @@ def test_outcome_of_blocks_that_pass_the_barrier_or_not():
 
 def test_blocks_have_the_area_asked_for():
     areas = [len(highway.scene(area, 0).blocks) * area for area in (4.0, 8.0)]
-    assert areas == pytest.approx([highway.SITE.source.area] * 2, rel=0.06)
+    assert areas == pytest.approx([highway.ROCK.area] * 2, rel=0.06)
 
 
 def test_error_of_a_mean_is_bias_and_noise():

@@ -17,7 +17,7 @@ FALL = 3.0
 
 def falling(dt: float, tolerance: float) -> Simulation:
     """Return the rock of `quick` in its fall."""
-    scene = Site.load("quick").realise(seed=3)
+    scene = Site.load("quick").realise((), 3, "mass")
     sim = Simulation(scene, Settings(dt=dt, sweep_tolerance=tolerance))
     sim.step(round(FALL / dt))
     return sim
@@ -33,7 +33,7 @@ def test_a_closer_tolerance_takes_more_sweeps(dt: float, substeps: int) -> None:
 
 @pytest.mark.parametrize("dt", [5e-3, 0.02])
 def test_forces_of_an_avalanche_press_and_stay_within_friction(dt: float) -> None:
-    sim = Simulation(Site.load("quick").realise(seed=3), Settings(dt=dt))
+    sim = Simulation(Site.load("quick").realise((), 3, "mass"), Settings(dt=dt))
     tried = 0
     for _ in range(round(FALL / dt)):
         sim.step()

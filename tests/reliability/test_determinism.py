@@ -15,7 +15,7 @@ DURATION = 3.0
 
 
 def scene(seed: int = 0) -> Scene:
-    return SITE.realise(LAYOUT, seed)
+    return SITE.realise(LAYOUT, seed, "mass")
 
 
 def play(seed: int = 0) -> Run:

@@ -12,10 +12,10 @@ from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, GravityWall, Lay
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.geometry import polygon_properties
 
-STATIONS = 6
+STATIONS = 3
 """Places across the zone where each kind is tried."""
 
-RELEASES = 12
+RELEASES = 4
 """Releases of the event with each."""
 
 HOLDS = 0.5

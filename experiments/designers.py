@@ -50,7 +50,7 @@ SEEDS, QUICK_SEEDS = 5, 1
 BUDGETS, QUICK_BUDGETS = (DEFAULT_RELEASES // 10, DEFAULT_RELEASES), (600,)
 VERIFY, QUICK_VERIFY = 20_000, 800
 TARGET = 0.05
-"""Distance of the default designer at its default budget that is asked for, on five of six sites."""
+"""Distance of the default designer at its default budget that is asked, on five of six sites."""
 
 
 def cases(quick: bool) -> Iterator[tuple[str, int, int]]:

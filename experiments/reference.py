@@ -1,8 +1,8 @@
 """The reference of each built-in design site: a catalogue of all kinds, raced on unseen releases.
 
-`python -m experiments.reference [--quick] [--out DIR]`. All singles of every kind and size over some 24
-stations race first, then the most promising pairs, then neighbours of the best. The best of every
-kind, the best for single blocks alone and the constants of `agents.constant` are verified on fresh
+`python -m experiments.reference [--quick] [--out DIR]`. All singles of every kind and size over some
+24 stations race first, then promising pairs, then neighbours of the best. The best of every kind,
+the best for single blocks alone and the constants of `agents.constant` are verified on fresh
 releases, until half the 95 % interval of the best is below 1 % of Z of nothing.
 
 Writes reference.csv, a row a layout, and reference.png. Goes on where it was stopped: a site whose

@@ -38,13 +38,13 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
 @click.command()
 @count_option("--sites", 2, 512, "Random sites to train on.")
-@count_option("--episodes", 0, 49152, "Episodes, of one release each.")
+@count_option("--episodes", 0, 49152, "Episodes.")
 @seed_option("Seed of all that is random.", SEED)
 @click.option("--processes", type=click.IntRange(1, 64), default=min(os.cpu_count() or 1, 64),
               help="Processes that simulate.  [default: one a core]")  # fmt: skip
 @out_option("train")
 def train(sites: int, episodes: int, seed: int, processes: int, out: Path | None) -> None:
-    """Train a policy that designs fences for a site from what it sees of it, without a search.
+    """Train a policy that designs a layout for a site from what it sees of it, without a search.
 
     Writes policy.safetensors, which `rigdda evaluate --policy` takes, and logs for TensorBoard.
     A training that was killed goes on where it stopped. Needs the extra rl.
@@ -56,51 +56,55 @@ def train(sites: int, episodes: int, seed: int, processes: int, out: Path | None
     with kept(folder), progress(terms.episodes) as tick:
         trained = training.train(terms, folder, processes, lambda done: tick(done, "PPO"))
     click.echo(
-        f"fall of the objective on {terms.beside} sites beside the training sites: before "
+        f"share that layouts take off Z on {terms.beside} sites beside the training sites: before "
         f"{trained.before:.3f}, after {trained.after:.3f}; policy.safetensors is in {folder}"
     )
 
 
 @click.command()
 @click.option("--designer", "names", type=click.Choice(DESIGNERS), multiple=True,
-              default=("rule", "policy"), show_default=True,
+              default=("constant", "rule", "random", "race"), show_default=True,
               help="What to try; repeatable.")  # fmt: skip
-@click.option("--policy", type=click.Path(), help="What `train` wrote; else the shipped policy.")
-@count_option("--simulations", 2, 176, "Releases that each designer may simulate on a site.")
-@count_option("--sites", 1, 20, "Unseen random sites; the first 20 are the list of test sites.")
-@count_option("--verify", 2, 32, "Unseen releases that each layout is verified on.")
+@click.option("--policy", type=click.Path(), help="What `train` wrote, to be tried as well.")
+@click.option("--split", type=click.Choice(("train", "validation", "test")), default="test",
+              show_default=True, help="Sites: those to learn from, to choose by, or unseen.")  # fmt: skip
+@count_option("--budget", 2, 3_000, "Releases that each designer may simulate on a site.")
+@count_option("--sites", 1, 6, "Sites of the split; six are one of each family.")
+@count_option("--verify", 10, 2_000, "Unseen releases that each layout is verified on.")
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("evaluate")
 def evaluate(
     names: tuple[str, ...],
     policy: str | None,
-    simulations: int,
+    split: str,
+    budget: int,
     sites: int,
     verify: int,
     seed: int,
     out: Path | None,
 ) -> None:
-    """Try designers on random sites that no training sees, at fidelity "fast".
+    """Try designers on generated sites: how far each is behind the best, in EUR a year.
 
-    Prints means over the sites with 95 % intervals, each designer also against the first; writes
-    scores.csv. Layouts that a killed or former run has evaluated are not simulated again.
+    Prints means over the sites with 95 % intervals; writes scores.csv. Layouts that a killed or
+    former run has evaluated are not simulated again.
     """
-    from agents import exam, extra, tables
+    from agents import contest, extra, tables
     from agents.policy import load, using
     from agents.store import Store
 
     designers = {name: extra.module(name).design for name in dict.fromkeys(names)}
     if policy is not None:
         designers["policy"] = using(load(policy))
-    posed = exam.unseen(sites)
+    posed = contest.pose(split, sites)
     folder = folder_for(out, "evaluate", "evaluations.jsonl", "scores.csv")
     store = Store(folder / "evaluations.jsonl")
     with kept(folder), progress(len(posed) * len(designers)) as tick:
-        scores = exam.sit(posed, designers, simulations, verify, seed, store, tick)
+        scores = contest.hold(posed, designers, budget, verify, seed, store, tick)
     tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
-    show(exam.table(scores))
-    resumed = f", {store.resumed} releases taken from a former run" if store.resumed else ""
-    click.echo(f"{len(posed)} sites, verified on {verify} releases each{resumed}; "
+    click.echo("EUR per metre of road and year; best: of these designers on each site")
+    show(contest.table(scores))
+    resumed = f", {store.resumed:,} releases taken from a former run" if store.resumed else ""
+    click.echo(f"{len(posed)} sites of {split}, verified on {verify:,} releases each{resumed}; "
                f"scores.csv is in {folder}")  # fmt: skip
 
 

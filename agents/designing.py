@@ -108,11 +108,14 @@ def _tell(done: Study, store: Store, verify: int, folder: Path) -> None:
     from agents.wording import order
 
     chosen, result = done.chosen.evaluation, done.result
-    click.echo("Z and its parts in EUR per metre of road and year; to build in EUR per metre")
+    click.echo(
+        "Z and its parts in EUR per metre of road and year; to build in EUR per metre;\n"
+        "rule: UNI 11211-4; debris: of what comes onto the road without barriers"
+    )
     show(verdict.costs(done))
     chances = verdict.chances(done)
     if chances is not None:
-        click.echo("chances of each design event, with their 95 % upper bounds")
+        click.echo("chances in each design event, with their 95 % upper bounds")
         show(chances)
     else:
         click.echo("no design events: the site names none (design = true)")

@@ -19,7 +19,7 @@ from rigdda import Layout, Outcome, Run, Site
 Tick = Callable[[int, str], None]
 """Called as a job goes on: releases done so far, and what is being done."""
 
-NOTHING, RULE, CONSTANT, SHED = "nothing", "rule (UNI 11211-4)", "constant", "rock shed"
+NOTHING, RULE, CONSTANT, SHED = "nothing", "rule", "constant", "rock shed"
 
 CHUNK = 256
 """Releases that are simulated between two words about progress."""

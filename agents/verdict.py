@@ -18,9 +18,11 @@ def costs(study: Study) -> Table:
     """Return the table of what each layout costs, at most 80 characters wide.
 
     Money is in EUR per metre of road and year, but for the last column but one: EUR per metre.
+    Debris is what comes onto the road, of what comes without barriers.
     """
     head = ("layout", "Z (95 %)", "capital", "harm", "repair", "to build", "debris")
     table = empty_table(head)
+    whole = study.nothing.evaluation.debris
     for case in study.cases:
         e = case.evaluation
         table.add_row(
@@ -30,7 +32,7 @@ def costs(study: Study) -> Table:
             euros(e.harm),
             euros(e.repair),
             euros(e.cost),
-            percent(e.debris_share),
+            percent(e.debris / whole) if whole else "-",
         )
     site = study.problem.site
     annual = euros(site.shed())
@@ -46,7 +48,7 @@ def chances(study: Study) -> Table | None:
     events = design_events(study.problem.site)
     if not events:
         return None
-    table = empty_table(("design event", "layout", "reaches the road", "a barrier fails", "of"))
+    table = empty_table(("design event", "layout", "reaches road", "barrier fails", "of"))
     for event in events:
         for i, case in enumerate(study.cases):
             e = case.evaluation
@@ -62,4 +64,4 @@ def _chance(estimate: Estimate) -> str:
     """Return a probability with its upper bound in words."""
     if not estimate.releases:
         return "-"
-    return f"{percent(estimate.probability)} (at most {percent(estimate.bound)})"
+    return f"{percent(estimate.probability)} (<= {percent(estimate.bound)})"

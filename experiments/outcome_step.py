@@ -3,8 +3,7 @@
 On `ramp`, a plane of 51 degrees above level ground, ten blocks slide down as one train, and the
 same corner hits the ground in every release: what a step makes of that blow is not averaged out.
 `quick` is the mass of the site of that name, whose releases differ. Judged by the greatest
-difference from the
-shortest step on either, over the 95 % interval of the difference.
+difference from the shortest step on either, over the 95 % interval of the difference.
 """
 
 from __future__ import annotations

@@ -1,15 +1,18 @@
-"""Barriers that may be built at each station, and what each is estimated to keep off the road.
+"""What every barrier of the menu is estimated to be worth, from one barrier-free ensemble.
 
-A barrier is estimated to stop each block that crosses its station with the centroid below its top,
-as long as there is room behind it and, for a fence, until the energies of what it stopped exceed
-its capacity. Both the room and what becomes of the blocks behind a failed fence are between two
-bounds: blocks that come to rest loosely, at the angle of friction and no longer than the fence
-stands, and blocks that lock and lean on each other, without end.
+The blocks that a barrier stops are taken out, as far as they would reach the road; what becomes of
+the others behind it is not known, so the simulation has the last word. A block is stopped by
+
+- a fence, if its centroid is below the top, until the energies of what the fence stopped exceed its
+  capacity, see `rigdda.Fence.for_width`;
+- a wall or an embankment, if its centroid is below the top. A gravity wall that slides by `SLID`
+  under a plastic impact must be mended;
+- a ditch, if it lands in it and does not leap out with the energy that is left: `BOUNCE` of it;
+- mesh, as often as its factor says.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,141 +20,155 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.crossings import Ensemble
+from agents.menu import Menu
 from envs import DesignProblem
-from envs.encoding import MIN_HEIGHT
-from rigdda import Barrier, Fence, Site, Wall
-from rigdda.site import BarrierZone
-
-HEIGHTS = 8
-"""Heights between the least and the greatest."""
-CAPACITIES = 4
-"""Capacities of fences between the least and the greatest, in equal ratios."""
-FILL = 0.8
-"""Share of a deposit that is rock, the rest voids between blocks: assumed."""
+from rigdda import Barrier, Ditch, Fence, GravityWall, Mesh, Site
+from rigdda.economy import ELEMENT, PANEL
 
 Floats = NDArray[np.float64]
+
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s2]."""
+SLID = 0.1
+"""Displacement at which a gravity wall is mended [m]."""
+BASE = 0.6
+"""Friction of its base [-]."""
+BOUNCE = 0.2
+"""Share of the energy that a block keeps when it lands in a ditch: assumed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Catalogue:
-    """Numbers of what may be built: R releases, K stations, J barriers a station.
+    """Numbers of what may be built: R releases, J barriers.
 
     Parameters
     ----------
-    barriers : K rows of J barriers
+    barriers : list of J barriers
         Those that may be built.
+    weight : (R,) array
+        How often what a release stands for happens [1/year per m].
     base : (R,) array
-        Share of the released mass that reaches the road without barriers.
-    relief : (R, K, J) array
-        Share of the released mass that a barrier keeps off the road.
-    cost : (K, J) array
-        Prices, as shares of the limit.
+        Harm of a release without barriers [EUR].
+    relief : (R, J) array
+        What a barrier takes off it [EUR].
+    annual : (J,) array
+        What a barrier costs a year, its expected repair included [EUR per m].
+    span : (J, 2) array
+        Chainages between which it stands [m].
     """
 
-    barriers: list[list[Barrier]]
+    barriers: list[Barrier]
+    weight: Floats
     base: Floats
     relief: Floats
-    cost: Floats
+    annual: Floats
+    span: Floats
+
+    @property
+    def objective(self) -> Floats:
+        """Estimated Z of each barrier alone, (J,) [EUR per m and year]."""
+        return self.annual + self.weight @ (self.base[:, None] - self.relief)
+
+    def take(self, chosen: Sequence[int] | NDArray[np.int64]) -> Catalogue:
+        """Return the catalogue of some barriers."""
+        i = np.asarray(chosen, dtype=np.int64)
+        barriers = [self.barriers[j] for j in i.tolist()]
+        relief, annual = self.relief[:, i], self.annual[i]
+        return Catalogue(barriers, self.weight, self.base, relief, annual, self.span[i])
 
 
-def tabulate(problem: DesignProblem, ensemble: Ensemble, locked: bool) -> Catalogue:
-    """Return the catalogue of a problem's walls and fences on its barrier-free ensemble.
-
-    Parameters
-    ----------
-    locked : bool
-        Whether blocks lock behind a barrier, instead of resting there loosely.
-    """
-    zone, stations = problem.site.barrier_zone, ensemble.stations.tolist()
-    at_road = ensemble.at(len(stations))
-    base = np.bincount(at_road["release"], at_road["mass"], minlength=len(ensemble.mass))
-    barriers: list[list[Barrier]] = [[] for _ in stations]
-    parts = []
-    heights = np.linspace(MIN_HEIGHT, zone.max_height, HEIGHTS).tolist()
-    for capacity in _capacities(zone, problem.kinds):
-        rows = [[_barrier(zone, x, h, capacity) for h in heights] for x in stations]
-        parts.append(_relief(problem.site, ensemble, rows, capacity, locked))
-        for row, new in zip(barriers, rows, strict=True):
-            row += new
-    cost = [[problem.site.cost([b]) for b in row] for row in barriers]
-    return Catalogue(
-        barriers=barriers,
-        base=base / ensemble.mass,
-        relief=np.concatenate(parts, axis=2) / ensemble.mass[:, None, None],
-        cost=np.array(cost) / problem.cost_limit,
-    )
+def tabulate(problem: DesignProblem, ensemble: Ensemble, barriers: list[Barrier]) -> Catalogue:
+    """Return the catalogue of barriers that a problem allows."""
+    site = problem.site
+    weight = ensemble.weights([site.rate(name, ()) for name in site.event_names])
+    effects = Effects(site, ensemble)
+    relief = np.zeros((len(weight), len(barriers)))
+    annual = np.zeros(len(barriers))
+    for j, barrier in enumerate(barriers):
+        harm, mended = effects.of(barrier)
+        relief[:, j] = effects.base - harm
+        capital = site.capital((barrier,)) if mended.any() else 0.0
+        annual[j] = site.annual((barrier,)) + capital * float(weight @ mended)
+    span = np.array([[b.x, b.x + b.extent] for b in barriers]).reshape(-1, 2)
+    return Catalogue(barriers, weight, effects.base, relief, annual, span)
 
 
-def _capacities(zone: BarrierZone, kinds: Sequence[str]) -> list[float]:
-    """Return the capacity of each model that may be built [J/m]; that of a wall has no end."""
-    fences = np.geomspace(zone.min_capacity, zone.max_capacity, CAPACITIES).tolist()
-    return [math.inf] * ("wall" in kinds) + fences * ("fence" in kinds)
+def whole(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> Catalogue:
+    """Return the catalogue of everything on a menu."""
+    barriers = [b for kind in problem.kinds for b in menu.lone(kind)]
+    return tabulate(problem, ensemble, barriers)
 
 
-def _barrier(zone: BarrierZone, x: float, height: float, capacity: float) -> Wall | Fence:
-    """Return a barrier of a model at a chainage [m] and of a height [m]."""
-    if math.isinf(capacity):
-        return Wall(x, height, zone.min_thickness)
-    return Fence(x, height, capacity)
+class Effects:
+    """What single barriers do to the releases of an ensemble."""
+
+    def __init__(self, site: Site, ensemble: Ensemble):
+        self.site, self.ensemble = site, ensemble
+        count = len(ensemble.event)
+        order = np.lexsort((ensemble.crossings["time"], ensemble.crossings["release"]))
+        table, risky = ensemble.crossings[order], ensemble.reach_road()[order]
+        stations = range(len(ensemble.stations))
+        self._at = [table[table["station"] == k] for k in stations]
+        self._risky = [risky[table["station"] == k] for k in stations]
+        road = ensemble.at(len(ensemble.stations))
+        self._volume = np.bincount(road["release"], road["volume"], minlength=count)
+        self.base = self._harm(self._volume)
+
+    def of(self, barrier: Barrier) -> tuple[Floats, Floats]:
+        """Return harm [EUR] and length of barrier to be mended [m] of every release, each (R,)."""
+        if isinstance(barrier, Mesh):
+            site = self.site
+            factor = [site.rate(name, (barrier,)) / max(site.rate(name, ()), 1e-300)
+                      for name in site.event_names]  # fmt: skip
+            return self.base * np.array(factor)[self.ensemble.event], np.zeros_like(self.base)
+        k = int(np.argmin(np.abs(self.ensemble.stations - barrier.x)))
+        table, risky = self._at[k], self._risky[k]
+        stopped, broken = self._stopped(barrier, table)
+        taken = np.bincount(
+            table["release"], table["volume"] * (stopped & risky), minlength=len(self.base)
+        )
+        left = self._volume - taken
+        harm = self._harm(np.where(left > 1e-9 * self._volume, left, 0.0))
+        least = PANEL if isinstance(barrier, Fence) else ELEMENT
+        failed = np.bincount(table["release"], broken, minlength=len(self.base)) > 0
+        return harm, failed * np.maximum(self.ensemble.width, least)
+
+    def _stopped(
+        self, barrier: Barrier, table: NDArray[np.void]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which crossings a barrier stops, and which break it, each (E,)."""
+        none = np.zeros(len(table), dtype=bool)
+        if isinstance(barrier, Ditch):
+            return self._lands(barrier, table), none
+        low = table["height"] <= barrier.height
+        width = self.ensemble.width[table["release"]]
+        if isinstance(barrier, Fence):
+            assert barrier.energy_class is not None
+            capacity = 1e3 * barrier.energy_class * width / np.minimum(width, PANEL)
+            stands = _sums(table["release"], table["energy"] * low) <= capacity
+            return low & stands, low & ~stands
+        if isinstance(barrier, GravityWall):
+            wall = barrier.density * barrier.height * barrier.thickness
+            mass = wall * np.maximum(width, ELEMENT)
+            speed = table["mass"] * table["speed"] / (table["mass"] + mass)
+            return low, low & (speed**2 > 2.0 * BASE * GRAVITY * SLID)
+        return low, none
+
+    def _lands(self, ditch: Ditch, table: NDArray[np.void]) -> NDArray[np.bool_]:
+        """Return which crossings end in a ditch: they fall into it, and do not leap out."""
+        fall = np.maximum(table["height"] - table["radius"], 0.0) + ditch.depth
+        lands = table["speed"] * np.sqrt(2.0 * fall / GRAVITY) <= ditch.width
+        leap = BOUNCE * table["speed"] ** 2 / (2.0 * GRAVITY)
+        return lands & (leap <= ditch.depth)
+
+    def _harm(self, volume: Floats) -> Floats:
+        """Return the harm of volumes on the road, 0 of none [EUR]."""
+        harms = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
+        return np.where(volume > 0.0, harms, 0.0)
 
 
-def _relief(
-    site: Site, ensemble: Ensemble, rows: list[list[Wall | Fence]], capacity: float, locked: bool
-) -> Floats:
-    """Return the mass that barriers of one capacity keep off the road, (R, K, J) [kg/m]."""
-    heights = [barrier.height for barrier in rows[0]]
-    stopped, risky, failed = (
-        np.stack(part, axis=2)
-        for part in zip(*(_stopped(ensemble, h, capacity) for h in heights), strict=True)
-    )
-    if locked:
-        return np.maximum.accumulate(risky, axis=2)
-    room = np.array([[room_behind(site, barrier) for barrier in row] for row in rows])
-    held = np.minimum(1.0, room / np.maximum(stopped, 1e-9)) * ~failed
-    return risky * held if failed.any() else np.maximum.accumulate(risky * held, axis=2)
-
-
-def _stopped(
-    ensemble: Ensemble, height: float, capacity: float
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return what barriers of a height and capacity stop at every station, each (R, K).
-
-    The mass, that of blocks which would reach the road [kg/m], and whether the capacity was
-    exceeded.
-    """
-    shape = len(ensemble.mass), len(ensemble.stations)
-    low = (ensemble.crossings["station"] < shape[1]) & (ensemble.crossings["height"] <= height)
-    table, risky = ensemble.crossings[low], ensemble.reach_road()[low]
-    order = np.lexsort((table["time"], table["station"], table["release"]))
-    table, risky = table[order], risky[order]
-    group = table["release"] * shape[1] + table["station"]
-    total = np.cumsum(table["energy"])
-    first = np.searchsorted(group, group)  # where the group of each crossing begins
-    taken = total - total[first] + table["energy"][first]
-    stands = taken <= capacity
-
-    def sums(weights: Floats) -> Floats:
-        out = np.zeros(shape[0] * shape[1])
-        np.add.at(out, group, weights)
-        return out.reshape(shape)
-
-    mass = table["mass"] * stands
-    return sums(mass), sums(mass * risky), sums(1.0 - stands) > 0.0
-
-
-def room_behind(site: Site, barrier: Wall | Fence) -> float:
-    """Return the rock that fits behind a barrier [kg/m].
-
-    Its surface rises uphill from the barrier's top at the angle of friction until it meets the
-    ground, as steep as a deposit that leans on it can be.
-    """
-    terrain = site.profile
-    top = float(barrier.outline(terrain)[:, 1].max())
-    rise = math.tan(math.radians(min(s.friction_deg for s in site.surfaces.values())))
-    x = np.linspace(barrier.x, float(terrain.points[0, 0]), 1000)
-    chainage, ground = terrain.points.T
-    over = np.interp(x, np.maximum.accumulate(chainage), ground)  # overhangs are filled
-    depth = top + rise * (barrier.x - x) - over
-    full = np.minimum.accumulate(depth) > 0.0
-    area = float(np.sum(depth[full]) * abs(x[1] - x[0]))
-    return FILL * site.source.density * area
+def _sums(release: NDArray[np.int32], values: Floats) -> Floats:
+    """Return the running sum of values within each release; they are in order."""
+    total = np.cumsum(values)
+    first = np.searchsorted(release, release)
+    return total - total[first] + values[first]

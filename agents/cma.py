@@ -11,22 +11,23 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.crossings import ensemble_for
-from agents.policy import SHIPPED, decide, load
-from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
+from agents.protocol import DesignResult, Ledger, Progress, Proposals
+from agents.ranking import value
+from agents.searching import search
 from agents.starts import starts
 from agents.store import Store
 from envs import DesignProblem
-from envs.encoding import MIN_HEIGHT, slot_size
-from envs.envelope import SEEDS
-from rigdda import Layout, check
+from envs.encoding import NUMBERS, slot_size
+from rigdda import Layout
 
 Floats = NDArray[np.float64]
 
 SIGMA = 0.25
 """Step at the start, an eighth of the decision box: stations are searched across a bench."""
-POPULATION = 6
-"""Layouts a generation: few, for budgets of some tens of layouts."""
+POPULATION = 8
+"""Layouts a generation: few, for budgets of a hundred layouts."""
+VERGE, PRESENT = -0.25, 0.5
+"""Presence of an empty slot and of a built one at the start: a barrier more or less is tried."""
 
 
 def design(
@@ -44,30 +45,7 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    first = starts(problem, ensemble_for(ledger))
-    return search(ledger, _propose(problem, first, np.random.default_rng(seed)))
-
-
-def warm_started(
-    problem: DesignProblem,
-    simulations: int,
-    seed: int = 0,
-    progress: Progress | None = None,
-    store: Store | None = None,
-) -> DesignResult:
-    """Return the best layout that CMA-ES finds from the shipped policy's, without an ensemble.
-
-    Raises
-    ------
-    BadInput, Diverged
-        If the budget is below 6 or the seed out of range; if fences are not among the kinds;
-        if a simulation diverges.
-    """
-    ledger = Ledger(problem, simulations, seed, progress, store)
-    check.integer("simulations", simulations, len(SEEDS) + 2)
-    first = [decide(load(SHIPPED), problem), ()]
-    ledger.used += len(SEEDS)
-    return search(ledger, _propose(problem, first, np.random.default_rng(seed)))
+    return search(ledger, _propose(problem, starts(ledger), np.random.default_rng(seed)))
 
 
 def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generator) -> Proposals:
@@ -76,7 +54,8 @@ def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generat
 
     best: tuple[float, Layout] = (math.inf, ())
     for layout in first:
-        best = min(best, ((yield layout).objective, layout), key=lambda pair: pair[0])
+        found = value(problem, (yield layout))
+        best = min(best, (found, layout), key=lambda pair: pair[0])
     low, high = problem.bounds
     options = {
         "bounds": [low.tolist(), high.tolist()],
@@ -93,7 +72,7 @@ def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generat
             vectors, values = strategy.ask(), []
             for vector in vectors:
                 layout = problem.decode(vector)
-                values.append((yield layout).objective)
+                values.append(value(problem, (yield layout)))
                 best = min(best, (values[-1], layout), key=lambda pair: pair[0])
             strategy.tell(vectors, values)
 
@@ -101,12 +80,13 @@ def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generat
 def _centre(problem: DesignProblem, layout: Layout, rng: np.random.Generator) -> Floats:
     """Return the vector of a layout, (size,), its empty slots on the verge of a barrier.
 
-    Their stations and kinds are drawn at random, so that every restart tries others.
+    Their stations, sizes and kinds are drawn at random, so that every restart tries others.
     """
     vector = problem.encode(layout)
-    empty = vector.reshape(-1, slot_size(problem.kinds))[len(layout) :]
-    verge = 2.0 * MIN_HEIGHT / problem.site.barrier_zone.max_height - 1.0
-    empty[:, 0] = rng.uniform(-1.0, 1.0, len(empty))
-    empty[:, 1:3] = max(-1.0, verge - 0.02), -1.0
-    empty[:, 3:] = rng.uniform(-1.0, 1.0, empty[:, 3:].shape)
+    slots = vector.reshape(-1, slot_size(problem.kinds))
+    empty = slots[len(layout) :]
+    empty[:, 0] = VERGE
+    empty[:, 1:] = rng.uniform(-1.0, 1.0, empty[:, 1:].shape)
+    slots[: len(layout), 0] = PRESENT
+    slots[:, NUMBERS:] *= 0.5  # scores of kinds: another may win
     return vector

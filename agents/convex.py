@@ -1,27 +1,34 @@
-"""Stations and sizes by mixed-integer linear programming on one barrier-free ensemble.
+"""Barriers by mixed-integer linear programming on one barrier-free ensemble.
 
-The cheapest layouts are sought that keep the CVaR of what passes below a ladder of limits, see
-`agents.programme`, as a catalogue of barriers estimates it, see `agents.catalogue`: for both bounds
-of what a barrier holds. The estimate does not know what a barrier does to the flow further down, so
-the simulation has the last word, and the engineering rule's barrier is tried beside the optima.
+The best choices of one, two and three barriers are sought, see `agents.programme`, as a catalogue
+estimates them, see `agents.catalogue`. The estimate does not know what a barrier does to the flow
+further down, so the simulation has the last word, and the engineering rule's barrier is tried
+beside the optima.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
 
-from agents.catalogue import tabulate
+import numpy as np
+
+from agents.catalogue import Catalogue, whole
 from agents.crossings import Ensemble, ensemble_for
+from agents.menu import Menu
 from agents.programme import Choice, choose
-from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
-from agents.rule import kind_for, rule
+from agents.protocol import DesignResult, Ledger, Progress, Proposals
+from agents.rule import rule
+from agents.searching import search
 from agents.store import Store
 from envs import DesignProblem
 from rigdda import Layout
 
-LADDER = (0.8, 0.5, 0.3, 0.15, 0.05)
-"""Limits of CVaR, as shares of that without barriers."""
+CAREFUL = (1.0, 0.8, 0.5)
+"""Shares of the estimated reliefs that count."""
+TABLE = 120
+"""Barriers of the catalogue that the programme chooses from: the best of every kind at every place,
+by what they are worth alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +38,7 @@ class ConvexResult(DesignResult):
     Parameters
     ----------
     choices : tuple of Choice
-        Optima of the programme, each with the bound of its relaxation, the loosest limit first.
+        Optima of the programme, each with the bound of its relaxation.
     """
 
     choices: tuple[Choice, ...]
@@ -49,17 +56,16 @@ def design(
     Raises
     ------
     BadInput, Diverged
-        If the budget is below 2, the seed out of range or neither fences nor walls are among the
-        kinds; if a simulation diverges.
+        If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
-    kind = kind_for(problem)
-    ledger = Ledger(problem, simulations, seed, progress, store)
-    ensemble = ensemble_for(ledger)
-    choices = optima(problem, ensemble)
-    layouts = [*(choice.layout for choice in choices), rule(problem.site, ensemble, kind)]
+    ledger, menu = Ledger(problem, simulations, seed, progress, store), Menu(problem)
+    ensemble = ensemble_for(ledger, menu.stations)
+    choices = optima(problem, ensemble, menu)
+    layouts = [*(choice.layout for choice in choices), rule(problem, ensemble, menu)]
+    ledger.starts |= set(layouts)
     found = search(ledger, _propose(layouts))
-    best = (found.layout, found.evaluation, found.history, found.simulations)
-    return ConvexResult(*best, choices=choices)
+    own = {name: getattr(found, name) for name in DesignResult.__dataclass_fields__}
+    return ConvexResult(**own, choices=choices)
 
 
 def _propose(layouts: list[Layout]) -> Proposals:
@@ -68,14 +74,37 @@ def _propose(layouts: list[Layout]) -> Proposals:
         yield layout
 
 
-def optima(problem: DesignProblem, ensemble: Ensemble) -> tuple[Choice, ...]:
-    """Return the optima of different layouts over both bounds and the ladder."""
-    if not {"fence", "wall"} & set(problem.kinds):
-        return ()
-    catalogues = [tabulate(problem, ensemble, locked) for locked in (True, False)]
+def optima(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> tuple[Choice, ...]:
+    """Return the optima of different layouts, of few barriers first."""
+    catalogue = promising(whole(problem, ensemble, menu))
     found: dict[Layout, Choice] = {}
-    for limit, catalogue in product(LADDER, catalogues):
-        choice = choose(catalogue, problem.max_barriers, limit)
-        if choice is not None:
+    for slots, share in _ladder(problem):
+        choice = choose(catalogue, slots, share)
+        if problem.fits(choice.layout):
             found.setdefault(choice.layout, choice)
     return tuple(found.values())
+
+
+def _ladder(problem: DesignProblem) -> Iterator[tuple[int, float]]:
+    """Yield how many barriers may be built and what share of reliefs counts."""
+    for slots in range(1, min(problem.max_barriers, 3) + 1):
+        for share in CAREFUL:
+            yield slots, share
+
+
+def promising(catalogue: Catalogue) -> Catalogue:
+    """Return the barriers of a catalogue that come into question.
+
+    Of every kind, the best at every station, as many of the best of these as of another kind.
+    """
+    best: dict[tuple[str, float], int] = {}
+    order = np.argsort(catalogue.objective, kind="stable").tolist()
+    for j in order:
+        barrier = catalogue.barriers[j]
+        best.setdefault((barrier.kind, 0.0 if barrier.kind == "mesh" else barrier.x), j)
+    kinds: dict[str, list[int]] = {}
+    for (kind, _), j in best.items():
+        kinds.setdefault(kind, []).append(j)
+    each = TABLE // max(1, len(kinds))
+    chosen = [j for group in kinds.values() for j in group[:each]]
+    return catalogue.take(sorted(chosen))

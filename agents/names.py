@@ -1,3 +1,6 @@
 """Names of the designers, known without importing one."""
 
-DESIGNERS = ("cma", "convex", "pareto", "policy", "ppo", "random", "rule", "tpe")
+DEFAULT = "race"
+"""The designer that is used if none is named."""
+
+DESIGNERS = ("cma", "constant", "convex", "pareto", "ppo", "race", "random", "rule", "tpe")

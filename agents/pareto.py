@@ -1,4 +1,6 @@
-"""The front of cost against debris by NSGA-II (Deb et al. 2002, IEEE TEC 6, 182-197; Optuna).
+"""The front of what barriers cost against what is left, by NSGA-II.
+
+Deb et al. (2002, IEEE TEC 6, 182-197), as Optuna has it.
 
 It starts from what one barrier-free ensemble suggests, see `agents.starts`, or from layouts that
 other designers found. What nothing dominates in the search is evaluated again on other releases,
@@ -15,8 +17,9 @@ from functools import partial
 import numpy as np
 
 from agents import trials
-from agents.crossings import ensemble_for
-from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
+from agents.protocol import DesignResult, Ledger, Progress, Proposals
+from agents.ranking import score
+from agents.searching import search
 from agents.starts import starts
 from agents.store import Store
 from envs import DesignProblem, Evaluation
@@ -57,7 +60,7 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    return _search(ledger, starts(problem, ensemble_for(ledger)), 0)
+    return _search(ledger, starts(ledger), 0)
 
 
 def warm_started(
@@ -80,7 +83,9 @@ def warm_started(
     """
     different = list(dict.fromkeys(layouts))
     check.integer("number of different layouts", len(different), 1, FINALISTS // 2 - 1)
-    return _search(Ledger(problem, simulations, seed, progress, store), different, len(different))
+    ledger = Ledger(problem, simulations, seed, progress, store)
+    ledger.starts |= set(different)
+    return _search(ledger, different, len(different))
 
 
 def _search(ledger: Ledger, first: list[Layout], known: int) -> ParetoResult:
@@ -88,26 +93,33 @@ def _search(ledger: Ledger, first: list[Layout], known: int) -> ParetoResult:
     choose = partial(finalists, known=known)
     found = search(ledger, _propose(ledger.problem, first, ledger.seed), choose, FINALISTS)
     ends = found.history.stage("final") or found.history.stage("search")
-    best = (found.layout, found.evaluation, found.history, found.simulations)
-    return ParetoResult(*best, front=front(entry.evaluation for entry in ends))
+    own = {name: getattr(found, name) for name in DesignResult.__dataclass_fields__}
+    return ParetoResult(**own, front=front(entry.evaluation for entry in ends))
+
+
+def residual(evaluation: Evaluation) -> float:
+    """Return harm and repair, what Z has beside the cost of barriers [EUR per m and year]."""
+    return evaluation.harm + evaluation.repair
 
 
 def front(evaluations: Iterable[Evaluation]) -> tuple[Evaluation, ...]:
     """Return those of which none other is as cheap and as safe, the cheapest first."""
     kept: list[Evaluation] = []
-    for e in sorted(evaluations, key=lambda e: (e.cost, e.debris)):
-        if not kept or e.debris < kept[-1].debris:
+    for e in sorted(evaluations, key=lambda e: (e.capital, residual(e))):
+        if not kept or residual(e) < residual(kept[-1]):
             kept.append(e)
     return tuple(kept)
 
 
-def finalists(evaluations: Sequence[Evaluation], n: int, known: int = 0) -> list[Evaluation]:
+def finalists(
+    problem: DesignProblem, evaluations: Sequence[Evaluation], n: int, known: int = 0
+) -> list[Evaluation]:
     """Return at most `n`: the first `known`, of the front the best objective and an even spread."""
     kept = list(evaluations[: min(known, n)])
     seen, room = {e.layout for e in kept}, n - len(kept)
     found = [e for e in front(evaluations) if e.layout not in seen]
     if len(found) > room:
-        best = min(range(len(found)), key=lambda i: found[i].objective)
+        best = min(range(len(found)), key=lambda i: score(problem, found[i]))
         spread = np.linspace(0, len(found) - 1, max(0, room - 1)).round().astype(int).tolist()
         found = [found[i] for i in sorted({best, *spread})[:room]]
     return kept + found
@@ -126,4 +138,4 @@ def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposal
     while True:
         trial = study.ask(space)
         evaluation = yield problem.decode(trials.vector(problem, trial.params))
-        study.tell(trial, (problem.penalised(evaluation.cost), evaluation.debris))
+        study.tell(trial, (evaluation.capital, residual(evaluation)))

@@ -1,14 +1,13 @@
 """Which barriers of a catalogue to build: a mixed-integer linear programme, by HiGHS.
 
-With z[k, j] = 1 for barrier j at station k, and p_r the share of release r that still reaches the
-road,
+With z[j] = 1 for barrier j, and h_r the harm that release r still does,
 
-    minimise    cost.z
-    subject to  p_r >= base_r - sum_kj relief[r, k, j] z[k, j],  p_r >= 0
-                CVaR_0.9(p) <= c CVaR_0.9(base),  cost.z <= limit,  sum z <= max_barriers
-                barriers at least MIN_GAP apart
+    minimise    annual.z + weight.h
+    subject to  h_r >= base_r - sum_j relief[r, j] z[j],  h_r >= 0
+                sum z <= max_barriers, and none where another stands
 
-with CVaR as in Rockafellar and Uryasev (2000, J. Risk 2, 21-41), a linear programme but for z.
+The sum of reliefs is more than two barriers take off together, so a second programme has them
+scaled down: its layouts are the more careful ones.
 """
 
 from __future__ import annotations
@@ -17,13 +16,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.catalogue import Catalogue, Floats
-from envs.encoding import MIN_GAP
+from envs.building import MIN_GAP
 from rigdda import Layout
-
-TAIL = 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,83 +29,68 @@ class Choice:
     Parameters
     ----------
     layout : tuple of Barrier
-        What is built.
-    cost : float
-        Its price, as a share of the limit.
+        What is built, downhill.
+    objective : float
+        Its Z as the programme sees it [EUR per m and year].
     bound : float
-        The price of the programme's linear relaxation: none that keeps the limit is cheaper.
+        That of the programme's linear relaxation: none is better.
     """
 
     layout: Layout
-    cost: float
+    objective: float
     bound: float
 
 
-def choose(catalogue: Catalogue, slots: int, limit: float) -> Choice | None:
-    """Return the cheapest choice of at most `slots` barriers, None if none keeps the limit.
+def choose(catalogue: Catalogue, slots: int, share: float = 1.0) -> Choice:
+    """Return the best choice of at most `slots` barriers.
 
     Parameters
     ----------
-    limit : float
-        Largest CVaR, as a share of that without barriers.
+    share : float
+        Share of each relief that counts.
     """
-    bound = _solve(catalogue, slots, limit, boolean=False)
-    found = None if bound is None else _solve(catalogue, slots, limit, boolean=True)
-    if bound is None or found is None:
-        return None
-    built = np.argwhere(found > 0.5)
-    layout = tuple(catalogue.barriers[k][j] for k, j in built)
-    cost = float((catalogue.cost * (found > 0.5)).sum())
-    return Choice(layout, cost, float((catalogue.cost * bound).sum()))
+    if not catalogue.barriers:
+        nothing = float(catalogue.weight @ catalogue.base)
+        return Choice((), nothing, nothing)
+    bound, _ = _solve(catalogue, slots, share, boolean=False)
+    value, z = _solve(catalogue, slots, share, boolean=True)
+    built = [catalogue.barriers[j] for j in np.flatnonzero(z > 0.5).tolist()]
+    return Choice(tuple(sorted(built, key=lambda b: b.x)), value, min(bound, value))
 
 
-def _solve(catalogue: Catalogue, slots: int, limit: float, boolean: bool) -> Floats | None:
-    """Return z (K, J), whole numbers or between 0 and 1, or None if nothing keeps the limit."""
+def _solve(catalogue: Catalogue, slots: int, share: float, boolean: bool) -> tuple[float, Floats]:
+    """Return the least objective and its z (J,), whole numbers or between 0 and 1."""
     import cvxpy as cp
 
-    releases = len(catalogue.base)
-    stations, options = np.nonzero(_worth_it(catalogue))
-    if not len(stations):  # nothing helps
-        kept = limit >= 1.0 or not catalogue.base.any()
-        return np.zeros_like(catalogue.cost) if kept else None
-    relief, cost = catalogue.relief[:, stations, options], catalogue.cost[stations, options]
-    z = cp.Variable(len(stations), boolean=boolean)
-    passing = cp.Variable(releases, nonneg=True)
-    at = (np.arange(len(catalogue.cost))[:, None] == stations).astype(np.float64)
-    rules = [
-        passing >= catalogue.base - relief @ z,
-        cp.cvar(passing, TAIL) <= limit * cp.cvar(catalogue.base, TAIL).value,
-        cost @ z <= 1.0,
-        cp.sum(z) <= slots,
-        (_near(catalogue) @ at) @ z <= 1,
-        z >= 0,
-        z <= 1,
-    ]
-    with suppress(ValueError):  # HiGHS ends some infeasible programmes as "unknown"
-        cp.Problem(cp.Minimize(cost @ z), rules).solve(solver=cp.HIGHS)
-    if z.value is None:
-        return None
-    out = np.zeros_like(catalogue.cost)
-    out[stations, options] = z.value
-    return out
+    useful = np.flatnonzero(catalogue.weight * catalogue.base > 0.0)
+    scale = max(float(catalogue.weight @ catalogue.base), 1e-12)
+    z = cp.Variable(len(catalogue.barriers), boolean=boolean)
+    left = cp.Variable(len(useful), nonneg=True)  # of a release's share of the harm [-]
+    weigh = (catalogue.weight * catalogue.base)[useful] / scale
+    part = share * catalogue.relief[useful] / catalogue.base[useful, None]
+    goal = (catalogue.annual / scale) @ z + weigh @ left
+    rules = [left >= 1.0 - part @ z, cp.sum(z) <= slots, z >= 0, z <= 1]
+    clashes = _clashes(catalogue)
+    if len(clashes):
+        rules.append(clashes @ z <= 1)
+    problem = cp.Problem(cp.Minimize(goal), rules)
+    with suppress(ValueError, cp.SolverError):
+        problem.solve(solver=cp.HIGHS, mip_rel_gap=GAP)
+    if z.value is None:  # nothing built is always a solution
+        return scale, np.zeros(len(catalogue.barriers))
+    return scale * float(problem.value), np.asarray(z.value, dtype=np.float64)
 
 
-def _worth_it(catalogue: Catalogue) -> NDArray[np.bool_]:
-    """Return which barriers do something that no cheaper one at their station does, (K, J)."""
-    kept = np.zeros(catalogue.cost.shape, dtype=bool)
-    for k, cost in enumerate(catalogue.cost):
-        relief = catalogue.relief[:, k, :].T
-        chosen: list[int] = []
-        for j in np.argsort(cost, kind="stable"):
-            if relief[j].any() and not any((relief[i] >= relief[j]).all() for i in chosen):
-                chosen.append(int(j))
-        kept[k, chosen] = True
-    return kept
+GAP = 0.01
+"""Relative gap at which an optimum is good enough: the estimates are worse."""
 
 
-def _near(catalogue: Catalogue) -> Floats:
-    """Return for each station which ones are too close downhill of it, itself included, (K, K)."""
-    x = np.array([row[0].x for row in catalogue.barriers])
-    reach = np.array([max(b.extent for b in row) for row in catalogue.barriers]) + MIN_GAP
-    ahead = x[None, :] - x[:, None]
-    return ((ahead >= 0.0) & (ahead < reach[:, None])).astype(np.float64)
+def _clashes(catalogue: Catalogue) -> Floats:
+    """Return which barriers stand at, or just beyond, the start of each other one, (n, J)."""
+    start, end = catalogue.span.T
+    starts = np.unique(start)
+    over = (start <= starts[:, None]) & (starts[:, None] < end + MIN_GAP)
+    kinds = np.array([b.kind == "mesh" for b in catalogue.barriers])
+    over &= ~kinds
+    rows = np.concatenate([over, kinds[None]])  # one mesh at most
+    return np.unique(rows[rows.sum(axis=1) > 1], axis=0).astype(np.float64)

@@ -1,19 +1,27 @@
-"""What every designer is and returns, and the search that most of them share."""
+"""What every designer is and returns, and how its releases are counted."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+import time
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents import limits
+from agents.bounds import on_bound
+from agents.reuse import Reuse
 from agents.seeds import release_seeds
-from agents.store import Store
+from agents.store import Batch, Store
 from envs import DesignProblem, Evaluation
 from rigdda import Layout, check
+
+DEFAULT_RELEASES = 30_000
+"""Budget of a search if none is given: about a minute for a built-in site on two cores."""
+
+Origin = Literal["start", "search"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +31,13 @@ class Entry:
     Parameters
     ----------
     simulations : int
-        Releases that the designer has simulated so far, those of this layout included.
-    stage : {"search", "semifinal", "final", "verification", "front"}
-        "semifinal", "final": one of the best, evaluated again on other releases; "verification",
-        "front": on releases that no search has seen.
+        Releases that the designer has used so far, those of this layout included.
+    stage : {"search", "semifinal", "final", "report", "verification", "front"}
+        "semifinal", "final": one of the best, evaluated again on other releases; "report": the
+        chosen one, on releases that chose nothing; "verification", "front": on releases that no
+        search has seen.
     evaluation : Evaluation
-        The layout, its objective, debris and cost.
+        What the layout was worth on these releases, without their outcomes.
     """
 
     simulations: int
@@ -63,18 +72,27 @@ class DesignResult:
     layout : Layout
         The chosen layout.
     evaluation : Evaluation
-        Its evaluation on the releases that chose it among the best; none of them was searched on.
-        Being the best of several it flatters a little: see `agents.verify`.
+        Its evaluation on releases that chose nothing, so it does not flatter; with a budget of less
+        than about ten releases on those that chose it.
     history : History
         All evaluated layouts.
     simulations : int
         Releases that the designer used, its barrier-free ensemble included.
+    origin : {"start", "search"}
+        Whether the layout is one that the designer began with, or one that its search came to.
+    on_bound : tuple of str
+        What of the layout lies on a bound of the zone, of its kind or of the list of classes.
+    seconds : float
+        Processor time, all cores together; not compared.
     """
 
     layout: Layout
     evaluation: Evaluation
     history: History
     simulations: int
+    origin: Origin
+    on_bound: tuple[str, ...]
+    seconds: float = field(compare=False)
 
 
 Progress = Callable[[Entry], None]
@@ -99,42 +117,14 @@ class Designer(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """How a budget is spent: releases a layout in the search and in the finals, and who is in them.
-
-    One release's debris scatters by about 0.05 and common seeds hardly help (chaos decorrelates
-    releases after a barrier), so a search averages 8 and the best five are told apart on 32. A
-    budget keeps two fifths for the finals: below 400 with fewer releases of each, then fewer
-    finalists; below 320 the search averages less, so that it still sees some 20 layouts. Of the
-    hundreds of layouts of a long search the best five are the luckiest, so what is left of the two
-    fifths is for semifinals.
-    """
-
-    releases: int
-    semifinalists: int
-    finalists: int
-    final_releases: int
-
-    @classmethod
-    def of(cls, simulations: int, most: int = 5) -> Plan:
-        """Return the plan for a budget, with at most so many finalists."""
-        final = 2 * simulations // 5
-        finalists = min(most, max(2, final // 16))
-        final_releases = min(32, final // finalists)
-        more = final // max(1, final_releases) - finalists
-        semifinalists = more if more >= 2 * finalists else 0
-        releases = min(8, max(1, simulations // 40))
-        return cls(releases, semifinalists, finalists, final_releases)
-
-    @property
-    def reserve(self) -> int:
-        """Releases that are kept for the semifinals and finals."""
-        return (self.semifinalists + self.finalists) * self.final_releases
-
-
 class Ledger:
-    """Counts a designer's simulations against its budget and keeps every evaluation."""
+    """Counts a designer's releases against its budget and keeps every evaluation.
+
+    Attributes
+    ----------
+    starts : set of Layout
+        Layouts that the designer begins with.
+    """
 
     def __init__(
         self,
@@ -148,89 +138,64 @@ class Ledger:
         self.budget = check.integer("simulations", simulations, 2, limits.RELEASES)
         self.seed = check.integer("seed", seed, 0, limits.SEED)
         self.used = 0
+        self.starts: set[Layout] = {()}
+        self.entries: list[Entry] = []
         self._progress = progress
         self._store = store or Store()
-        self.entries: list[Entry] = []
+        self._reuse = Reuse(problem.site)
+        self._begun = time.process_time()
 
     @property
     def left(self) -> int:
-        """Releases that may still be simulated."""
+        """Releases that may still be used."""
         return self.budget - self.used
 
     def evaluate(self, layout: Layout, stage: str, releases: int) -> Evaluation:
-        """Evaluate a layout on the first releases of a stream and enter it."""
+        """Evaluate a layout on the first releases of the stream of a stage and enter it."""
         seeds = release_seeds(stage, self.seed, releases)
         evaluation = self._store.evaluate(self.problem, layout, seeds)
         self.used += releases
+        self._enter(stage, evaluation)
+        return evaluation
+
+    def sample(
+        self, layout: Layout, stage: str, start: Mapping[str, int], counts: Mapping[str, int]
+    ) -> Batch:
+        """Sample some releases of each event with a layout and enter what they say together.
+
+        Parameters
+        ----------
+        stage : str
+            Stream of the releases.
+        start, counts : mapping of str to int
+            By name of event: how many releases of the stream are passed over, how many are drawn;
+            of these the ones that need no simulation are not counted, see `agents.reuse`.
+        """
+        drawn = {name: n for name, n in counts.items() if n > 0}
+        seeds = {
+            name: release_seeds(stage, self.seed, n, start.get(name, 0))
+            for name, n in drawn.items()
+        }
+        batch = self._store.sample(self.problem, layout, seeds)
+        spared = self._reuse.spared(layout, seeds, batch.releases)
+        self.used += sum(drawn.values()) - spared
+        self._enter(stage, batch.evaluation)
+        return batch
+
+    def _enter(self, stage: str, evaluation: Evaluation) -> None:
         self.entries.append(Entry(self.used, stage, evaluation))
         if self._progress is not None:
             self._progress(self.entries[-1])
-        return evaluation
 
-    def result(self, evaluation: Evaluation) -> DesignResult:
-        """Return the result whose layout has this evaluation."""
-        history = History(tuple(self.entries))
-        return DesignResult(evaluation.layout, evaluation, history, self.used)
-
-
-Choose = Callable[[Sequence[Evaluation], int], list[Evaluation]]
-"""Returns at most so many of some evaluations."""
-
-
-def best(evaluations: Sequence[Evaluation], n: int) -> list[Evaluation]:
-    """Return those of the best `n` different layouts, the best first."""
-    ranked = sorted(evaluations, key=lambda e: e.objective)
-    return list({e.layout: e for e in reversed(ranked)}.values())[::-1][:n]
-
-
-def search(
-    ledger: Ledger, proposals: Proposals, choose: Choose = best, most: int = 5
-) -> DesignResult:
-    """Evaluate what is proposed as far as the budget goes, then the finalists on other releases.
-
-    Parameters
-    ----------
-    ledger : Ledger
-        Counts the releases.
-    proposals : Proposals
-        What is evaluated in the search.
-    choose : callable
-        Chooses who is in the finals, by default those of least objective.
-    most : int
-        Finalists at most.
-
-    Raises
-    ------
-    BadInput, Diverged
-        As `DesignProblem.evaluate` does.
-    """
-    plan = Plan.of(ledger.left, most)
-    layout = next(proposals)
-    while ledger.left >= plan.reserve + plan.releases:
-        evaluation = ledger.evaluate(layout, "search", plan.releases)
-        try:
-            layout = proposals.send(evaluation)
-        except StopIteration:
-            break
-    return finish(ledger, plan, choose)
-
-
-def finish(ledger: Ledger, plan: Plan, choose: Choose = best) -> DesignResult:
-    """Evaluate the finalists of a search on other releases; return the best as the result.
-
-    Semifinalists, if the plan has any, are those of least objective in the search, and finalists
-    then those of least objective in the semifinals.
-
-    Raises
-    ------
-    BadInput, Diverged
-        As `DesignProblem.evaluate` does.
-    """
-    left, releases = [entry.evaluation for entry in ledger.entries], plan.final_releases
-    if plan.semifinalists > 0:
-        chosen = choose(left, plan.semifinalists)
-        left = [ledger.evaluate(e.layout, "semifinal", releases) for e in chosen]
-    finalists = choose(left, plan.finalists)
-    if releases > 0:
-        finalists = [ledger.evaluate(e.layout, "final", releases) for e in finalists]
-    return ledger.result(min(finalists, key=lambda e: e.objective))
+    def result(self, evaluation: Evaluation, origin: Origin | None = None) -> DesignResult:
+        """Return the result whose layout has this evaluation, by default from where it is known."""
+        layout = evaluation.layout
+        return DesignResult(
+            layout=layout,
+            evaluation=evaluation,
+            history=History(tuple(self.entries)),
+            simulations=self.used,
+            origin=origin or ("start" if layout in self.starts else "search"),
+            on_bound=on_bound(self.problem, layout),
+            seconds=time.process_time() - self._begun,
+        )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
+from agents.protocol import DesignResult, Ledger, Progress, Proposals
+from agents.searching import search
 from agents.store import Store
 from envs import DesignProblem
 

@@ -1,4 +1,4 @@
-"""Seeds of releases: disjoint streams for searching, choosing, looking and verifying."""
+"""Seeds of releases: disjoint streams for searching, choosing, reporting, looking and verifying."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import numpy as np
 from agents import limits
 from rigdda import check
 
-STREAMS = ("search", "semifinal", "final", "ensemble", "verification")
-"""search: all layouts of a search; semifinal, final: the best of them again; ensemble: barrier-free
-releases that a designer looks at; verification: seen by no search."""
+STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
+"""search: all layouts of a search; semifinal, final: the best of them again, to choose; report: the
+chosen one, whose value it tells without having chosen anything; ensemble: barrier-free releases
+that a designer looks at; verification: seen by no search."""
 
 
-def release_seeds(stream: str, seed: int, n: int) -> tuple[int, ...]:
-    """Return the first `n` release seeds of a stream.
+def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, ...]:
+    """Return `n` release seeds of a stream, by default the first.
 
     A seed's remainder by the number of streams is its stream, so that no two streams share one,
     whatever the seeds of the searches.
@@ -26,6 +27,8 @@ def release_seeds(stream: str, seed: int, n: int) -> tuple[int, ...]:
         Seed of the search, at least 0.
     n : int
         How many.
+    start : int
+        How many of the stream are passed over.
 
     Raises
     ------
@@ -35,5 +38,5 @@ def release_seeds(stream: str, seed: int, n: int) -> tuple[int, ...]:
     tag = STREAMS.index(check.one_of("stream", stream, STREAMS))
     entropy = [check.integer("seed", seed, 0), tag]
     count = check.integer("releases", n, 0, limits.RELEASES)
-    words = np.random.SeedSequence(entropy).generate_state(count)
+    words = np.random.SeedSequence(entropy).generate_state(start + count)[start:]
     return tuple(int(word) * len(STREAMS) + tag for word in words)

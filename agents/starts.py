@@ -1,47 +1,55 @@
 """Layouts worth trying first: what one barrier-free ensemble suggests to every search.
 
-The optima of `convex`, the engineering rule, its barrier lower and weaker (the rule does not know
-what it costs), and no barrier at all.
+The optima of `convex`, the engineering rule, its fence lower and weaker (the rule does not know
+what it costs), the best constant, and no barrier at all.
 """
 
 from __future__ import annotations
 
-import msgspec
-
 from agents import convex
-from agents.crossings import Ensemble
+from agents.constant import constant
+from agents.crossings import Ensemble, ensemble_for
+from agents.menu import CLASSES, STEP, Menu
+from agents.protocol import Ledger, Proposals
 from agents.rule import rule
 from envs import DesignProblem
-from envs.encoding import MIN_HEIGHT
-from rigdda import Fence, Layout, Wall
-from rigdda.site import BarrierZone
+from envs.building import MIN_HEIGHT
+from rigdda import Fence, Layout
 
-CHEAPER = ((0.75, 1.0), (0.5, 1.0), (1.0, 0.4), (0.75, 0.4))
-"""Shares of the rule's height and capacity that are tried."""
+CHEAPER = ((0, 1), (1, 0), (1, 1), (0, 2))
+"""Steps of height and of class by which the rule's fence is tried smaller."""
 
 
-def starts(problem: DesignProblem, ensemble: Ensemble) -> list[Layout]:
+def starts(ledger: Ledger) -> list[Layout]:
     """Return the different layouts that an ensemble suggests, the most promising first."""
-    found = [choice.layout for choice in convex.optima(problem, ensemble)]
-    for kind in ("fence", "wall"):
-        if kind in problem.kinds:
-            one = rule(problem.site, ensemble, kind)
-            found += [
-                one,
-                *(_cheaper(problem.site.barrier_zone, one, *shares) for shares in CHEAPER),
-            ]
-    return list(dict.fromkeys([*found, ()]))
+    menu = Menu(ledger.problem)
+    ensemble = ensemble_for(ledger, menu.stations)
+    optima = [choice.layout for choice in convex.optima(ledger.problem, ensemble, menu)]
+    found = list(dict.fromkeys([*optima, *known(ledger.problem, ensemble, menu), ()]))
+    ledger.starts |= set(found)
+    return found
 
 
-def _cheaper(
-    zone: BarrierZone, layout: tuple[Wall | Fence, ...], height: float, capacity: float
-) -> Layout:
-    """Return a layout at a share of its heights and capacities, none below the least."""
-    out: list[Wall | Fence] = []
+def known(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> list[Layout]:
+    """Return the layouts that need no search: the rule's, it smaller, and the best constant."""
+    one = rule(problem, ensemble, menu)
+    smaller = [_smaller(one, *steps) for steps in CHEAPER]
+    layouts = [one, constant(problem, menu), *smaller]
+    return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]
+
+
+def offered(ledger: Ledger) -> Proposals:
+    """Yield what `starts` suggests."""
+    for layout in starts(ledger):  # noqa: UP028, a list cannot be sent values
+        yield layout
+
+
+def _smaller(layout: Layout, lower: int, weaker: int) -> Layout:
+    """Return a layout whose fences are lower and of a lower class by some steps."""
+    out = []
     for b in layout:
-        lower = msgspec.structs.replace(b, height=max(MIN_HEIGHT, height * b.height))
-        if isinstance(lower, Fence):
-            weaker = max(zone.min_capacity, capacity * lower.capacity)
-            lower = msgspec.structs.replace(lower, capacity=weaker)
-        out.append(lower)
+        if isinstance(b, Fence) and b.energy_class is not None:
+            name = CLASSES[max(0, CLASSES.index(b.energy_class) - weaker)]
+            b = Fence(b.x, max(MIN_HEIGHT, b.height - lower * STEP), energy_class=name)
+        out.append(b)
     return tuple(out)

@@ -1,4 +1,7 @@
-"""Evaluations on disk, so that a search that was killed goes on where it stopped."""
+"""Evaluations on disk, so that a search that was killed goes on where it stopped.
+
+What is kept of a release is what it cost, not its outcome: a search makes tens of thousands.
+"""
 
 from __future__ import annotations
 
@@ -6,46 +9,70 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import msgspec
 
 import envs
 import rigdda
 from envs import DesignProblem, Evaluation
-from rigdda import Barrier, Layout, __version__
+from rigdda import Layout, Outcome, __version__
 from rigdda.kernel import source_hash
 
 INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
-"""Constants of JSON lines: intervals of one release have no ends. Nothing that is kept is NaN."""
+"""Constants of JSON lines: an interval may have no end. Nothing that is kept is NaN."""
+
+
+class Release(NamedTuple):
+    """What is kept of a release.
+
+    Its bill [EUR per occurrence], the volume that came onto the road [m3], whether a block reached
+    the road, whether a barrier failed.
+    """
+
+    bill: float
+    volume: float
+    reached: bool
+    failed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Releases of a layout, by event, and what they say of it together."""
+
+    evaluation: Evaluation
+    releases: dict[str, tuple[Release, ...]]
 
 
 class Store:
-    """Evaluates layouts and keeps each evaluation, looked up by all that determines it.
+    """Evaluates layouts and keeps what they were worth, looked up by all that determines it.
 
     A search asks for the same layouts on the same seeds when it is run again; what the store has
-    is handed back instead of simulated. An entry of another site, objective, seed or version of
-    the mechanics is never handed back.
+    is handed back instead of simulated. An entry of another site, problem, seed or version of the
+    mechanics is never handed back. Evaluations of a store have no outcomes, whether they were just
+    simulated or not.
 
     Parameters
     ----------
     path : path, optional
         A file of JSON lines, one an evaluation, appended to and flushed at once; a last line that
-        a kill left unfinished is cut off, other lines that are no evaluation are passed over, and
-        so is an evaluation that is not what its outcomes are worth. None: memory only.
+        a kill left unfinished is cut off, and lines whose checksum does not fit are passed over.
+        None: memory only.
 
     Attributes
     ----------
     simulated, resumed : int
-        Releases simulated so far, and releases taken from the file instead.
+        Releases evaluated so far, and releases taken from the file instead.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None = None):
         self.path = None if path is None else Path(path)
         self.simulated = self.resumed = 0
-        self._known: dict[str, Evaluation] = {}
+        self._known: dict[str, Batch] = {}
         self._kept: set[str] = set()
         if self.path is not None and self.path.is_file():
             self._read(self.path)
@@ -57,7 +84,8 @@ class Store:
         for line in text[:whole].splitlines():
             try:
                 data = json.loads(line, parse_constant=INFINITE.__getitem__)
-                self._known[data["key"]] = msgspec.convert(data["evaluation"], Evaluation)
+                if data["sum"] == _sum(data["key"], data["batch"]):
+                    self._known[data["key"]] = msgspec.convert(data["batch"], Batch)
             except (ValueError, KeyError, TypeError, RecursionError, msgspec.ValidationError):
                 continue
         self._kept = set(self._known)
@@ -71,38 +99,75 @@ class Store:
         BadInput, Diverged
             As `DesignProblem.evaluate` does.
         """
-        key = _key(problem, layout, seeds)
-        if key in self._kept and not _sound(self._known[key], problem, layout, seeds):
-            self._kept.remove(key)
-            del self._known[key]
+        drawn = tuple(seeds)
+
+        def simulate() -> Batch:
+            return Batch(problem.evaluate(layout, drawn), {})
+
+        found = self._recall(_key(problem, layout, drawn), len(drawn), simulate)
+        return replace(found.evaluation, layout=layout, seeds=drawn)
+
+    def sample(
+        self, problem: DesignProblem, layout: Layout, seeds: Mapping[str, Sequence[int]]
+    ) -> Batch:
+        """Return what releases of some events cost with a layout, simulated or as it was kept.
+
+        Parameters
+        ----------
+        seeds : mapping of str to sequence of int
+            Release seeds by name of event; of every event as many as are wanted.
+
+        Raises
+        ------
+        BadInput, Diverged
+            As `DesignProblem.sample` does.
+        """
+        asked = {name: tuple(drawn) for name, drawn in seeds.items()}
+
+        def simulate() -> Batch:
+            outcomes = problem.sample(layout, asked)
+            found: dict[str, list[Release]] = {name: [] for name in asked}
+            for outcome in outcomes:
+                found[outcome.event].append(_release(problem, layout, outcome))
+            kept = {name: tuple(releases) for name, releases in found.items()}
+            return Batch(problem.judge(layout, outcomes), kept)
+
+        count = sum(map(len, asked.values()))
+        found = self._recall(_key(problem, layout, sorted(asked.items())), count, simulate)
+        return replace(found, evaluation=replace(found.evaluation, layout=layout))
+
+    def _recall(self, key: str, count: int, simulate: Callable[[], Batch]) -> Batch:
+        """Return what is known by a key, or simulate it and keep it."""
         if key in self._known:
-            self.resumed += len(seeds) if key in self._kept else 0
+            self.resumed += count if key in self._kept else 0
             return self._known[key]
-        evaluation = problem.evaluate(layout, seeds)
-        self.simulated += len(seeds)
-        self._known[key] = evaluation
+        batch = simulate()
+        bare = replace(batch.evaluation, layout=(), seeds=(), outcomes=(), simulated=0, seconds=0.0)
+        self._known[key] = replace(batch, evaluation=bare)
+        self.simulated += count
         if self.path is not None:
-            line = json.dumps({"key": key, "evaluation": msgspec.to_builtins(evaluation)})
+            data = msgspec.to_builtins(self._known[key])
+            line = json.dumps({"key": key, "sum": _sum(key, data), "batch": data})
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(line + "\n")
-        return evaluation
+        return self._known[key]
 
 
-def _sound(
-    kept: Evaluation, problem: DesignProblem, layout: Sequence[Barrier], seeds: Sequence[int]
-) -> bool:
-    """Return whether a kept evaluation is of these releases and what their outcomes are worth."""
-    barriers = [len(outcome.barriers) for outcome in kept.outcomes]
-    if barriers != [len(layout)] * len(seeds):
-        return False
-    return kept == problem.judge(tuple(layout), tuple(seeds), kept.outcomes)
+def _release(problem: DesignProblem, layout: Layout, outcome: Outcome) -> Release:
+    """Return what is kept of an outcome."""
+    bill = problem.site.bill(layout, outcome)
+    failed = any(barrier.failed for barrier in outcome.barriers)
+    return Release(bill.harm + bill.repair, outcome.road_volume, outcome.reached, failed)
 
 
-def _key(problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> str:
+def _sum(key: str, data: Any) -> str:
+    """Return a checksum of a line, by which damage is noticed."""
+    return hashlib.sha256((key + json.dumps(data)).encode()).hexdigest()[:16]
+
+
+def _key(problem: DesignProblem, layout: Layout, seeds: Any) -> str:
     """Return a hash of all that an evaluation depends on."""
-    limit = problem.cost_limit
-    weights = [problem.objective(1.0, 0.0), problem.objective(0.0, limit), limit]
-    asked = [__version__, mechanics(), problem.site, weights, list(layout), list(seeds)]
+    asked = [__version__, mechanics(), problem.site, problem.targets, list(layout), seeds]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:32]
 
 

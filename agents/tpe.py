@@ -6,8 +6,9 @@ It is told first what one barrier-free ensemble suggests, see `agents.starts`.
 from __future__ import annotations
 
 from agents import trials
-from agents.crossings import ensemble_for
-from agents.protocol import DesignResult, Ledger, Progress, Proposals, search
+from agents.protocol import DesignResult, Ledger, Progress, Proposals
+from agents.ranking import value
+from agents.searching import search
 from agents.starts import starts
 from agents.store import Store
 from envs import DesignProblem
@@ -32,7 +33,7 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    return search(ledger, _propose(problem, starts(problem, ensemble_for(ledger)), ledger.seed))
+    return search(ledger, _propose(problem, starts(ledger), ledger.seed))
 
 
 def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:
@@ -48,4 +49,4 @@ def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposal
     while True:
         trial = study.ask(space)
         evaluation = yield problem.decode(trials.vector(problem, trial.params))
-        study.tell(trial, evaluation.objective)
+        study.tell(trial, value(problem, evaluation))

@@ -15,7 +15,7 @@ from rigdda import Layout
 if TYPE_CHECKING:
     from optuna.distributions import BaseDistribution
 
-NAMES = ("station", "height", "size")
+NAMES = ("presence", "station", "height", "size")
 """Numbers of a slot, as in `envs.encoding`."""
 
 

@@ -1,0 +1,140 @@
+"""Candidates of a race: what each cost in the releases so far, event by event."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.store import Release
+from envs import DesignProblem
+from envs.intervals import upper_bound
+from rigdda import Layout
+
+Floats = NDArray[np.float64]
+
+TRUSTED = 8
+"""Releases of an event below which a candidate borrows the mean and the spread of no barriers."""
+
+
+class Arm:
+    """A layout and its releases of this race.
+
+    Z is estimated as in `DesignProblem`: what the barriers cost a year, and for each event its rate
+    times the mean bill.
+
+    Attributes
+    ----------
+    releases : dict of str to list of Release
+        By name of event, in the order of the seeds, the same for all candidates of a race.
+    """
+
+    def __init__(self, problem: DesignProblem, layout: Layout, strict: bool = False):
+        site = problem.site
+        self.problem, self.layout, self.strict = problem, layout, strict
+        self.priced = problem.nothing.objective > 0.0
+        self.annual = site.annual(layout) if self.priced else 0.0
+        self.rates = {name: site.rate(name, layout) for name in site.event_names}
+        self.releases: dict[str, list[Release]] = {name: [] for name in site.event_names}
+        self._arrays: dict[str, Floats] = {}
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of its barriers, downhill."""
+        return tuple(barrier.kind for barrier in self.layout)
+
+    def add(self, releases: Mapping[str, Iterable[Release]]) -> None:
+        """Take more releases."""
+        for name, more in releases.items():
+            self.releases[name] += more
+        self._arrays = {}
+
+    def bills(self, event: str) -> Floats:
+        """Return what each release of an event cost, (n,) [EUR]; without prices its debris [m3]."""
+        if event not in self._arrays:
+            own = self.releases[event]
+            found = [r.bill if self.priced else r.volume for r in own]
+            self._arrays[event] = np.array(found, dtype=np.float64)
+        return self._arrays[event]
+
+    def mean(self, event: str, nothing: Arm | None = None) -> float:
+        """Return the mean bill of an event [EUR]; of few releases drawn towards that of nothing."""
+        own = self.bills(event)
+        if nothing is None or len(own) >= TRUSTED:
+            return float(own.mean()) if len(own) else 0.0
+        return float((own.sum() + (TRUSTED - len(own)) * nothing.mean(event)) / TRUSTED)
+
+    def objective(self, nothing: Arm | None = None) -> float:
+        """Return Z [EUR per m and year]."""
+        events = self.rates.items()
+        return self.annual + math.fsum(rate * self.mean(name, nothing) for name, rate in events)
+
+    def spread(self, event: str) -> float:
+        """Return the standard deviation of the bill of an event [EUR], 0 of less than two."""
+        own = self.bills(event)
+        return float(own.std(ddof=1)) if len(own) > 1 else 0.0
+
+    def shortfall(self) -> float:
+        """Return the most by which a design event exceeds a target, 0 if none does.
+
+        By its estimate or, if it is to be strict, by its upper bound.
+        """
+        targets = self.problem.targets
+        over = [0.0]
+        for event in self.problem.site.events:
+            own = self.releases[event.name]
+            if event.design and own:
+                for wanted, which in ((targets.reach, "reached"), (targets.failure, "failed")):
+                    if wanted is not None:
+                        count = sum(getattr(r, which) for r in own)
+                        share = upper_bound(count, len(own)) if self.strict else count / len(own)
+                        over.append(share - wanted)
+        return max(over)
+
+    def key(self, nothing: Arm | None = None) -> tuple[float, float]:
+        """Return what candidates are ranked by: how far a target is missed, then Z."""
+        return self.shortfall(), self.objective(nothing)
+
+
+def behind(arm: Arm, other: Arm, nothing: Arm) -> float:
+    """Return by how many standard errors an arm is behind another of the same releases.
+
+    The variance of the difference of an event is that of a sample with one more release, which
+    differs by the spread of nothing: none of n is not never.
+    """
+    variance = 0.0
+    for name, rate in arm.rates.items():
+        own, its = rate * arm.bills(name), other.rates[name] * other.bills(name)
+        n = min(len(own), len(its))
+        if n == 0:
+            continue
+        apart = own[:n] - its[:n]
+        squares = float(((apart - apart.mean()) ** 2).sum()) + (rate * nothing.spread(name)) ** 2
+        variance += squares / (n * n)
+    gap = arm.objective(nothing) - other.objective(nothing)
+    return gap / math.sqrt(variance) if variance > 0.0 else math.copysign(math.inf, gap)
+
+
+def allocation(problem: DesignProblem, n: int, leaders: Sequence[Arm]) -> dict[str, int]:
+    """Return how many of `n` releases go to each event: half as for nothing, half by the leaders.
+
+    Releases go where rate times spread is large. What no barrier stops has the spread that it has
+    without; what the leaders stop tells them apart no more.
+    """
+    counts = problem.allocation(n)
+    if not leaders:
+        return counts
+    weight = {
+        name: float(np.mean([arm.rates[name] * arm.spread(name) for arm in leaders]))
+        for name in counts
+    }
+    total = sum(weight.values())
+    if total <= 0.0:
+        return counts
+    spare = n - 2 * len(counts)
+    half = {name: 0.5 * max(0, count - 2) for name, count in counts.items()}
+    return {
+        name: 2 + int(max(0.0, half[name] + 0.5 * spare * weight[name] / total)) for name in counts
+    }

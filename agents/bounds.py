@@ -1,0 +1,64 @@
+"""What of a layout lies on a bound: there the answer may be the zone's rather than the slope's."""
+
+from __future__ import annotations
+
+from envs import DesignProblem
+from envs.building import MIN_HEIGHT
+from rigdda import Barrier, Fence, Layout, Mesh
+from rigdda.barriers import FENCE_CLASSES
+
+NEAR = 0.05
+"""Distance from a bound at which a length lies on it [m]."""
+
+
+def on_bound(problem: DesignProblem, layout: Layout) -> tuple[str, ...]:
+    """Return what lies on a bound of the zone, of its kind or of the list of classes, in words.
+
+    The bounds of mesh, and those by what stands next to a barrier, do not count.
+    """
+    names = []
+    for barrier in layout:
+        if not isinstance(barrier, Mesh):
+            found = [*_place(problem, barrier), *_size(problem, barrier)]
+            names += [f"{barrier.words}: {words}" for words in found]
+    return tuple(names)
+
+
+def _place(problem: DesignProblem, barrier: Barrier) -> list[str]:
+    """Return which ends of the zone a barrier stands at."""
+    zone, road = problem.zone, problem.site.road.start
+    start, end = problem.place.works(barrier)
+    found = []
+    if start - zone.start <= NEAR:
+        found.append("start of the zone")
+    if zone.end - end <= NEAR:
+        found.append("end of the zone")
+    if isinstance(barrier, Fence) and road - end - barrier.elongation <= NEAR:
+        found.append("clearance to the road")
+    return found
+
+
+def _size(problem: DesignProblem, barrier: Barrier) -> list[str]:
+    """Return which sizes of a barrier are the least or greatest."""
+    zone = problem.zone
+    if isinstance(barrier, Fence):
+        classes = tuple(FENCE_CLASSES)
+        assert barrier.energy_class is not None
+        tallest = FENCE_CLASSES[barrier.energy_class].height
+        found = _ends(barrier.height, MIN_HEIGHT, min(tallest, zone.max_height), "height")
+        if barrier.energy_class in (classes[0], classes[-1]):
+            found.append("lowest class" if barrier.energy_class == classes[0] else "highest class")
+        return found
+    if barrier.kind == "ditch":
+        depth = _ends(barrier.depth, MIN_HEIGHT, zone.max_depth, "depth")
+        return depth + _ends(barrier.width, zone.min_width, zone.max_width, "width")
+    what = "width" if barrier.kind == "embankment" else "thickness"
+    height = _ends(barrier.height, MIN_HEIGHT, zone.max_height, "height")
+    least, most = zone.min_thickness, zone.max_thickness
+    return height + _ends(getattr(barrier, what), least, most, what)
+
+
+def _ends(value: float, low: float, high: float, name: str) -> list[str]:
+    """Return whether a length is the least or the greatest."""
+    found = [f"least {name}"] if value - low <= NEAR else []
+    return found + ([f"greatest {name}"] if high - value <= NEAR else [])

@@ -1,0 +1,188 @@
+"""The default designer: a catalogue of all kinds, raced; pairs of the best; their neighbours.
+
+Singles of every allowed kind over stations and sizes race on common releases, see `agents.racing`.
+Pairs of the best of each kind are foretold from them: of what one lets past, the other lets past
+its share. The promising ones race, and then neighbours of the best: other stations and sizes, with
+ever smaller steps, a barrier more or less. Each race meets fresh releases, and no barrier at all
+runs in each. The best few are chosen from on releases of their own, and the chosen one is reported
+on others again, which chose nothing: so its value does not flatter.
+
+What a barrier-free ensemble says of fences, see `agents.catalogue`, spares the race most of them.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from agents.arms import Arm
+from agents.catalogue import tabulate
+from agents.constant import constant
+from agents.crossings import ensemble_for
+from agents.menu import FINEST, Menu, spread
+from agents.protocol import DesignResult, Ledger, Progress
+from agents.racing import Track
+from agents.rule import rule
+from agents.searching import search
+from agents.starts import offered
+from agents.store import Store
+from envs import DesignProblem
+from rigdda import Barrier, Layout
+
+SINGLES, PAIRS, NEARBY, FINAL = 0.40, 0.14, 0.24, 0.10
+"""Shares of the budget: races of singles, pairs and neighbours, and the choice among the best; the
+rest is for the ensemble and the report."""
+
+RELEASES = 30
+"""Releases an event, on average, before anything is dropped."""
+FEWEST = 8
+"""The same with a small budget."""
+FIELD = 150
+"""A budget that is this many times as large affords `RELEASES`."""
+
+FINALISTS = 5
+ROUNDS = 6
+"""Rounds of neighbours: at each at which none is better the step is halved."""
+LEAST = 8
+"""Candidates that a round of neighbours should have."""
+ADDED = 3
+"""Barriers that are tried beside the best layout in every round."""
+BEST_OF = 8
+"""Singles of a kind of which pairs are made."""
+BETTER = 0.4
+"""Part of what may be built of a kind that is looked at, by what the ensemble says of it."""
+
+
+def design(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> DesignResult:
+    """Return the best layout that racing finds within the budget.
+
+    With a budget that is too small for races, it is the best of the layouts that need no search.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 2 or the seed out of range; if a simulation diverges.
+    """
+    ledger = Ledger(problem, simulations, seed, progress, store)
+    events = len(problem.site.events)
+    first = min(RELEASES, max(FEWEST, simulations // (FIELD * events))) * events
+    if simulations < 20 * first:
+        return search(ledger, offered(ledger))
+    menu, track = Menu(problem), Track(ledger)
+    start = singles(menu, ledger, int(SINGLES * simulations / first))
+    ledger.starts |= set(start)
+    best = track.race([(), *start], int(SINGLES * simulations), first, keep=2 * FINALISTS)
+    lone = list(track.seen.values())
+    pairs = foretold(problem, lone, lone, track.nothing, int(PAIRS * simulations / first))
+    seen = [arm.layout for arm in best]
+    best = track.race([*seen[:2], *pairs], int(PAIRS * simulations), first, keep=FINALISTS)
+    seen = [*(arm.layout for arm in best), *seen]
+    near = nearby(track, menu, best, lone, int(NEARBY * simulations), first)
+    finalists = list(dict.fromkeys([(), *(arm.layout for arm in near), *seen]))[:FINALISTS]
+    budget = int(FINAL * simulations)
+    chosen = track.race(finalists, budget, first, keep=1, stage="final", strict=True)[0]
+    return ledger.result(ledger.evaluate(chosen.layout, "report", ledger.left))
+
+
+def singles(menu: Menu, ledger: Ledger, n: int) -> list[Layout]:
+    """Return about `n` layouts to begin with: one barrier of every kind here and there.
+
+    Of each kind, from the part that the ensemble says is better, as different ones as can be; of
+    fences the best at stations apart. The rule's layout and the best constant are among them.
+    """
+    problem = ledger.problem
+    ensemble = ensemble_for(ledger, menu.stations)
+    each = max(2, n // len(problem.kinds))
+    lists = []
+    for kind in problem.kinds:
+        table = tabulate(problem, ensemble, menu.lone(kind))
+        order = np.argsort(table.objective, kind="stable").tolist()
+        better = [table.barriers[i] for i in order[: max(each, int(BETTER * len(order)))]]
+        lists.append(_apart(better, each) if kind == "fence" else spread(better, each))
+    mixed = [(b,) for row in itertools.zip_longest(*lists) for b in row if b is not None]
+    known = [rule(problem, ensemble, menu), constant(problem, menu)]
+    return [layout for layout in dict.fromkeys([*known, *mixed]) if problem.fits(layout)]
+
+
+def _apart(barriers: Sequence[Barrier], n: int) -> list[Barrier]:
+    """Return at most `n` of some barriers, the best first: half of them best of stations apart."""
+    best: dict[float, Barrier] = {}
+    for barrier in barriers:
+        best.setdefault(barrier.x, barrier)
+    chosen = spread(list(best.values()), max(1, n // 2))
+    rest = [barrier for barrier in barriers if barrier not in chosen]
+    return [*chosen, *rest][:n]
+
+
+def foretold(
+    problem: DesignProblem, arms: Sequence[Arm], others: Sequence[Arm], nothing: Arm, n: int
+) -> list[Layout]:
+    """Return at most `n` layouts of one arm and another together, the most promising first.
+
+    Of an event the mean bill of both is foretold as the product of theirs over that of nothing.
+    """
+    firsts, seconds = _best_of(arms, nothing), _best_of(others, nothing)
+    found: dict[Layout, float] = {}
+    for one, two in itertools.product(firsts, seconds):
+        both = tuple(sorted((*one.layout, *two.layout), key=lambda b: b.x))
+        if both in found or len(both) > problem.max_barriers or not problem.fits(both):
+            continue
+        value = one.annual + two.annual
+        for name in problem.site.event_names:
+            base = nothing.mean(name)
+            share = one.mean(name) * two.mean(name) / base if base > 0.0 else 0.0
+            value += problem.site.rate(name, both) * share
+        found[both] = value
+    return sorted(found, key=lambda layout: found[layout])[:n]
+
+
+def _best_of(arms: Sequence[Arm], nothing: Arm) -> list[Arm]:
+    """Return the best `BEST_OF` arms of every kind, nothing left out."""
+    kept: dict[tuple[str, ...], list[Arm]] = {}
+    for arm in sorted(arms, key=lambda arm: arm.key(nothing)):
+        if arm.layout and len(kept.setdefault(arm.kinds, [])) < BEST_OF:
+            kept[arm.kinds].append(arm)
+    return [arm for group in kept.values() for arm in group]
+
+
+def nearby(
+    track: Track, menu: Menu, best: list[Arm], lone: list[Arm], budget: int, first: int
+) -> list[Arm]:
+    """Return the best of rounds of neighbours around the best, the best first."""
+    zone = menu.zone
+    step, level = max(FINEST, (zone.end - zone.start) / 16.0), 2
+    centres, tried = best[:2], set(track.seen)
+    end = track.ledger.left - budget
+    rounds = min(ROUNDS, max(1, budget // (LEAST * first)))
+    for i in range(rounds):
+        left = track.ledger.left - end
+        around = itertools.chain.from_iterable(_around(track, menu, centres, lone, step, level))
+        layouts = [layout for layout in dict.fromkeys(around) if layout not in tried]
+        field = [*(arm.layout for arm in centres), *layouts]
+        found = track.race(field, left // (rounds - i), first, keep=3)
+        tried |= set(track.seen)
+        if found[0].layout == centres[0].layout:
+            step, level = max(FINEST, 0.5 * step), 1
+        centres = found[:1] if found[0].layout else centres
+    return found
+
+
+def _around(
+    track: Track, menu: Menu, centres: list[Arm], lone: list[Arm], step: float, level: int
+) -> Iterator[Iterable[Layout]]:
+    """Yield what may be tried: a barrier more, one less, neighbours of the best and of the next."""
+    layout = centres[0].layout
+    if layout:
+        yield foretold(menu.problem, centres[:1], lone, track.nothing, ADDED)
+    if len(layout) > 1:
+        yield [(*layout[:i], *layout[i + 1 :]) for i in range(len(layout))]
+    for centre in centres:
+        yield menu.neighbours(centre.layout, step, level)

@@ -8,27 +8,20 @@ several blocks only.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import rigdda
+from envs import untouched
 from envs.crew import Workers
 from envs.memory import Memory, fingerprint
 from envs.samples import Sample
-from rigdda import BarrierOutcome, Ditch, Fence, Layout, Mesh, Outcome, Site
-from rigdda.barriers import earthworks
-from rigdda.resistance import resistance
+from rigdda import Fence, Layout, Mesh, Outcome, Site
 
 Job = tuple[Site, Layout, int, str]
 """A site, what stands on it, the seed of a release and the name of its event."""
-
-Span = tuple[float, float]
-
-MARGIN = 0.1
-"""Distance from a barrier beyond which blocks are sure not to touch it [m]."""
 
 
 class Key(NamedTuple):
@@ -48,9 +41,6 @@ free: Memory[Key, Outcome] = Memory(1 << 16)
 
 held: Memory[Key, Outcome] = Memory(1 << 16)
 """Outcomes of single fences that held one block, by the fence without its class."""
-
-spans: Memory[tuple[bytes, tuple[Any, ...]], tuple[Span, ...]] = Memory(1 << 12)
-"""Where the barriers of a layout are on a site."""
 
 
 def outcomes(jobs: Sequence[Job], workers: Workers | None = None) -> Sample:
@@ -115,10 +105,11 @@ def _recall(keys: Sequence[Key], jobs: Sequence[Job]) -> dict[Key, Outcome]:
         without = bare.get(key._replace(layout=()))
         before = stood.get(place) if place is not None else None
         found: Outcome | None
-        if without is not None and not _touches(sites[key.site], key, without):
-            found = replace(without, barriers=_untouched(sites[key.site], key, without.width))
-        else:
-            found = _of_class(key.layout[0], before) if before is not None else None
+        found = (
+            untouched.outcome(sites[key.site], key.site, key.layout, without) if without else None
+        )
+        if found is None and before is not None:
+            found = _of_class(key.layout[0], before)
         if found is not None:
             known[key] = found
     return known
@@ -129,61 +120,15 @@ def _remember(fresh: Mapping[Key, Outcome], jobs: Mapping[Key, Job]) -> None:
     bare, stood = {}, {}
     for key, outcome in fresh.items():
         site = jobs[key][0]
-        if not _touches(site, key, outcome):
-            bare[key._replace(layout=())] = replace(outcome, barriers=())
+        if untouched.misses(site, key.site, key.layout, outcome):
+            lies = outcome.slope_fraction + outcome.held_fraction
+            alone = replace(outcome, barriers=(), held_fraction=0.0, slope_fraction=lies)
+            bare[key._replace(layout=())] = alone
         place = _place(site, key)
         if place is not None and not outcome.barriers[0].failed:
             stood[place] = outcome
     free.remember(bare)
     held.remember(stood)
-
-
-def _touches(site: Site, key: Key, outcome: Outcome) -> bool:
-    """Tell whether blocks come near a barrier of a layout."""
-    low, high = outcome.reach
-    spans = _spans(site, key) if key.layout else ()
-    return any(low < end + MARGIN and high > start - MARGIN for start, end in spans)
-
-
-def _spans(site: Site, key: Key) -> tuple[Span, ...]:
-    """Return the chainages between which each barrier changes something [m]."""
-    name = key.site, key.layout
-    known = spans.recall([name]).get(name)
-    if known is None:
-        _, moved = earthworks(site.profile, key.layout, site.soil)
-        ends = {b: (float(m[:, 0].min()), float(m[:, 0].max())) for b, m in moved.items()}
-        known = tuple(ends.get(b, (b.x, b.x + b.extent)) for b in key.layout)
-        spans.remember({name: known})
-    return known
-
-
-def _untouched(site: Site, key: Key, width: float) -> tuple[BarrierOutcome, ...]:
-    """Return what happens to barriers that no block comes near: nothing."""
-    if not key.layout:
-        return ()
-    built = [barrier.for_width(width) for barrier in key.layout]
-    scene = None
-    if not all(isinstance(barrier, Fence | Ditch) for barrier in built):  # what bears by friction
-        drawn = site.draw(key.seed, key.event)
-        scene = site.scene(drawn._replace(blocks=drawn.blocks[:1]), built)
-    return tuple(
-        BarrierOutcome(
-            hits=0,
-            max_energy=0.0,
-            total_energy=0.0,
-            absorbed_energy=0.0,
-            impact_heights=(),
-            overtopped=0,
-            failed=False,
-            caught=0.0,
-            state="stands",
-            displacement=0.0,
-            thrust=0.0,
-            resistance=resistance(scene, i) if scene else getattr(barrier, "resistance", math.inf),
-            left_height=0.0 if isinstance(barrier, Ditch) else barrier.height,
-        )
-        for i, barrier in enumerate(built)
-    )
 
 
 def _place(site: Site, key: Key) -> Key | None:

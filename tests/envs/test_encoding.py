@@ -1,132 +1,159 @@
-"""Vectors and layouts: every vector is a layout that can be built, and back."""
+"""Vectors and layouts: every vector is a layout that may be built, and back."""
 
 from __future__ import annotations
 
+from collections import Counter
+
+import cases
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from envs import encoding
-from rigdda import BadInput, Layout, Wall
-from rigdda.site import BarrierZone
+from envs.problem import DesignProblem
+from rigdda import BadInput, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
 
-ZONE = BarrierZone(10.0, 30.0, max_height=4.0, min_thickness=0.5, max_thickness=2.0)
-NEAR = 1e-9
-
-
-@st.composite
-def zones(draw: st.DrawFn) -> BarrierZone:
-    low = draw(st.floats(0.1, 2.0))
-    high = low + draw(st.sampled_from([0.0, 0.3, 2.5]))
-    start = draw(st.floats(-50.0, 200.0))
-    length = high + draw(st.floats(0.0, 60.0))
-    return BarrierZone(start, start + length, draw(st.floats(0.6, 9.0)), low, high)
+ALL = ("fence", "ditch", "embankment", "gravity_wall", "wall", "mesh")
+PROBLEM = DesignProblem(cases.cut(), 3, ALL)
+SLOT = encoding.slot_size(ALL)
+vectors = arrays(float, 3 * SLOT, elements=st.floats(-1.0, 1.0))
 
 
-def vectors(slots: st.SearchStrategy[int]) -> st.SearchStrategy[np.ndarray]:
-    return slots.flatmap(lambda n: arrays(float, 3 * n, elements=st.floats(-1.0, 1.0)))
+def slot(kind: str, station: float = 0.0, height: float = 0.0, size: float = 0.0) -> np.ndarray:
+    """Return a slot with a barrier of a kind."""
+    return np.array([1.0, station, height, size, *(1.0 if k == kind else 0.0 for k in ALL)])
 
 
-def numbers(layout: Layout) -> np.ndarray:
-    return np.array([(wall.x, wall.height, wall.thickness) for wall in layout]).reshape(-1, 3)
+def alone(kind: str, *numbers: float) -> Layout:
+    """Return the layout of a vector with one barrier."""
+    return PROBLEM.decode(np.concatenate([slot(kind, *numbers), np.full(2 * SLOT, -1.0)]))
 
 
-@settings(deadline=None)
-@given(zones(), vectors(st.integers(1, 6)))
-def test_every_vector_is_a_layout_that_can_be_built(zone: BarrierZone, vector: np.ndarray) -> None:
-    layout = encoding.decode(zone, vector)
-    assert encoding.check_layout(zone, layout) == layout
-    x, height, thickness = numbers(layout).T
-    assert len(layout) <= len(vector) // 3
-    assert (height >= encoding.MIN_HEIGHT).all()
-    assert (x[1:] - (x + thickness)[:-1] >= encoding.MIN_GAP - NEAR).all()
+def agree(one: Layout, two: Layout) -> None:
+    """Check that two layouts are the same to rounding."""
+    assert [b.kind for b in one] == [b.kind for b in two]
+    for a, b in zip(one, two, strict=True):
+        for name in a.__struct_fields__:
+            value = getattr(a, name)
+            near = pytest.approx(value, abs=1e-7) if isinstance(value, float) else value
+            assert getattr(b, name) == near
 
 
-@settings(deadline=None)
-@given(zones(), vectors(st.integers(1, 6)), st.integers(0, 2))
-def test_encoding_is_undone_by_decoding(zone: BarrierZone, vector: np.ndarray, spare: int) -> None:
-    layout = encoding.decode(zone, vector)
-    slots = len(vector) // 3 + spare
-    code = encoding.encode(zone, layout, slots)
-    assert code.shape == (3 * slots,)
+def test_one_kind_needs_no_scores() -> None:
+    assert [encoding.slot_size(ALL[:n]) for n in (1, 2, 6)] == [4, 6, 10]
+    assert DesignProblem(cases.cut(), 2, ["fence"]).size == 8
+    low, high = PROBLEM.bounds
+    np.testing.assert_array_equal([low, high], [[-1.0] * 30, [1.0] * 30])
+
+
+@given(vectors)
+def test_every_vector_is_a_layout_that_may_be_built(vector: np.ndarray) -> None:
+    layout = PROBLEM.decode(vector)
+    assert PROBLEM.check(layout) == layout
+    PROBLEM.site.realise(layout)
+    assert PROBLEM.site.capital(layout) >= 0.0
+    assert len(layout) <= (vector.reshape(3, SLOT)[:, 0] > 0.0).sum()
+
+
+@given(vectors)
+def test_encoding_is_undone_by_decoding(vector: np.ndarray) -> None:
+    layout = PROBLEM.decode(vector)
+    code = PROBLEM.encode(layout)
+    assert code.shape == vector.shape
     assert np.abs(code).max() <= 1.0
-    again = numbers(encoding.decode(zone, code))
-    np.testing.assert_allclose(again, numbers(layout), rtol=0, atol=NEAR)
+    agree(layout, PROBLEM.decode(code))
 
 
-@settings(deadline=None)
-@given(vectors(st.just(4)), st.permutations(range(4)))
-def test_the_order_of_the_slots_does_not_matter(vector: np.ndarray, order: list[int]) -> None:
-    shuffled = vector.reshape(4, 3)[order].ravel()
-    assert encoding.decode(ZONE, shuffled) == encoding.decode(ZONE, vector)
-
-
-@settings(deadline=None)
-@given(arrays(float, 9, elements=st.floats(allow_nan=False)))
+@given(arrays(float, 3 * SLOT, elements=st.floats(allow_nan=False)))
 def test_numbers_beyond_the_bounds_are_clipped(values: np.ndarray) -> None:
-    vector = encoding.vector("action", values, 9)
-    np.testing.assert_array_equal(vector, np.clip(values, -1.0, 1.0))
+    assert PROBLEM.decode(values) == PROBLEM.decode(np.clip(values, -1.0, 1.0))
 
 
-def test_the_whole_range_of_a_wall() -> None:
-    lowest = encoding.decode(ZONE, np.array([-1.0, 2 * 0.5 / 4.0 - 1.0, -1.0]))
-    assert lowest == (Wall(10.0, 0.5, 0.5),)
-    assert encoding.decode(ZONE, np.ones(3)) == (Wall(28.0, 4.0, 2.0),)
-    assert encoding.decode(ZONE, np.zeros(3)) == (Wall(10.0 + 0.5 * 18.75, 2.0, 1.25),)
-    assert encoding.decode(ZONE, np.array([0.0, 2 * 0.49 / 4.0 - 1.0, 0.0])) == ()
-    assert encoding.decode(ZONE, np.full(9, -1.0)) == ()
+@pytest.mark.parametrize("name", ["bench", "talus", "shu-hwa"])
+def test_random_vectors_build_from_nothing_to_all(name: str) -> None:
+    problem, rng = DesignProblem(name), np.random.default_rng(2)
+    count: Counter[int] = Counter()
+    kinds: Counter[str] = Counter()
+    for _ in range(150):
+        layout = problem.decode(rng.uniform(-1.0, 1.0, problem.size))
+        count[len(layout)] += 1
+        kinds.update(barrier.kind for barrier in layout)
+    assert min(count[n] for n in range(4)) >= 3
+    assert min(kinds[kind] for kind in problem.kinds) >= 10
 
 
-def slots(*walls: tuple[float, float, float]) -> np.ndarray:
-    """Return the vector of walls (x, height, thickness), however close they are."""
-    return np.concatenate([encoding.encode(ZONE, [Wall(*wall)], 1) for wall in walls])
+def test_presence_above_0_builds() -> None:
+    one = slot("fence")
+    for presence, number in ((-1.0, 0), (0.0, 0), (0.01, 1), (1.0, 1)):
+        one[0] = presence
+        vector = np.concatenate([one, np.full(2 * SLOT, -1.0)])
+        assert len(PROBLEM.decode(vector)) == number
 
 
-def test_walls_apart_stay_where_they_are() -> None:
-    walls = [(11.0, 2.0, 1.0), (14.0, 3.0, 1.0), (20.0, 1.0, 2.0)]
-    np.testing.assert_allclose(numbers(encoding.decode(ZONE, slots(*walls))), walls, atol=NEAR)
+def test_the_range_of_every_kind() -> None:
+    at = 0.3  # x = 12.97
+    x = pytest.approx(12.97)
+    (least,), (most,) = alone("gravity_wall", at, -1, -1), alone("gravity_wall", at, 1, 1)
+    assert (least.x, least.height, least.thickness) == (x, 0.5, 0.5)
+    assert (most.x, most.height, most.thickness) == (x, 5.0, 2.0)
+    (wall,) = alone("wall", at)
+    assert (wall.height, wall.thickness) == (2.75, 1.25)
+    (dam,) = alone("embankment", at, -0.5, 1)
+    assert (dam.height, dam.width) == (0.5 + 0.25 * 4.5, 2.0)
+    (ditch,) = alone("ditch", at, -1, -0.5)
+    assert (ditch.depth, ditch.width, ditch.side_slope) == (0.5, 2.75, 0.67)
+    assert alone("mesh", at, 0, -1) == (Mesh(1.5, "light"),)
+    assert alone("mesh", at, 0, 1) == (Mesh(1.5, "heavy"),)
 
 
-def test_close_walls_move_apart_both_ways() -> None:
-    layout = encoding.decode(ZONE, slots((20.5, 3.0, 1.0), (20.0, 2.0, 1.0)))
-    expected = [(18.75, 2.0, 1.0), (21.75, 3.0, 1.0)]
-    np.testing.assert_allclose(numbers(layout), expected, atol=NEAR)
+def test_the_size_of_a_fence_is_its_class_which_limits_its_height() -> None:
+    classes = [alone("fence", -0.9, 1.0, size)[0].energy_class for size in np.linspace(-1, 1, 91)]
+    assert sorted(set(classes)) == list(encoding.CLASSES)
+    assert classes == sorted(classes)
+    assert [alone("fence", -0.9, 1.0, s)[0].height for s in (-1.0, -0.6)] == [2.5, 3.0]
+    assert alone("fence", -0.9, -1.0, -1.0)[0].height == 0.5
 
 
-def test_close_walls_at_the_end_of_the_zone_stay_inside() -> None:
-    layout = encoding.decode(ZONE, slots((29.0, 3.0, 1.0), (28.5, 2.0, 1.0)))
-    expected = [(26.0, 2.0, 1.0), (29.0, 3.0, 1.0)]
-    np.testing.assert_allclose(numbers(layout), expected, atol=NEAR)
+def test_a_barrier_moves_to_the_nearest_place_where_it_may_stand() -> None:
+    (fence,) = alone("fence", 1.0, 0.0, -1.0)  # 17.8: it gives way by 2 m, the road is at 18
+    assert fence.x == pytest.approx(15.8)
+    (wall,) = alone("gravity_wall", -0.5, 0.0, -1.0)  # 7.45, on the cut
+    assert 9.5 < wall.x <= 10.0
 
 
-def test_the_lowest_wall_is_dropped_where_there_is_no_room() -> None:
-    short = BarrierZone(10.0, 15.0, min_thickness=1.0, max_thickness=1.0)
-    vector = np.concatenate(
-        [encoding.encode(short, [Wall(x, h, 1.0)], 1) for x, h in [(10, 2), (12, 1), (14, 3)]]
-    )
-    layout = encoding.decode(short, vector)
-    np.testing.assert_allclose(numbers(layout), [(10, 2, 1), (14, 3, 1)], atol=NEAR)
+def test_earlier_slots_keep_their_place() -> None:
+    first, second = slot("fence", 0.2, 0.0, -1.0), slot("gravity_wall", 0.2, 0.0, -1.0)
+    rest = np.full(SLOT, -1.0)
+    fence = PROBLEM.decode(np.concatenate([first, rest, rest]))[0]
+    both = PROBLEM.decode(np.concatenate([first, second, rest]))
+    assert fence in both and len(both) == 2
+    swapped = PROBLEM.decode(np.concatenate([second, first, rest]))
+    assert swapped != both
+
+
+def test_the_largest_score_wins_and_the_first_of_equals() -> None:
+    vector = np.full(3 * SLOT, -1.0)
+    vector[:SLOT] = [1.0, 0.3, 0.0, 0.0, 0.1, -0.2, -0.3, 0.2, 0.2, 0.0]
+    assert PROBLEM.decode(vector)[0].kind == "gravity_wall"
 
 
 @pytest.mark.parametrize(
     ("layout", "message"),
     [
-        ([Wall(9.0, 1.0)], r"layout\[0\]\.x = 9\.0: give a number of at least 10 and at most 29"),
-        ([Wall(29.5, 1.0)], r"layout\[0\]\.x = 29\.5: .* at most 29$"),
-        ([Wall(12.0, 1.0), Wall(20.0, 4.5)], r"layout\[1\]\.height = 4\.5: .* at most 4$"),
-        ([Wall(12.0, 1.0, 3.0)], r"layout\[0\]\.thickness = 3\.0"),
-        ([Wall(12.0, 0.4)], r"layout\[0\]\.height = 0\.4: give a number of at least 0\.5"),
-        ([Wall(12.0, 1.0), Wall(14.5, 1.0)], r"layout\[1\]\.x = 14\.5: put it 2 m downhill"),
-        ([Wall(x, 1.0) for x in (11, 15, 19, 23)], "layout = '4 barriers': give at most 3"),
-        ([(12.0, 1.0, 1.0)], r"layout\[0\] = \(12\.0, 1\.0, 1\.0\): give barriers: rigdda\.Wall"),
-        (Wall(12.0, 1.0), "layout = Wall.*: give a sequence"),
+        ([Wall(13.0, 0.4)], r"layout\[0\]\.height = 0\.4: give a number of at least 0\.5"),
+        ([Fence(12.0, 2.0, energy_class=250, thickness=0.5)], r"layout\[0\]\.thickness = 0\.5"),
+        ([GravityWall(12.0, 2.0, 1.0, 2000.0)], r"layout\[0\]\.density = 2000\.0: give 2400"),
+        ([Ditch(11.0, 1.0, 6.0, 1.0)], r"layout\[0\]\.side_slope = 1\.0: give 0\.67"),
+        ([Embankment(11.0, 1.0, 1.0, 0.6)], r"layout\[0\]\.side_slope = 0\.6: give 0\.5"),
+        ([Mesh(1.0, "light")], r"layout\[0\]\.x = 1\.0: give 1\.5"),
+        ([Wall(3.0, 1.0)], r"layout\[0\]\.x = 3\.0"),
     ],
 )
-def test_layouts_that_no_vector_gives_are_refused(layout: list[Wall], message: str) -> None:
+def test_layouts_that_no_vector_gives_are_refused(layout: list, message: str) -> None:
     with pytest.raises(BadInput, match=message) as caught:
-        encoding.encode(ZONE, layout, 3)
+        PROBLEM.encode(layout)
     assert "\n" not in str(caught.value)
 
 
@@ -137,7 +164,7 @@ def test_layouts_that_no_vector_gives_are_refused(layout: list[Wall], message: s
         (np.zeros((3, 3)), r"shape of action = \(3, 3\)"),
         (0.5, r"shape of action = \(\)"),
         ([0.0] * 4 + [float("nan")] + [0.0] * 4, r"action\[4\] = nan: give a number"),
-        ([[1.0], [2.0, 3.0]], "action = .*: give 9 numbers"),
+        ([[1.0], [2.0, 3.0]], r"action = .*: give 9 numbers"),
         ("high", "action = 'high': give 9 numbers"),
         (None, "action"),
     ],

@@ -1,0 +1,144 @@
+"""What is not simulated again has the outcome that simulating it gives."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+
+import cases
+import msgspec
+import pytest
+
+import rigdda
+from envs import reuse, untouched
+from envs.memory import Memory, fingerprint
+from envs.samples import Sample
+from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Outcome, Site
+
+SEEDS = range(24)
+
+
+@pytest.fixture(scope="module")
+def site() -> Site:
+    return cases.cut()
+
+
+@pytest.fixture(autouse=True)
+def fresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("free", "held"):
+        monkeypatch.setattr(reuse, name, Memory(4096))
+
+
+def same(one: Outcome, two: Outcome) -> None:
+    """Check that two outcomes agree, all numbers to the rounding of a ground with other corners."""
+    first, second = asdict(one), asdict(two)
+    tables = zip(first.pop("barriers"), second.pop("barriers"), strict=True)
+    for a, b in [(first, second), *tables]:
+        for name, value in a.items():
+            number = isinstance(value, float) or name in ("reach", "run_out")
+            assert b[name] == (pytest.approx(value, rel=1e-6, abs=1e-4) if number else value), name
+
+
+def jobs(site: Site, layout: Layout, event: str) -> list[reuse.Job]:
+    return [(site, layout, seed, event) for seed in SEEDS]
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        (Fence(15.0, 2.0, energy_class=250),),
+        (GravityWall(15.0, 1.0, 0.8),),
+        (Ditch(14.0, 1.0, 3.0, side_slope=0.67),),
+        (Embankment(13.0, 1.5),),
+        (Ditch(11.5, 1.0, 2.5, side_slope=0.67), Fence(15.0, 2.0, energy_class=100)),
+    ],
+)
+@pytest.mark.parametrize("event", ["small", "low", "group"])
+def test_what_no_block_comes_near_changes_nothing(site: Site, layout: Layout, event: str) -> None:
+    reuse.outcomes(jobs(site, (), event))
+    found = reuse.outcomes(jobs(site, layout, event))
+    for seed, outcome, ran in zip(SEEDS, found, found.ran, strict=True):
+        if not ran:
+            same(outcome, rigdda.release(site, layout, seed, event)[1])
+
+
+def test_much_is_reused_where_little_comes_so_far(site: Site) -> None:
+    layout = (Fence(15.0, 2.0, energy_class=250),)
+    reuse.outcomes(jobs(site, (), "small"))
+    assert reuse.outcomes(jobs(site, layout, "small")).simulated < 0.7 * len(SEEDS)
+    again = reuse.outcomes(jobs(site, (), "small"))
+    assert (again.simulated, again.seconds < 0.05) == (0, True)
+
+
+def test_a_release_that_stays_clear_of_its_layout_is_one_without(site: Site) -> None:
+    layout = (Fence(15.0, 2.0, energy_class=250),)
+    first = reuse.outcomes(jobs(site, layout, "small"))
+    without = reuse.outcomes(jobs(site, (), "small"))
+    assert 0 < without.simulated < len(SEEDS)
+    for seed, outcome, ran in zip(SEEDS, without, without.ran, strict=True):
+        if not ran:
+            same(outcome, rigdda.release(site, (), seed, "small")[1])
+            assert untouched.misses(site, fingerprint(site), layout, first[seed])
+
+
+@pytest.mark.parametrize("event", ["small", "block"])
+def test_a_fence_that_held_a_block_holds_it_in_every_class_above(site: Site, event: str) -> None:
+    tried = [(Fence(10.5, 2.0, energy_class=k),) for k in (1000, 100, 250)]
+    reuse.outcomes(jobs(site, tried[0], event))
+    for layout in tried[1:]:
+        found = reuse.outcomes(jobs(site, layout, event))
+        assert found.simulated < len(SEEDS)
+        for seed, outcome in zip(SEEDS, found, strict=True):
+            same(outcome, rigdda.release(site, layout, seed, event)[1])
+
+
+def test_groups_and_several_fences_are_simulated(site: Site) -> None:
+    one, two = Fence(10.5, 2.0, energy_class=250), Fence(14.0, 2.0, energy_class=250)
+    for layout, event in (((one,), "group"), ((one, two), "small")):
+        higher = tuple(
+            msgspec.structs.replace(f, energy_class=500, elongation=None) for f in layout
+        )
+        reuse.outcomes(jobs(site, layout, event)[:4])
+        touched = reuse.outcomes(jobs(site, higher, event)[:4])
+        clear = [untouched.misses(site, fingerprint(site), higher, o) for o in touched]
+        assert touched.simulated >= 4 - sum(clear)
+
+
+def test_equal_releases_are_simulated_once_and_other_sites_anew(site: Site) -> None:
+    job = (site, (), 3, "small")
+    found = reuse.outcomes([job, job, (site, (), 4, "small")])
+    assert found.ran == (True, False, True)
+    assert found[0] == found[1] == rigdda.release(*job)[1]
+    slower = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, damping=0.2))
+    assert reuse.outcomes([(slower, (), 3, "small")]).simulated == 1
+
+
+def test_mesh_is_no_part_of_a_release(site: Site) -> None:
+    reuse.outcomes(jobs(site, (), "small"))
+    assert reuse.outcomes(jobs(site, (rigdda.Mesh(1.5, "light"),), "small")).simulated == 0
+
+
+def test_samples_add_up_and_split() -> None:
+    one = Sample([cases.outcome()] * 2, (True, False), 3.0)
+    two = Sample([cases.outcome("block")], (True,), 1.0)
+    both = one + two
+    assert (len(both), both.simulated, both.seconds) == (3, 2, 4.0)
+    first, second = both.split([0, 2, 3])
+    assert (first, first.ran, first.seconds) == (one, one.ran, 2.0)
+    assert second.seconds == 2.0
+    assert Sample([cases.outcome()]).simulated == 0
+
+
+def test_memory_is_bounded() -> None:
+    memory: Memory[int, str] = Memory(2)
+    memory.remember({1: "a", 2: "b"})
+    assert memory.recall([1, 5]) == {1: "a"}  # and so it is the latest
+    memory.remember({3: "c"})
+    assert memory.recall(range(5)) == {1: "a", 3: "c"}
+
+
+def test_outcomes_without_barriers_have_nothing_held(site: Site) -> None:
+    held = replace(cases.outcome("small", 0.0, False, held=0.5), reach=(0.0, 5.0))
+    key = reuse.Key(fingerprint(site), (Fence(15.0, 2.0, energy_class=100),), 1, "small")
+    reuse._remember({key: held}, {key: (site, key.layout, 1, "small")})
+    (kept,) = reuse.free.recall([key._replace(layout=())]).values()
+    assert (kept.held_fraction, kept.slope_fraction) == (0.0, 1.0)

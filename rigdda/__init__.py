@@ -2,7 +2,7 @@
 
 from rigdda import sites
 from rigdda.barriers import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Wall
-from rigdda.errors import BadInput, Diverged, Error, SoftContacts
+from rigdda.errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from rigdda.loads import BodyForce, LineLoad, PointLoad
 from rigdda.outcome import BarrierOutcome, Outcome
 from rigdda.release import release, release_many, release_outcome
@@ -25,6 +25,7 @@ __all__ = [
     "Bolt",
     "Ditch",
     "Diverged",
+    "DoubtfulInput",
     "Embankment",
     "Error",
     "Fence",

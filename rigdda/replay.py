@@ -181,7 +181,7 @@ def log_run(
             columns.append(rr.TimeColumn(PLACEMENT, sequence=[placement] * len(times)))
         return columns
 
-    _log_setting(rec, f"{root}/world", run.scene, marks)
+    _log_setting(rec, f"{root}/world", run, marks)
     for i in range(len(run.scene.barriers)):
         _log_barrier(rec, f"{root}/world/barriers/{i}", clock, run, i)
     for i in range(len(run.scene.blocks)):
@@ -198,9 +198,9 @@ def log_run(
     rec.log(f"{root}/notes", page, static=True)
 
 
-def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks) -> None:
-    """Log what never changes: the camera, the ground and the road."""
-    left, bottom, right, top = _frame(scene)
+def _log_setting(rec: rr.RecordingStream, world: str, run: Run, marks: Marks) -> None:
+    """Log what never changes: the camera, the ground as it is at the end and the road."""
+    left, bottom, right, top = _frame(run.scene)
     rec.log(world, rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
     eye = rr.Transform3D(translation=[(left + right) / 2, (bottom + top) / 2, CAMERA])
     lens = rr.Pinhole(
@@ -211,9 +211,10 @@ def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks
         image_plane_distance=CAMERA,
     )
     rec.log(f"{world}/camera", eye, lens, static=True)
-    if scene.ground is None:
+    ground = run.ground
+    if ground is None:
         return
-    chain = scene.ground.points
+    chain = ground.points
     surface = shapely.LineString(chain)
     _log_shape(rec, f"{world}/terrain", _ground(chain, bottom), LAYER["terrain"], GROUND, surface)
     if marks.road is not None:
@@ -225,7 +226,7 @@ def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks
 
 
 def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i: int) -> None:
-    """Log barrier `i`: a gravity wall moves, a failed fence turns pale, a ditch is a line."""
+    """Log barrier `i`: a gravity wall moves, what failed turns pale, a ditch is a line."""
     barrier, z = run.scene.barriers[i], LAYER["barriers"]
     outline = run.scene.outline(i)
     if isinstance(barrier, Ditch):

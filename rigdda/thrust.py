@@ -14,8 +14,6 @@ from __future__ import annotations
 
 import math
 
-from numpy.typing import NDArray
-
 from rigdda.constants import ASLEEP, BOLT, HELD, IMPACT, OPEN, PIN, RETIRED, SHOCK, TERRAIN
 from rigdda.gauges import FAILED, barrier_contact, write_event
 from rigdda.islands import root

@@ -83,7 +83,11 @@ def test_the_largest_score_wins_and_the_first_of_equals():
     [
         ([Fence(12.0, 2.0, 1e6)], ("wall", "ditch"), r"layout\[0\]\.kind = 'fence'"),
         ([Fence(12.0, 2.0, 9e9)], ALL, r"layout\[0\]\.capacity = 9"),
-        ([Fence(12.0, 2.0, 1e6, 0.5)], ALL, r"layout\[0\]\.thickness = 0\.5: leave it at 0\.2"),
+        (
+            [Fence(12.0, 2.0, 1e6, thickness=0.5)],
+            ALL,
+            r"layout\[0\]\.thickness = 0\.5: leave it at 0\.2",
+        ),
         ([GravityWall(12.0, 2.0, 1.0, 2000.0)], ALL, r"layout\[0\]\.density"),
         ([Ditch(12.0, 3.0, 4.0)], ALL, r"layout\[0\]\.depth = 3\.0: .* at most 2$"),
         ([Ditch(12.0, 1.0, 4.0), Wall(17.0, 2.0)], ALL, r"layout\[1\]\.x = 17\.0: put it 2 m"),

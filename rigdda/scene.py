@@ -311,9 +311,7 @@ class Scene:
             raise BadInput(where, name, f"define it in surfaces or use one of {known}")
 
     def ground_without(self, gone: Collection[int]) -> Terrain | None:
-        """Return the ground after some of the barriers were pushed away, of which only embankments
-        leave it another.
-        """
+        """Return the ground after some of the barriers were pushed away: embankments change it."""
         if self.terrain is None or len(gone) == 0:
             return self.ground
         left = [b for i, b in enumerate(self.barriers) if i not in gone]

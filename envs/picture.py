@@ -33,7 +33,7 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
     frame : int
         Index of the frame, the last by default.
     """
-    terrain = run.scene.ground
+    terrain = run.ground
     assert terrain is not None
     x, y = terrain.points.T
     for i, barrier in enumerate(run.scene.barriers):

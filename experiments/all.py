@@ -25,6 +25,7 @@ SCRIPTS = (
     "fig14_retained",
     "ablation",
     "outcome_step",
+    "fence_step",
     "hard_cases",
     "speed_error",
 )

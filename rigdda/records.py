@@ -153,14 +153,12 @@ TARGET = _record(
     sag=float,  # height that it loses by what it absorbs [m/J]
     low=float,  # interval of an embankment [m], empty for what is not one
     high=float,
-    push=float,  # impulse of its contacts in this step, downhill [N s]
-    most=float,  # greatest thrust of a contact in it [N]
+    most=float,  # greatest thrust of a contact in this step [N]
     block=int,  # whose it is
     x=float,  # and where [m]
     y=float,
-    mean=float,  # thrust, mean over the last second [N]
-    thrust=float,  # its greatest so far [N]
-    limit=float,  # of the mean, beyond which it fails; inf: it does not, or has [N]
+    thrust=float,  # greatest mean over a second so far [N]
+    limit=float,  # beyond which it fails; inf: it does not, or has [N]
 )
 """What is known of a barrier."""
 
@@ -388,7 +386,9 @@ class Gauges(NamedTuple):
     target: NDArray[np.void]  # (B,) of TARGET
     barrier: Ints  # (M,) barrier that a body is, -1: rock
     fences: int  # their number
-    impulse: Floats  # (B, K) impulses of the last K steps, which are a second [N s]
+    push: Floats  # (B, 2) impulse downhill of contacts at rest, and of others, in this step [N s]
+    impulse: Floats  # (B, K, 2) that in the last K steps, which are a second [N s]
+    mean: Floats  # (B, 2) thrust, mean over these [N]
     last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
     watch_low: float  # interval of x [m]
     watch_high: float

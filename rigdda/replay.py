@@ -190,7 +190,7 @@ def log_run(
             columns.append(rr.TimeColumn(PLACEMENT, sequence=[placement] * len(times)))
         return columns
 
-    _log_setting(rec, f"{root}/world", run.scene, marks)
+    _log_setting(rec, f"{root}/world", run, marks)
     labels = marks.labels or [describe(barrier) for barrier in run.scene.barriers]
     for i, label in enumerate(labels):
         _log_barrier(rec, f"{root}/world/barriers/{i}", clock, run, i)
@@ -209,9 +209,9 @@ def log_run(
     rec.log(f"{root}/notes", page, static=True)
 
 
-def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks) -> None:
-    """Log what never changes: the camera, the ground and the road."""
-    left, bottom, right, top = _frame(scene)
+def _log_setting(rec: rr.RecordingStream, world: str, run: Run, marks: Marks) -> None:
+    """Log what never changes: the camera, the ground as it is at the end and the road."""
+    left, bottom, right, top = _frame(run.scene)
     rec.log(world, rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
     eye = rr.Transform3D(translation=[(left + right) / 2, (bottom + top) / 2, CAMERA])
     lens = rr.Pinhole(
@@ -222,9 +222,10 @@ def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks
         image_plane_distance=CAMERA,
     )
     rec.log(f"{world}/camera", eye, lens, static=True)
-    if scene.ground is None:
+    ground = run.ground
+    if ground is None:
         return
-    chain = scene.ground.points
+    chain = ground.points
     surface = shapely.LineString(chain)
     _log_shape(rec, f"{world}/terrain", _ground(chain, bottom), LAYER["terrain"], GROUND, surface)
     if marks.road is not None:

@@ -120,6 +120,12 @@ class Run:
         cos, sin = np.cos(theta), np.sin(theta)
         return (corners - start[:2]) @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
 
+    @property
+    def ground(self) -> Terrain | None:
+        """The ground at the end: without the embankments that were pushed away."""
+        failed = self.events["target"][self.events["kind"] == FAILED]
+        return self.scene.ground_without(failed)
+
     def crossings(self, station: int) -> NDArray[np.void]:
         """Return the events in which a block first passes `station`."""
         return self._of(CROSSING, station)

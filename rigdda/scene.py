@@ -343,9 +343,10 @@ class Scene:
             known = ", ".join(self.surfaces)
             raise BadInput(where, name, f"define it in surfaces or use one of {known}")
 
-    def ground_without(self, gone: Collection[int]) -> Terrain:
-        """Return the ground after some of the barriers, embankments, were pushed away."""
-        assert self.terrain is not None
+    def ground_without(self, gone: Collection[int]) -> Terrain | None:
+        """Return the ground after some of the barriers were pushed away: embankments change it."""
+        if self.terrain is None or len(gone) == 0:
+            return self.ground
         left = [b for i, b in enumerate(self.barriers) if i not in gone]
         return earthworks(self.terrain, left, self.fill)[0]
 

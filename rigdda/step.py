@@ -385,8 +385,9 @@ def advance(
                 bodies, gauges, counters[EVENTS], counters[STEPS] * levels[0].dt
             )
             counters[EVENTS], pushed = watch_thrust(
-                bodies, gauges, counters[EVENTS], counters[STEPS], time, levels[0]
-            )
+                bodies, now, count, gauges, work.islands, counters[EVENTS], counters[STEPS], time,
+                levels[0],
+            )  # fmt: skip
             lower_fences(bodies, outlines, gauges, p)
             steps -= 1
             if bad < 0 and len(frames) > 0 and steps % stride == 0:

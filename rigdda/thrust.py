@@ -4,6 +4,10 @@ What lies against a barrier and what strikes it both press on it, in the ratio o
 step. Over a second it is the momentum that the barrier takes, which does not depend on the step.
 Of a fence only contacts at rest count: blows cost it energy, see `fence`. A contact with the ground
 presses on the embankment on which it is.
+
+Rock that is jammed between two rigid faces presses on both with any force, of which nothing is left
+once one of them gives way. So contacts at rest count for no more than the weight of what leans on
+the barrier: that is what drives rock on a slope 45 degrees steeper than its friction.
 """
 
 from __future__ import annotations
@@ -12,28 +16,28 @@ import math
 
 from rigdda.constants import ASLEEP, BOLT, HELD, IMPACT, OPEN, PIN, RETIRED, SHOCK, TERRAIN
 from rigdda.gauges import FAILED, barrier_contact, write_event
-from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contact, Contacts, Gauges, Parameters
+from rigdda.islands import root
+from rigdda.kernel import kernel, stage
+from rigdda.records import Bodies, Contact, Contacts, Gauges, Islands, Parameters
+
+REST, HITS = 0, 1
+"""Contacts of a barrier by which thrust is summed up."""
 
 
 @kernel
-def pressed(gauges: Gauges, c: Contact) -> tuple[int, float]:
-    """Return the barrier that a contact presses on, -1 for none, and its thrust downhill [N]."""
-    on_b = c.shear * c.ny - c.normal * c.nx
-    if c.b == TERRAIN:
-        for barrier in range(len(gauges.target)):
-            if gauges.target[barrier].low <= c.x <= gauges.target[barrier].high:
-                return barrier, on_b
-        return -1, 0.0
-    block, barrier = barrier_contact(gauges, c.a, c.b)
-    if barrier < 0 or c.kind == BOLT or c.kind == PIN:
-        return -1, 0.0
-    if gauges.target[barrier].capacity < math.inf and (c.kind == IMPACT or c.kind == SHOCK):
-        return -1, 0.0
-    return barrier, on_b if block == c.a else -on_b
+def pressed(gauges: Gauges, c: Contact) -> int:
+    """Return the barrier that a contact presses on, -1 for none."""
+    if c.state == OPEN or c.kind == BOLT or c.kind == PIN:
+        return -1
+    if c.b != TERRAIN:
+        return barrier_contact(gauges, c.a, c.b)[1]
+    for barrier in range(len(gauges.target)):
+        if gauges.target[barrier].low <= c.x <= gauges.target[barrier].high:
+            return barrier
+    return -1
 
 
-@kernel
+@stage
 def note_thrust(
     bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, whole: bool, p: Parameters
 ) -> None:
@@ -42,21 +46,49 @@ def note_thrust(
         c = contacts[k]
         body = bodies[c.a]
         # what is cut back counts in its parts, what is held or sleeps in the step as a whole
-        elsewhere = body.cut == 1 if whole else body.status == HELD or body.status == ASLEEP
-        if c.state == OPEN or elsewhere:
+        if body.cut == 1 if whole else (body.status == HELD or body.status == ASLEEP):
             continue
-        barrier, thrust = pressed(gauges, c)
+        barrier = pressed(gauges, c)
         if barrier < 0:
             continue
-        target = gauges.target[barrier]
-        target.push += thrust * p.dt
+        target, hit = gauges.target[barrier], c.kind == IMPACT or c.kind == SHOCK
+        if hit and target.capacity < math.inf:
+            continue
+        thrust = c.shear * c.ny - c.normal * c.nx  # on body b
+        if c.b != TERRAIN and barrier_contact(gauges, c.a, c.b)[0] != c.a:
+            thrust = -thrust
+        gauges.push[barrier, HITS if hit else REST] += thrust * p.dt
         if thrust > target.most:
             target.most, target.block, target.x, target.y = thrust, c.a, c.x, c.y
 
 
 @kernel
+def weight_on(
+    bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, islands: Islands, barrier: int,
+    p: Parameters,
+) -> float:  # fmt: skip
+    """Return the weight of the blocks that lean on a barrier, through others or not [N]."""
+    parent, leans = islands.parent, islands.slot
+    for i in range(p.blocks):
+        parent[i], leans[i] = i, 0
+    for k in range(count):
+        c = contacts[k]
+        if c.state != OPEN and 0 <= c.b < p.blocks:
+            i, j = root(parent, c.a), root(parent, c.b)
+            parent[max(i, j)] = min(i, j)
+    for k in range(count):
+        if pressed(gauges, contacts[k]) == barrier:
+            leans[root(parent, contacts[k].a)] = 1
+    weight = 0.0
+    for i in range(len(gauges.rock)):
+        weight += leans[root(parent, i)] * bodies[i].mass * p.gravity
+    return weight
+
+
+@stage
 def watch_thrust(
-    bodies: Bodies, gauges: Gauges, events: int, step: int, time: float, p: Parameters
+    bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, islands: Islands, events: int,
+    step: int, time: float, p: Parameters,
 ) -> tuple[int, bool]:  # fmt: skip
     """End a step: set the means over a second, and let what they exceed fail.
 
@@ -69,20 +101,26 @@ def watch_thrust(
     """
     ground = False
     for barrier in range(len(gauges.target)):
-        target, impulse = gauges.target[barrier], gauges.impulse[barrier]
-        place = step % len(impulse)
-        target.mean += (target.push - impulse[place]) / (len(impulse) * p.dt)
-        impulse[place] = target.push
-        target.thrust = max(target.thrust, target.mean)
-        if target.mean > target.limit:
-            target.limit = math.inf
-            events = write_event(
-                gauges, events, time, FAILED, bodies[target.block], target.block, barrier,
-                target.x, target.y, target.y - target.ground,
-            )  # fmt: skip
-            ground = ground or target.low <= target.high
-            for fence in range(p.blocks, len(bodies)):
-                if gauges.barrier[fence] == barrier:
-                    bodies[fence].status = RETIRED
-        target.push = target.most = 0.0
+        target, last, push = gauges.target[barrier], gauges.impulse[barrier], gauges.push[barrier]
+        place, period = step % len(last), len(last) * p.dt
+        for kind in range(2):
+            gauges.mean[barrier, kind] += (push[kind] - last[place, kind]) / period
+            last[place, kind], push[kind] = push[kind], 0.0
+        target.most = 0.0
+        rest, hits = gauges.mean[barrier, REST], gauges.mean[barrier, HITS]
+        if rest + hits <= target.thrust:
+            continue
+        rest = min(rest, weight_on(bodies, contacts, count, gauges, islands, barrier, p))
+        target.thrust = max(target.thrust, rest + hits)
+        if target.thrust <= target.limit:
+            continue
+        target.limit = math.inf
+        ground = ground or target.low <= target.high
+        events = write_event(
+            gauges, events, time, FAILED, bodies[target.block], target.block, barrier, target.x,
+            target.y, target.y - target.ground,
+        )  # fmt: skip
+        for fence in range(p.blocks, len(bodies)):
+            if gauges.barrier[fence] == barrier:
+                bodies[fence].status = RETIRED
     return events, ground

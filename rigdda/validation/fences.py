@@ -12,7 +12,10 @@ from rigdda.scene import Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, box, kinetic_energy, masses, rock
 
-FENCE = Fence(x=0.0, height=20.0, capacity=1e5)
+CAPACITY = 1e5
+"""Of the fence [J/m]."""
+
+FENCE = Fence(0.0, 20.0, CAPACITY)
 
 SIDE = 1.4
 """Side of the squares [m]."""
@@ -32,7 +35,7 @@ def volley(shares: Sequence[float], late: float = 0.0) -> Scene:
     mass = masses(Scene(None, (box(width=SIDE, height=SIDE),)))[0][0]
     blocks = []
     for i, share in enumerate(shares):
-        speed = math.sqrt(2.0 * share * FENCE.capacity / mass)
+        speed = math.sqrt(2.0 * share * CAPACITY / mass)
         x, y = -3.0 - 5.0 * i - speed * late, 2.0 + 3.0 * i
         blocks.append(box(x, y, SIDE, SIDE, velocity=(speed, 0.0, 0.0)))
     return Scene(Terrain(FLAT), tuple(blocks), rock(30.0, 0.5), barriers=(FENCE,), gravity=0.0)
@@ -50,7 +53,7 @@ def fly(lab: Lab, scene: Scene) -> tuple[int, float]:
     sim = lab.simulate(scene)
     events = sim.run(DURATION).events
     broken = events[events["kind"] == FAILED]
-    kept = kinetic_energy(sim.velocities, *masses(scene)) / FENCE.capacity
+    kept = kinetic_energy(sim.velocities, *masses(scene)) / CAPACITY
     return int(broken["block"][0]) + 1 if len(broken) else 0, kept
 
 

@@ -1,0 +1,131 @@
+"""Barriers against step: debris and failures of layouts whose barriers can fail.
+
+Fences of 2.5 and 3.5 m on the two benches of `shu-hwa`, of capacities at which some fail and some
+do not, and one on `quick`; a ditch, an embankment and a gravity wall. Damping in contact only.
+Judged by the greatest difference from the shortest step, over the 95 % interval of the difference.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from msgspec.structs import replace
+
+from experiments.script import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    Number,
+    draw,
+    interval,
+    main,
+    say,
+    write,
+)
+from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Settings, Site
+from rigdda.release import release_many
+
+Row = dict[str, float | str]
+
+
+def benches(upper: float, lower: float) -> Layout:
+    """Return fences of such capacities on the two benches of `shu-hwa`."""
+    return Fence(50.5, 2.5, upper), Fence(67.8, 3.5, lower)
+
+
+LAYOUTS: dict[str, tuple[str, Layout]] = {
+    "fences, 0.7 MJ/m": ("shu-hwa", benches(7e5, 7e5)),
+    "fences, 3 MJ/m": ("shu-hwa", benches(3e6, 3e6)),
+    "fences, 2.5 and 5 MJ/m": ("shu-hwa", benches(2.5e6, 5e6)),
+    "fence": ("quick", (Fence(24.0, 3.0, 2e5, elongation=3.0),)),
+    "ditch": ("quick", (Ditch(29.8, 1.5, 4.0),)),
+    "embankment": ("quick", (Embankment(24.5, 1.0, 0.5, 0.5),)),
+    "gravity wall": ("quick", (GravityWall(24.0, 2.0, 1.0),)),
+}
+"""Site and layout by name."""
+
+COLOURS = (BLUE, RED, GREEN, ORANGE, GREY, "#7d3c98", "#148f77")
+
+STEPS, QUICK_STEPS = (1.25e-3, 2.5e-3, 5e-3, 1e-2, 2e-2), (2.5e-3, 5e-3, 1e-2)
+"""Steps [s], the shortest first: what the others are compared with."""
+
+RELEASES, QUICK_RELEASES = 24, 6
+
+MOST = 1.6
+"""Greatest difference over its interval that 56 comparisons may show by chance [-]: 3.1 standard
+deviations, which one of them exceeds in a tenth of such studies."""
+
+
+def row(name: str, dt: float, releases: int) -> Row:
+    """Return debris share and number of failures of a layout at a step [s]: means, half intervals.
+
+    With none or all of the releases alike the interval of a failure is that of one in between.
+    """
+    site, layout = LAYOUTS[name]
+    found = Site.load(site)
+    found = replace(found, motion=replace(found.motion, dt=dt, damping_when="contact"))
+    outcomes = release_many([(found, layout, seed) for seed in range(releases)])
+    debris, half = interval(outcome.debris_fraction for outcome in outcomes)
+    failures, half_failures = interval(sum(b.failed for b in o.barriers) for o in outcomes)
+    return {
+        "layout": name,
+        "dt_s": dt,
+        "releases": releases,
+        "debris": debris,
+        "debris_half": half,
+        "failures": failures,
+        "failures_half": max(half_failures, 2.0 / releases),
+    }
+
+
+def difference(rows: list[Row]) -> float:
+    """Return the greatest difference from the shortest step, over its 95 % interval [-]."""
+    most = 0.0
+    for name in LAYOUTS:
+        for what in ("debris", "failures"):
+            here = [(float(r[what]), float(r[f"{what}_half"])) for r in rows if r["layout"] == name]
+            value, half = np.array(here).T
+            apart = np.abs(value - value[0]) / np.maximum(np.hypot(half, half[0]), 1e-9)
+            most = max(most, float(apart.max()))
+    return most
+
+
+def picture(figure: Figure, rows: list[Row]) -> None:
+    """Draw debris and failures against the step."""
+    for axes, what in zip(figure.subplots(1, 2), ("debris", "failures"), strict=True):
+        for name, colour in zip(LAYOUTS, COLOURS, strict=True):
+            here = [r for r in rows if r["layout"] == name]
+            dt, value, half = (
+                np.array([float(r[k]) for r in here]) for k in ("dt_s", what, f"{what}_half")
+            )
+            axes.errorbar(1e3 * dt, value, half, fmt="o-", color=colour, capsize=3, label=name)
+        axes.axvline(1e3 * Settings().dt, color="0.8", linewidth=6.0, zorder=0)
+        axes.set(xscale="log", xlabel="step [ms]", ylim=(0, None))
+        axes.set_xticks([1e3 * dt for dt in STEPS], [f"{1e3 * dt:g}" for dt in STEPS], minor=False)
+        axes.minorticks_off()
+        axes.set_ylabel(
+            "share past the road's edge [-]" if what == "debris" else "barriers that fail"
+        )
+    axes.legend()
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Write fence_step.csv and fence_step.png."""
+    rows = []
+    for name in LAYOUTS:
+        for dt in QUICK_STEPS if quick else STEPS:
+            say(f"barriers against step: {name}, {1e3 * dt:g} ms")
+            rows.append(row(name, dt, QUICK_RELEASES if quick else RELEASES))
+    write(out / "fence_step.csv", rows)
+    draw(out / "fence_step.png", (11.0, 4.5), lambda figure: picture(figure, rows))
+    most = difference(rows)
+
+    return Number("greatest difference from the shortest step, over its interval", most, high=MOST)
+
+
+if __name__ == "__main__":
+    main(run)

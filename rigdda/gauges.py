@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.constants import NEW_HIT_TIME, OPEN
+from rigdda.constants import AWAKE, END_CHECK, NEW_HIT_TIME, OPEN
 from rigdda.kernel import inlined, kernel
 from rigdda.motion import kinetic_energy
 from rigdda.records import Bodies, Body, Contacts, Gauges, Islands
@@ -64,11 +64,12 @@ def note_hits(
 
 @inlined
 def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> int:
-    """Write a crossing for each station that a centroid first passes; watch energies."""
+    """Write a crossing for each station that a centroid first passes; watch energies and extents."""
     stations = len(gauges.station)
     for i in range(len(gauges.rock)):
         body, rock = bodies[i], gauges.rock[i]
         x = body.x
+        rock.low, rock.high = min(rock.low, x - body.radius), max(rock.high, x + body.radius)
         if gauges.watch_low <= x <= gauges.watch_high:
             rock.energy = max(rock.energy, kinetic_energy(body))
         while rock.next < stations and x >= gauges.station[rock.next].x:
@@ -77,3 +78,18 @@ def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> in
             events = write_event(gauges, events, time, CROSSING, body, i, s, x, y, height)
             rock.next += 1
     return events
+
+
+@kernel
+def is_over(bodies: Bodies, gauges: Gauges, steps: int, blocks: int) -> bool:
+    """Return whether nothing moves any more but what has left `gauges.leave` behind, downhill.
+
+    Looked at every so many steps of the run, so that it ends in the same one however it is called.
+    """
+    if gauges.leave == -math.inf or steps % END_CHECK != 0:
+        return False
+    for i in range(blocks):
+        body = bodies[i]
+        if body.status == AWAKE and not (body.x - body.radius > gauges.leave and body.vx > 0.0):
+            return False
+    return True

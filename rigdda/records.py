@@ -142,6 +142,8 @@ STATION = _record(
 WATCHED = _record(
     next=int,  # first station that it has not passed
     energy=float,  # largest energy in the interval watched [J]
+    low=float,  # least and greatest x that its circle came to [m]
+    high=float,
 )
 """What is known of a block."""
 
@@ -379,6 +381,7 @@ class Gauges(NamedTuple):
     last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
     watch_low: float  # interval of x [m]
     watch_high: float
+    leave: float  # x beyond which what moves on is left alone [m]; -inf: the run is not ended early
     event: NDArray[np.void]
 
 

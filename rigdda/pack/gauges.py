@@ -19,7 +19,11 @@ from rigdda.scene import Scene, Terrain
 
 
 def pack_gauges(
-    scene: Scene, bodies: Bodies, stations: NDArray[np.float64], watch: tuple[float, float]
+    scene: Scene,
+    bodies: Bodies,
+    stations: NDArray[np.float64],
+    watch: tuple[float, float],
+    leave: float,
 ) -> Gauges:
     """Return the gauges, with no station passed that a block starts beyond."""
     blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.ground
@@ -27,6 +31,8 @@ def pack_gauges(
     station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
     rock = np.zeros(blocks, dtype=WATCHED)
     rock["next"] = np.searchsorted(stations, bodies["x"][:blocks], side="right")
+    rock["low"] = bodies["x"][:blocks] - bodies["radius"][:blocks]
+    rock["high"] = bodies["x"][:blocks] + bodies["radius"][:blocks]
     target = np.zeros(barriers, dtype=TARGET)
     target["capacity"] = [b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]
     target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
@@ -40,6 +46,7 @@ def pack_gauges(
         np.full((free_bodies(scene), barriers), -np.inf),
         float(watch[0]),
         float(watch[1]),
+        float(leave),
         np.zeros(room, dtype=EVENT).view(np.recarray),
     )
 

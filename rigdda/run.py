@@ -65,6 +65,8 @@ class Run:
         Energy that each barrier took from the blocks [J], as `BarrierOutcome` says.
     watch_energy : (N,) array
         Largest kinetic energy of each block while its centroid was in the watched interval [J].
+    extent : (N, 2) array
+        Least and greatest chainage that the circle about each block came to [m].
     barrier_poses : (T, B, 3) array
         x, y, theta of the centroid of each barrier's outline; only gravity walls move.
     """
@@ -76,6 +78,7 @@ class Run:
     events: NDArray[np.void]
     absorbed: NDArray[np.float64]
     watch_energy: NDArray[np.float64]
+    extent: NDArray[np.float64]
     barrier_poses: NDArray[np.float64]
 
     def _check(self) -> None:
@@ -88,6 +91,7 @@ class Run:
             "events": self.events.shape[:1],
             "absorbed": (b,),
             "watch_energy": (n,),
+            "extent": (n, 2),
             "barrier_poses": (t, b, 3),
         }
         for name, shape in shapes.items():
@@ -135,6 +139,7 @@ class Run:
                 events=self.events,
                 absorbed=self.absorbed,
                 watch_energy=self.watch_energy,
+                extent=self.extent,
                 barrier_poses=self.barrier_poses,
             )
 

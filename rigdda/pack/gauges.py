@@ -30,9 +30,7 @@ def pack_gauges(
     station = np.zeros(len(stations), dtype=STATION)
     station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
     rock = np.zeros(blocks, dtype=WATCHED)
-    rock["next"] = np.searchsorted(stations, bodies["x"][:blocks], side="right")
-    rock["low"] = bodies["x"][:blocks] - bodies["radius"][:blocks]
-    rock["high"] = bodies["x"][:blocks] + bodies["radius"][:blocks]
+    start_rock(rock, bodies, stations)
     target = np.zeros(barriers, dtype=TARGET)
     target["capacity"] = [b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]
     target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
@@ -49,6 +47,13 @@ def pack_gauges(
         float(leave),
         np.zeros(room, dtype=EVENT).view(np.recarray),
     )
+
+
+def start_rock(rock: NDArray[np.void], bodies: Bodies, stations: NDArray[np.float64]) -> None:
+    """Write where blocks start: between which stations, and their extent."""
+    x, radius = bodies["x"][: len(rock)], bodies["radius"][: len(rock)]
+    rock["next"] = stations.searchsorted(x, side="right")
+    rock["low"], rock["high"] = x - radius, x + radius
 
 
 def _ground(terrain: Terrain | None, x: float) -> float:

@@ -1,8 +1,21 @@
 """Rigid-block discontinuous deformation analysis for the design of rockfall protection."""
 
 from rigdda import sites
-from rigdda.barriers import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Wall
-from rigdda.errors import BadInput, Diverged, Error, SoftContacts
+from rigdda.barriers import (
+    Barrier,
+    Ditch,
+    Embankment,
+    Fence,
+    GravityWall,
+    Layout,
+    Mesh,
+    MeshOption,
+    Wall,
+)
+from rigdda.barriers.files import load_layout, save_layout
+from rigdda.economy import Bill, Consequences, Prices
+from rigdda.errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
+from rigdda.events import Drawn, Event
 from rigdda.loads import BodyForce, LineLoad, PointLoad
 from rigdda.outcome import BarrierOutcome, Outcome
 from rigdda.release import release, release_many, release_outcome
@@ -10,7 +23,8 @@ from rigdda.run import Run
 from rigdda.scene import Block, Scene, Surface
 from rigdda.settings import Settings
 from rigdda.simulation import Simulation, simulate_many
-from rigdda.site import Site, load_layout, save_layout
+from rigdda.site import Site
+from rigdda.source import Source
 from rigdda.supports import Bolt, FixedPoint
 from rigdda.terrain import Terrain
 
@@ -20,26 +34,35 @@ __all__ = [
     "BadInput",
     "Barrier",
     "BarrierOutcome",
+    "Bill",
     "Block",
     "BodyForce",
     "Bolt",
+    "Consequences",
     "Ditch",
     "Diverged",
+    "DoubtfulInput",
+    "Drawn",
     "Embankment",
     "Error",
+    "Event",
     "Fence",
     "FixedPoint",
     "GravityWall",
     "Layout",
     "LineLoad",
+    "Mesh",
+    "MeshOption",
     "Outcome",
     "PointLoad",
+    "Prices",
     "Run",
     "Scene",
     "Settings",
     "Simulation",
     "Site",
     "SoftContacts",
+    "Source",
     "Surface",
     "Terrain",
     "Wall",

@@ -30,8 +30,11 @@ def number(
     Raises
     ------
     BadInput
-        If it is not a number, not finite, beyond `LARGEST` or outside the interval.
+        If it is not a number, not finite, beyond `LARGEST` or outside the interval. Booleans and
+        arrays are no numbers, though Python takes them for such.
     """
+    if isinstance(value, bool | np.bool_ | np.ndarray):
+        raise BadInput(field, value, "give a number")
     try:
         out = float(value)
     except (TypeError, ValueError):
@@ -151,6 +154,34 @@ def integer(field: str, value: Any, low: int, high: float = math.inf) -> int:
         bounds = f"of at least {low}" + (f" and at most {high}" if high < math.inf else "")
         raise BadInput(field, value, f"give a whole number {bounds}")
     return int(value)
+
+
+def interval(
+    field: str,
+    value: Any,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    open_low: bool = False,
+) -> tuple[float, float]:
+    """Return `value` as two numbers in [low, high] that do not fall.
+
+    With `open_low` they are above `low`, and the second is above the first.
+
+    Raises
+    ------
+    BadInput
+        If it is not two such numbers.
+    """
+    try:
+        first, second = value
+    except (TypeError, ValueError):
+        raise BadInput(field, value, "give two numbers [low, high]") from None
+    first = number(field, first, low, high, open_low=open_low)
+    second = number(field, second, low, high, open_low=open_low)
+    if second < first or (open_low and second == first):
+        raise BadInput(field, value, "give the lesser number first, then the greater")
+    return first, second
 
 
 def vector(field: str, value: Sequence[float]) -> tuple[float, float]:

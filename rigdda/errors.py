@@ -47,3 +47,7 @@ class Diverged(Error, RuntimeError):
 
 class SoftContacts(UserWarning):
     """A result leans on contacts whose penalty stiffness is too small for the load they carry."""
+
+
+class DoubtfulInput(UserWarning):
+    """Something a user wrote is allowed and hardly meant; the message names field and mend."""

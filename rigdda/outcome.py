@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rigdda.barriers import Barrier, Ditch, Embankment, GravityWall
 from rigdda.geometry import polygon_properties
 from rigdda.run import Run
+from rigdda.scene import Scene
 from rigdda.site import Site
 
 GRAIN = 2.0**40
@@ -78,8 +79,21 @@ class Outcome:
 
     Parameters
     ----------
+    event : str
+        Name of the event.
+    width : float
+        Its width along the road [m].
     released_mass : float
         Mass of all blocks that could move [kg per metre of width].
+    released_volume : float
+        Volume of all blocks that could move, their area times the width [m3].
+    road_volume : float
+        Of this, volume of the blocks whose centroid ever passed the uphill edge of the road [m3].
+    reached : bool
+        Whether any did.
+    reach : (low, high)
+        Chainages between which all blocks stayed, corners included [m]: barriers wholly outside
+        change nothing.
     debris_fraction : float
         Share of the released mass whose centroid ever passed the uphill edge of the road, in the
         air included: what the reward measures.
@@ -88,7 +102,8 @@ class Outcome:
     max_energy_on_road : float
         Largest kinetic energy of a block over the road [J].
     run_out : tuple of float
-        Chainages that 50, 95 and 100 % of the mass have not passed at the end [m].
+        Chainages that 50, 95 and 100 % of the mass have not passed at the end [m], at most that of
+        the downhill edge of the road: a release is over when nothing moves but what goes on there.
     slope_fraction, held_fraction, road_fraction, beyond_fraction : float
         Where the mass is at the end, by centroid; they add up to 1 exactly. Held: uphill of a
         barrier that stands and below the line that rises uphill from its top at the angle of
@@ -99,7 +114,13 @@ class Outcome:
         One for each barrier of the layout.
     """
 
+    event: str
+    width: float
     released_mass: float
+    released_volume: float
+    road_volume: float
+    reached: bool
+    reach: tuple[float, float]
     debris_fraction: float
     debris_on_road: float
     max_energy_on_road: float
@@ -121,8 +142,22 @@ def watch(site: Site) -> tuple[float, float]:
     return site.road.start, site.road.end
 
 
-def measure(site: Site, run: Run) -> Outcome:
-    """Return the outcome of a run that watched `stations` and `watch` of its site and layout."""
+def leave(site: Site, scene: Scene) -> float:
+    """Return the chainage beyond which a block that moves on downhill matters no more [m].
+
+    Beyond the road, and from where on the ground does not rise, so that nothing rolls back.
+    """
+    ground = scene.ground or site.profile
+    x, y = ground.points[:, 0], ground.points[:, 1]
+    rising = np.flatnonzero(np.diff(y) > 0.0)
+    return max(site.road.end, float(x[rising[-1] + 1]) if len(rising) else -math.inf)
+
+
+def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
+    """Return the outcome of a run that watched `stations` and `watch` of its site and layout.
+
+    It is one of an event, so wide [m].
+    """
     scene = run.scene
     area, weight, mass = _masses(run)
     lines = stations(site, scene.barriers)
@@ -132,17 +167,24 @@ def measure(site: Site, run: Run) -> Outcome:
     road = (x >= site.road.start) & ~beyond
     reach = [_reach(run, i, x, y) for i in range(len(scene.barriers))]
     held = np.any([np.zeros(len(x), dtype=bool), *reach], axis=0) & ~road & ~beyond
+    came = np.isfinite(passed[site.road.start])
     resting = np.hypot(*run.velocities[-1, :, :2].T) < AT_REST
 
     def share(where: NDArray[np.bool_]) -> float:
         return float(weight[where].sum() / GRAIN)
 
     return Outcome(
+        event=event,
+        width=width,
         released_mass=mass,
-        debris_fraction=share(np.isfinite(passed[site.road.start])),
+        released_volume=width * float(area[weight > 0.0].sum()),
+        road_volume=width * float(area[came].sum()),
+        reached=bool(came.any()),
+        reach=(float(run.extent[:, 0].min()), float(run.extent[:, 1].max())),
+        debris_fraction=share(came),
         debris_on_road=float(area[road].sum()),
         max_energy_on_road=float(run.watch_energy.max()),
-        run_out=_run_out(x, weight),
+        run_out=_run_out(np.minimum(x, site.road.end), weight),
         slope_fraction=share(~(held | road | beyond)),
         held_fraction=share(held),
         road_fraction=share(road),

@@ -25,12 +25,13 @@ import shapely
 from numpy.typing import NDArray
 
 from rigdda import check
-from rigdda.barriers import Ditch, GravityWall
+from rigdda.barriers import Ditch, GravityWall, describe
 from rigdda.errors import BadInput, Error
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
 from rigdda.run import CROSSING, Run
 from rigdda.scene import Scene
+from rigdda.states import STANDS, states
 
 Floats = NDArray[np.float64]
 Colour = tuple[int, int, int]
@@ -45,6 +46,9 @@ MOVING = 0.1
 CAMERA = 1000.0
 """Distance of the camera [m]: one pixel is one metre, and a layer shifts a point by 1e-5."""
 LAYER = {"terrain": 0.0, "barriers": 0.02, "road": 0.04, "blocks": 0.06}
+LABEL = 0.05
+"""Height of a label above the top of its barrier, as a share of the view; every third is as
+high."""
 EDGE = 0.01
 """z of a layer, and of an outline above its fill [m]."""
 
@@ -52,6 +56,7 @@ SKY: Colour = (233, 240, 246)
 GROUND: Colour = (201, 188, 165)
 BARRIER: Colour = (28, 90, 160)
 BROKEN: Colour = (176, 182, 188)
+FAILED: Colour = (214, 40, 70)
 ROAD: Colour = (232, 93, 4)
 ROCK: tuple[Colour, ...] = ((104, 88, 74), (128, 108, 90), (88, 80, 76), (146, 122, 98))
 INK: Colour = (40, 34, 30)
@@ -78,6 +83,9 @@ class Marks:
         Words about the episode: seed, layout, reward, objective.
     title : str
         Name of the recording.
+    labels : sequence of str
+        What each barrier of the scene is called, a fence with its class; without any, the words
+        that the scene has for them.
 
     Raises
     ------
@@ -88,6 +96,7 @@ class Marks:
     road: tuple[float, float] | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     title: str = "rockfall"
+    labels: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         if self.road is None:
@@ -182,8 +191,10 @@ def log_run(
         return columns
 
     _log_setting(rec, f"{root}/world", run.scene, marks)
-    for i in range(len(run.scene.barriers)):
+    labels = marks.labels or [describe(barrier) for barrier in run.scene.barriers]
+    for i, label in enumerate(labels):
         _log_barrier(rec, f"{root}/world/barriers/{i}", clock, run, i)
+        _log_state(rec, f"{root}/world/labels/{i}", clock, run, i, label)
     for i in range(len(run.scene.blocks)):
         _log_block(rec, f"{root}/world/blocks/{i}", clock, run, i)
     for name, values in _scalars(run, marks).items():
@@ -225,7 +236,7 @@ def _log_setting(rec: rr.RecordingStream, world: str, scene: Scene, marks: Marks
 
 
 def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i: int) -> None:
-    """Log barrier `i`: a gravity wall moves, a failed fence turns pale, a ditch is a line."""
+    """Log barrier `i`: a gravity wall moves, what fails turns pale, a ditch is a line."""
     barrier, z = run.scene.barriers[i], LAYER["barriers"]
     outline = run.scene.outline(i)
     if isinstance(barrier, Ditch):
@@ -244,6 +255,29 @@ def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i
     if np.isfinite(failure):
         when = clock([run.times[0], failure])
         rec.send_columns(entity, when, rr.Mesh3D.columns(albedo_factor=[BARRIER, BROKEN]))
+
+
+def _log_state(
+    rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i: int, label: str
+) -> None:
+    """Log what barrier `i` is and in which state, over time, above its top."""
+    outline, changes = run.scene.outline(i), states(run, i)
+    x, top = float(outline[:, 0].mean()), float(outline[:, 1].max())
+    left, bottom, right, high = _frame(run.scene)
+    lift = LABEL * max(right - left, high - bottom) * (1 + i % 3)
+    place = (x, top + lift, LAYER["blocks"] + EDGE)
+    colours = [BARRIER if state == STANDS else FAILED for _, state in changes]
+    rec.send_columns(
+        entity,
+        clock([time for time, _ in changes]),
+        rr.Points3D.columns(
+            positions=[place] * len(changes),
+            labels=[f"{label}: {state}" for _, state in changes],
+            colors=colours,
+            radii=[rr.Radius.ui_points(3.0)] * len(changes),
+            show_labels=[True] * len(changes),
+        ),
+    )
 
 
 def _log_motion(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
 
+import msgspec
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,7 @@ from shapely.validation import explain_validity
 
 from rigdda import check
 from rigdda.apart import check_apart, deepest, in_ground
-from rigdda.barriers import Barrier, Earthwork, GravityWall, Layout, Wall, earthworks
+from rigdda.barriers import Barrier, Built, Earthwork, GravityWall, Layout, Mesh, Wall, earthworks
 from rigdda.errors import BadInput
 from rigdda.geometry import clearly_convex, edges, is_convex, polygon_properties
 from rigdda.loads import Load
@@ -24,8 +25,7 @@ from rigdda.terrain import Terrain
 __all__ = ["Barrier", "Block", "Layout", "Scene", "Surface", "Terrain", "Wall", "simple_polygon"]
 
 
-@dataclass(frozen=True, slots=True)
-class Surface:
+class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Strength and rebound of a surface.
 
     Parameters
@@ -110,10 +110,33 @@ class Block:
         object.__setattr__(self, "velocity", (vx, vy, omega))
         object.__setattr__(self, "fixed", bool(fixed))
 
+    @classmethod
+    def sound(
+        cls,
+        corners: Sequence[tuple[float, float]],
+        density: float,
+        surface: str,
+        velocity: tuple[float, float, float],
+    ) -> Block:
+        """Return a block of finite floats that are known to be sound, unchecked.
+
+        Corners anticlockwise, of a simple polygon. Checks take longer than all else in drawing a
+        release of one block.
+        """
+        block = object.__new__(cls)
+        vertices = np.array(corners)
+        vertices.setflags(write=False)
+        object.__setattr__(block, "vertices", vertices)
+        object.__setattr__(block, "density", density)
+        object.__setattr__(block, "surface", surface)
+        object.__setattr__(block, "velocity", velocity)
+        object.__setattr__(block, "fixed", False)
+        return block
+
 
 MEMBERS = (
     ("blocks", Block, "rigdda.Block"),
-    ("barriers", Barrier, "barriers: rigdda.Wall, GravityWall, Fence, Ditch or Embankment"),
+    ("barriers", Built, "barriers: rigdda.Wall, GravityWall, Fence, Ditch or Embankment"),
     ("loads", Load, "loads: rigdda.PointLoad, LineLoad or BodyForce"),
     ("supports", Support, "supports: rigdda.FixedPoint or Bolt"),
 )
@@ -206,10 +229,12 @@ class Scene:
         blocks: Sequence[Block],
         surfaces: Mapping[str, Surface] | None = None,
         interfaces: Mapping[tuple[str, str], Surface] | None = None,
+        barriers: Sequence[Built] | None = None,
     ) -> Scene:
-        """Return the scene with other blocks, and other properties of the surfaces of that name.
+        """Return the scene with other blocks and other properties of the surfaces of that name.
 
-        The ground and what stands on it are not built and checked again.
+        The ground and what stands on it are not built and checked again; `barriers` are those of
+        the scene but for what they resist.
 
         Raises
         ------
@@ -226,6 +251,10 @@ class Scene:
             object.__setattr__(other, "surfaces", surfaces)
         if interfaces is not None:
             object.__setattr__(other, "interfaces", interfaces)
+        if barriers is not None:
+            moved = {b: self._moved[a] for a, b in zip(self.barriers, barriers) if a in self._moved}
+            object.__setattr__(other, "barriers", tuple(barriers))
+            object.__setattr__(other, "_moved", moved)
         other._check_blocks()
         for i, block in enumerate(other.blocks):
             other._known(f"block {i}: surface", block.surface)
@@ -308,7 +337,7 @@ class Scene:
         what = self.barriers[barrier]
         if isinstance(what, Earthwork):
             return self._moved[what]
-        assert self.ground is not None
+        assert self.ground is not None and not isinstance(what, Mesh)
         if barrier not in self._outlines:
             corners = what.outline(self.ground)
             corners.setflags(write=False)

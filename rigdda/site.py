@@ -6,125 +6,72 @@ import os
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
-import shapely
 import tomli_w
 
-from rigdda import check, sites
-from rigdda.barriers import (
-    Barrier,
-    Ditch,
-    Earthwork,
-    Embankment,
-    Fence,
-    GravityWall,
-    Layout,
-    as_layout,
-    earthworks,
-    from_table,
-    section,
-    to_tables,
-)
+from rigdda import boulders, check, economy, sites
+from rigdda.barriers import Barrier, Built, Mesh, MeshOption, as_layout
+from rigdda.economy import Bill, Consequences, Prices
 from rigdda.errors import BadInput
+from rigdda.events import Drawn, Event
 from rigdda.files import atomic, read
-from rigdda.geometry import overlap
+from rigdda.place import BarrierZone, Interface, Motion, Road, Scatter, Slope, Stretch
 from rigdda.scene import Block, Scene, Surface
 from rigdda.settings import Settings
-from rigdda.source import NEAR, Point, Source
+from rigdda.soundness import check_site
+from rigdda.source import Point, Source
 from rigdda.terrain import Terrain
+
+if TYPE_CHECKING:
+    from rigdda.outcome import Outcome
 
 STEEPEST_DEG = 85.0
 """Friction angle up to which scatter may raise that of a surface [deg]."""
 
-
-class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The ground: corners from the crest down to beyond the road, x growing downhill [m].
-
-    It may have overhangs, as the base of a toppling slope has; earthworks need ground without.
-    `surface` names the surface of every segment, `toe` is the chainage where the slope ends [m].
-    """
-
-    points: tuple[Point, ...]
-    toe: float
-    surface: str = "rock"
+STEEP_SIDES, FLAT_SIDE = {"rock": 0.25}, 0.67
+"""Side slope of a ditch, run over rise [-], by the surface that it is cut in: 4:1 stands in rock;
+all else is taken for soil."""
 
 
-class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The road: chainage of its uphill and its downhill edge [m]."""
+class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A slope, its loose rock and how often it falls, the road below, and what protection costs.
 
-    start: float
-    end: float
-
-
-class BarrierZone(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where barriers may stand [m] and how large they may be.
-
-    Height of all kinds but ditches [m]; thickness of walls, the width of an embankment's crest
-    included [m]; capacity of fences [J per metre of width]; depth and width of ditches [m].
-    """
-
-    start: float
-    end: float
-    max_height: float = 4.0
-    min_thickness: float = 0.5
-    max_thickness: float = 2.0
-    min_capacity: float = 1e5
-    max_capacity: float = 5e6
-    max_depth: float = 2.0
-    min_width: float = 2.0
-    max_width: float = 6.0
-
-
-class Costs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Prices of barriers per metre of slope width, in relative units: a user's table.
-
-    ============  =========================================================================
-    wall          (base + square height^2) (1 + thickness) / 2: it rises faster than height
-    gravity wall  base + gravity_wall height thickness: by its concrete
-    fence         base + fence height^2 (capacity / 1 MJ)^0.45: posts bend as height^2
-    ditch         base + ditch area: by what is dug out [m2]
-    embankment    base + embankment area: by what is filled in [m2]
-    ============  =========================================================================
-
-    All times `off_toe` uphill of the toe, where access is dear. `limit` is the budget of a layout.
-    Prices of fences rise about as E^0.45 (150, 270, 430, 600 per m2 at 0.25, 1, 3, 5 MJ, from
-    memory); the others are plausible beside them: one unit is what a square metre of a 1 MJ fence
-    costs that is 3 m high.
-    """
-
-    base: float = 1.0
-    square: float = 1.0
-    off_toe: float = 1.5
-    limit: float = 40.0
-    gravity_wall: float = 1.5
-    fence: float = 0.35
-    ditch: float = 0.5
-    embankment: float = 0.3
-
-
-class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How releases are computed: damping [1/s], simulated time [s] and time step [s]."""
-
-    damping: float = 0.0
-    damping_when: str = "always"
-    duration: float = 25.0
-    dt: float = 5e-3
-
-
-class Scatter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What varies at random from release to release, beside the joints.
-
-    Standard deviation of the friction angles [deg], all surfaces together.
-    """
-
-    friction_deg: float = 0.0
-
-
-class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A slope, its loose rock, the road below, and where barriers may stand.
+    Parameters
+    ----------
+    name : str
+        Its name.
+    description : str
+        What it is, and what of it is assumed.
+    family : str
+        Family of sites that it belongs to; "paper" for scenes of publications.
+    slope : table
+        The ground.
+    sources : tables
+        Where rock starts.
+    events : tables
+        What comes down and how often. By default each source that is no band, once a year.
+    road : table
+        The road.
+    barrier_zone : table
+        Where barriers may stand.
+    surfaces : tables
+        The surfaces, by name: friction_deg, cohesion, tension, restitution. "soil" is that of
+        embankments, "concrete" that of walls and fences, "rock" where they are missing.
+    interfaces : tables
+        How two surfaces meet.
+    prices : table
+        What barriers cost.
+    consequences : table
+        What rock on the road costs.
+    meshes : tables
+        Mesh that may be hung over the face.
+    motion : table
+        How releases are computed.
+    scatter : table
+        What varies at random.
 
     Raises
     ------
@@ -134,97 +81,29 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     name: str
     description: str
+    family: str = ""
     slope: Slope
-    source: Source
+    sources: tuple[Source, ...]
+    events: tuple[Event, ...] = ()
     road: Road
     barrier_zone: BarrierZone
     surfaces: dict[str, Surface]
-    costs: Costs = Costs()
+    interfaces: tuple[Interface, ...] = ()
+    prices: Prices = msgspec.field(default_factory=Prices)
+    consequences: Consequences = Consequences()
+    meshes: tuple[MeshOption, ...] = ()
     motion: Motion = Motion()
     scatter: Scatter = Scatter()
 
     def __post_init__(self) -> None:
-        self._check_slope()
-        self._check_source()
-        self._check_zone()
-        for group, label in ((self.costs, "costs"), (self.motion, "motion")):
-            for field in group.__struct_fields__:
-                value = getattr(group, field)
-                if field != "damping_when":
-                    check.number(f"{label}.{field}", value, 0.0)
-        check.number("costs.limit", self.costs.limit, 0.0, open_low=True)
-        check.one_of("motion.damping_when", self.motion.damping_when, ("always", "contact"))
-        check.number("motion.duration", self.motion.duration, 0.0, open_low=True)
-        check.number("scatter.friction_deg", self.scatter.friction_deg, 0.0, 10.0)
-        self.settings()
-
-    def _check_slope(self) -> None:
-        points = check.points("slope.points", self.slope.points, 2)
-        x, (low, high) = points[:, 0], points[[0, -1], 0]
-        if not (low < high and (low <= x).all() and (x <= high).all()) or (
-            points[0, 1] <= points[-1, 1]
-        ):
-            raise BadInput(
-                "slope.points",
-                f"{len(points)} points",
-                "list them downhill, the one of least x first, the one of greatest x last",
-            )
-        check.number("slope.toe", self.slope.toe, low, high)
-        check.number("road.start", self.road.start, low, high)
-        check.number("road.end", self.road.end, low, high)
-        if self.road.end <= self.road.start:
-            raise BadInput("road.end", self.road.end, f"put it beyond road.start {self.road.start}")
-        for where, name in (("slope", self.slope.surface), ("source", self.source.surface)):
-            check.one_of(f"{where}.surface", name, self.surfaces)
-
-    def _check_source(self) -> None:
-        chain = self.profile.points
-        deep = chain[:, 1].min() - 1.0
-        ground = shapely.Polygon([*chain, (chain[-1, 0], deep), (chain[0, 0], deep)])
-        for where, piece in self.source.pieces():
-            rock = shapely.Polygon(piece)
-            left, _, right, _ = rock.bounds
-            if left < chain[0, 0]:
-                raise BadInput(where, piece, f"put it beyond the crest at {chain[0, 0]:g}")
-            if right >= self.road.start:
-                raise BadInput(where, piece, f"put it uphill of the road at {self.road.start:g}")
-            sunk = overlap(rock, ground)
-            if sunk > NEAR * rock.length:
-                corners = shapely.points(piece)
-                depth = shapely.distance(ground.exterior, corners) * ground.contains(corners)
-                corner = int(depth.argmax())
-                raise BadInput(
-                    f"{where}[{corner}]",
-                    piece[corner],
-                    f"raise it out of the ground, in which {sunk:g} m2 of the rock are",
-                )
-
-    def _check_zone(self) -> None:
-        zone = self.barrier_zone
-        check.number("barrier_zone.start", zone.start, self.slope.points[0][0])
-        check.number("barrier_zone.end", zone.end, zone.start, self.road.start, open_low=True)
-        check.number("barrier_zone.max_height", zone.max_height, 0.5, open_low=True)
-        check.number("barrier_zone.min_thickness", zone.min_thickness, 0.0, open_low=True)
-        check.number("barrier_zone.max_thickness", zone.max_thickness, zone.min_thickness)
-        check.number("barrier_zone.min_capacity", zone.min_capacity, 0.0, open_low=True)
-        check.number("barrier_zone.max_capacity", zone.max_capacity, zone.min_capacity)
-        check.number("barrier_zone.max_depth", zone.max_depth, 0.5, open_low=True)
-        check.number("barrier_zone.min_width", zone.min_width, 0.0, open_low=True)
-        check.number("barrier_zone.max_width", zone.max_width, zone.min_width)
-        ground, corners = self.profile, {float(x) for x, _ in self.slope.points}
-        x = sorted({zone.start, zone.end} | {at for at in corners if zone.start < at < zone.end})
-        foot = [(at, ground.height(at)) for at in x]
-        over = [(at, y + zone.max_height) for at, y in reversed(foot)]
-        room = shapely.Polygon([*foot, *over])
-        for where, piece in self.source.pieces():
-            taken = shapely.intersection(room, shapely.Polygon(piece))
-            if taken.area > NEAR * taken.length:
-                mend = f"put it beyond {taken.bounds[2]:g}: {where} is where barriers may stand"
-                raise BadInput("barrier_zone.start", zone.start, mend)
+        if not self.events:
+            usual = tuple(Event(s.name, 1.0, s.name) for s in self.sources)
+            msgspec.structs.force_setattr(self, "events", usual)
+        check_site(self)
 
     @classmethod
     def load(cls, source: str | os.PathLike[str]) -> Site:
-        """Read a site from a TOML file, or a built-in one by its name.
+        """Read a site from a TOML file, or a built-in or generated one by its name.
 
         Raises
         ------
@@ -234,150 +113,310 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not isinstance(source, str | os.PathLike):
             raise BadInput("site", source, "name a TOML file or a built-in site")
         path = Path(source)
-        if path.suffix == ".toml" or path.is_file():
-            if not path.is_file():
-                raise BadInput("site", str(source), "name an existing TOML file")
-            text = read("site file", path)
-        else:
-            text = sites.text(check.one_of("site", str(source), sites.names()))
+        if path.suffix != ".toml" and not path.is_file():
+            return sites.load(str(source))
+        if not path.is_file():
+            raise BadInput("site", str(source), "name an existing TOML file")
+        return cls.parse(read("site file", path), str(source))
+
+    @classmethod
+    def parse(cls, text: str, name: str) -> Site:
+        """Return the site of a TOML text; errors call the file `name`.
+
+        Raises
+        ------
+        BadInput
+            If it is not a sound site.
+        """
         try:
             return msgspec.toml.decode(text, type=cls)
         except msgspec.ValidationError as error:
             if isinstance(error.__cause__, BadInput):
                 raise error.__cause__ from None
-            raise BadInput("site file", str(source), str(error)) from None
+            raise BadInput("site file", name, str(error)) from None
         except (msgspec.DecodeError, RecursionError) as error:
-            raise BadInput("site file", str(source), f"mend its TOML: {error}") from None
+            raise BadInput("site file", name, f"mend its TOML: {error}") from None
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the site as TOML; `load` gives it back."""
+        data = msgspec.to_builtins(self)
+        for table in (*data["sources"], *data["events"]):  # TOML has no null
+            for name in [name for name, value in table.items() if value is None]:
+                del table[name]
         with atomic(path) as part:
-            part.write_text(tomli_w.dumps(msgspec.to_builtins(self)), encoding="utf-8")
+            part.write_text(tomli_w.dumps(data), encoding="utf-8")
 
     @property
     def profile(self) -> Terrain:
-        """The ground as a terrain."""
-        return _ground(tuple(map(tuple, self.slope.points)), self.slope.surface)
+        """The ground as a terrain, with a corner wherever its surface changes."""
+        return _ground(self.slope.points, self.slope.surface, self.slope.surfaces)
+
+    @property
+    def event_names(self) -> tuple[str, ...]:
+        """Names of the events."""
+        return tuple(event.name for event in self.events)
+
+    def event(self, name: str) -> Event:
+        """Return an event by its name.
+
+        Raises
+        ------
+        BadInput
+            If there is none.
+        """
+        return self.events[self._index(name)]
+
+    def _index(self, name: str) -> int:
+        for i, event in enumerate(self.events):
+            if event.name == name:
+                return i
+        raise BadInput("event", name, "choose one of " + ", ".join(self.event_names))
+
+    def source(self, name: str) -> Source:
+        """Return a source by its name.
+
+        Raises
+        ------
+        BadInput
+            If there is none.
+        """
+        for source in self.sources:
+            if source.name == name:
+                return source
+        raise BadInput("source", name, "choose one of " + ", ".join(s.name for s in self.sources))
+
+    def events_of(self, source: Source) -> list[Event]:
+        """Return the events that come from a source."""
+        return [event for event in self.events if event.source == source.name]
+
+    def pick(self, seed: int) -> str:
+        """Return the name of the event that a seed draws by rate."""
+        rates = np.array([event.rate for event in self.events])
+        rng = np.random.default_rng([check.integer("seed", seed, 0), len(rates)])
+        return self.events[rng.choice(len(rates), p=rates / rates.sum())].name
+
+    @property
+    def rooms(self) -> tuple[tuple[float, float], ...]:
+        """Intervals of the zone in which barriers may stand [m]: those without loose rock.
+
+        Around a band so much is left out as its largest block reaches beyond it.
+        """
+        start, end = self.barrier_zone.start, self.barrier_zone.end
+        found = []
+        for low, high in sorted(self._taken()):
+            if start < min(low, end):
+                found.append((start, min(low, end)))
+            start = max(start, high)
+        return (*found, (start, end)) if start < end else tuple(found)
+
+    def _taken(self) -> list[tuple[float, float]]:
+        """Return the intervals that loose blocks of bands may take up [m]."""
+        found = []
+        for source in self.sources:
+            if source.band is not None:
+                reaches = (boulders.reach(source, event) for event in self.events_of(source))
+                reach = max(reaches, default=0.0)
+                found.append((source.band[0] - reach, source.band[1] + reach))
+        return found
 
     def settings(self) -> Settings:
         """Return the numerical settings of this site's releases."""
         return Settings(dt=self.motion.dt)
 
-    def realise(self, layout: Sequence[Barrier] = (), seed: int = 0) -> Scene:
-        """Return the scene of one release: the joints and friction that `seed` draws.
-
-        The release is the same for every layout.
+    def draw(self, seed: int = 0, event: str | None = None) -> Drawn:
+        """Return what a seed draws of an event, or of one that it draws by rate.
 
         Raises
         ------
         BadInput
-            If a barrier does not stand on the slope or the seed is not a whole number >= 0.
+            If there is no such event, or the seed is not a whole number >= 0.
         """
-        shift, blocks = _drawn(msgspec.json.encode(self.source), check.integer("seed", seed, 0))
-        shift *= self.scatter.friction_deg
+        seed = check.integer("seed", seed, 0)
+        name = self.pick(seed) if event is None else event
+        index = self._index(name)
+        what = self.events[index]
+        rock = self.source(what.source)
+        if rock.band is None:
+            normal, blocks = _cut(msgspec.json.encode(rock), seed, index)
+            width = what.width_of([])
+        else:
+            rng = np.random.default_rng([seed, index])
+            normal = rng.standard_normal()
+            ground = boulders.line(self.slope.points)
+            areas, drawn = boulders.draw(rng, rock, what, ground)
+            blocks, width = tuple(drawn), what.width_of(areas)
+        return Drawn(name, blocks, width, normal * self.scatter.friction_deg)
+
+    def realise(
+        self, layout: Sequence[Barrier] = (), seed: int = 0, event: str | None = None
+    ) -> Scene:
+        """Return the scene of one release of an event, or of one that the seed draws by rate.
+
+        Blocks and friction are the same for every layout. Mesh is not part of a scene.
+
+        Raises
+        ------
+        BadInput
+            If a barrier does not stand on the slope or stands where loose rock lies, there is no
+            such event, or the seed is not a whole number >= 0.
+        """
+        drawn = self.draw(seed, event)
+        return self.scene(drawn, self.built(layout, drawn.width))
+
+    def built(self, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
+        """Return what stands of a layout, as it resists an event of this width [m].
+
+        Raises
+        ------
+        BadInput
+            If a barrier stands where loose rock lies, or a mesh is not one of the options.
+        """
+        standing: list[Built] = []
+        taken = self._taken()
+        for i, barrier in enumerate(as_layout(layout)):
+            if isinstance(barrier, Mesh):
+                self.mesh(barrier)
+                continue
+            for low, high in taken:
+                if barrier.x < high and barrier.x + barrier.extent > low:
+                    mend = f"put it outside x = {low:.2f} to {high:.2f}, where loose rock lies"
+                    raise BadInput(f"barriers[{i}].x", barrier.x, mend)
+            standing.append(barrier.for_width(width))
+        return tuple(standing)
+
+    def scene(self, drawn: Drawn, barriers: Sequence[Built] = ()) -> Scene:
+        """Return the scene of what was drawn, with barriers as `built` gives them."""
+        surfaces, interfaces = self.strength(drawn.friction_deg)
         return Scene(
             terrain=self.profile,
-            blocks=blocks,
-            surfaces={
-                name: Surface(
-                    min(max(s.friction_deg + shift, 0.0), max(s.friction_deg, STEEPEST_DEG)),
-                    s.cohesion,
-                    s.tension,
-                    s.restitution,
-                )
-                for name, s in self.surfaces.items()
-            },
-            barriers=as_layout(layout),
+            blocks=drawn.blocks,
+            surfaces=surfaces,
+            interfaces=interfaces,
+            barriers=tuple(barriers),
             damping=self.motion.damping,
             damping_when=self.motion.damping_when,
         )
 
-    def cost(self, layout: Sequence[Barrier]) -> float:
-        """Return the price of a layout per metre of slope width, in the units of `costs`.
+    def strength(
+        self, shift: float
+    ) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+        """Return the surfaces and how pairs meet, with all friction angles shifted [deg]."""
+        surfaces = {name: _shifted(s, shift) for name, s in self.surfaces.items()}
+        return surfaces, {pair: _shifted(s, shift) for pair, s in self.pairs().items()}
+
+    def pairs(self) -> dict[tuple[str, str], Surface]:
+        """Return the surfaces of contacts: of rock with the ground the ground's, unless said."""
+        grounds = {self.slope.surface, *(s.surface for s in self.slope.surfaces)}
+        if "soil" in self.surfaces:
+            grounds.add("soil")  # embankments are ground
+        rocks = {source.surface for source in self.sources}
+        found = {(r, g): self.surfaces[g] for r in sorted(rocks) for g in sorted(grounds) if r != g}
+        for pair in self.interfaces:
+            found.pop((pair.second, pair.first), None)
+            found[pair.first, pair.second] = pair.surface
+        return found
+
+    @property
+    def soil(self) -> str:
+        """Name of the surface of embankments."""
+        usual = "concrete" if "concrete" in self.surfaces else "rock"
+        return "soil" if "soil" in self.surfaces else usual
+
+    def ditch_side(self, x: float, width: float) -> float:
+        """Return the side slope of a ditch [-], the flattest of the ground that it is cut in."""
+        points, names = self.slope.chain()
+        ends = zip(points, points[1:], names, strict=False)
+        spanned = {name for (a, _), (b, _), name in ends if a < x + width and b > x}
+        return max((STEEP_SIDES.get(name, FLAT_SIDE) for name in spanned), default=FLAT_SIDE)
+
+    def access(self, x: float) -> float:
+        """Return the factor on prices at a chainage: dearer the higher above the road [-]."""
+        rise = self.profile.height(x) - self.profile.height(self.road.start)
+        return 1.0 + self.prices.access * max(rise, 0.0) / economy.ACCESS_HEIGHT
+
+    def mesh(self, mesh: Mesh) -> MeshOption:
+        """Return the option that a mesh is.
 
         Raises
         ------
         BadInput
-            If a ditch or an embankment does not fit.
+            If the site has no such option.
+        """
+        for option in self.meshes:
+            if option.name == mesh.option:
+                return option
+        known = ", ".join(option.name for option in self.meshes) or "none: this site has no mesh"
+        raise BadInput("mesh option", mesh.option, f"choose one of {known}")
+
+    def rate(self, event: str, layout: Sequence[Barrier] = ()) -> float:
+        """Return how often an event happens with the mesh of a layout [1/year per metre of slope].
+
+        Raises
+        ------
+        BadInput
+            If there is no such event or mesh option, or an option is there twice.
+        """
+        rate, used = self.event(event).rate / 100.0, set()
+        for barrier in layout:
+            if isinstance(barrier, Mesh):
+                if barrier.option in used:
+                    raise BadInput("mesh option", barrier.option, "hang each option once")
+                used.add(barrier.option)
+                rate *= self.mesh(barrier).factors.get(event, 1.0)
+        return rate
+
+    def capital(self, layout: Sequence[Barrier]) -> float:
+        """Return what a layout costs to build [EUR per metre of road].
+
+        Raises
+        ------
+        BadInput
+            If an earthwork does not fit, or a barrier has no price.
+        """
+        return float(sum(economy.capitals(self, as_layout(layout))))
+
+    def annual(self, layout: Sequence[Barrier]) -> float:
+        """Return what a layout costs a year, upkeep included [EUR per metre of road and year].
+
+        Raises as `capital` does.
         """
         standing = as_layout(layout)
-        _, moved = earthworks(self.profile, standing, self.slope.surface)
-        off_toe = self.costs.off_toe
-        return float(
-            sum(
-                self._price(b, section(moved[b]) if isinstance(b, Earthwork) else 0.0)
-                * (off_toe if b.x < self.slope.toe else 1.0)
-                for b in standing
-            )
-        )
+        each = zip(standing, economy.capitals(self, standing), strict=True)
+        return float(sum(price * self.prices.annual(b.kind) for b, price in each))
 
-    def _price(self, barrier: Barrier, area: float) -> float:
-        """Return the price of a barrier at the toe; `area` of earth is moved for it [m2]."""
-        c = self.costs
-        match barrier:
-            case GravityWall():
-                return c.base + c.gravity_wall * barrier.height * barrier.thickness
-            case Fence():
-                return c.base + c.fence * barrier.height**2 * (barrier.capacity / 1e6) ** 0.45
-            case Ditch():
-                return c.base + c.ditch * area
-            case Embankment():
-                return c.base + c.embankment * area
-        return (c.base + c.square * barrier.height**2) * (1.0 + barrier.thickness) / 2.0
+    def bill(self, layout: Sequence[Barrier], outcome: Outcome) -> Bill:
+        """Return what a release with a layout costs [EUR per occurrence of its event]."""
+        return economy.bill(self, as_layout(layout), outcome)
+
+    def shed(self) -> float:
+        """Return what a rock shed over the road costs a year [EUR per metre of road and year].
+
+        A reference: nothing reaches the road below it.
+        """
+        return self.prices.shed * self.prices.annual("shed")
 
 
 @lru_cache(maxsize=256)
-def _ground(points: tuple[Point, ...], surface: str) -> Terrain:
+def _ground(points: tuple[Point, ...], surface: str, stretches: tuple[Stretch, ...]) -> Terrain:
     """Return the terrain of a slope; it is asked for several times in every episode."""
-    return Terrain(points, (surface,) * (len(points) - 1))
+    return Terrain(*Slope(points, 0.0, surface, stretches).chain())
 
 
 @lru_cache(maxsize=4096)
-def _drawn(source: bytes, seed: int) -> tuple[float, tuple[Block, ...]]:
-    """Return what a seed draws: a standard normal number and the blocks of a source, as JSON.
+def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]]:
+    """Return what a seed draws of a mass, as JSON: a standard normal number and its blocks.
 
     Cutting takes as long as simulating a small release, and a search asks for the same releases
     again and again; one takes about 10 kB.
     """
-    rng, rock = np.random.default_rng(seed), msgspec.json.decode(source, type=Source)
+    rng, rock = np.random.default_rng([seed, event]), msgspec.json.decode(source, type=Source)
     normal = rng.standard_normal()
-    cells = rock.draw(rng)
-    return normal, tuple(Block(c, density=rock.density, surface=rock.surface) for c in cells)
+    return normal, tuple(Block(c, rock.density, rock.surface) for c in rock.cut(rng))
 
 
-def load_layout(path: str | os.PathLike[str]) -> Layout:
-    """Read a layout from a TOML or JSON file with one table `barriers` a barrier.
-
-    Each table has the parameters of its class, and `kind` = "wall" (the default), "gravity_wall",
-    "fence", "ditch" or "embankment".
-
-    Raises
-    ------
-    BadInput
-        If the file is missing, a field is unknown or a value is outside its range.
-    """
-    file = Path(path)
-    if not file.is_file():
-        raise BadInput("layout", str(path), "name an existing TOML or JSON file")
-    decode = msgspec.json.decode if file.suffix == ".json" else msgspec.toml.decode
-    try:
-        tables = decode(read("layout", file), type=_LayoutFile).barriers
-        return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))
-    except msgspec.ValidationError as error:
-        raise BadInput("layout", str(path), str(error)) from None
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise BadInput("layout", str(path), f"mend the file: {error}") from None
-
-
-def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None:
-    """Write a layout as TOML, or as JSON if the path ends in .json."""
-    data = {"barriers": to_tables(as_layout(layout))}
-    with atomic(path) as part:
-        if str(path).endswith(".json"):
-            part.write_bytes(msgspec.json.format(msgspec.json.encode(data)))
-        else:
-            part.write_text(tomli_w.dumps(data), encoding="utf-8")
-
-
-class _LayoutFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    barriers: tuple[dict[str, Any], ...] = ()
+def _shifted(surface: Surface, shift: float) -> Surface:
+    """Return a surface whose friction angle is shifted [deg]."""
+    if shift == 0.0:
+        return surface
+    angle = min(surface.friction_deg + shift, max(surface.friction_deg, STEEPEST_DEG))
+    return msgspec.structs.replace(surface, friction_deg=max(angle, 0.0))

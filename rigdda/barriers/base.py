@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Self
 
 import msgspec
 import numpy as np
@@ -26,6 +27,10 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
     def kind(self) -> str:
         """Name of the kind, as in layout files."""
         return str(type(self).__struct_config__.tag)
+
+    def for_width(self, width: float) -> Self:
+        """Return it as it resists, per metre, an event of this width [m]."""
+        return self
 
     def _check(self, *lengths: str) -> None:
         """Check and set where it is and its lengths."""

@@ -10,12 +10,16 @@ import msgspec
 from rigdda import check
 from rigdda.barriers.base import Floats
 from rigdda.barriers.earthworks import Ditch, Earthwork, Embankment
+from rigdda.barriers.mesh import Mesh
 from rigdda.barriers.standing import Fence, GravityWall, Wall
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
 from rigdda.terrain import Terrain
 
-Barrier = Wall | GravityWall | Fence | Ditch | Embankment
+Built = Wall | GravityWall | Fence | Ditch | Embankment
+"""What a scene has: all but mesh."""
+
+Barrier = Built | Mesh
 Layout = tuple[Barrier, ...]
 
 KINDS: dict[str, type[Barrier]] = {
@@ -24,6 +28,7 @@ KINDS: dict[str, type[Barrier]] = {
     "fence": Fence,
     "ditch": Ditch,
     "embankment": Embankment,
+    "mesh": Mesh,
 }
 """Class of every kind, by its name in layout files."""
 
@@ -68,7 +73,7 @@ def as_layout(layout: Any) -> Layout:
     BadInput
         If it is not a sequence of barriers.
     """
-    what = "barriers: rigdda.Wall, GravityWall, Fence, Ditch or Embankment"
+    what = "barriers: rigdda.Wall, GravityWall, Fence, Ditch, Embankment or Mesh"
     return check.sequence("layout", layout, Barrier, what)
 
 
@@ -110,6 +115,8 @@ def describe(barrier: Barrier, digits: int = 1) -> str:
 
     head = f"{barrier.words} at {metres(barrier.x)}"
     match barrier:
+        case Mesh():
+            return f"{head}, {barrier.option}"
         case Ditch():
             return f"{head}, {metres(barrier.depth)} deep, {metres(barrier.width)} wide"
         case Embankment():

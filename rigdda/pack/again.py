@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.barriers import GravityWall
 from rigdda.geometry import is_convex
 from rigdda.pack import Arrays, pack
-from rigdda.pack.bodies import block_traits, write_polygons
-from rigdda.pack.gauges import start_rock
+from rigdda.pack.bodies import barrier_trait, block_traits, write_polygons
+from rigdda.pack.gauges import start_rock, start_targets
 from rigdda.pack.parameters import frictions, rock_numbers, write_rock_numbers
 from rigdda.scene import Scene
 from rigdda.settings import Settings
@@ -20,8 +21,8 @@ class Template:
     """The arrays of a scene before its first step, and what it takes to set them back.
 
     Ground, barriers and space are packed once. A scene of `Scene.with_rock` with as many blocks,
-    all convex, is written into the same arrays: they are to the bit what `pack` gives. One
-    simulation at a time uses them.
+    all convex, is written into the same arrays: they are to the bit what `pack` gives, as far as
+    they are read. One simulation at a time uses them.
 
     Parameters
     ----------
@@ -80,7 +81,15 @@ class Template:
             count[i] = outlines.polygon["count"][i] = n
             number[i] = np.where(np.arange(self._corners) < n, np.arange(self._corners), 0)
         polygons = [b.vertices for b in scene.blocks]
-        write_polygons(polygons, block_traits(scene.blocks, self._names), bodies, outlines)
+        traits = block_traits(scene.blocks, self._names)
+        for i in scene.bodies:
+            barrier = scene.barriers[i]
+            if isinstance(barrier, GravityWall):  # they follow the blocks
+                polygons.append(scene.outline(i))
+                traits.append(barrier_trait(scene, barrier, self._names))
+        write_polygons(polygons, traits, bodies, outlines)
+        if scene.barriers != self.scene.barriers:
+            start_targets(arrays.gauges.target, scene)
         if scene.surfaces is not self.scene.surfaces:
             arrays.interfaces["friction"] = frictions(scene, len(arrays.interfaces))
         start_rock(arrays.gauges.rock, bodies, self._stations)

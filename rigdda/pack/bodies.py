@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.barriers import Fence, GravityWall
+from rigdda.barriers import Built, Fence, GravityWall
 from rigdda.constants import (
     AWAKE,
     BOLT,
@@ -49,14 +49,7 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
     bodies = np.zeros(len(polygons), dtype=BODY)  # its columns are quicker to set than a recarray's
     outlines = pack_outlines(polygons, bodies)
     traits = block_traits(scene.blocks, names)
-    for number in scene.bodies:
-        barrier = scene.barriers[number]
-        heavy = isinstance(barrier, GravityWall)
-        surface = names.index(scene.barrier_surface)
-        if isinstance(barrier, Fence):
-            surface = len(names)
-        density = barrier.density if isinstance(barrier, GravityWall) else 1.0
-        traits.append((density, 0.0, 0.0, 0.0, surface, AWAKE if heavy else FIXED))
+    traits += [barrier_trait(scene, scene.barriers[i], names) for i in scene.bodies]
     bodies = bodies.view(np.recarray)
     write_polygons(polygons, traits, bodies, outlines)
     for load in scene.loads:
@@ -81,6 +74,14 @@ def block_traits(blocks: Sequence[Block], names: list[str]) -> list[Trait]:
         )
         for b in blocks
     ]
+
+
+def barrier_trait(scene: Scene, barrier: Built, names: list[str]) -> Trait:
+    """Return the same of a barrier that is a body."""
+    surface = len(names) if isinstance(barrier, Fence) else names.index(scene.barrier_surface)
+    if isinstance(barrier, GravityWall):
+        return barrier.density, 0.0, 0.0, 0.0, surface, AWAKE
+    return 1.0, 0.0, 0.0, 0.0, surface, FIXED
 
 
 def write_polygons(

@@ -32,8 +32,8 @@ def pack_gauges(
     rock = np.zeros(blocks, dtype=WATCHED)
     start_rock(rock, bodies, stations)
     target = np.zeros(barriers, dtype=TARGET)
-    target["capacity"] = [b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]
     target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
+    start_targets(target, scene)
     room = event_room(free_bodies(scene), len(stations), barriers)
     return Gauges(
         station.view(np.recarray),
@@ -47,6 +47,11 @@ def pack_gauges(
         float(leave),
         np.zeros(room, dtype=EVENT).view(np.recarray),
     )
+
+
+def start_targets(target: NDArray[np.void], scene: Scene) -> None:
+    """Write what barriers resist."""
+    target["capacity"] = [b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]
 
 
 def start_rock(rock: NDArray[np.void], bodies: Bodies, stations: NDArray[np.float64]) -> None:

@@ -102,7 +102,8 @@ from envs.crew import Crew
 from test_batched import worker
 
 if __name__ == "__main__":
-    print(*Crew(2).map(worker, [(None, (), 1), (None, (), 2)]), flush=True)
+    crew = Crew(2)  # held on to: the processes of a crew that nothing holds end with it
+    print(*crew.map(worker, [(None, (), 1), (None, (), 2)]), flush=True)
     input()
 """
 
@@ -116,10 +117,12 @@ def test_a_crew_ends_with_what_started_it(tmp_path: Path) -> None:
     parent = subprocess.Popen(
         [sys.executable, script], env=os.environ | {"PYTHONPATH": folders}, **pipes
     )
-    workers = [int(word) for word in parent.stdout.readline().split()]
-    assert len(set(workers)) == 2 and all(map(runs, workers))
-    parent.kill()
-    parent.communicate()
+    try:
+        workers = [int(word) for word in parent.stdout.readline().split()]
+        assert len(set(workers)) == 2 and all(map(runs, workers))
+    finally:  # or what is left running fails the tests that follow
+        parent.kill()
+        parent.communicate()
     until = time.monotonic() + 30.0
     while any(map(runs, workers)) and time.monotonic() < until:
         time.sleep(0.05)

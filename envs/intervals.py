@@ -1,0 +1,226 @@
+"""95 % intervals that hold for rare outcomes, too: of probabilities, means of costs, and sums.
+
+A release costs little unless a block comes onto the road or a barrier fails. So the mean cost of an
+event is taken apart into the probability of that, of which even none of n tells something, and the
+mean cost with and without it; the parts are put together again by their distances from the ends of
+their intervals.
+
+Sources: Zou and Donner, Construction of confidence limits about effect measures: a general
+approach, Statistics in Medicine 27 (2008) 1693-1702; Berry and Armitage, Mid-P confidence
+intervals: a brief review, The Statistician 44 (1995) 417-423; Clopper and Pearson, Biometrika 26
+(1934) 404-413.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+from scipy.special import betainc, betaincinv, stdtrit
+
+Interval = tuple[float, float]
+
+CONFIDENCE = 0.95
+"""Probability of every interval, and of the one-sided bounds."""
+
+BORROWED = 3
+"""Weight, in releases, of a spread that is known from elsewhere beside that of the sample: of two
+or three releases that reach the road the spread is hardly known."""
+
+
+class Estimate(NamedTuple):
+    """A probability as seen in some releases.
+
+    Parameters
+    ----------
+    probability, low, high : float
+        Share of the releases in which it happened, and its 95 % interval; without releases nan
+        and (0, 1).
+    releases : int
+        How many.
+    """
+
+    probability: float
+    low: float
+    high: float
+    releases: int
+
+    @property
+    def count(self) -> int:
+        """In how many releases it happened."""
+        return round(self.probability * self.releases) if self.releases else 0
+
+    @property
+    def bound(self) -> float:
+        """One-sided 95 % upper bound, by Clopper and Pearson."""
+        return upper_bound(self.count, self.releases)
+
+    @property
+    def floor(self) -> float:
+        """One-sided 95 % lower bound, by Clopper and Pearson."""
+        return lower_bound(self.count, self.releases)
+
+
+class Known(NamedTuple):
+    """What is known beforehand of the cost of a release that is dear.
+
+    Its mean, used where the sample has no such release, and its coefficient of variation [-].
+    """
+
+    mean: float
+    variation: float
+
+
+class Mean(NamedTuple):
+    """A mean and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def times(self, factor: float) -> Mean:
+        """Return the mean of what is `factor` (at least 0) times as much."""
+        return Mean(factor * self.value, factor * self.low, factor * self.high)
+
+    @property
+    def interval(self) -> Interval:
+        """The 95 % interval."""
+        return self.low, self.high
+
+
+def estimate(count: int, releases: int) -> Estimate:
+    """Return the probability of what happened in `count` of some releases."""
+    low, high = mid_p(count, releases)
+    return Estimate(count / releases if releases else math.nan, low, high, releases)
+
+
+@lru_cache(maxsize=1 << 16)
+def mid_p(count: int, releases: int) -> Interval:
+    """Return the mid-P interval of a probability; of 0 of n the upper end is nearly 3/n.
+
+    The outcomes beyond the one seen and half the chance of that one have 2.5 % at each end.
+    """
+    if releases == 0:
+        return 0.0, 1.0
+    tail = 0.5 * (1.0 - CONFIDENCE)
+
+    def beyond(p: float, least: int) -> float:
+        """Return the chance of at least so many."""
+        if least <= 0:
+            return 1.0
+        return float(betainc(least, releases - least + 1, p)) if least <= releases else 0.0
+
+    def above(p: float) -> float:
+        return 0.5 * (beyond(p, count) + beyond(p, count + 1))
+
+    low = brentq(lambda p: above(p) - tail, 0.0, 1.0) if count > 0 else 0.0
+    high = brentq(lambda p: above(p) - (1.0 - tail), 0.0, 1.0) if count < releases else 1.0
+    return low, high
+
+
+@lru_cache(maxsize=1 << 16)
+def upper_bound(count: int, releases: int) -> float:
+    """Return the one-sided 95 % upper bound of a probability, by Clopper and Pearson."""
+    if count >= releases:
+        return 1.0
+    return float(betaincinv(count + 1, releases - count, CONFIDENCE))
+
+
+@lru_cache(maxsize=1 << 16)
+def lower_bound(count: int, releases: int) -> float:
+    """Return the one-sided 95 % lower bound of a probability, by Clopper and Pearson."""
+    if count == 0:
+        return 0.0
+    return float(betaincinv(count, releases - count + 1, 1.0 - CONFIDENCE))
+
+
+def student_interval(values: ArrayLike) -> Interval:
+    """Return the 95 % interval of the mean of independent values; one alone tells nothing."""
+    sample = np.asarray(values, dtype=np.float64)
+    if len(sample) < 2:
+        return -math.inf, math.inf
+    mean, half = float(sample.mean()), _half(sample, None)
+    return mean - half, mean + half
+
+
+def cost(values: ArrayLike, dear: ArrayLike, known: Known | None = None) -> Mean:
+    """Return the mean of costs that are small unless a release is `dear`.
+
+    mean = c + p (d - c), with the mean costs c of the cheap and d of the dear releases and the
+    share p of the latter: mid-P interval of p, Student's of c and d.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Cost of each release, at least 0.
+    dear : (n,) array of bool
+        Whether a block reached the road, or a barrier failed.
+    known : Known, optional
+        What is known of the cost of a dear release; its mean counts only where none was seen.
+    """
+    sample, which = np.asarray(values, dtype=np.float64), np.asarray(dear, dtype=bool)
+    if not len(sample):
+        return Mean(math.nan, 0.0, math.inf)
+    high, low = sample[which], sample[~which]
+    share = len(high) / len(sample)
+    least, most = mid_p(len(high), len(sample))
+    rest = float(low.mean()) if len(low) else 0.0
+    top = float(high.mean()) if len(high) else (known.mean if known else 0.0)
+    jump = abs(top - rest)
+    of_high, of_low = _half(high, known), _half(low, None)
+    common = (share * of_high) ** 2 + ((1.0 - share) * of_low) ** 2
+    value = float(sample.mean())
+    below = math.sqrt((jump * (share - least)) ** 2 + common)
+    above = math.sqrt((jump * (most - share)) ** 2 + common)
+    return Mean(value, max(value - below, 0.0), value + above)
+
+
+def _half(sample: NDArray[np.float64], known: Known | None) -> float:
+    """Return half of Student's interval of a mean, with a spread known beforehand if there is one.
+
+    Of one value alone, without such a spread, it is the value itself.
+    """
+    n = len(sample)
+    if n == 0:
+        return 0.0
+    mean, borrowed = float(sample.mean()), BORROWED if known else 0
+    freedom = n - 1 + borrowed
+    if freedom == 0:
+        return abs(mean)
+    squares = float(np.square(sample - mean).sum())
+    if known:
+        squares += borrowed * (known.variation * mean) ** 2
+    return float(quantile(freedom)) * math.sqrt(squares / freedom / n)
+
+
+@lru_cache(maxsize=1 << 12)
+def quantile(freedom: int) -> float:
+    """Return Student's t that the mean of normal values stays below in 97.5 %."""
+    return float(stdtrit(freedom, 0.5 * (1.0 + CONFIDENCE)))
+
+
+def total(parts: Iterable[Mean]) -> Mean:
+    """Return the sum of independent means, by the distances of their ends (Zou and Donner)."""
+    value = below = above = 0.0
+    for part in parts:
+        value += part.value
+        below += (part.value - part.low) ** 2
+        above += (part.high - part.value) ** 2
+    return Mean(value, value - math.sqrt(below), value + math.sqrt(above))
+
+
+def pair(one: Mean, two: Mean, correlation: float) -> Mean:
+    """Return the sum of two means of the same releases, with the correlation of their values."""
+
+    def reach(a: float, b: float) -> float:
+        return math.sqrt(max(a * a + b * b + 2.0 * correlation * a * b, 0.0))
+
+    value = one.value + two.value
+    below = reach(one.value - one.low, two.value - two.low)
+    above = reach(one.high - one.value, two.high - two.value)
+    return Mean(value, max(value - below, 0.0), value + above)

@@ -135,9 +135,7 @@ def surely_on_ground(chain: NDArray, corners: NDArray) -> bool:
 _on_ground = Direct(surely_on_ground)
 
 
-def deepest(
-    solid: NDArray[np.float64], outlines: Sequence[NDArray[np.float64]]
-) -> Sunk | None:
+def deepest(solid: NDArray[np.float64], outlines: Sequence[NDArray[np.float64]]) -> Sunk | None:
     """Return the first block of which more than a hundredth is in a polygon, None if none is.
 
     Parameters

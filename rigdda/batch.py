@@ -45,7 +45,8 @@ class Batch:
     def outcome(self, seed: int, event: str | None = None) -> Outcome:
         """Return the outcome of one release. Raises as `rigdda.release` does."""
         drawn = self._site.draw(seed, event)
-        run = self._simulation(self._scene(drawn)).run(*[self._site.motion.duration] * 2)
+        duration = self._site.motion.duration
+        run = self._simulation(self._scene(drawn)).run(duration, duration)
         return measure(self._site, run, drawn.event, drawn.width)
 
     def _scene(self, drawn: Drawn) -> Scene:
@@ -55,12 +56,11 @@ class Batch:
             self._base = scene, drawn.friction_deg
             return scene
         base, shift = self._base
-        same = drawn.friction_deg == shift
-        return base.with_rock(
-            drawn.blocks,
-            *((None, None) if same else self._site.strength(drawn.friction_deg)),
-            [b.for_width(drawn.width) for b in self._standing] if self._standing else None,
-        )
+        surfaces, interfaces = base.surfaces, base.interfaces
+        if drawn.friction_deg != shift:
+            surfaces, interfaces = self._site.strength(drawn.friction_deg)
+        barriers = [b.for_width(drawn.width) for b in self._standing]
+        return base.with_rock(drawn.blocks, surfaces, interfaces, barriers)
 
     def _simulation(self, scene: Scene) -> Simulation:
         if len(scene.blocks) > MOST_BLOCKS:

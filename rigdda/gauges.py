@@ -64,7 +64,7 @@ def note_hits(
 
 @inlined
 def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> int:
-    """Write a crossing for each station that a centroid first passes; watch energies and extents."""
+    """Write a crossing for each station that a centroid first passes; watch energies, extents."""
     stations = len(gauges.station)
     for i in range(len(gauges.rock)):
         body, rock = bodies[i], gauges.rock[i]

@@ -226,10 +226,10 @@ class Scene:
 
     def with_rock(
         self,
-        blocks: Sequence[Block],
-        surfaces: Mapping[str, Surface] | None = None,
-        interfaces: Mapping[tuple[str, str], Surface] | None = None,
-        barriers: Sequence[Built] | None = None,
+        blocks: tuple[Block, ...],
+        surfaces: Mapping[str, Surface],
+        interfaces: Mapping[tuple[str, str], Surface],
+        barriers: Sequence[Built],
     ) -> Scene:
         """Return the scene with other blocks and other properties of the surfaces of that name.
 
@@ -246,13 +246,12 @@ class Scene:
         other = object.__new__(Scene)
         for name in Scene.__slots__:
             object.__setattr__(other, name, getattr(self, name))
-        object.__setattr__(other, "blocks", tuple(blocks))
-        if surfaces is not None:
-            object.__setattr__(other, "surfaces", surfaces)
-        if interfaces is not None:
-            object.__setattr__(other, "interfaces", interfaces)
-        if barriers is not None:
-            moved = {b: self._moved[a] for a, b in zip(self.barriers, barriers) if a in self._moved}
+        changed = {"blocks": blocks, "surfaces": surfaces, "interfaces": interfaces}
+        for name, value in changed.items():
+            object.__setattr__(other, name, value)
+        if barriers:
+            pairs = zip(self.barriers, barriers, strict=True)
+            moved = {b: self._moved[a] for a, b in pairs if a in self._moved}
             object.__setattr__(other, "barriers", tuple(barriers))
             object.__setattr__(other, "_moved", moved)
         other._check_blocks()

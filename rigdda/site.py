@@ -297,9 +297,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             damping_when=self.motion.damping_when,
         )
 
-    def strength(
-        self, shift: float
-    ) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+    def strength(self, shift: float) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
         """Return the surfaces and how pairs meet, with all friction angles shifted [deg]."""
         surfaces = {name: _shifted(s, shift) for name, s in self.surfaces.items()}
         return surfaces, {pair: _shifted(s, shift) for pair, s in self.pairs().items()}

@@ -16,7 +16,6 @@ from rigdda.constants import (
     EVENTS_FULL,
     HELD,
     OPEN,
-    RETIRED,
     SPEED_LIMIT,
     TERRAIN,
 )
@@ -56,7 +55,6 @@ from rigdda.records import (
     OPEN_CLOSE,
     STEPS,
     Bodies,
-    Body,
     Boxes,
     Contacts,
     Gauges,

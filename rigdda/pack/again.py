@@ -44,7 +44,9 @@ class Template:
         self._arrays = pack(scene, settings, stations, watch, leave)
         self._names = list(scene.surfaces)
         self._corners = self._arrays.outlines.corner.shape[1]
-        flat = [array.view(np.ndarray).reshape(-1).view(np.uint8) for array in _leaves(self._arrays)]
+        flat = [
+            array.view(np.ndarray).reshape(-1).view(np.uint8) for array in _leaves(self._arrays)
+        ]
         self._fresh = [(array, array.copy()) for array in flat if array.size]
 
     def fits(self, scene: Scene) -> bool:

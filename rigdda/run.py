@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.barriers import from_table, to_tables
+from rigdda.barriers import GravityWall, from_table, to_tables
 from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.gauges import CROSSING, FAILED, HIT
@@ -116,6 +116,8 @@ class Run:
     def outline(self, barrier: int, frame: int = -1) -> NDArray[np.float64]:
         """Return the (n, 2) corners of a barrier in a frame, see `Scene.outline` [m]."""
         corners = self.scene.outline(barrier)
+        if not isinstance(self.scene.barriers[barrier], GravityWall):
+            return corners
         start, (x, y, theta) = self.barrier_poses[0, barrier], self.barrier_poses[frame, barrier]
         cos, sin = np.cos(theta), np.sin(theta)
         return (corners - start[:2]) @ np.array([[cos, sin], [-sin, cos]]) + [x, y]

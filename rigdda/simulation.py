@@ -266,6 +266,8 @@ class Simulation:
     def _elastic(self) -> float:
         """Return the energy stored in bolts and plain contacts now [J]."""
         b, links = self._arrays.bodies, self._arrays.links
+        if len(links) + self._counters[CONTACTS] == 0:
+            return 0.0
         total = bolt_energy(b, links) if len(links) else 0.0
         c = self._now[: self._counters[CONTACTS]]
         c = c[(c["kind"] == PLAIN) & (c["state"] != OPEN)]
@@ -443,7 +445,7 @@ class Simulation:
                 error.run = self._record(kept, start + np.array(at))
                 raise
         # what follows from the load by default is as stiff as it should be
-        contacts = self._now[: self._counters[CONTACTS]]
+        contacts = self._now.view(np.ndarray)[: self._counters[CONTACTS]]
         chosen = self.settings.penetration is not None or bool((contacts["kind"] == PLAIN).any())
         if chosen and self._compression() > SOFT:
             warnings.warn(
@@ -462,21 +464,22 @@ class Simulation:
         barrier_poses[:, list(self.scene.bodies)] = frames[:, n:, :3]
         events = np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
         gauges = self._arrays.gauges
+        rock, target = gauges.rock.view(np.ndarray), gauges.target.view(np.ndarray)
         return Run(
             self.scene,
             steps * self.settings.dt,
             frames[:, :n, :3].copy(),
             frames[:, :n, 3:].copy(),
             events,
-            gauges.target["absorbed"].copy(),
-            gauges.rock["energy"].copy(),
-            np.stack([gauges.rock["low"], gauges.rock["high"]], axis=1),
+            target["absorbed"].copy(),
+            rock["energy"].copy(),
+            np.stack([rock["low"], rock["high"]], axis=1),
             barrier_poses,
         )
 
     def _drain_events(self) -> None:
         n = self._counters[EVENTS]
-        self._events.append(self._arrays.gauges.event[:n].copy())
+        self._events.append(self._arrays.gauges.event.view(np.ndarray)[:n].copy())
         self._counters[EVENTS] = 0
 
     def _grow(self) -> None:

@@ -41,13 +41,23 @@ class Template:
         leave: float,
     ):
         self.scene, self._settings, self._stations = scene, settings, stations
-        self._arrays = pack(scene, settings, stations, watch, leave)
         self._names = list(scene.surfaces)
-        self._corners = self._arrays.outlines.corner.shape[1]
-        flat = [
-            array.view(np.ndarray).reshape(-1).view(np.uint8) for array in _leaves(self._arrays)
+        packed = pack(scene, settings, stations, watch, leave)
+        self._corners = packed.outlines.corner.shape[1]
+        number = packed.outlines.corner["number"]
+        number[: len(scene.blocks)] = np.arange(self._corners)  # where there is no corner, too
+        self._memory, self._arrays = together(packed)
+        self._fresh = self._memory.copy()
+        plain = [
+            array.view(np.ndarray)  # quicker to reach into than a recarray
+            for array in (
+                self._arrays.bodies,
+                self._arrays.outlines.polygon,
+                self._arrays.gauges.rock,
+                self._arrays.parameters,
+            )
         ]
-        self._fresh = [(array, array.copy()) for array in flat if array.size]
+        self._bodies, self._polygons, self._rock, self._levels = plain
 
     def fits(self, scene: Scene) -> bool:
         """Return whether a scene of `with_rock` can be written into these arrays."""
@@ -74,14 +84,10 @@ class Template:
             If its smallest block is too small for the step.
         """
         arrays = self._arrays
-        for array, fresh in self._fresh:
-            array[:] = fresh
-        bodies, outlines = arrays.bodies, arrays.outlines
-        count, number = bodies["count"], outlines.corner["number"]
+        self._memory[:] = self._fresh
+        bodies, outlines = self._bodies, arrays.outlines
         for i, block in enumerate(scene.blocks):
-            n = len(block.vertices)
-            count[i] = outlines.polygon["count"][i] = n
-            number[i] = np.where(np.arange(self._corners) < n, np.arange(self._corners), 0)
+            bodies["count"][i] = self._polygons["count"][i] = len(block.vertices)
         polygons = [b.vertices for b in scene.blocks]
         traits = block_traits(scene.blocks, self._names)
         for i in scene.bodies:
@@ -89,14 +95,35 @@ class Template:
             if isinstance(barrier, GravityWall):  # they follow the blocks
                 polygons.append(scene.outline(i))
                 traits.append(barrier_trait(scene, barrier, self._names))
-        write_polygons(polygons, traits, bodies, outlines)
+        write_polygons(polygons, traits, arrays.bodies, outlines)
         if scene.barriers != self.scene.barriers:
             start_targets(arrays.gauges.target, scene)
         if scene.surfaces is not self.scene.surfaces:
             arrays.interfaces["friction"] = frictions(scene, len(arrays.interfaces))
-        start_rock(arrays.gauges.rock, bodies, self._stations)
-        write_rock_numbers(arrays.parameters, rock_numbers(scene, self._settings, bodies))
+        start_rock(self._rock, bodies, self._stations)
+        write_rock_numbers(self._levels, rock_numbers(scene, self._settings, bodies))
         return arrays
+
+
+def together(arrays: Arrays) -> tuple[NDArray[np.uint8], Arrays]:
+    """Return a block of memory and copies of all arrays in it, which are set back in one go.
+
+    Arrays that are one and the same stay so.
+    """
+    leaves = {id(array): array for array in _leaves(arrays) if array.size}
+    room = [-(-array.nbytes // LINE) * LINE for array in leaves.values()]
+    memory = np.zeros(sum(room), dtype=np.uint8)
+    moved, low = {}, 0
+    for (key, array), size in zip(leaves.items(), room, strict=True):
+        place = memory[low : low + array.nbytes].view(array.dtype).reshape(array.shape)
+        place[...] = array
+        moved[key] = place.view(type(array))
+        low += size
+    return memory, _replaced(arrays, moved)
+
+
+LINE = 64
+"""Bytes to a multiple of which arrays are aligned: a line of the cache."""
 
 
 def _leaves(arrays: Any) -> list[NDArray[Any]]:
@@ -105,3 +132,10 @@ def _leaves(arrays: Any) -> list[NDArray[Any]]:
         return [arrays]
     parts = [_leaves(a) for a in arrays] if isinstance(arrays, tuple) else []
     return [array for part in parts for array in part]
+
+
+def _replaced(arrays: Any, by: dict[int, Any]) -> Any:
+    """Return nested named tuples with other arrays in the place of these, by their identity."""
+    if isinstance(arrays, tuple):
+        return type(arrays)(*(_replaced(a, by) for a in arrays))
+    return by.get(id(arrays), arrays)

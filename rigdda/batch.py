@@ -46,10 +46,10 @@ class Batch:
         """Return the outcome of one release. Raises as `rigdda.release` does."""
         drawn = self._site.draw(seed, event)
         duration = self._site.motion.duration
-        run = self._simulation(self._scene(drawn)).run(duration, duration)
+        run = self.simulation(self.scene(drawn)).run(duration, duration)
         return measure(self._site, run, drawn.event, drawn.width)
 
-    def _scene(self, drawn: Drawn) -> Scene:
+    def scene(self, drawn: Drawn) -> Scene:
         """Return the scene of what was drawn, on the ground and with the barriers of the first."""
         if self._base is None:
             scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
@@ -62,7 +62,8 @@ class Batch:
         barriers = [b.for_width(drawn.width) for b in self._standing]
         return base.with_rock(drawn.blocks, surfaces, interfaces, barriers)
 
-    def _simulation(self, scene: Scene) -> Simulation:
+    def simulation(self, scene: Scene) -> Simulation:
+        """Return the simulation of such a scene; that of the one before is of no more use."""
         if len(scene.blocks) > MOST_BLOCKS:
             return simulation(self._site, scene)
         key = len(scene.blocks), max(len(b.vertices) for b in scene.blocks)

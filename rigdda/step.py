@@ -303,6 +303,15 @@ def rest_all(bodies: Bodies) -> None:
             body.vx = body.vy = body.omega = 0.0
 
 
+@kernel
+def set_out(bodies: Bodies, shaking: Shaking, since: float, time: float, p: Parameters) -> None:
+    """Begin a step: at rest in static mode, in the field that the motion of the ground makes."""
+    if p.static:
+        rest_all(bodies)
+    if len(shaking) > 0:
+        set_field(shaking, since, time, p)
+
+
 @entry_kernel
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
@@ -352,13 +361,9 @@ def advance(
             keep_touch(bodies, now, count, gauges, time)
             excess = 0.0
             bad = fly(bodies, flyer, now, system.matrix, system.motion, work.islands, p, ledger)
-            if bodies[flyer].status != AWAKE:
-                flight = flown
+            flight = flight if bodies[flyer].status == AWAKE else flown
         else:
-            if p.static:
-                rest_all(bodies)
-            if len(shaking) > 0:
-                set_field(shaking, start * p.dt, time, p)
+            set_out(bodies, shaking, start * p.dt, time, p)
             copy_index(work.begin, work.first)
             count = detect(
                 bodies, outlines, ground, interfaces, links, before, now, work, gauges, time, p,

@@ -91,10 +91,9 @@ class Template:
         polygons = [b.vertices for b in scene.blocks]
         traits = block_traits(scene.blocks, self._names)
         for i in scene.bodies:
-            barrier = scene.barriers[i]
-            if isinstance(barrier, GravityWall):  # they follow the blocks
+            if isinstance(scene.barriers[i], GravityWall):  # they follow the blocks
                 polygons.append(scene.outline(i))
-                traits.append(barrier_trait(scene, barrier, self._names))
+                traits.append(barrier_trait(scene, i, self._names))
         write_polygons(polygons, traits, arrays.bodies, outlines)
         if scene.barriers != self.scene.barriers:
             start_targets(arrays.gauges.target, scene)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.barriers import Built, Fence, GravityWall
+from rigdda.barriers import Fence, GravityWall
 from rigdda.constants import (
     AWAKE,
     BOLT,
@@ -49,7 +49,7 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
     bodies = np.zeros(len(polygons), dtype=BODY)  # its columns are quicker to set than a recarray's
     outlines = pack_outlines(polygons, bodies)
     traits = block_traits(scene.blocks, names)
-    traits += [barrier_trait(scene, scene.barriers[i], names) for i in scene.bodies]
+    traits += [barrier_trait(scene, i, names) for i in scene.bodies]
     bodies = bodies.view(np.recarray)
     write_polygons(polygons, traits, bodies, outlines)
     for load in scene.loads:
@@ -76,8 +76,9 @@ def block_traits(blocks: Sequence[Block], names: list[str]) -> list[Trait]:
     ]
 
 
-def barrier_trait(scene: Scene, barrier: Built, names: list[str]) -> Trait:
+def barrier_trait(scene: Scene, number: int, names: list[str]) -> Trait:
     """Return the same of a barrier that is a body."""
+    barrier = scene.barriers[number]
     surface = len(names) if isinstance(barrier, Fence) else names.index(scene.barrier_surface)
     if isinstance(barrier, GravityWall):
         return barrier.density, 0.0, 0.0, 0.0, surface, AWAKE

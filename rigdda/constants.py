@@ -213,6 +213,12 @@ WAKE_SPEED = 0.05
 NEW_HIT_TIME = 0.1
 """Time apart from the barrier after which a touch counts as a new hit [s]."""
 
+LONGEST_FLIGHT = 64
+"""Steps for which a flight is looked ahead: the more, the wider the search for what may be met."""
+
+END_CHECK = 8
+"""Steps from one look at whether a release is over to the next."""
+
 SPEED_LIMIT = 1e4
 """Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall."""
 
@@ -244,7 +250,7 @@ OPEN, STICK, SLIP = 0, 1, 2
 # kind of a contact in one step
 REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN = 0, 1, 2, 3, 4, 5, 6, 7
 # why the step loop returned
-DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE, GROUND_MOVED = 0, 1, 2, 3, 4
+DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE, GROUND_MOVED, ENDED = 0, 1, 2, 3, 4, 5
 # solver
 AUTO, PCG, BLOCK_PCG, SOR, DIRECT = 0, 1, 2, 3, 4
 TERRAIN = -1

@@ -22,7 +22,8 @@ def keep_frame(bodies: Bodies, frame: NDArray) -> None:
 
 def frame_of(bodies: Bodies) -> NDArray[np.float64]:
     """Return the frame of the present state, (M, 6), see `keep_frame`."""
-    return np.stack([bodies[name] for name in ("x", "y", "theta", "vx", "vy", "omega")], axis=1)
+    plain = bodies.view(np.ndarray)
+    return np.stack([plain[name] for name in ("x", "y", "theta", "vx", "vy", "omega")], axis=1)
 
 
 def no_frames(bodies: Bodies) -> NDArray[np.float64]:

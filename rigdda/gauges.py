@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import math
 
-from rigdda.constants import NEW_HIT_TIME, OPEN
+from rigdda.constants import AWAKE, END_CHECK, NEW_HIT_TIME, OPEN
 from rigdda.kernel import inlined, kernel
 from rigdda.motion import kinetic_energy
-from rigdda.records import Bodies, Body, Contacts, Gauges, Islands
+from rigdda.records import (
+    STEPS,
+    STILL,
+    Bodies,
+    Body,
+    Contacts,
+    Gauges,
+    Ints,
+    Islands,
+    Parameters,
+)
 
 HIT, CROSSING, FAILED = 0, 1, 2
 """Kinds of event: a block touches a barrier; a block's centroid first passes a station; a block
@@ -64,11 +74,12 @@ def note_hits(
 
 @inlined
 def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> int:
-    """Write a crossing for each station that a centroid first passes; watch energies."""
+    """Write a crossing for each station that a centroid first passes; watch energies, extents."""
     stations = len(gauges.station)
     for i in range(len(gauges.rock)):
         body, rock = bodies[i], gauges.rock[i]
         x = body.x
+        rock.low, rock.high = min(rock.low, x - body.radius), max(rock.high, x + body.radius)
         if gauges.watch_low <= x <= gauges.watch_high:
             rock.energy = max(rock.energy, kinetic_energy(body))
         while rock.next < stations and x >= gauges.station[rock.next].x:
@@ -77,3 +88,22 @@ def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> in
             events = write_event(gauges, events, time, CROSSING, body, i, s, x, y, height)
             rock.next += 1
     return events
+
+
+@kernel
+def is_over(bodies: Bodies, gauges: Gauges, counters: Ints, p: Parameters) -> bool:
+    """Return whether nothing moves any more but what has left `gauges.leave` behind, downhill.
+
+    Where there are barriers it must have been so for a second: what lies on them presses on, and
+    thrust is a mean over a second. Looked at every so many steps of the run, so that it ends in the
+    same one however it is called.
+    """
+    if gauges.leave == -math.inf or counters[STEPS] % END_CHECK != 0:
+        return False
+    for i in range(p.blocks):
+        body = bodies[i]
+        if body.status == AWAKE and not (body.x - body.radius > gauges.leave and body.vx > 0.0):
+            counters[STILL] = 0
+            return False
+    counters[STILL] += END_CHECK
+    return len(gauges.target) == 0 or counters[STILL] * p.dt >= 1.0 + END_CHECK * p.dt

@@ -2,15 +2,50 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+
+from rigdda.kernel import Direct, entry_kernel, kernel
+
+CLEARLY = 1e-6
+"""Turn at a corner, or area, over the square of the perimeter that is more than rounding [-]."""
 
 FLAT = 1e-9
 """Turn at a corner over the square of the perimeter that counts as none [-]: rounding."""
 
 GRID = 1e-9
 """Grid of overlaps [m]: far finer than blocks, far coarser than rounding."""
+
+
+@kernel
+def moments(vertices: NDArray, low: int, high: int) -> tuple[float, float, float, float]:
+    """Return area, centroid x and y, and polar second moment of the polygon vertices[low:high]."""
+    x0, y0 = vertices[low, 0], vertices[low, 1]
+    twice, sum_x, sum_y, second = 0.0, 0.0, 0.0, 0.0
+    for k in range(low, high):
+        j = k + 1 if k + 1 < high else low
+        px, py = vertices[k, 0] - x0, vertices[k, 1] - y0
+        qx, qy = vertices[j, 0] - x0, vertices[j, 1] - y0
+        cross = px * qy - py * qx
+        twice += cross
+        sum_x += (px + qx) * cross
+        sum_y += (py + qy) * cross
+        second += cross * ((px * px + px * qx + qx * qx) + (py * py + py * qy + qy * qy))
+    area = 0.5 * twice
+    x, y = sum_x / (6.0 * area), sum_y / (6.0 * area)
+    return area, x0 + x, y0 + y, second / 12.0 - area * (x * x + y * y)
+
+
+@entry_kernel
+def moments_of(vertices: NDArray) -> tuple[float, float, float, float]:
+    """Return the `moments` of a whole polygon."""
+    return moments(vertices, 0, len(vertices))
+
+
+_moments = Direct(moments_of)
 
 
 def polygon_properties(
@@ -21,14 +56,40 @@ def polygon_properties(
     Exact sums over the edges of the (n, 2) corners, anticlockwise; the second moment is about the
     centroid. Taken relative to the first corner, so that far coordinates cost no digits.
     """
-    origin = vertices[0]
-    p = vertices - origin
-    q = np.concatenate([p[1:], p[:1]])
-    cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-    area = 0.5 * cross.sum()
-    centre = ((p + q) * cross[:, None]).sum(axis=0) / (6.0 * area)
-    about_origin = (cross * ((p * p + p * q + q * q).sum(axis=1))).sum() / 12.0
-    return float(area), origin + centre, float(about_origin - area * centre @ centre)
+    area, x, y, second = _moments.call(np.array(vertices, dtype=np.float64, order="C"))
+    return area, np.array([x, y]), second
+
+
+@entry_kernel
+def is_sound(vertices: NDArray) -> bool:
+    """Return whether a polygon is anticlockwise and clearly convex, so that it is simple.
+
+    Every corner turns to the left by far more than rounding, and the edges go round once: their
+    direction changes from left to right only once. No edge is short and the area not small.
+    """
+    n, around, twice, turned = len(vertices), 0.0, 0.0, 0
+    for k in range(n):
+        j = k + 1 if k + 1 < n else 0
+        dx, dy = vertices[j, 0] - vertices[k, 0], vertices[j, 1] - vertices[k, 1]
+        around += math.sqrt(dx * dx + dy * dy)
+    for k in range(n):
+        i, j = k - 1 if k > 0 else n - 1, k + 1 if k + 1 < n else 0
+        bx, by = vertices[k, 0] - vertices[i, 0], vertices[k, 1] - vertices[i, 1]
+        ex, ey = vertices[j, 0] - vertices[k, 0], vertices[j, 1] - vertices[k, 1]
+        if not bx * ey - by * ex > CLEARLY * around * around:
+            return False
+        turned += int(bx < 0.0 <= ex)
+        twice += (vertices[k, 0] - vertices[0, 0]) * (vertices[j, 1] - vertices[0, 1])
+        twice -= (vertices[k, 1] - vertices[0, 1]) * (vertices[j, 0] - vertices[0, 0])
+    return turned == 1 and 0.5 * twice > CLEARLY * around * around
+
+
+_is_sound = Direct(is_sound)
+
+
+def clearly_convex(vertices: NDArray[np.float64]) -> bool:
+    """Return whether a polygon is surely simple, convex and anticlockwise, in a microsecond."""
+    return bool(_is_sound.call(np.array(vertices, dtype=np.float64, order="C")))
 
 
 def overlap(a: shapely.Polygon, b: shapely.Polygon) -> float:
@@ -53,6 +114,8 @@ def turns(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def is_convex(vertices: NDArray[np.float64]) -> bool:
     """Return whether an anticlockwise simple polygon is convex but for rounding."""
+    if clearly_convex(vertices):
+        return True
     perimeter = np.hypot(*edges(vertices).T).sum()
     return bool(turns(vertices).min() >= -FLAT * perimeter**2)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from rigdda.constants import RETIRED
 from rigdda.kernel import kernel
 from rigdda.records import Body
 
@@ -20,3 +21,12 @@ def kinetic_energy(body: Body) -> float:
     """Return the energy of translation and rotation of a body [J]."""
     speed = body.vx**2 + body.vy**2
     return 0.5 * body.mass * speed + 0.5 * body.inertia * body.omega**2
+
+
+@kernel
+def retire(body: Body) -> float:
+    """Take a block that has left the site out of the simulation; returns its kinetic energy [J]."""
+    energy = kinetic_energy(body)
+    body.status = RETIRED
+    body.vx = body.vy = body.omega = 0.0
+    return energy

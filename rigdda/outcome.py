@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
+from operator import and_
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigdda.barriers import Barrier, Ditch, Embankment, Fence, GravityWall
+from rigdda.gauges import CROSSING, FAILED, HIT
 from rigdda.geometry import polygon_properties
 from rigdda.resistance import resistance
 from rigdda.run import Run
+from rigdda.scene import Scene
 from rigdda.site import Site
 
 GRAIN = 2.0**40
@@ -118,7 +123,8 @@ class Outcome:
     max_energy_on_road : float
         Largest kinetic energy of a block over the road [J].
     run_out : tuple of float
-        Chainages that 50, 95 and 100 % of the mass have not passed at the end [m].
+        Chainages that 50, 95 and 100 % of the mass have not passed at the end [m], at most that of
+        the downhill edge of the road: a release is over when nothing moves but what goes on there.
     slope_fraction, held_fraction, road_fraction, beyond_fraction : float
         Where the mass is at the end, by centroid; they add up to 1 exactly. Held: uphill of a
         barrier that stands and below the line that rises uphill from its top at the angle of
@@ -157,101 +163,119 @@ def watch(site: Site) -> tuple[float, float]:
     return site.road.start, site.road.end
 
 
+def leave(site: Site, scene: Scene) -> float:
+    """Return the chainage beyond which a block that moves on downhill matters no more [m].
+
+    Beyond the road, and from where on the ground does not rise, so that nothing rolls back.
+    """
+    ground = scene.ground or site.profile
+    x, y = ground.points[:, 0], ground.points[:, 1]
+    rising = np.flatnonzero(np.diff(y) > 0.0)
+    return max(site.road.end, float(x[rising[-1] + 1]) if len(rising) else -math.inf)
+
+
 def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
     """Return the outcome of a run that watched `stations` and `watch` of its site and layout.
 
     It is one of an event, so wide [m].
     """
-    scene = run.scene
-    area, weight, mass = _masses(run)
-    lines = stations(site, scene.barriers)
-    passed = {line: _first_passed(run, i) for i, line in enumerate(lines)}
-    x, y = run.poses[-1, :, 0], run.poses[-1, :, 1]
-    beyond = x > site.road.end
-    road = (x >= site.road.start) & ~beyond
-    reach = [_reach(run, i, x, y) for i in range(len(scene.barriers))]
-    held = np.any([np.zeros(len(x), dtype=bool), *reach], axis=0) & ~road & ~beyond
-    came = np.isfinite(passed[site.road.start])
-    resting = np.hypot(*run.velocities[-1, :, :2].T) < AT_REST
+    scene, road = run.scene, site.road
+    area, weight, mass = _masses(scene)
+    log = _log(run, stations(site, scene.barriers))
+    at = list(zip(*run.poses[-1, :, :2].T.tolist(), strict=True))
+    place = [2 if x > road.end else int(x >= road.start) for x, _ in at]
+    came = [time < math.inf for time in log.passed[road.start]]
+    resting = [math.hypot(vx, vy) < AT_REST for vx, vy, _ in run.velocities[-1].tolist()]
+    states = [state_of(run, i) for i in range(len(scene.barriers))]
+    reach = [_reach(run, i, state, at) for i, state in enumerate(states)]
+    held = [on == 0 and any(r[k] for r in reach) for k, on in enumerate(place)]
 
-    def share(where: NDArray[np.bool_]) -> float:
-        return float(weight[where].sum() / GRAIN)
+    def share(where: Iterable[bool]) -> float:
+        return sum(w for w, here in zip(weight, where, strict=True) if here) / GRAIN
+
+    def size(where: Iterable[bool]) -> float:
+        return math.fsum(a for a, here in zip(area, where, strict=True) if here)
 
     return Outcome(
         event=event,
         width=width,
         released_mass=mass,
-        released_volume=width * float(area[weight > 0.0].sum()),
-        road_volume=width * float(area[came].sum()),
-        reached=bool(came.any()),
-        reach=_extent(run),
+        released_volume=width * size(w > 0.0 for w in weight),
+        road_volume=width * size(came),
+        reached=any(came),
+        reach=(float(run.extent[:, 0].min()), float(run.extent[:, 1].max())),
         debris_fraction=share(came),
-        debris_on_road=float(area[road].sum()),
+        debris_on_road=size(on == 1 for on in place),
         max_energy_on_road=float(run.watch_energy.max()),
-        run_out=_run_out(x, weight),
-        slope_fraction=share(~(held | road | beyond)),
+        run_out=_run_out([min(x, road.end) for x, _ in at], weight),
+        slope_fraction=share(on == 0 and not h for on, h in zip(place, held, strict=True)),
         held_fraction=share(held),
-        road_fraction=share(road),
-        beyond_fraction=share(beyond),
+        road_fraction=share(on == 1 for on in place),
+        beyond_fraction=share(on == 2 for on in place),
         barriers=tuple(
-            _barrier(run, i, passed[b.end], share(reach[i] & resting))
-            for i, b in enumerate(scene.barriers)
+            _barrier(run, i, states[i], log, share(map(and_, reach[i], resting)))
+            for i in range(len(scene.barriers))
         ),
     )
 
 
-def _masses(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _masses(scene: Scene) -> tuple[list[float], list[float], float]:
     """Return areas, whole-number weights that add up to GRAIN, and the released mass."""
-    blocks = run.scene.blocks
-    area = np.array([polygon_properties(b.vertices)[0] for b in blocks])
-    mass = np.array([0.0 if b.fixed else b.density for b in blocks]) * area
-    weight = np.floor(mass / mass.sum() * GRAIN)
-    weight[np.argmax(weight)] += GRAIN - weight.sum()
-    return area, weight, math.fsum(mass)
+    area = [polygon_properties(b.vertices)[0] for b in scene.blocks]
+    mass = [0.0 if b.fixed else b.density * a for b, a in zip(scene.blocks, area, strict=True)]
+    whole = math.fsum(mass)
+    weight = [math.floor(m / whole * GRAIN) * 1.0 for m in mass]
+    weight[weight.index(max(weight))] += GRAIN - sum(weight)
+    return area, weight, whole
 
 
-def _extent(run: Run) -> tuple[float, float]:
-    """Return the least and the greatest chainage that blocks came to in the frames of a run [m]."""
-    size = [
-        np.hypot(*(b.vertices - polygon_properties(b.vertices)[1]).T).max()
-        for b in run.scene.blocks
-    ]
-    x = run.poses[:, :, 0]
-    return float((x - size).min()), float((x + size).max())
+def _run_out(x: list[float], weight: list[float]) -> tuple[float, float, float]:
+    order = sorted(range(len(x)), key=lambda k: x[k])
+    reached = list(accumulate(weight[k] / GRAIN for k in order))
+    half, most, every = (x[order[bisect_left(reached, q)]] for q in (0.5, 0.95, 1.0))
+    return half, most, every
 
 
-def _run_out(x: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float, float, float]:
-    order = np.argsort(x)
-    reached = np.cumsum(weight[order]) / GRAIN
-    at = [x[order][np.searchsorted(reached, q)] for q in (0.5, 0.95, 1.0)]
-    return float(at[0]), float(at[1]), float(at[2])
+class _Log(NamedTuple):
+    """The events of a run: what happened to each barrier, and when blocks first passed stations."""
+
+    hits: list[list[tuple[float, float]]]  # energy [J] and height [m] of each hit of a barrier
+    failure: list[float]  # when it failed, inf if it did not [s]
+    passed: dict[float, list[float]]  # by station: when each block passed it, inf if it did not [s]
 
 
-def _first_passed(run: Run, station: int) -> NDArray[np.float64]:
-    """Return the time at which each block first passed a station, inf if it did not, (N,) [s]."""
-    time = np.full(run.poses.shape[1], np.inf)
-    crossings = run.crossings(station)
-    time[crossings["block"]] = crossings["time"]
-    return time
+def _log(run: Run, lines: Sequence[float]) -> _Log:
+    barriers, blocks = len(run.scene.barriers), len(run.scene.blocks)
+    log = _Log(
+        [[] for _ in range(barriers)],
+        [math.inf] * barriers,
+        {line: [math.inf] * blocks for line in lines},
+    )
+    for time, kind, block, target, _, _, height, _, energy in run.events.tolist():
+        if kind == HIT:
+            log.hits[target].append((energy, height))
+        elif kind == CROSSING:
+            log.passed[lines[target]][block] = time
+        elif kind == FAILED:
+            log.failure[target] = min(time, log.failure[target])
+    return log
 
 
-def _reach(
-    run: Run, index: int, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _reach(run: Run, index: int, state: str, at: Sequence[tuple[float, float]]) -> list[bool]:
     """Return which centroids (x, y) a barrier holds at the end, as `Outcome` says."""
     scene, barrier = run.scene, run.scene.barriers[index]
-    if state_of(run, index) in GONE:
-        return np.zeros(len(x), dtype=bool)
+    if state in GONE:
+        return [False] * len(at)
     rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
-    corners = run.outline(index)
     if isinstance(barrier, Ditch):
         assert scene.ground is not None
         edge, top = barrier.end, scene.ground.height(barrier.end)
-        return (x >= barrier.x) & (x < edge) & (y < top + rise * (edge - x))
-    face, top = corners[:, 0].min(), corners[:, 1].max()
+        return [barrier.x <= x < edge and y < top + rise * (edge - x) for x, y in at]
+    corners = run.outline(index).tolist()
+    face, top = min(x for x, _ in corners), max(y for _, y in corners)
     if isinstance(barrier, Embankment):  # its uphill side belongs to it
         face += barrier.side_slope * barrier.height
-    return (x < face) & (y < top + rise * (face - x))
+    return [x < face and y < top + rise * (face - x) for x, y in at]
 
 
 def state_of(run: Run, index: int) -> str:
@@ -270,21 +294,19 @@ def state_of(run: Run, index: int) -> str:
 
 def _displacement(run: Run, index: int) -> float:
     """Return the distance of a barrier's centroid from where it was at the start [m]."""
-    moved = run.barrier_poses[-1, index, :2] - run.barrier_poses[0, index, :2]
-    return float(np.hypot(*moved))
+    return math.dist(*run.barrier_poses[[0, -1], index, :2].tolist())
 
 
-def _barrier(run: Run, index: int, passed: NDArray[np.float64], caught: float) -> BarrierOutcome:
-    hits = run.hits(index)
-    uphill = run.poses[0, :, 0] < run.scene.barriers[index].x
-    failure, state = run.failure(index), state_of(run, index)
+def _barrier(run: Run, index: int, state: str, log: _Log, caught: float) -> BarrierOutcome:
+    barrier, hits, failure = run.scene.barriers[index], log.hits[index], log.failure[index]
+    passed = zip(run.poses[0, :, 0].tolist(), log.passed[barrier.end], strict=True)
     return BarrierOutcome(
         hits=len(hits),
-        max_energy=float(hits["energy"].max(initial=0.0)),
-        total_energy=math.fsum(hits["energy"]),
+        max_energy=max((energy for energy, _ in hits), default=0.0),
+        total_energy=math.fsum(energy for energy, _ in hits),
         absorbed_energy=float(run.absorbed[index]),
-        impact_heights=tuple(float(h) for h in hits["height"]),
-        overtopped=int((uphill & np.isfinite(passed) & (passed < failure)).sum()),
+        impact_heights=tuple(height for _, height in hits),
+        overtopped=sum(x < barrier.x and time < failure for x, time in passed),
         failed=state != "stands",
         caught=caught,
         state=state,

@@ -64,14 +64,20 @@ def built(site: Site, layout: Sequence[Barrier], width: float) -> tuple[Built, .
     return tuple(standing)
 
 
+def strength(site: Site, shift: float) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+    """Return the surfaces and how pairs meet, with friction shifted, see `Site.strength`."""
+    surfaces = {name: _shifted(s, shift) for name, s in site.surfaces.items()}
+    return surfaces, {pair: _shifted(s, shift) for pair, s in pairs(site).items()}
+
+
 def scene(site: Site, drawn: Drawn, barriers: Sequence[Built]) -> Scene:
     """Return the scene of what was drawn, see `Site.scene`."""
-    shift = drawn.friction_deg
+    surfaces, interfaces = strength(site, drawn.friction_deg)
     return Scene(
         terrain=site.profile,
         blocks=drawn.blocks,
-        surfaces={name: _shifted(s, shift) for name, s in site.surfaces.items()},
-        interfaces={pair: _shifted(s, shift) for pair, s in pairs(site).items()},
+        surfaces=surfaces,
+        interfaces=interfaces,
         barriers=tuple(barriers),
         damping=site.motion.damping,
         damping_when=site.motion.damping_when,

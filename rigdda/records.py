@@ -142,6 +142,8 @@ STATION = _record(
 WATCHED = _record(
     next=int,  # first station that it has not passed
     energy=float,  # largest energy in the interval watched [J]
+    low=float,  # least and greatest x that its circle came to [m]
+    high=float,
 )
 """What is known of a block."""
 
@@ -392,19 +394,21 @@ class Gauges(NamedTuple):
     last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
     watch_low: float  # interval of x [m]
     watch_high: float
+    leave: float  # x beyond which what moves on is left alone [m]; -inf: the run is not ended early
     event: NDArray[np.void]
 
 
 LEDGER = ("friction", "impact", "damping", "external", "links")
 """Work done on the blocks so far [J]: entries of the ledger array."""
 
-COUNTERS = 14
+COUNTERS = 15
 """Length of the counter array. Its entries:"""
 
 STEPS, ITERATIONS, RELAXED, SOLVES, SOLVER_ITERATIONS = 0, 1, 2, 3, 4
-CONTACTS, EVENTS, CONTACT_TOTAL, SWEEPS, CUT_BACKS = 5, 6, 7, 8, 9
+CONTACTS, EVENTS, CONTACT_TOTAL, SWEEPS, CUT_BACKS, STILL = 5, 6, 7, 8, 9, 10
 """Steps; open-close iterations; islands relaxed; systems solved and iterations of their solver;
-contacts now; events not yet read; contacts, sweeps of relaxation and cut-backs so far."""
+contacts now; events not yet read; contacts, sweeps of relaxation and cut-backs so far; steps since
+anything moved that matters."""
 
-BROAD_PHASE, NARROW_PHASE, OPEN_CLOSE, MOTION = 10, 11, 12, 13
+BROAD_PHASE, NARROW_PHASE, OPEN_CLOSE, MOTION = 11, 12, 13, 14
 """Processor cycles by phase of the step, if they are timed."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from rigdda.barriers import Barrier
-from rigdda.outcome import Outcome, measure, stations, watch
+from rigdda.barriers import Barrier, Layout, as_layout
+from rigdda.batch import Batch, Job, outcomes, simulation
+from rigdda.errors import Error
+from rigdda.outcome import Outcome, measure
 from rigdda.run import Run
-from rigdda.simulation import Simulation
 from rigdda.site import Site
 
 EVERY = 0.05
@@ -27,7 +29,7 @@ def release(
     Returns
     -------
     run : Run
-        Frames every 0.05 s.
+        Frames every 0.05 s; it ends when nothing moves any more but what goes on beyond the road.
     outcome : Outcome
         What it means for the road.
 
@@ -40,25 +42,46 @@ def release(
     """
     drawn = site.draw(seed, event)
     scene = site.scene(drawn, site.built(layout, drawn.width))
-    lines = stations(site, scene.barriers)  # not of `layout`, which may be walked through once only
-    simulation = Simulation(scene, site.settings(), lines, watch(site))
-    run = simulation.run(site.motion.duration, EVERY, progress)
+    run = simulation(site, scene).run(site.motion.duration, EVERY, progress)
     return run, measure(site, run, drawn.event, drawn.width)
 
 
 def release_outcome(
     site: Site, layout: Sequence[Barrier] = (), seed: int = 0, event: str | None = None
 ) -> Outcome:
-    """Return the outcome that `release` gives."""
-    return release(site, layout, seed, event)[1]
+    """Return the outcome that `release` gives, in less time: frames on the way are not kept."""
+    return Batch(site, layout).outcome(seed, event)
 
 
-def release_many(
-    jobs: Sequence[tuple[Site, Sequence[Barrier], int, str | None]],
-) -> list[Outcome]:
-    """Return the outcomes of many releases (site, layout, seed, event), over all cores in threads.
+def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcome]:
+    """Return the outcomes of many releases (site, layout, seed, event), in threads.
 
-    Each outcome is the one that `release` gives. Raises as `release` does.
+    Each outcome is the one that `release` gives. Releases of a site with a layout share what does
+    not depend on the seed.
+
+    Parameters
+    ----------
+    jobs : sequence of (Site, sequence of Barrier, int, str or None)
+        Releases.
+    threads : int, optional
+        How many; by default one for each core.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `release` does, for the first job that fails.
     """
-    with ThreadPoolExecutor() as pool:
-        return list(pool.map(lambda job: release_outcome(*job), jobs))
+    each = [(site, as_layout(layout), seed, event) for site, layout, seed, event in jobs]
+    if threads is None:
+        threads = os.cpu_count() or 1
+    groups: dict[tuple[int, Layout], list[int]] = {}
+    for place, (site, layout, _, _) in enumerate(each):
+        groups.setdefault((id(site), layout), []).append(place)
+    queue = iter([place for group in groups.values() for place in group])
+    with ThreadPoolExecutor(threads) as pool:
+        parts = list(pool.map(lambda _: outcomes(each, queue), range(threads)))
+    found = sorted((pair for part in parts for pair in part), key=lambda pair: pair[0])
+    for _, outcome in found:
+        if isinstance(outcome, Error):
+            raise outcome
+    return [outcome for _, outcome in found if isinstance(outcome, Outcome)]

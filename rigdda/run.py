@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.barriers import from_table, to_tables
+from rigdda.barriers import GravityWall, from_table, to_tables
 from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.gauges import CROSSING, FAILED, HIT
@@ -67,6 +67,8 @@ class Run:
         Greatest mean over a second of the thrust on each barrier [N], as `BarrierOutcome` says.
     watch_energy : (N,) array
         Largest kinetic energy of each block while its centroid was in the watched interval [J].
+    extent : (N, 2) array
+        Least and greatest chainage that the circle about each block came to [m].
     barrier_poses : (T, B, 3) array
         x, y, theta of the centroid of each barrier's outline; only gravity walls move.
     """
@@ -79,6 +81,7 @@ class Run:
     absorbed: NDArray[np.float64]
     thrust: NDArray[np.float64]
     watch_energy: NDArray[np.float64]
+    extent: NDArray[np.float64]
     barrier_poses: NDArray[np.float64]
 
     def _check(self) -> None:
@@ -92,6 +95,7 @@ class Run:
             "absorbed": (b,),
             "thrust": (b,),
             "watch_energy": (n,),
+            "extent": (n, 2),
             "barrier_poses": (t, b, 3),
         }
         for name, shape in shapes.items():
@@ -116,6 +120,8 @@ class Run:
     def outline(self, barrier: int, frame: int = -1) -> NDArray[np.float64]:
         """Return the (n, 2) corners of a barrier in a frame, see `Scene.outline` [m]."""
         corners = self.scene.outline(barrier)
+        if not isinstance(self.scene.barriers[barrier], GravityWall):
+            return corners
         start, (x, y, theta) = self.barrier_poses[0, barrier], self.barrier_poses[frame, barrier]
         cos, sin = np.cos(theta), np.sin(theta)
         return (corners - start[:2]) @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
@@ -146,6 +152,7 @@ class Run:
                 absorbed=self.absorbed,
                 thrust=self.thrust,
                 watch_energy=self.watch_energy,
+                extent=self.extent,
                 barrier_poses=self.barrier_poses,
             )
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.validation import explain_validity
 
 from rigdda import check
-from rigdda.apart import check_apart, deepest
+from rigdda.apart import check_apart, deepest, in_ground
 from rigdda.barriers import (
     Barrier,
     Built,
@@ -27,7 +27,7 @@ from rigdda.barriers import (
     earthworks,
 )
 from rigdda.errors import BadInput
-from rigdda.geometry import edges, is_convex
+from rigdda.geometry import clearly_convex, edges, is_convex, polygon_properties
 from rigdda.loads import Load
 from rigdda.supports import FixedPoint, Support
 from rigdda.terrain import Terrain
@@ -211,6 +211,7 @@ class Scene:
     base_motion: NDArray[np.float64] | None = None
     ground: Terrain | None = field(init=False, repr=False)
     _moved: Mapping[Barrier, NDArray[np.float64]] = field(init=False, repr=False)
+    _outlines: dict[int, NDArray[np.float64]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._check_members()
@@ -220,19 +221,61 @@ class Scene:
             check.set_number(self, "gravity", 0.0)
         check.set_number(self, "damping", 0.0)
         check.one_of("damping_when", self.damping_when, ("always", "contact"))
-        if not any(not b.fixed for b in self.blocks):
-            raise BadInput("blocks", f"{len(self.blocks)} blocks", "give at least one free block")
-        check_apart([b.vertices for b in self.blocks], [b.fixed for b in self.blocks])
+        self._check_blocks()
         self._check_loads()
         if self.base_motion is not None:
             object.__setattr__(self, "base_motion", _history(self.base_motion))
         self._check_names()
         object.__setattr__(self, "ground", self.terrain)
         object.__setattr__(self, "_moved", {})
+        object.__setattr__(self, "_outlines", {})
         if self.barriers:
             self._build()
         if self.ground is not None:
             self._check_clear(self.ground)
+
+    def with_rock(
+        self,
+        blocks: tuple[Block, ...],
+        surfaces: Mapping[str, Surface],
+        interfaces: Mapping[tuple[str, str], Surface],
+        barriers: Sequence[Built],
+    ) -> Scene:
+        """Return the scene with other blocks and other properties of the surfaces of that name.
+
+        The ground and what stands on it are not built and checked again; `barriers` are those of
+        the scene but for what they resist.
+
+        Raises
+        ------
+        BadInput
+            As the scene does, for the blocks; if it has loads or supports.
+        """
+        if self.loads or self.supports:
+            raise BadInput("scene", self, "give one without loads and supports: they are on blocks")
+        other = object.__new__(Scene)
+        for name in Scene.__slots__:
+            object.__setattr__(other, name, getattr(self, name))
+        changed = {"blocks": blocks, "surfaces": surfaces, "interfaces": interfaces}
+        for name, value in changed.items():
+            object.__setattr__(other, name, value)
+        if barriers:
+            pairs = zip(self.barriers, barriers, strict=True)
+            moved = {b: self._moved[a] for a, b in pairs if a in self._moved}
+            object.__setattr__(other, "barriers", tuple(barriers))
+            object.__setattr__(other, "_moved", moved)
+        other._check_blocks()
+        for i, block in enumerate(other.blocks):
+            other._known(f"block {i}: surface", block.surface)
+        if other.ground is not None:
+            other._check_clear(other.ground)
+        return other
+
+    def _check_blocks(self) -> None:
+        """Check that there is a free block and that blocks are apart."""
+        if not any(not b.fixed for b in self.blocks):
+            raise BadInput("blocks", f"{len(self.blocks)} blocks", "give at least one free block")
+        check_apart([b.vertices for b in self.blocks], [b.fixed for b in self.blocks])
 
     def _check_members(self) -> None:
         """Check what the scene is made of, and set sequences to tuples and mappings to dicts."""
@@ -281,13 +324,13 @@ class Scene:
     def _check_clear(self, ground: Terrain) -> None:
         """Check that no free block starts deep in the ground or in what stands on it."""
         free = {i: block.vertices for i, block in enumerate(self.blocks) if not block.fixed}
-        found = deepest(ground.solid, list(free.values()))
+        found = in_ground(ground, list(free.values()))
         if found is not None:
             i = list(free)[found.block]
             mend = f"raise it: {found.shared:.3g} m2 of it are in the ground"
             raise BadInput(f"blocks[{i}]", self.blocks[i].vertices.tolist(), mend)
         for j in self.bodies:
-            found = deepest(shapely.Polygon(self.outline(j)), list(free.values()))
+            found = deepest(self.outline(j), list(free.values()))
             if found is not None:
                 i = list(free)[found.block]
                 mend = f"move it: {found.shared:.3g} m2 of block {i} are in it"
@@ -307,7 +350,17 @@ class Scene:
         if isinstance(what, Earthwork):
             return self._moved[what]
         assert self.ground is not None and not isinstance(what, Mesh)
-        return what.outline(self.ground)
+        if barrier not in self._outlines:
+            corners = what.outline(self.ground)
+            corners.setflags(write=False)
+            self._outlines[barrier] = corners
+        return self._outlines[barrier]
+
+    @property
+    def barrier_poses(self) -> NDArray[np.float64]:
+        """x, y, theta of the centroid of each barrier's outline at the start, (B, 3) [m, rad]."""
+        centres = [polygon_properties(self.outline(i))[1] for i in range(len(self.barriers))]
+        return np.array([[*centre, 0.0] for centre in centres]).reshape(-1, 3)
 
     @property
     def bodies(self) -> tuple[int, ...]:
@@ -359,6 +412,13 @@ class Scene:
     def barrier_surface(self) -> str:
         """Name of the surface of every barrier."""
         return "concrete" if "concrete" in self.surfaces else "rock"
+
+    def friction_deg(self, first: str, second: str) -> float:
+        """Return the friction angle between two named surfaces [deg], that of `interface`."""
+        pair = self.interfaces.get((first, second)) or self.interfaces.get((second, first))
+        if pair is not None:
+            return pair.friction_deg
+        return min(self.surfaces[first].friction_deg, self.surfaces[second].friction_deg)
 
     def interface(self, first: str, second: str) -> Surface:
         """Return the properties of the contact between two named surfaces."""
@@ -415,6 +475,8 @@ def simple_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:
         If the polygon crosses itself, repeats a corner or has no area.
     """
     corners = check.points(where, value, 3)
+    if clearly_convex(corners):
+        return corners
     polygon = shapely.Polygon(corners)
     if not polygon.is_valid:
         raise BadInput(where, corners.tolist(), f"untangle it: {explain_validity(polygon)}")

@@ -19,6 +19,7 @@ from rigdda.constants import (
     BAD_STATE,
     BOLT,
     CONTACTS_FULL,
+    ENDED,
     EVENTS_FULL,
     FIXED,
     GROUND_MOVED,
@@ -35,9 +36,9 @@ from rigdda.contact.links import bolt_energy
 from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.frames import frame_of, no_frames, pieces
 from rigdda.gauges import FAILED
-from rigdda.geometry import polygon_properties
 from rigdda.kernel import Direct
-from rigdda.pack import pack
+from rigdda.pack import Arrays, pack
+from rigdda.pack.again import Template
 from rigdda.pack.ground import pack_ground
 from rigdda.pack.space import empty_contacts, empty_system, empty_work
 from rigdda.records import (
@@ -148,6 +149,12 @@ class Simulation:
         Chainages whose first crossing by each block is recorded as an event [m].
     watch : (float, float), optional
         Interval of x in which the largest energy of each block is kept [m].
+    leave : float, optional
+        End a run as soon as nothing moves any more, or only downhill beyond this chainage [m];
+        None: it lasts as long as is asked for.
+    template : Template, optional
+        Arrays packed for the same stations, interval, chainage and settings, and a scene from which
+        this one differs in its rock: it is started in them.
 
     Raises
     ------
@@ -162,18 +169,34 @@ class Simulation:
         settings: Settings | None = None,
         stations: Sequence[float] = (),
         watch: tuple[float, float] | None = None,
+        leave: float | None = None,
+        template: Template | None = None,
     ):
         if not isinstance(scene, Scene):
             raise BadInput("scene", scene, "give a rigdda.Scene")
         if not isinstance(settings, Settings | None):
             raise BadInput("settings", settings, "give rigdda.Settings or None")
+        self.scene = scene
+        self.settings = settings or Settings()
+        if template is None:
+            self._arrays = self._pack(stations, watch, leave)
+        else:
+            self._arrays = template.write(scene)
+        self._start()
+
+    def _pack(
+        self, stations: Sequence[float], watch: tuple[float, float] | None, leave: float | None
+    ) -> Arrays:
         lines = chainages(stations)
         low, high = (math.inf, -math.inf) if watch is None else check.vector("watch", watch)
         if watch is not None and not low < high:
             raise BadInput("watch", watch, "give an interval (low, high)")
-        self.scene = scene
-        self.settings = settings or Settings()
-        self._arrays = pack(scene, self.settings, lines, (low, high))
+        end = -math.inf if leave is None else check.number("leave", leave)
+        return pack(self.scene, self.settings, lines, (low, high), end)
+
+    def _start(self) -> None:
+        """Set what is counted and kept to what it is before the first step."""
+        scene = self.scene
         self._now, self._before = self._arrays.now, self._arrays.before
         self._counters = np.zeros(COUNTERS, dtype=np.int64)
         self._ledger = np.zeros(len(LEDGER))
@@ -181,8 +204,7 @@ class Simulation:
         self._seconds = 0.0
         self._no_frames = no_frames(self._arrays.bodies)
         self._elastic_at_start = self._elastic()
-        centres = [polygon_properties(scene.outline(i))[1] for i in range(len(scene.barriers))]
-        self._barrier_start = np.array([[*centre, 0.0] for centre in centres]).reshape(-1, 3)
+        self._barrier_start = scene.barrier_poses
         self._events: list[NDArray[np.void]] = []
 
     @property
@@ -250,6 +272,8 @@ class Simulation:
     def _elastic(self) -> float:
         """Return the energy stored in bolts and plain contacts now [J]."""
         b, links = self._arrays.bodies, self._arrays.links
+        if len(links) + self._counters[CONTACTS] == 0:
+            return 0.0
         total = bolt_energy(b, links) if len(links) else 0.0
         c = self._now[: self._counters[CONTACTS]]
         c = c[(c["kind"] == PLAIN) & (c["state"] != OPEN)]
@@ -325,8 +349,11 @@ class Simulation:
         """
         self._advance(check.integer("n", n, 0), self._no_frames)
 
-    def _advance(self, steps: int, frames: NDArray[np.float64]) -> None:
-        """Take steps, as many from each of the frames to be kept to the next."""
+    def _advance(self, steps: int, frames: NDArray[np.float64]) -> bool:
+        """Take steps, as many from each of the frames to be kept to the next.
+
+        Returns whether the run is over before that, see `leave`.
+        """
         target, timing = self._counters[STEPS] + steps, self.settings.timing
         stride = steps // max(len(frames), 1)
         while self._counters[STEPS] < target:
@@ -363,6 +390,9 @@ class Simulation:
                 self._move_ground()
             elif reason == BAD_STATE:
                 raise Diverged(self._divergence(block))
+            elif reason == ENDED:
+                return True
+        return False
 
     def _divergence(self, block: int) -> str:
         """Return what is known of a block that moves too fast, and of the contact that did it."""
@@ -412,13 +442,18 @@ class Simulation:
             kept.append(np.empty((count, len(bodies), 6)))
             at += range(at[-1] + apart, at[-1] + (count + 1) * apart, apart)
             try:
-                self._advance(count * apart, kept[-1])
+                if self._advance(count * apart, kept[-1]):
+                    last = self._counters[STEPS] - start
+                    at = [mark for mark in at if mark < last]
+                    kept = [np.concatenate(kept)[: len(at)], frame_of(bodies)[None]]
+                    at.append(last)
+                    break
             except Diverged as error:
                 at = [mark for mark in at if start + mark < self._counters[STEPS]]
                 error.run = self._record(kept, start + np.array(at))
                 raise
         # what follows from the load by default is as stiff as it should be
-        contacts = self._now[: self._counters[CONTACTS]]
+        contacts = self._now.view(np.ndarray)[: self._counters[CONTACTS]]
         chosen = self.settings.penetration is not None or bool((contacts["kind"] == PLAIN).any())
         if chosen and self._compression() > SOFT:
             warnings.warn(
@@ -437,21 +472,23 @@ class Simulation:
         barrier_poses[:, list(self.scene.bodies)] = frames[:, n:, :3]
         events = np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
         gauges = self._arrays.gauges
+        rock, target = gauges.rock.view(np.ndarray), gauges.target.view(np.ndarray)
         return Run(
             self.scene,
             steps * self.settings.dt,
             frames[:, :n, :3].copy(),
             frames[:, :n, 3:].copy(),
             events,
-            gauges.target["absorbed"].copy(),
-            gauges.target["thrust"].copy(),
-            gauges.rock["energy"].copy(),
+            target["absorbed"].copy(),
+            target["thrust"].copy(),
+            rock["energy"].copy(),
+            np.stack([rock["low"], rock["high"]], axis=1),
             barrier_poses,
         )
 
     def _drain_events(self) -> None:
         n = self._counters[EVENTS]
-        self._events.append(self._arrays.gauges.event[:n].copy())
+        self._events.append(self._arrays.gauges.event.view(np.ndarray)[:n].copy())
         self._counters[EVENTS] = 0
 
     def _move_ground(self) -> None:

@@ -242,6 +242,10 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         drawn = self.draw(seed, event)
         return self.scene(drawn, self.built(layout, drawn.width))
 
+    def strength(self, shift: float) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+        """Return the surfaces and how pairs meet, with all friction angles shifted [deg]."""
+        return realisation.strength(self, shift)
+
     @property
     def soil(self) -> str:
         """Name of the surface of embankments."""

@@ -12,11 +12,11 @@ from rigdda.constants import (
     BAD_STATE,
     CONTACTS_FULL,
     DONE,
+    ENDED,
     EVENTS_FULL,
     GROUND_MOVED,
     HELD,
     OPEN,
-    RETIRED,
     SPEED_LIMIT,
     TERRAIN,
 )
@@ -38,11 +38,12 @@ from rigdda.correction import (
 )
 from rigdda.cut_back import act_early, hold_others, level_for, mark_cut, release_all, too_far
 from rigdda.fence import charge_fences, lower_fences, wake_behind
+from rigdda.flight import fly, keep_touch, land, take_off
 from rigdda.frames import keep_frame
-from rigdda.gauges import barrier_contact, note_hits, note_passage
+from rigdda.gauges import barrier_contact, is_over, note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel, stage
-from rigdda.motion import kinetic_energy, top_speed
+from rigdda.motion import retire, top_speed
 from rigdda.open_close import let_wait, open_close
 from rigdda.records import (
     BROAD_PHASE,
@@ -55,7 +56,6 @@ from rigdda.records import (
     OPEN_CLOSE,
     STEPS,
     Bodies,
-    Body,
     Boxes,
     Contacts,
     Gauges,
@@ -190,15 +190,6 @@ def detect(
     return count
 
 
-@kernel
-def retire(body: Body) -> float:
-    """Take a block that has left the site out of the simulation; returns its kinetic energy [J]."""
-    energy = kinetic_energy(body)
-    body.status = RETIRED
-    body.vx = body.vy = body.omega = 0.0
-    return energy
-
-
 @stage
 def move_island(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, motion: Motion, islands: Islands,
@@ -314,6 +305,15 @@ def rest_all(bodies: Bodies) -> None:
             body.vx = body.vy = body.omega = 0.0
 
 
+@kernel
+def set_out(bodies: Bodies, shaking: Shaking, since: float, time: float, p: Parameters) -> None:
+    """Begin a step: at rest in static mode, in the field that the motion of the ground makes."""
+    if p.static:
+        rest_all(bodies)
+    if len(shaking) > 0:
+        set_field(shaking, since, time, p)
+
+
 @entry_kernel
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
@@ -335,42 +335,56 @@ def advance(
     Returns
     -------
     reason : int
-        DONE, CONTACTS_FULL, EVENTS_FULL, GROUND_MOVED or BAD_STATE; anything but DONE stops early.
+        DONE, CONTACTS_FULL, EVENTS_FULL, GROUND_MOVED, BAD_STATE or ENDED; anything but DONE stops
+        early.
     block : int
         The block that went bad, else -1.
     swapped : bool
         Whether `now` and `before` have changed roles.
     """
     swapped, level, part = False, 0, 0
+    may_fly = len(links) == 0 and len(shaking) == 0 and not levels[0].static
+    may_fly = may_fly and levels[0].post_correction
+    flyer, flown, flight = -1, 0, 0  # steps of a flight that are taken, and all of them
     while steps > 0:
         p, parts = levels[level], 2**level
         room = len(gauges.event) - counters[EVENTS]
         if level == 0 and room < (p.blocks + 1) * (len(gauges.station) + len(gauges.target)):
+            land(bodies, outlines, flyer, flown)
             return EVENTS_FULL, -1, swapped
         start = counters[STEPS] * parts + part
         time = (start + 1) * p.dt
-        if p.static:
-            rest_all(bodies)
-        if len(shaking) > 0:
-            set_field(shaking, start * p.dt, time, p)
-        copy_index(work.begin, work.first)
-        count = detect(
-            bodies, outlines, ground, interfaces, links, before, now, work, gauges, time, p,
-            counters, deepest,
-        )  # fmt: skip
-        # a cut-back, which cannot be left, has room to spare
-        if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
-            copy_index(work.first, work.begin)
-            return CONTACTS_FULL, -1, swapped
-        now, before = before, now
-        swapped = not swapped
+        if may_fly and level == 0 and flown == flight:
+            land(bodies, outlines, flyer, flown)
+            flyer, flight = take_off(bodies, outlines, ground, work.islands, work.begin, p)
+            flown = 0
+        if flown < flight:
+            flown += 1
+            count = counters[CONTACTS]
+            keep_touch(bodies, now, count, gauges, time)
+            excess = 0.0
+            bad = fly(bodies, flyer, now, system.matrix, system.motion, work.islands, p, ledger)
+            flight = flight if bodies[flyer].status == AWAKE else flown
+        else:
+            set_out(bodies, shaking, start * p.dt, time, p)
+            copy_index(work.begin, work.first)
+            count = detect(
+                bodies, outlines, ground, interfaces, links, before, now, work, gauges, time, p,
+                counters, deepest,
+            )  # fmt: skip
+            # a cut-back, which cannot be left, has room to spare
+            if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
+                copy_index(work.first, work.begin)
+                return CONTACTS_FULL, -1, swapped
+            now, before = before, now
+            swapped = not swapped
+            bad, excess = solve_and_move(
+                bodies, outlines, now, count, system, work, gauges, time, p, level == 0, counters,
+                ledger,
+            )  # fmt: skip
+            yield_bolts(bodies, links)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
-        bad, excess = solve_and_move(
-            bodies, outlines, now, count, system, work, gauges, time, p, level == 0, counters,
-            ledger,
-        )  # fmt: skip
-        yield_bolts(bodies, links)
         note_thrust(bodies, now, count, gauges, level == 0, p)
         pushed = False
         part += 1
@@ -392,8 +406,14 @@ def advance(
             steps -= 1
             if bad < 0 and len(frames) > 0 and steps % stride == 0:
                 keep_frame(bodies, frames[len(frames) - 1 - steps // stride])
+            if bad < 0 and is_over(bodies, gauges, counters, levels[0]):
+                land(bodies, outlines, flyer, flown)
+                return ENDED, -1, swapped
         if bad >= 0:
+            land(bodies, outlines, flyer, flown)
             return BAD_STATE, bad, swapped
         if pushed:
+            land(bodies, outlines, flyer, flown)
             return GROUND_MOVED, -1, swapped
+    land(bodies, outlines, flyer, flown)
     return DONE, -1, swapped

@@ -60,7 +60,9 @@ def run() -> Run:
     )
     at_wall = np.tile([27.5, 2.0, 0.0], (FRAMES, 1, 1))
     taken, energies = np.array([12.5]), np.array([0.0, 0.1, 7.0])
-    return Run(scene, times, poses, velocities, events, taken, np.zeros(1), energies, at_wall)
+    extent = np.stack([poses[:, :, 0].min(axis=0), poses[:, :, 0].max(axis=0)], axis=1)
+    thrust = np.zeros(1)
+    return Run(scene, times, poses, velocities, events, taken, thrust, energies, extent, at_wall)
 
 
 @pytest.fixture
@@ -247,7 +249,7 @@ def test_viewer_is_local_and_its_failure_is_told(
 def test_save_and_load_is_exact(run: Run, tmp_path: Path) -> None:
     run.save(tmp_path / "run.npz")
     back = Run.load(tmp_path / "run.npz")
-    for name in ("times", "poses", "velocities", "events", "absorbed", "watch_energy"):
+    for name in ("times", "poses", "velocities", "events", "absorbed", "watch_energy", "extent"):
         kept, read = getattr(run, name), getattr(back, name)
         assert kept.dtype == read.dtype
         assert kept.tobytes() == read.tobytes()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,7 @@ def pack(
     settings: Settings,
     stations: NDArray[np.float64],
     watch: tuple[float, float],
+    leave: float = -math.inf,
 ) -> Arrays:
     """Return the kernels' arrays for a scene at rest at its start.
 
@@ -59,6 +61,8 @@ def pack(
         Ascending chainages whose first crossings are recorded [m].
     watch : (float, float)
         Interval of x in which energies are watched [m].
+    leave : float
+        x beyond which what moves on is left alone [m], -inf: the run is not ended early.
     """
     names = list(scene.surfaces)
     bodies, outlines = pack_bodies(scene, names)
@@ -76,6 +80,6 @@ def pack(
         empty_contacts(room),
         empty_system(blocks, room),
         empty_work(len(bodies), blocks, room),
-        pack_gauges(scene, bodies, stations, watch, settings.dt),
+        pack_gauges(scene, bodies, stations, watch, leave, settings.dt),
         pack_parameters(scene, settings, bodies, interfaces),
     )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigdda.barriers import Fence, GravityWall
 from rigdda.constants import (
@@ -14,8 +16,10 @@ from rigdda.constants import (
     PIN,
     TERRAIN,
 )
-from rigdda.correction import place_all_corners
-from rigdda.geometry import convex_parts, polygon_properties, turns
+from rigdda.correction import place_corners, polygon_row
+from rigdda.correction import polygons as polygons_of
+from rigdda.geometry import convex_parts, moments, polygon_properties, turns
+from rigdda.kernel import Direct, entry_kernel
 from rigdda.records import (
     BODY,
     CORNER,
@@ -27,7 +31,7 @@ from rigdda.records import (
     Links,
     Outlines,
 )
-from rigdda.scene import Scene
+from rigdda.scene import Block, Scene
 from rigdda.supports import FixedPoint
 
 
@@ -43,29 +47,84 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
     """
     polygons = [b.vertices for b in scene.blocks] + [scene.outline(i) for i in scene.bodies]
     bodies = np.zeros(len(polygons), dtype=BODY)  # its columns are quicker to set than a recarray's
-    properties = [polygon_properties(polygon) for polygon in polygons]
-    outlines = pack_outlines(polygons, [centre for _, centre, _ in properties], bodies)
-    for i, polygon in enumerate(polygons):
-        area, centre, second = properties[i]
-        block = scene.blocks[i] if i < len(scene.blocks) else None
-        barrier = None if block else scene.barriers[scene.bodies[i - len(scene.blocks)]]
-        heavy = block or (barrier if isinstance(barrier, GravityWall) else None)
-        density = heavy.density if heavy else 1.0
-        bodies["x"][i], bodies["y"][i] = centre
-        bodies["radius"][i] = np.hypot(*(polygon - centre).T).max()
-        bodies["mass"][i], bodies["inertia"][i] = density * area, density * second
-        bodies["surface"][i] = names.index(block.surface if block else scene.barrier_surface)
-        if isinstance(barrier, Fence):
-            bodies["surface"][i] = len(names)
-        bodies["status"][i] = FIXED if (block.fixed if block else not heavy) else AWAKE
-        if block and not block.fixed:
-            bodies["vx"][i], bodies["vy"][i], bodies["omega"][i] = block.velocity
-        for load in scene.loads:
-            if load.block == i:
-                _add_load(bodies, i, *load.resultant(area, centre))
+    outlines = pack_outlines(polygons, bodies)
+    traits = block_traits(scene.blocks, names)
+    traits += [barrier_trait(scene, i, names) for i in scene.bodies]
     bodies = bodies.view(np.recarray)
-    place_all_corners(bodies, outlines)
+    write_polygons(polygons, traits, bodies, outlines)
+    for load in scene.loads:
+        i = load.block
+        area, centre, _ = polygon_properties(polygons[i])
+        _add_load(bodies, i, *load.resultant(area, centre))
     return bodies, outlines
+
+
+Trait = tuple[float, float, float, float, int, int]
+"""Density [kg/m3], velocity [m/s, m/s, rad/s], surface and status of a body."""
+
+
+def block_traits(blocks: Sequence[Block], names: list[str]) -> list[Trait]:
+    """Return density, velocity, surface and status of blocks."""
+    return [
+        (
+            b.density,
+            *((0.0, 0.0, 0.0) if b.fixed else b.velocity),
+            names.index(b.surface),
+            FIXED if b.fixed else AWAKE,
+        )
+        for b in blocks
+    ]
+
+
+def barrier_trait(scene: Scene, number: int, names: list[str]) -> Trait:
+    """Return the same of a barrier that is a body."""
+    barrier = scene.barriers[number]
+    surface = len(names) if isinstance(barrier, Fence) else names.index(scene.barrier_surface)
+    if isinstance(barrier, GravityWall):
+        return barrier.density, 0.0, 0.0, 0.0, surface, AWAKE
+    return 1.0, 0.0, 0.0, 0.0, surface, FIXED
+
+
+def write_polygons(
+    polygons: Sequence[Floats], traits: Sequence[Trait], bodies: Bodies, outlines: Outlines
+) -> None:
+    """Write the first bodies of an array and their outlines, from the corners of each."""
+    corners = np.concatenate(polygons)
+    _write.call(corners, np.array(traits, dtype=np.float64), bodies, outlines)
+
+
+@entry_kernel
+def write_bodies(corners: NDArray, traits: NDArray, bodies: Bodies, outlines: Outlines) -> None:
+    """Set bodies at their start from the corners of one after the other, and place their corners.
+
+    The number of corners and the parts of each body are set. Density, velocity, surface and status
+    are columns of `traits`.
+    """
+    low = 0
+    for i in range(len(traits)):
+        body = bodies[i]
+        high = low + body.count
+        area, body.x, body.y, second = moments(corners, low, high)
+        density = traits[i, 0]
+        body.mass, body.inertia = density * area, density * second
+        body.vx, body.vy, body.omega = traits[i, 1], traits[i, 2], traits[i, 3]
+        body.surface, body.status = int(traits[i, 4]), int(traits[i, 5])
+        farthest = 0.0
+        for k in range(low, high):
+            dx, dy = corners[k, 0] - body.x, corners[k, 1] - body.y
+            farthest = max(farthest, math.hypot(dx, dy))
+        body.radius = farthest
+        for place in range(polygons_of(body)):
+            row = polygon_row(body, i, place)
+            for k in range(outlines.polygon[row].count):
+                local, number = outlines.local[row, k], outlines.corner[row, k].number
+                local.x = corners[low + number, 0] - body.x
+                local.y = corners[low + number, 1] - body.y
+        place_corners(bodies, outlines, i)
+        low = high
+
+
+_write = Direct(write_bodies)
 
 
 def _add_load(bodies: Bodies, i: int, force: Floats, point: Floats) -> None:
@@ -77,8 +136,11 @@ def _add_load(bodies: Bodies, i: int, force: Floats, point: Floats) -> None:
     bodies["moment_sin"][i] -= x * fx + y * fy
 
 
-def pack_outlines(polygons: list[Floats], centres: list[Floats], bodies: Bodies) -> Outlines:
-    """Return the outlines and convex parts of bodies, and set where each body's parts are."""
+def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
+    """Return the outlines and convex parts of bodies, and set where each body's parts are.
+
+    Where their corners are `write_polygons` sets.
+    """
     rows = [(i, list(range(len(p)))) for i, p in enumerate(polygons)]
     for i, polygon in enumerate(polygons):
         parts = convex_parts(polygon)
@@ -91,8 +153,6 @@ def pack_outlines(polygons: list[Floats], centres: list[Floats], bodies: Bodies)
     for row, (i, number) in enumerate(rows):
         polygon, corner = polygons[i], corners[row, : len(number)]
         outlined["count"][row], outlined["body"][row] = len(number), i
-        own = points[row, : len(number)]
-        own["x"], own["y"] = (polygon - centres[i])[number].T
         corner["number"] = number
         following = [*number[1:], number[0]]
         corner["inner"] = np.subtract(following, number) % len(polygon) != 1

@@ -24,31 +24,18 @@ def pack_gauges(
     bodies: Bodies,
     stations: NDArray[np.float64],
     watch: tuple[float, float],
+    leave: float,
     dt: float,
 ) -> Gauges:
-    """Return the gauges, with no station passed that a block starts beyond; `dt` is the step [s].
-
-    Fences sag in scenes of several blocks: a release of one block is the same for all capacities
-    that are not exceeded.
-    """
+    """Return the gauges, with no station passed that a block starts beyond; `dt`: the step [s]."""
     blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.ground
     station = np.zeros(len(stations), dtype=STATION)
     station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
     rock = np.zeros(blocks, dtype=WATCHED)
-    rock["next"] = np.searchsorted(stations, bodies["x"][:blocks], side="right")
+    start_rock(rock, bodies, stations)
     target = np.zeros(barriers, dtype=TARGET)
-    target["capacity"] = [b.capacity if isinstance(b, Fence) else np.inf for b in scene.barriers]
     target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
-    target["low"], target["high"], target["limit"] = np.inf, -np.inf, np.inf
-    for i, barrier in enumerate(scene.barriers):
-        if isinstance(barrier, Fence | Embankment):
-            target["limit"][i] = resistance(scene, i)
-        corners = scene.outline(i)
-        if isinstance(barrier, Embankment):
-            target["low"][i], target["high"][i] = corners[:, 0].min(), corners[:, 0].max()
-        if isinstance(barrier, Fence):
-            target["top"][i] = 0.5 * np.ptp(corners[:, 1])
-            target["sag"][i] = barrier.sag if _several(scene) else 0.0
+    start_targets(target, scene)
     room = event_room(free_bodies(scene), len(stations), barriers)
     return Gauges(
         station.view(np.recarray),
@@ -62,13 +49,38 @@ def pack_gauges(
         np.full((free_bodies(scene), barriers), -np.inf),
         float(watch[0]),
         float(watch[1]),
+        float(leave),
         np.zeros(room, dtype=EVENT).view(np.recarray),
     )
 
 
-def _several(scene: Scene) -> bool:
-    """Return whether more than one block is free to move."""
-    return sum(not block.fixed for block in scene.blocks) > 1
+def start_targets(target: NDArray[np.void], scene: Scene) -> None:
+    """Write what barriers resist, where they press on the ground, and how fences sag.
+
+    Fences sag in scenes of several blocks: a release of one block is the same for all capacities
+    that are not exceeded.
+    """
+    several = sum(not block.fixed for block in scene.blocks) > 1
+    target["capacity"] = target["low"] = target["limit"] = np.inf
+    target["high"] = -np.inf
+    for i, barrier in enumerate(scene.barriers):
+        if not isinstance(barrier, Fence | Embankment):
+            continue
+        target["limit"][i] = resistance(scene, i)
+        corners = scene.outline(i)
+        if isinstance(barrier, Embankment):
+            target["low"][i], target["high"][i] = corners[:, 0].min(), corners[:, 0].max()
+        else:
+            target["capacity"][i] = barrier.capacity
+            target["top"][i] = 0.5 * np.ptp(corners[:, 1])
+            target["sag"][i] = barrier.sag if several else 0.0
+
+
+def start_rock(rock: NDArray[np.void], bodies: Bodies, stations: NDArray[np.float64]) -> None:
+    """Write where blocks start: between which stations, and their extent."""
+    x, radius = bodies["x"][: len(rock)], bodies["radius"][: len(rock)]
+    rock["next"] = stations.searchsorted(x, side="right")
+    rock["low"], rock["high"] = x - radius, x + radius
 
 
 def _ground(terrain: Terrain | None, x: float) -> float:

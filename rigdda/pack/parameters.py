@@ -54,50 +54,76 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
     fences = any(isinstance(b, Fence) for b in scene.barriers)
     every = [*names, scene.barrier_surface] if fences else names
     found = np.zeros((len(every), len(every)), dtype=INTERFACE)
-    for i, a in enumerate(every):
-        for j, b in enumerate(every):
+    found["friction"] = frictions(scene, len(every))
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
             surface = scene.interface(a, b)
-            found["friction"][i, j] = np.tan(np.radians(surface.friction_deg))
-            if max(i, j) < len(names):
-                plain = surface.restitution is None
-                found["restitution"][i, j] = PLAIN_CONTACT if plain else surface.restitution
-                found["cohesion"][i, j], found["tension"][i, j] = surface.cohesion, surface.tension
+            plain = surface.restitution is None
+            found["restitution"][i, j] = PLAIN_CONTACT if plain else surface.restitution
+            found["cohesion"][i, j], found["tension"][i, j] = surface.cohesion, surface.tension
     return found.view(np.recarray)
+
+
+def frictions(scene: Scene, size: int) -> list[list[float]]:
+    """Return the coefficient of friction of each two of `size` surfaces, see `pack_interfaces`."""
+    every = list(scene.surfaces)
+    every += [scene.barrier_surface] * (size - len(every))
+    return [[math.tan(math.radians(scene.friction_deg(a, b))) for b in every] for a in every]
+
+
+def rock_numbers(scene: Scene, settings: Settings, bodies: Bodies) -> dict[str, float]:
+    """Return the numbers that depend on the blocks."""
+    free = [i for i, b in enumerate(scene.blocks) if not b.fixed]
+    mass = bodies["mass"][free]
+    area = mass / [scene.blocks[i].density for i in free]
+    size = math.sqrt(np.add.reduce(area) / len(free))
+    gravity = math.hypot(*scene.gravity_vector)
+    least = int(area.argmin())
+    check_step(settings, free[least], math.sqrt(area[least]), gravity)
+    steady = STEADY_STEP * math.sqrt(size / gravity) if gravity > 0.0 else math.inf
+    static = settings.mode == "static"
+    coarse = settings.dt > steady and not static
+    numbers = {
+        "displacement_limit": settings.displacement_limit * size,
+        "deflection_limit": math.inf if static else DEFLECTED * size,
+        "sinking_limit": SINKING * size if coarse else math.inf,
+        "first_cut": 1,
+        "block_weight": np.add.reduce(mass) / len(free) * (gravity or 9.81),
+        "penetration": settings.penetration or PENETRATION_RATIO * size,
+        "slack": SLACK_RATIO * size,
+    }
+    if coarse:
+        halvings = round(math.log2(settings.dt / steady))
+        numbers["first_cut"] = min(max(1, halvings), CUTS)
+    return numbers
+
+
+def write_rock_numbers(levels: NDArray[np.void], numbers: dict[str, float]) -> None:
+    """Write what `rock_numbers` gives, for a step and its parts: these are not cut back."""
+    for name, value in numbers.items():
+        levels[name] = value
+    levels["sinking_limit"][1:] = math.inf
 
 
 def pack_parameters(
     scene: Scene, settings: Settings, bodies: Bodies, interfaces: Interfaces
 ) -> NDArray[np.void]:
     """Return the numbers of the scene and the settings, for the step and for its parts."""
-    free = [i for i, b in enumerate(scene.blocks) if not b.fixed]
-    area = [bodies["mass"][i] / scene.blocks[i].density for i in free]
-    size = math.sqrt(np.mean(area))
     gx, gy = scene.gravity_vector
-    gravity = math.hypot(gx, gy)
-    check_step(settings, free[int(np.argmin(area))], math.sqrt(min(area)), gravity)
-    steady = STEADY_STEP * math.sqrt(size / gravity) if gravity > 0.0 else math.inf
     static = settings.mode == "static"
-    coarse = settings.dt > steady and not static
     shaken = scene.base_motion is not None
     floor = -np.inf
     if scene.terrain is not None and gx == 0.0 and gy < 0.0:
         floor = scene.terrain.points[:, 1].min() - FALL_BELOW
     numbers = {
         "blocks": free_bodies(scene),
-        "displacement_limit": settings.displacement_limit * size,
-        "deflection_limit": math.inf if static else DEFLECTED * size,
-        "sinking_limit": SINKING * size if coarse else math.inf,
-        "first_cut": 1,
         "gravity_x": gx,
         "gravity_y": gy,
-        "gravity": gravity,
+        "gravity": math.hypot(gx, gy),
         "field_x": gx,
         "field_y": gy,
         "damping": scene.damping,
         "damping_in_contact_only": scene.damping_when == "contact",
-        "block_weight": np.mean(bodies["mass"][free]) * (gravity or 9.81),
-        "penetration": settings.penetration or PENETRATION_RATIO * size,
-        "slack": SLACK_RATIO * size,
         "tolerance": settings.tolerance,
         "sweep_tolerance": settings.sweep_tolerance,
         "iterations": settings.open_close_iterations,
@@ -111,12 +137,9 @@ def pack_parameters(
         "floor": floor,
         "bonded": (interfaces["cohesion"] + interfaces["tension"]).any(),
     }
-    if coarse:
-        halvings = round(math.log2(settings.dt / steady))
-        numbers["first_cut"] = min(max(1, halvings), CUTS)
     levels = np.zeros(CUTS + 1, dtype=PARAMETERS)
     for name, value in numbers.items():
         levels[name] = value
     levels["dt"] = settings.dt / 2.0 ** np.arange(CUTS + 1)
-    levels["sinking_limit"][1:] = math.inf  # the parts of a step are not cut back
+    write_rock_numbers(levels, rock_numbers(scene, settings, bodies))
     return levels.view(np.recarray)

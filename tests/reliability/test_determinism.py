@@ -24,7 +24,7 @@ def play(seed: int = 0) -> Run:
 
 def same(one: Run, other: Run) -> bool:
     """Return whether two runs are equal to the last bit."""
-    names = ("times", "poses", "velocities", "events", "absorbed", "watch_energy")
+    names = ("times", "poses", "velocities", "events", "absorbed", "watch_energy", "extent")
     return scene_to_json(one.scene) == scene_to_json(other.scene) and all(
         getattr(one, name).dtype == getattr(other, name).dtype
         and np.array_equal(getattr(one, name), getattr(other, name))

@@ -1,0 +1,76 @@
+"""Processor time of a release in a batch: of one block or more, with and without barriers.
+
+Releases of the design site `bench` one after the other, as `rigdda.release_many` computes them in
+each of its threads, in steps of 10, 5 and 2.5 ms. The time is split into what is drawn and checked
+(scene), what is written into the arrays (pack), the steps (run) and the outcome.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from experiments.script import Number, main, say, write
+from rigdda import Embankment, Fence, Layout, Site, sites
+from rigdda.batch import Batch
+from rigdda.outcome import measure
+
+SITE, TARGET = "bench", 0.5
+EVENTS = {"one block": "block", "group": "group", "slab": "slab"}
+LAYOUTS: dict[str, Layout] = {
+    "nothing": (),
+    "fence": (Fence(31.0, 4.0, capacity=1e6),),
+    "embankment": (Embankment(31.0, 1.5),),
+}
+PARTS = ("scene", "pack", "run", "outcome")
+WARM = 20
+"""Releases before those that are timed, by which all is packed that is packed once."""
+
+
+def cost(site: Site, layout: Layout, event: str, releases: int) -> dict[str, float]:
+    """Return the mean processor time of each part of a release [ms]."""
+    batch, duration = Batch(site, layout), site.motion.duration
+    seconds = np.zeros((releases, len(PARTS)))
+    for seed in range(-WARM, releases):
+        clock = [time.thread_time()]
+        drawn = site.draw(seed % releases, event)
+        scene = batch.scene(drawn)
+        clock.append(time.thread_time())
+        simulation = batch.simulation(scene)
+        clock.append(time.thread_time())
+        run = simulation.run(duration, duration)
+        clock.append(time.thread_time())
+        measure(site, run, drawn.event, drawn.width)
+        clock.append(time.thread_time())
+        if seed >= 0:
+            seconds[seed] = np.diff(clock)
+    mean = 1e3 * seconds.mean(axis=0)
+    median = 1e3 * float(np.median(seconds.sum(axis=1)))
+    return dict(zip(PARTS, mean.tolist(), strict=True)) | {"all": mean.sum(), "median": median}
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Time releases and write them as a table."""
+    site, rows, worst = sites.load(SITE), [], -math.inf
+    for dt in (10e-3,) if quick else (10e-3, 5e-3, 2.5e-3):
+        timed = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, dt=dt))
+        for what, event in EVENTS.items():
+            say(f"{what}, {1e3 * dt:g} ms")
+            releases = (100 if quick else 1000) if what == "one block" else (5 if quick else 20)
+            for name, layout in LAYOUTS.items():
+                found = cost(timed, layout, event, releases)
+                row: dict[str, Any] = {"release": what, "layout": name, "dt_ms": 1e3 * dt}
+                rows.append(row | {"releases": releases} | {f"{k}_ms": v for k, v in found.items()})
+                if what == "one block" and dt == site.motion.dt:
+                    worst = max(worst, found["median"])
+    write(out / "release_cost.csv", rows)
+    return Number("processor time of a release of one block, median [ms]", worst, high=TARGET)
+
+
+if __name__ == "__main__":
+    main(run)

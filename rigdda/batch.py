@@ -1,0 +1,101 @@
+"""Many releases of one site with one layout, which share what does not depend on the seed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from rigdda.barriers import Barrier, Mesh, as_layout
+from rigdda.errors import Error
+from rigdda.events import Drawn
+from rigdda.outcome import Outcome, leave, measure, stations, watch
+from rigdda.pack.again import Template
+from rigdda.scene import Scene
+from rigdda.simulation import Simulation, chainages
+from rigdda.site import Site
+
+MOST_BLOCKS = 32
+"""Most blocks of a scene whose arrays are kept: packing more takes little beside simulating them.
+There are about as many kinds of them as numbers of blocks and of corners."""
+
+Job = tuple[Site, Sequence[Barrier], int, str | None]
+"""A site, a layout, a seed and the name of an event, None for one that the seed draws."""
+
+
+class Batch:
+    """Releases of a site with a layout, one after the other.
+
+    The ground and what stands on it are built and packed once; for a release its blocks are checked
+    and written into the arrays of the last one. Outcomes are those of `rigdda.release`.
+
+    Parameters
+    ----------
+    site : Site
+        Where.
+    layout : sequence of Barrier
+        What stands.
+    """
+
+    def __init__(self, site: Site, layout: Sequence[Barrier]):
+        self._site, self._layout = site, as_layout(layout)
+        self._standing = [b for b in self._layout if not isinstance(b, Mesh)]
+        self._settings, self._watch = site.settings(), watch(site)
+        self._base: tuple[Scene, float] | None = None
+        self._templates: dict[tuple[int, int], Template] = {}
+
+    def outcome(self, seed: int, event: str | None = None) -> Outcome:
+        """Return the outcome of one release. Raises as `rigdda.release` does."""
+        drawn = self._site.draw(seed, event)
+        duration = self._site.motion.duration
+        run = self.simulation(self.scene(drawn)).run(duration, duration)
+        return measure(self._site, run, drawn.event, drawn.width)
+
+    def scene(self, drawn: Drawn) -> Scene:
+        """Return the scene of what was drawn, on the ground and with the barriers of the first."""
+        if self._base is None:
+            scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
+            self._base = scene, drawn.friction_deg
+            return scene
+        base, shift = self._base
+        surfaces, interfaces = base.surfaces, base.interfaces
+        if drawn.friction_deg != shift:
+            surfaces, interfaces = self._site.strength(drawn.friction_deg)
+        barriers = [b.for_width(drawn.width) for b in self._standing]
+        return base.with_rock(drawn.blocks, surfaces, interfaces, barriers)
+
+    def simulation(self, scene: Scene) -> Simulation:
+        """Return the simulation of such a scene; that of the one before is of no more use."""
+        if len(scene.blocks) > MOST_BLOCKS:
+            return simulation(self._site, scene)
+        key = len(scene.blocks), max(len(b.vertices) for b in scene.blocks)
+        template = self._templates.get(key)
+        if template is None or not template.fits(scene):
+            lines = chainages(stations(self._site, scene.barriers))
+            beyond = leave(self._site, scene)
+            template = Template(scene, self._settings, lines, self._watch, beyond)
+            self._templates[key] = template
+        return Simulation(scene, self._settings, template=template)
+
+
+def simulation(site: Site, scene: Scene) -> Simulation:
+    """Return a simulation of a scene of a site that watches what its outcome needs."""
+    lines = stations(site, scene.barriers)
+    return Simulation(scene, site.settings(), lines, watch(site), leave(site, scene))
+
+
+def outcomes(jobs: Sequence[Job], places: Iterable[int]) -> list[tuple[int, Outcome | Error]]:
+    """Return the outcomes of the jobs at some places, or what went wrong, each with its place.
+
+    Several threads may share `places`, an iterator. Jobs with the same site and layout are to
+    follow one another.
+    """
+    found: list[tuple[int, Outcome | Error]] = []
+    batch, of = None, None
+    for place in places:
+        site, layout, seed, event = jobs[place]
+        try:
+            if batch is None or of is None or of[0] is not site or of[1] != layout:
+                batch, of = Batch(site, layout), (site, layout)
+            found.append((place, batch.outcome(seed, event)))
+        except Error as error:
+            found.append((place, error))
+    return found

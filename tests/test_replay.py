@@ -19,8 +19,8 @@ from rerun.chunk import RrdReader
 from rigdda import replay
 from rigdda.barriers import Built, Embankment, Fence, GravityWall
 from rigdda.errors import BadInput, Error
-from rigdda.replay import Marks, open_viewer
 from rigdda.gauges import FAILED
+from rigdda.replay import Marks, open_viewer
 from rigdda.run import CROSSING, EVENT, HIT, Run
 from rigdda.scene import Block, Scene, Surface, Terrain, Wall
 from rigdda.states import states
@@ -137,7 +137,7 @@ def with_barriers(run: Run, *barriers: Built, failed: tuple[tuple[int, float], .
     """Return the run with other barriers, of which some fail at a time."""
     scene = Scene(run.scene.terrain, run.scene.blocks, barriers=barriers)
     n = len(barriers)
-    poses = np.zeros((FRAMES, n, 3)) + [27.5, 2.0, 0.0]
+    poses = np.tile([27.5, 2.0, 0.0], (FRAMES, n, 1))
     events = [(when, FAILED, 2, i, 27.0, 2.0, 1.0, 4.0, 5.0) for i, when in failed]
     changed = {"scene": scene, "barrier_poses": poses, "events": np.array(events, EVENT)}
     for name in ("absorbed", "thrust"):

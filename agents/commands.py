@@ -67,7 +67,7 @@ def train(sites: int, episodes: int, seed: int, processes: int, out: Path | None
               help="What to try; repeatable.")  # fmt: skip
 @click.option("--policy", type=click.Path(), help="What `train` wrote, to be tried as well.")
 @click.option("--split", type=click.Choice(("train", "validation", "test")), default="test",
-              show_default=True, help="Sites: those to learn from, to choose by, or unseen.")  # fmt: skip
+              show_default=True, help="Sites to learn from, to choose by, or unseen.")  # fmt: skip
 @count_option("--budget", 2, 3_000, "Releases that each designer may simulate on a site.")
 @count_option("--sites", 1, 6, "Sites of the split; six are one of each family.")
 @count_option("--verify", 10, 2_000, "Unseen releases that each layout is verified on.")

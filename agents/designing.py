@@ -123,7 +123,8 @@ def _tell(done: Study, store: Store, verify: int, folder: Path) -> None:
     click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
     for barrier in chosen.layout:
         click.echo(f"  {order(barrier, done.problem.site)}")
-    lines = [findings.limits(result, done.nothing.evaluation, chosen, done.left)]
+    cases = [(case.name, case.evaluation) for case in done.cases]
+    lines = [findings.limits(result, cases, done.left)]
     lines += [
         *findings.failing(done.problem.site, chosen),
         findings.undecided(done.problem, chosen),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from agents.protocol import DesignResult
 from agents.wording import euros, percent, span
 from envs import DesignProblem, Evaluation
@@ -21,19 +23,23 @@ def worst(evaluation: Evaluation) -> str | None:
     return most if most is not None and left[most] > 0.0 else None
 
 
-def limits(result: DesignResult, nothing: Evaluation, chosen: Evaluation, left: str) -> str:
+def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: str) -> str:
     """Return one line that says what limits the answer.
 
     Parameters
     ----------
     result : DesignResult
         What the designer found.
-    nothing, chosen : Evaluation
-        No barrier and the found layout, verified.
+    cases : sequence of (str, Evaluation)
+        Verified layouts: nothing the first, the found one the last.
     left : str
         What is left of the risk, in words.
     """
-    parts = [_pays(nothing, chosen)]
+    chosen = cases[-1][1]
+    parts = [_pays(cases[0][1], chosen)]
+    for name, other in cases[1:-1]:
+        if other.ci[1] < chosen.ci[0]:
+            parts.append(f"{name} costs less a year: the search wants a larger --budget")
     if chosen.layout and result.on_bound:
         parts.append(f"the layout lies on a bound: {', '.join(result.on_bound)}")
     return "; ".join(filter(None, [*parts, left]))
@@ -42,7 +48,7 @@ def limits(result: DesignResult, nothing: Evaluation, chosen: Evaluation, left: 
 def _pays(nothing: Evaluation, chosen: Evaluation) -> str:
     """Return in words that no layout pays, or that none is shown to pay; else nothing."""
     if not chosen.layout:
-        return "nothing pays: no layout that was tried costs less a year than it saves"
+        return "nothing pays: the search found no layout that costs less a year than it saves"
     if chosen.ci[1] < nothing.ci[0]:
         return ""
     return (

@@ -1,61 +1,49 @@
-"""A trained policy: from what is seen of a site without barriers to its fences, with no search.
+"""A trained policy: from what is seen of a site without barriers to its layout, with no search.
 
-It starts from the engineering rule's fence, as far as that can be told from what is seen; the
-network says what is better, as differences of the vector.
-
-`rigdda train` makes it; the one that is shipped says by which command, with which seed and version.
-Torch is not needed to use it.
+`rigdda train` makes it and `rigdda evaluate --policy FILE` tries it; none is shipped. Torch is not
+needed to use it.
 """
 
 from __future__ import annotations
 
 import os
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from agents.features import RULE, WIDTH, features
+from agents.features import WIDTH, features
 from agents.network import Network
 from agents.protocol import Designer, DesignResult, Ledger, Progress
 from agents.store import Store
 from envs import DesignProblem
-from envs.envelope import SEEDS
 from envs.observation import observe
-from rigdda import BadInput, Fence, Layout, check
+from envs.slots import KINDS, Slots
+from rigdda import BadInput, Layout
 
-KINDS = ("fence",)
-"""What a policy builds."""
-SLOTS = 3
-"""Fences that it decides on."""
-VERGE = (-0.4, -0.8, 0.0), (0.4, -0.8, 0.0)
-"""Slots of the fences that are not built: at 0.4 m of the 4 m that sites allow by default."""
-SHIPPED = Path(__file__).with_suffix(".safetensors")
+SLOTS = Slots(KINDS, 3)
+"""Barriers that a policy decides on, of any kind that a problem allows."""
+
+FINAL = 64
+"""Releases on which the designer tells what its layout is worth, if it has so many."""
 
 
-def design(
-    problem: DesignProblem,
-    simulations: int,
-    seed: int = 0,
-    progress: Progress | None = None,
-    store: Store | None = None,
-) -> DesignResult:
-    """Return the layout of the shipped policy and its evaluation.
+def _anchor() -> np.ndarray:
+    """Return one barrier near the zone's lower end; two more a little short of being built."""
+    numbers = np.zeros((SLOTS.count, SLOTS.width))
+    numbers[:, 0] = 0.4, -0.4, -0.4
+    numbers[:, 1] = 0.6, -0.2, 0.2
+    return numbers.ravel()
 
-    At most 36 simulations are used: 4 to look at, 32 to evaluate.
 
-    Raises
-    ------
-    BadInput, Diverged
-        If the budget is below 5, the seed out of range or fences are not among the kinds; if a
-        simulation diverges.
-    """
-    return using(load(SHIPPED))(problem, simulations, seed, progress, store)
+ANCHOR = _anchor()
+"""What a network's outputs are added to, (SLOTS.size,): from here all is tried in a training."""
 
 
 def using(network: Network) -> Designer:
-    """Return the designer that builds what a network decides."""
+    """Return the designer that builds what a network decides.
+
+    It needs 2 releases at least; all it has, up to 64, tell what the layout is worth.
+    """
 
     def design(
         problem: DesignProblem,
@@ -65,48 +53,27 @@ def using(network: Network) -> Designer:
         store: Store | None = None,
     ) -> DesignResult:
         ledger = Ledger(problem, simulations, seed, progress, store)
-        if ledger.budget <= len(SEEDS):
-            mend = (
-                f"give at least {len(SEEDS) + 1}: the policy looks at {len(SEEDS)} releases first"
-            )
-            raise BadInput("simulations", simulations, mend)
         layout = decide(network, problem)
-        ledger.used += len(SEEDS)
-        return ledger.result(ledger.evaluate(layout, "final", min(32, ledger.left)))
+        return ledger.result(ledger.evaluate(layout, "report", min(FINAL, ledger.left)))
 
     return design
 
 
 def decide(network: Network, problem: DesignProblem) -> Layout:
-    """Return what a network builds: of more fences than there are slots, the highest.
+    """Return what a network builds, as far as a problem has slots for it and allows its kinds.
 
     Raises
     ------
-    BadInput, Diverged
-        If fences are not among the kinds; if a simulation diverges.
+    Diverged
+        If a simulation of what is seen diverges.
     """
-    check.one_of("kind of the policy's barriers", *KINDS, problem.kinds)
-    posed = pose(problem)
-    seen = features(observe(posed, ()))
-    layout = posed.decode(np.clip(anchor(seen) + network(seen), -1.0, 1.0))
-    fences = [barrier for barrier in layout if isinstance(barrier, Fence)]
-    kept = sorted(fences, key=lambda fence: -fence.height)[: problem.max_barriers]
-    return tuple(sorted(kept, key=lambda fence: fence.x))
-
-
-def anchor(seen: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the (9,) vector, for (F,) features, that a network's outputs are added to.
-
-    The rule's fence, then none: two that are a little too low to be built, so that what is tried
-    around them sometimes is.
-    """
-    return np.concatenate([seen[RULE], *VERGE])
-
-
-def pose(problem: DesignProblem) -> DesignProblem:
-    """Return a problem as policies are trained on it: of `SLOTS` fences."""
-    weights = problem.risk_weight, problem.cost_weight, problem.cost_limit
-    return DesignProblem(problem.site, SLOTS, KINDS, *weights)
+    seen = features(observe(problem, problem.nothing, np.zeros(0)))
+    used = SLOTS.width * min(SLOTS.count, problem.max_barriers)
+    numbers = np.clip(ANCHOR + network(seen), -1.0, 1.0)[:used]
+    named = Slots(tuple(dict.fromkeys([*SLOTS.kinds, *problem.kinds])), SLOTS.count)
+    rows = numbers.reshape(-1, SLOTS.width)
+    absent = np.full((len(rows), named.width - SLOTS.width), -1.0)  # scores of "wall"
+    return named.decode(problem, np.hstack([rows, absent]).ravel())
 
 
 @lru_cache(maxsize=4)
@@ -116,10 +83,10 @@ def load(path: str | os.PathLike[str]) -> Network:
     Raises
     ------
     BadInput
-        If there is no such file, it is not a network or not one from these features to fences.
+        If there is no such file, it is not a network or not one from these features to layouts.
     """
     network = Network.load(path)
-    sizes, wanted = network.sizes, (WIDTH, 3 * SLOTS)
+    sizes, wanted = network.sizes, (WIDTH, SLOTS.size)
     if not sizes or (sizes[0], sizes[-1]) != wanted:
         mend = f"name a network of {wanted[0]} features and {wanted[1]} outputs"
         raise BadInput("policy", str(path), mend)

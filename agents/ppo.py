@@ -23,8 +23,9 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from agents.features import features
 from agents.network import Network, scaled
-from agents.policy import anchor
-from agents.protocol import DesignResult, Ledger, Plan, Progress, finish
+from agents.policy import ANCHOR, SLOTS
+from agents.protocol import DesignResult, Ledger, Progress
+from agents.searching import Plan, finish
 from agents.store import Store
 from envs import DesignProblem, sb3_vec_env
 from rigdda.files import atomic
@@ -33,8 +34,9 @@ Floats = NDArray[np.float32]
 
 HIDDEN = [64, 64]
 """Neurons of the hidden layers; few, since sites are few."""
-EXPLORATION = -1.6
-"""Logarithm of the standard deviation of actions at the start: 0.2, a tenth of the decision box."""
+EXPLORATION = -0.7
+"""Logarithm of the standard deviation of actions at the start: half of the way from the middle of
+the decision box to its edge, so that every kind and class is tried."""
 RECENT = 0.1
 """Share of the last episode in what is usual at a site."""
 COMMON: dict[str, Any] = {"gamma": 1.0, "device": "cpu", "verbose": 0}
@@ -93,9 +95,9 @@ class _Bandit(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Evaluate what the action stands for."""
-        layout = self.ledger.problem.decode(action)
-        evaluation = self.ledger.evaluate(layout, "search", self.plan.releases)
-        return np.zeros(1, dtype=np.float32), -evaluation.objective, True, False, {}
+        problem = self.ledger.problem
+        evaluation = self.ledger.evaluate(problem.decode(action), "search", self.plan.releases)
+        return np.zeros(1, dtype=np.float32), problem.reward(evaluation), True, False, {}
 
 
 class _WhilePaid(BaseCallback):
@@ -112,14 +114,12 @@ class _WhilePaid(BaseCallback):
 class Featured(VecEnvWrapper):
     """`BarrierDesign` as the policy's network sees it and acts on it.
 
-    Scaled features are seen; actions are added to the rule's fence, see `agents.policy.anchor`. A
-    reward is what is better than usual at its site: sites differ in what can be gained by far more
-    than layouts do, and copies keep their site.
+    Scaled features are seen; actions are added to `agents.policy.ANCHOR`. A reward is what is
+    better than usual at its site: sites differ in what can be gained, and copies keep their site.
     """
 
     def __init__(self, venv: VecEnv, mean: Floats, scale: Floats):
         self.mean, self.scale = mean, scale
-        self.anchors = np.zeros((venv.num_envs, *(venv.action_space.shape or ())))
         self.usual = np.full(venv.num_envs, np.nan)
         seen = spaces.Box(-np.inf, np.inf, mean.shape, np.float32)
         super().__init__(venv, seen, spaces.Box(-2.0, 2.0, venv.action_space.shape, np.float32))
@@ -130,7 +130,7 @@ class Featured(VecEnvWrapper):
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Start a step of every copy."""
-        built = np.clip(self.anchors + actions, -1.0, 1.0)
+        built = np.clip(ANCHOR + actions, -1.0, 1.0)
         self.venv.step_async(built.astype(np.float32))
 
     def step_wait(self) -> Any:
@@ -146,25 +146,22 @@ class Featured(VecEnvWrapper):
         return self._scaled(seen), better.astype(np.float32), dones, infos
 
     def _scaled(self, seen: Any) -> Floats:
-        count = len(seen["span"])
-        plain = [features({k: v[i] for k, v in seen.items()}) for i in range(count)]
-        self.anchors = np.stack([anchor(one) for one in plain])
+        plain = [features({k: v[i] for k, v in seen.items()}) for i in range(self.num_envs)]
         return np.stack([scaled(one, self.mean, self.scale) for one in plain])
 
 
-def pool(problems: Sequence[DesignProblem], processes: int | None = None) -> VecEnv:
-    """Return one copy of `BarrierDesign` for each problem, of one release an episode.
+def pool(names: Sequence[str], fidelity: str, processes: int | None = None) -> VecEnv:
+    """Return one copy of `BarrierDesign` for each site, of one release an episode.
 
     Every copy keeps its site, so that what is seen of it is simulated once. Releases are simulated
     in threads over all cores, or in so many processes.
     """
-    first = problems[0]
     copies = sb3_vec_env(
-        "rigdda/BarrierDesign-v0", len(problems), site=first.site, kinds=first.kinds,
-        max_barriers=first.max_barriers, releases=1, processes=processes,
+        "rigdda/BarrierDesign-v0", len(names), site=names[0], kinds=SLOTS.kinds,
+        max_barriers=SLOTS.count, releases=1, fidelity=fidelity, processes=processes,
     )  # fmt: skip
-    for i, posed in enumerate(problems):
-        copies.set_attr("problem", posed, i)
+    for i, name in enumerate(names):
+        copies.get_attr("venue", i)[0].settle(name)
     return copies
 
 

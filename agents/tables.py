@@ -179,7 +179,7 @@ def empty_table(head: Sequence[str]) -> Table:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD)
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for i, name in enumerate(head):
         left = i == 0 or name in WORDS
         table.add_column(name, justify="left" if left else "right")

@@ -1,4 +1,4 @@
-"""Training of a policy: PPO on a pool of random sites, from the engineering rule's fence on.
+"""Training of a policy: PPO on a pool of generated sites, from one barrier of any kind on.
 
 What is made lands in one folder and is taken up again from there: `training.json` (the terms),
 `checkpoint.zip` (the trainer), `ppo_0/` (TensorBoard), `policy.safetensors`.
@@ -20,20 +20,27 @@ from numpy.typing import NDArray
 from agents import extra, limits
 from agents.features import features
 from agents.network import Network
-from agents.policy import KINDS, SLOTS, decide
+from agents.policy import SLOTS, decide
 from agents.seeds import release_seeds
 from agents.store import mechanics
-from envs import DesignProblem, fidelity
+from envs import DesignProblem
 from envs.crew import Crew
 from envs.envelope import barrier_free
 from envs.observation import observe
+from envs.places import pose
 from rigdda import BadInput, __version__, check, sites
 from rigdda.files import atomic
 
 Tick = Callable[[int], None]
 
-RELEASES = 8
+RELEASES = 64
 """Releases of each site on which the policy is compared with the one that it started from."""
+
+FIDELITY = "fast"
+"""Fidelity of the releases that are learnt from."""
+
+SPLIT = "train"
+"""Sites that are learnt from, and those beside them."""
 
 FILES = ("training.json", "checkpoint.zip", "policy.safetensors")
 """What a training leaves in its folder, beside the logs."""
@@ -61,7 +68,7 @@ class Terms:
     seed: int
 
     def __post_init__(self) -> None:
-        check.integer("sites", self.sites, 2, len(sites.TRAIN_SEEDS) // 2)
+        check.integer("sites", self.sites, 2, len(sites.split(SPLIT)) // 2)
         check.integer("episodes", self.episodes, 0, limits.RELEASES)
         check.integer("seed", self.seed, 0, limits.SEED)
 
@@ -73,7 +80,7 @@ class Terms:
 
 @dataclass(frozen=True, slots=True)
 class Trained:
-    """A policy and what it took off the objective before and after its training.
+    """A policy and what its layouts took off before and after its training, over Z of nothing.
 
     Means over sites beside the training sites.
     """
@@ -95,11 +102,12 @@ def train(terms: Terms, out: Path, processes: int, tick: Tick) -> Trained:
     """
     ppo = extra.module("ppo")
     _same(terms, out)
-    pool = [problem(site) for site in sites.TRAIN_SEEDS[: terms.sites]]
+    names = sites.split(SPLIT)
+    pool = [problem(name) for name in names[: terms.sites]]
     with closing(Crew(processes)) as crew:
         barrier_free([posed.site for posed in pool], crew)
-    mean, scale = scaling(np.stack([features(observe(posed, ())) for posed in pool]))
-    copies = ppo.Featured(ppo.pool(pool, processes), mean, scale)
+    mean, scale = scaling(np.stack([see(posed) for posed in pool]))
+    copies = ppo.Featured(ppo.pool(names[: terms.sites], FIDELITY, processes), mean, scale)
     with closing(copies):
         model = ppo.learner(copies, terms.seed, out)
         notes = _notes(terms)
@@ -109,14 +117,18 @@ def train(terms: Terms, out: Path, processes: int, tick: Tick) -> Trained:
         ppo.learn(model, terms.episodes, out / "checkpoint.zip", tick)
     network = ppo.export(model, mean, scale, notes)
     network.save(out / "policy.safetensors")
-    beside = sites.TRAIN_SEEDS[terms.sites : terms.sites + terms.beside]
-    posed = [problem(site) for site in beside]
+    posed = [problem(name) for name in names[terms.sites : terms.sites + terms.beside]]
     return Trained(network, examine(start, posed), examine(network, posed))
 
 
-def problem(site: int) -> DesignProblem:
-    """Return the problem of a training site, at fidelity "fast"."""
-    return DesignProblem(fidelity.at(sites.random(site), "fast"), SLOTS, KINDS)
+def problem(name: str) -> DesignProblem:
+    """Return the problem of a training site."""
+    return pose(name, SLOTS.count, None, FIDELITY)
+
+
+def see(posed: DesignProblem) -> NDArray[np.float32]:
+    """Return the features of a problem."""
+    return features(observe(posed, posed.nothing, np.zeros(0)))
 
 
 def scaling(
@@ -128,13 +140,10 @@ def scaling(
 
 
 def examine(network: Network, problems: list[DesignProblem]) -> float:
-    """Return what a policy takes off the objective, the mean over problems."""
+    """Return the share of Z of nothing that a policy takes off, the mean over problems."""
     seeds = release_seeds("final", 0, RELEASES)
-    gains = []
-    for posed in problems:
-        nothing, built = posed.evaluate((), seeds), posed.evaluate(decide(network, posed), seeds)
-        gains.append(nothing.objective - built.objective)
-    return float(np.mean(gains))
+    built = [posed.evaluate(decide(network, posed), seeds) for posed in problems]
+    return float(np.mean([p.reward(e) for p, e in zip(problems, built, strict=True)]))
 
 
 def _notes(terms: Terms) -> dict[str, str]:

@@ -1,13 +1,14 @@
 """What all environments share: an episode, in halves around each simulation.
 
-`ask_reset` and `ask_step` say what to simulate, `tell_reset` and `tell_step` take what it gave. So
-one environment simulates its own releases and a batched one those of all copies together.
+`draw` and `ask` say what an episode is about and what to simulate, `start` and `tell` take what
+that gave. So one environment simulates its own releases and a batched one those of all copies
+together.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium
@@ -17,16 +18,19 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 import rigdda
-from envs import encoding, fidelity
+from envs import encoding, observation
+from envs.crew import Workers
+from envs.envelope import barrier_free
 from envs.evaluation import Evaluation
-from envs.observation import Observation
 from envs.picture import picture
-from envs.problem import KINDS, DesignProblem
-from envs.recorder import Recorder, Trigger
-from envs.trial import Answer, Ask, simulate
-from rigdda import BadInput, Run, Site, check, sites
+from envs.places import Place, Venue
+from envs.recorder import Recorder, Shown, Trigger
+from envs.reuse import Sample
+from envs.trial import Answer, Ask, plain, simulate
+from rigdda import BadInput, Run, check
 
 Action = NDArray[np.floating[Any]]
+Observation = dict[str, NDArray[np.float32]] | NDArray[np.float32]
 Info = dict[str, Any]
 Step = tuple[Observation, float, bool, bool, Info]
 
@@ -36,12 +40,23 @@ SCORED_SEEDS = 2**31
 MOST_RELEASES = 100_000
 """Most releases of an episode, all of which are simulated in a step."""
 
-RANDOM = "random"
-"""Name of a site that is another random one in every episode."""
+MOST_LOOKS = 4
+"""Releases of every event in which what stands is looked at, if as many are scored."""
+
+TOLD = ("objective", "capital", "harm", "repair", "debris", "debris_share", "cost")
+"""What `info` tells of an evaluation."""
 
 
-class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
-    """Barriers of a site, placed some slots a step; see the environments made of it."""
+class BarrierEnv(gymnasium.Env[Any, Action]):
+    """Barriers of a site, placed some slots a step; see the environments made of it.
+
+    Attributes
+    ----------
+    problem : DesignProblem
+        That of this episode.
+    venue : Venue
+        Where episodes play.
+    """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
 
@@ -50,22 +65,18 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
 
     def __init__(
         self,
-        site: str | os.PathLike[str] | Site = "quick",
+        site: Place = "quick",
         max_barriers: int = 3,
-        kinds: Sequence[str] = KINDS,
+        kinds: Sequence[str] | None = None,
         releases: int = 4,
-        risk_weight: float = 1.0,
-        cost_weight: float = 0.2,
-        cost_limit: float | None = None,
         fidelity: str = "full",
+        flat: bool = False,
         record: str | os.PathLike[str] | None = None,
         record_trigger: Trigger | None = None,
         render_mode: str | None = None,
     ):
-        self.fidelity = fidelity
-        self._random = isinstance(site, str) and site == RANDOM
-        self._terms = (max_barriers, kinds, risk_weight, cost_weight, cost_limit)
-        self.problem = self._pose(sites.random(sites.TRAIN_SEEDS[0]) if self._random else site)
+        self.venue = Venue(site, max_barriers, kinds, fidelity)
+        self.problem, self.slots = self.venue.first, self.venue.slots
         self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
         if record is None and record_trigger is not None:
             raise BadInput("record_trigger", record_trigger, "name a folder in `record` as well")
@@ -74,70 +85,61 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
             check.one_of("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (self.width,), np.float32)
-        self.observation_space = self._space()
+        self._space = observation.space(self.slots.size, max_barriers, self.looks)
+        self.flat = flat
+        self.observation_space = spaces.flatten_space(self._space) if flat else self._space
         self._episode = 0
-        self._slots = np.zeros(0)  # the numbers of this episode's actions
-        self._asked = self._slots  # and of the one that is being simulated
-        self._answer: Answer | None = None  # the last one
+        self._numbers = np.zeros(0)  # of this episode's actions
+        self._asked = self._numbers  # and those of the one that is being simulated
+        self.seeds: tuple[int, ...] = ()
         self._stages: list[Evaluation] = []  # without barriers, then after each step
+        self._rewards: list[float] = []  # of each step
+        self._looked = Sample()  # what was seen of what stands
         self.open = False
         self._wanted: bool | None = None  # whether the episode is to be recorded, once asked
         self._shown: Run | None = None
-
-    def _pose(self, site: str | os.PathLike[str] | Site) -> DesignProblem:
-        """Return the problem of a site, at the environment's fidelity and terms."""
-        problem = DesignProblem(site, *self._terms)
-        cheaper = fidelity.at(problem.site, self.fidelity)
-        return problem if cheaper is problem.site else DesignProblem(cheaper, *self._terms)
 
     @property
     def width(self) -> int:
         """Numbers in an action, of whole slots."""
         raise NotImplementedError
 
-    def _space(self) -> spaces.Dict:
-        """Return the space of observations."""
-        raise NotImplementedError
-
-    def _observe(self, answer: Answer) -> Observation:
-        """Return what is seen of what was simulated last."""
-        raise NotImplementedError
-
-    @property
-    def seeds(self) -> tuple[int, ...]:
-        """Seeds of the episode's releases, empty before the first reset."""
-        return self._stages[0].seeds if self._stages else ()
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Draw the releases of a new episode, and its site if that is random; simulate them."""
-        (answer,) = simulate([self.ask_reset(seed)])
-        assert answer is not None
-        return self.tell_reset(answer)
+        """Draw the releases of a new episode, and its site if there is a choice.
+
+        `options`: `site`, as the keyword, for this episode.
+        """
+        self.draw(seed, options)
+        look_ahead([self])
+        return self.start()
 
     def step(self, action: Action) -> Step:
         """Simulate the episode's releases with what `action` adds."""
-        (answer,) = simulate([self.ask_step(action)])
-        return self.tell_step(answer)
+        (answer,) = simulate([self.ask(action)])
+        return self.tell(answer)
 
-    def ask_reset(self, seed: int | None) -> Ask:
-        """Draw a new episode and return what to simulate for it."""
+    def draw(self, seed: int | None, options: Mapping[str, Any] | None = None) -> None:
+        """Draw a new episode."""
         self._cut_off()
         super().reset(seed=seed)
-        if self._random:
-            number = int(self.np_random.integers(len(sites.TRAIN_SEEDS)))
-            self.problem = self._pose(sites.random(sites.TRAIN_SEEDS[number]))
-        drawn = self.np_random.integers(SCORED_SEEDS, size=self.releases).tolist()
-        return Ask(self.problem, (), tuple(drawn), looks=True)
+        self.open = False
+        self.problem = self.venue.draw(self.np_random, options)
+        self.seeds = tuple(self.np_random.integers(SCORED_SEEDS, size=self.releases).tolist())
 
-    def tell_reset(self, answer: Answer) -> tuple[Observation, Info]:
-        """Start the episode; return its first observation and info."""
-        self._slots = self._asked = np.zeros(0)
-        self._stages, self.open, self._wanted = [answer.evaluation], True, None
-        return self._show(answer)
+    def seen(self, looked: Sample) -> None:
+        """Take what was seen of the site without barriers."""
+        self._looked = looked
 
-    def ask_step(self, action: Action) -> Ask | None:
+    def start(self) -> tuple[Observation, Info]:
+        """Start the episode that was drawn; return its first observation and info."""
+        self._numbers = self._asked = np.zeros(0)
+        self._stages, self.open, self._wanted = [self.problem.nothing], True, None
+        self._rewards = []
+        return self._show()
+
+    def ask(self, action: Action) -> Ask | None:
         """Return what to simulate for an action, None if it changes nothing.
 
         If the action is refused, the episode can go on with another.
@@ -145,35 +147,80 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         if not self.open:
             raise ResetNeeded("the episode has ended: call reset() before the next step")
         numbers = encoding.vector("action", action, self.width)
-        slots = np.concatenate([self._slots, numbers])
-        layout = self._layout(slots)
+        asked = np.concatenate([self._numbers, numbers])
+        layout = self.slots.decode(self.problem, asked)
         if self.recorder and self._wanted is None:  # if that raises, nothing is lost
             self._wanted = self.recorder.wants(self._episode)
-        self._asked = slots
+        self._asked = asked
         if layout == self._stages[-1].layout:
             return None
-        return Ask(self.problem, layout, self.seeds, self.looks)
+        return Ask(self.problem, layout, self.seeds, self.sights)
 
-    def _layout(self, slots: NDArray[np.float64]) -> rigdda.Layout:
-        """Return the layout of the first slots of an episode, the others being empty."""
-        vector = np.full(self.problem.size, -1.0)
-        vector[: len(slots)] = slots
-        return self.problem.decode(vector)
+    @property
+    def sights(self) -> int:
+        """Releases of every event in which what stands is looked at."""
+        return min(self.releases, MOST_LOOKS) if self.looks else 0
 
-    def tell_step(self, answer: Answer | None) -> Step:
+    def tell(self, answer: Answer | None) -> Step:
         """Finish the step whose ask gave `answer`."""
-        answer = answer or self._answer
-        assert answer is not None
-        now = answer.evaluation
-        self._slots = self._asked
+        before = now = self._stages[-1]
+        if answer is not None:
+            assert answer.evaluation is not None  # an episode has releases
+            now, self._looked = answer.evaluation, answer.looked
+        self._numbers = self._asked
         self._stages.append(now)
-        reward = self._stages[-2].objective - now.objective
-        added = self._slots[-self.width :]
-        terminated = len(self._slots) == self.problem.size or not self._layout(added)
-        seen, info = self._show(answer)
+        reward = self.problem.reward(now) - self.problem.reward(before)
+        self._rewards.append(float(reward))
+        added = self.slots.decode(self.problem, self._numbers[-self.width :])
+        terminated = len(self._numbers) == self.slots.size or not added
+        seen, info = self._show()
         if terminated:
             self._end()
-        return seen, reward, terminated, False, info
+        return seen, float(reward), terminated, False, info
+
+    def _show(self) -> tuple[Observation, Info]:
+        """Return the observation and the info of what stands."""
+        now, self._shown = self._stages[-1], None
+        left = 1.0 - len(self._numbers) / self.slots.size
+        stands = self.slots.encode(self.problem, now.layout)
+        seen = observation.observe(self.problem, now, stands)
+        if self.looks:
+            count = self.slots.count
+            seen |= observation.looked(self.problem, now.layout, self._looked, count, left)
+        info: Info = {
+            "site": self.problem.site.name,
+            "layout": now.layout,
+            "outcomes": plain(now.outcomes),
+            **{name: float(getattr(now, name)) for name in TOLD},
+        }
+        if self.flat:
+            return np.concatenate([seen[name] for name in self._space]), info
+        return seen, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return the end of the release that stands for the others as an image, (450, 800, 3)."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() shows nothing: make the environment with a render_mode")
+            return None
+        if not self._stages:
+            raise ResetNeeded("call reset() before render()")
+        now, site = self._stages[-1], self.problem.site
+        if self._shown is None:
+            self._shown = rigdda.release(site, now.layout, *self.typical)[0]
+        road = (site.road.start, site.road.end)
+        title = f"{site.name}: {now.objective:.0f} EUR per metre and year"
+        return picture(self._shown, road, f"{title}, to build {now.cost:.0f} EUR per metre")
+
+    @property
+    def typical(self) -> tuple[int, str]:
+        """Seed and event of the release that stands for the others; of nothing, the first."""
+        now = self._stages[-1]
+        return now.typical if now.outcomes else (self.seeds[0], self.problem.plan(self.seeds)[0])
+
+    @property
+    def shown(self) -> Shown:
+        """That release, for a replay."""
+        return Shown(self.problem.site, *self.typical, self.releases)
 
     def _end(self) -> None:
         """End the episode; write its replay if that is wanted.
@@ -202,27 +249,17 @@ class BarrierEnv(gymnasium.Env[dict[str, Any], Action]):
         """Write the replay of the episode that has ended."""
         raise NotImplementedError
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return the end of the release nearest the mean as an image, (450, 800, 3)."""
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() shows nothing: make the environment with a render_mode")
-            return None
-        if not self._stages:
-            raise ResetNeeded("call reset() before render()")
-        now, site = self._stages[-1], self.problem.site
-        if self._shown is None:
-            self._shown = rigdda.release(site, now.layout, now.typical)[0]
-        title = f"{site.name}: objective {now.objective:.3f}, debris {now.debris:.3f}"
-        road = (site.road.start, site.road.end)
-        return picture(self._shown, road, f"{title}, cost {now.cost:.1f}")
 
-    def _show(self, answer: Answer) -> tuple[Observation, Info]:
-        """Make an answer what is shown; return its observation and info."""
-        now, self._answer, self._shown = answer.evaluation, answer, None
-        info = {
-            "objective": now.objective,
-            "cost": now.cost,
-            "layout": now.layout,
-            "outcomes": now.outcomes,
-        }
-        return self._observe(answer), info
+def look_ahead(copies: Sequence[BarrierEnv], workers: Workers | None = None) -> None:
+    """Look at the sites of drawn episodes before they start, all together.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    barrier_free([copy.problem.site for copy in copies], workers)
+    asks = [Ask(copy.problem, (), (), copy.sights) for copy in copies]
+    for copy, answer in zip(copies, simulate(asks, workers), strict=True):
+        assert answer is not None
+        copy.seen(answer.looked)

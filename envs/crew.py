@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context, parent_process
 from threading import Thread
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
-from rigdda import Layout, Site, check
+from rigdda import check
 
 Result = TypeVar("Result")
 
-Job = tuple[Site, Layout, int]
-"""A site, what stands on it and the seed of a release."""
+Job = tuple[Any, ...]
+"""A site, what stands on it, the seed of a release and the name of its event."""
 
 MOST = 256
 """Most processes."""
@@ -28,7 +28,7 @@ KEPT = 4096
 class Workers(Protocol):
     """Where releases are simulated: a `Crew`, or an Executor of the standard library."""
 
-    def map(self, fn: Callable[[Job], Result], jobs: Sequence[Job], /) -> Iterator[Result]:
+    def map(self, fn: Callable[[Any], Result], jobs: Sequence[Any], /) -> Iterator[Result]:
         """Return an iterator over the results of a function of every job, in order."""
 
 
@@ -61,7 +61,7 @@ class Crew:
         """Return what makes a crew of as many: a copy of an environment has its own."""
         return Crew, (len(self._pools),)
 
-    def map(self, fn: Callable[[Job], Result], jobs: Sequence[Job], /) -> Iterator[Result]:
+    def map(self, fn: Callable[[Any], Result], jobs: Sequence[Job], /) -> Iterator[Result]:
         """Start all jobs and return an iterator over the results of a function, in order.
 
         The function is at module level, for the processes to find it.

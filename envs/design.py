@@ -2,49 +2,47 @@
 
 from __future__ import annotations
 
-from gymnasium import spaces
-
-from envs import observation
 from envs.base import BarrierEnv
-from envs.observation import Observation
 from envs.recorder import Recorder
-from envs.trial import Answer
 
 
 class BarrierDesign(BarrierEnv):
     """Design all barriers of a site at once: an episode is one step.
 
     Action
-        Box(-1, 1, (size,), float32): station, height, and thickness, capacity or width of each
-        barrier, then one score for each kind if there are several, as `DesignProblem.decode`
-        reads them; size is 3 max_barriers for one kind, else (3 + kinds) max_barriers.
+        Box(-1, 1, (size,), float32): for each barrier presence (above 0), station, height, size
+        or class, then one score for each kind if there are several, as `DesignProblem.decode`
+        reads them; size is 4 max_barriers for one kind, else (4 + kinds) max_barriers.
     Observation
-        Dict of 1-D float32 arrays, see `envs.observation`. It depends on the site and on what
-        stands, not on the episode's releases.
+        Dict of 1-D float32 arrays, see `envs.observation`, or these as one array if `flat`. It
+        depends on the site and on what stands, not on the episode's releases.
     Reward
-        objective(no barrier) - objective(layout) on the same releases, a float.
+        (Z of nothing - Z of the layout) / Z of nothing, a float. Z of nothing is the site's cached
+        mean, Z of the layout that of the episode's releases.
     Termination
         After one step. Truncated by a TimeLimit only.
     Info
-        At reset without barriers, at step with the layout: `objective` and `cost` (floats),
-        `layout` (tuple of Barrier), `outcomes` (tuple of Outcome, one a release).
+        At reset without barriers, at step with the layout: `site` (name), `layout` (tuple of
+        Barrier), `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
+        (floats), `outcomes`: plain numbers of each release, none at reset.
     Randomness
-        `reset` draws the seeds of the episode's releases and, for the site "random", the site;
+        `reset` draws the seeds of the episode's releases and, if there is a choice, the site;
         `reset(seed=...)` fixes all that follows.
 
     Parameters
     ----------
     site : str, path or Site
-        As `DesignProblem` takes it, or "random": another of the random training sites in every
-        episode.
-    max_barriers, kinds, risk_weight, cost_weight, cost_limit
-        See `DesignProblem`.
+        As `DesignProblem` takes it; "train", "validation" or "test": another site of the split in
+        every episode; "random" is "train". `reset(options={"site": ...})` takes the same.
+    max_barriers, kinds, fidelity
+        See `DesignProblem`. Where every episode draws its site, all kinds by default; mesh is
+        not offered where a site has none.
     releases : int
         Random releases over which an episode averages.
-    fidelity : {"full", "fast"}
-        See `envs.fidelity`.
+    flat : bool
+        Whether observations are one array.
     record : path, optional
-        Folder for a replay of each episode: its release whose debris is nearest the mean.
+        Folder for a replay of each episode: the release that stands for the others.
     record_trigger : callable, optional
         Whether to record an episode, by its number from 0; None: every one.
     render_mode : {"rgb_array"}, optional
@@ -61,13 +59,7 @@ class BarrierDesign(BarrierEnv):
     @property
     def width(self) -> int:
         """Numbers in an action."""
-        return self.problem.size
-
-    def _space(self) -> spaces.Dict:
-        return observation.space(self.problem)
-
-    def _observe(self, answer: Answer) -> Observation:
-        return observation.observe(self.problem, answer.evaluation.layout)
+        return self.slots.size
 
     def _record(self, recorder: Recorder) -> None:
-        recorder.write(self._episode, self.problem.site, self._stages)
+        recorder.write(self._episode, self.shown, self._stages, self._rewards)

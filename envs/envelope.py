@@ -1,8 +1,7 @@
-"""What comes down a site: energies, bounce heights and the deposit, without barriers or with."""
+"""What comes down a site without barriers: how often, energies, bounce heights and the deposit."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
@@ -13,41 +12,54 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from envs.crew import Job, Workers
+from envs.crew import Workers
 from envs.memory import Memory, fingerprint
-from rigdda import Layout, Run, Simulation, Site
+from rigdda import Run, Simulation, Site
 from rigdda.geometry import polygon_properties
 
 Floats = NDArray[np.float64]
 
 STATIONS = 16
-"""Stations across the barrier zone; 1 to 5 m apart, near the size of a wall."""
+"""Stations across the barrier zone."""
 
-BINS = 16
-"""Parts of the profile in which the deposit is counted, and one more beyond the road."""
+BINS = 8
+"""Parts from the zone's start to the road's downhill edge in which the deposit is counted; one more
+uphill of it, and one beyond the road."""
 
 QUANTILE = 0.95
 """Share of passing blocks below the envelope, the usual basis of a barrier's size."""
 
-SEEDS = range(2**32, 2**32 + 4)
-"""Releases behind an envelope. Environments score releases of seeds below 2**31 only."""
+CLASSES = ("single blocks", "groups")
+"""Classes of events that are told apart: blocks that fall alone, and those that push each other."""
+
+FIRST = 2**32
+"""First seed of the releases behind an envelope; environments score seeds below 2**31 only."""
+
+BLOCKS, LEAST = 16, 2
+"""Blocks of each event that are looked at, and least number of its releases."""
+
+Job = tuple[Site, tuple[()], int, str]
+"""A release without barriers: site, layout, seed, event."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Envelope:
-    """What passes and what is left, over some releases of a site.
+    """What passes and what is left, over some releases of every event of a site.
 
     Parameters
     ----------
-    energy : (STATIONS,) array
+    often : (2, STATIONS) array
+        How often a release passes a station [1/year per 100 m], of each of `CLASSES`.
+    energy : (2, STATIONS) array
         95 % kinetic energy of the blocks that pass a station [J], 0 where none does.
-    bounce : (STATIONS,) array
+    bounce : (2, STATIONS) array
         95 % height of their centroids above the ground [m].
-    deposit : (BINS + 1,) array
-        Share of the released mass at the end in equal parts of the profile from the crest to the
-        road's downhill edge, and beyond it; adds up to 1.
+    deposit : (BINS + 2,) array
+        Share of what comes down in a year that ends uphill of the zone, in equal parts from its
+        start to the road's downhill edge, and beyond; adds up to 1.
     """
 
+    often: Floats
     energy: Floats
     bounce: Floats
     deposit: Floats
@@ -57,7 +69,7 @@ class Transit(NamedTuple):
     """What passed in one release.
 
     `energy` [J] and `bounce` [m]: of each block's first passage of every station, STATIONS arrays;
-    `deposit`: (BINS + 1,), see `Envelope`.
+    `deposit`: (BINS + 2,) [m2].
     """
 
     energy: list[Floats]
@@ -66,12 +78,21 @@ class Transit(NamedTuple):
 
 
 memory: Memory[bytes, Envelope] = Memory(8192)
-"""Envelopes without barriers by site, about 3 kB each."""
+"""Envelopes by site, about 3 kB each."""
 
 
 def stations(site: Site) -> Floats:
     """Return the chainages at which blocks are watched, (STATIONS,) [m]."""
     return np.linspace(site.barrier_zone.start, site.barrier_zone.end, STATIONS)
+
+
+def largest(site: Site, event: str) -> int:
+    """Return the greatest number of blocks of an event, that of a mass as it is wanted."""
+    found = site.event(event)
+    source = site.source(found.source)
+    if source.band is not None:
+        return found.number[1]
+    return max(1, round(source.area / source.mean_block_area))
 
 
 def envelope(site: Site) -> Envelope:
@@ -98,69 +119,71 @@ def barrier_free(sites: Sequence[Site], workers: Workers | None = None) -> list[
     keys = [fingerprint(site) for site in sites]
     known = memory.recall(keys)
     new = {key: site for key, site in zip(keys, sites, strict=True) if key not in known}
-    found = standing([(site, (), SEEDS) for site in new.values()], workers)
-    fresh = dict(zip(new, found, strict=True))
+    jobs = {key: _jobs(site) for key, site in new.items()}
+    with nullcontext(workers) if workers else ThreadPoolExecutor() as pool:
+        transits = pool.map(_transit, [job for own in jobs.values() for job in own])
+        fresh = {
+            key: _summary(new[key], own, list(islice(transits, len(own))))
+            for key, own in jobs.items()
+        }
     memory.remember(fresh)
     known |= fresh
     return [known[key] for key in keys]
 
 
-def standing(
-    cases: Sequence[tuple[Site, Layout, Sequence[int]]], workers: Workers | None = None
-) -> list[Envelope]:
-    """Return the envelope of every case (site, layout, seeds).
-
-    Simulated in threads over all cores, or in `workers`.
-
-    Raises
-    ------
-    BadInput, Diverged
-        As `rigdda.release` does.
-    """
-    jobs = [(site, layout, seed) for site, layout, seeds in cases for seed in seeds]
-    with nullcontext(workers) if workers else ThreadPoolExecutor() as pool:
-        transits = pool.map(_transit, jobs)
-        return [_summary(list(islice(transits, len(seeds)))) for _, _, seeds in cases]
+def _jobs(site: Site) -> list[Job]:
+    """Return the releases behind the envelope of a site: of large masses only a few."""
+    counts = {name: max(LEAST, BLOCKS // largest(site, name)) for name in site.event_names}
+    return [(site, (), FIRST + i, name) for name, count in counts.items() for i in range(count)]
 
 
 def _transit(job: Job) -> Transit:
     """Simulate a release and return what passed."""
-    site, layout, seed = job
+    site, layout, seed, event = job
     lines = stations(site).tolist()
-    simulation = Simulation(site.realise(layout, seed), site.settings(), lines)
+    simulation = Simulation(site.realise(layout, seed, event), site.settings(), lines)
     run = simulation.run(site.motion.duration, site.motion.duration)
     passing = [run.crossings(i) for i in range(STATIONS)]
     energy, bounce = ([p[name] for p in passing] for name in ("energy", "height"))
     return Transit(energy, bounce, _deposit(site, run))
 
 
-def _summary(transits: Sequence[Transit]) -> Envelope:
+def _summary(site: Site, jobs: Sequence[Job], transits: Sequence[Transit]) -> Envelope:
     """Return the envelope of some releases of a site."""
-
-    def quantiles(name: str) -> Floats:
-        parts = zip(*(getattr(transit, name) for transit in transits), strict=True)
-        return np.array([_quantile(np.concatenate(part)) for part in parts])
-
-    deposit = np.mean([transit.deposit for transit in transits], axis=0)
-    out = Envelope(quantiles("energy"), quantiles("bounce"), deposit)
-    for array in (out.energy, out.bounce, out.deposit):
+    names = [event for *_, event in jobs]
+    rates = {name: site.rate(name, ()) for name in site.event_names}
+    weights = np.array([100.0 * rates[name] / names.count(name) for name in names])
+    groups = np.array([largest(site, name) > 1 for name in names])
+    often, energy, bounce = np.zeros((3, 2, STATIONS))
+    out = Envelope(often, energy, bounce, np.zeros(BINS + 2))
+    for kind, mine in enumerate((~groups, groups)):
+        own = [(transits[i], float(weights[i])) for i in np.flatnonzero(mine).tolist()]
+        for k in range(STATIONS):
+            out.often[kind, k] = sum(weight for transit, weight in own if len(transit.energy[k]))
+            for name in ("energy", "bounce"):
+                values = [getattr(transit, name)[k] for transit, _ in own]
+                getattr(out, name)[kind, k] = _quantile(values, [weight for _, weight in own])
+    out.deposit[:] = weights @ np.array([transit.deposit for transit in transits])
+    out.deposit[:] /= max(out.deposit.sum(), 1e-300)
+    for array in (out.often, out.energy, out.bounce, out.deposit):
         array.setflags(write=False)
     return out
 
 
-def _quantile(values: Floats) -> float:
-    """Return what `np.quantile` gives, in a thirtieth of its time; 0 of no values."""
-    if not len(values):
+def _quantile(parts: Sequence[Floats], weights: Sequence[float]) -> float:
+    """Return the `QUANTILE` of all values, each weighing as its part does; 0 of no values."""
+    if not any(map(len, parts)):
         return 0.0
-    ordered, (part, below) = np.sort(values), math.modf(QUANTILE * (len(values) - 1))
-    low, high = ordered[int(below) : int(below) + 2][[0, -1]].tolist()
-    return float(low + part * (high - low))
+    values = np.concatenate(parts)
+    weight = np.repeat(weights, [len(part) for part in parts])
+    order = np.argsort(values)
+    share = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(share, QUANTILE * share[-1])])
 
 
 def _deposit(site: Site, run: Run) -> Floats:
-    """Return the share of a run's mass in each part of the profile and beyond, (BINS + 1,)."""
-    edges = np.linspace(site.slope.points[0][0], site.road.end, BINS + 1)
-    part = np.searchsorted(edges[1:], run.poses[-1, :, 0])
-    mass = [b.density * polygon_properties(b.vertices)[0] for b in run.scene.blocks]
-    weight = np.bincount(part, mass, BINS + 1)
-    return weight / weight.sum()
+    """Return the area in each part at the end, (BINS + 2,) [m2]; see `Envelope`."""
+    edges = np.linspace(site.barrier_zone.start, site.road.end, BINS + 1)
+    part = np.searchsorted(edges, run.poses[-1, :, 0])
+    area = [polygon_properties(block.vertices)[0] for block in run.scene.blocks]
+    return np.bincount(part, area, BINS + 2).astype(np.float64)

@@ -13,6 +13,9 @@ from rigdda import BadInput, Site, check
 from rigdda.barriers import KINDS as ALL_KINDS
 from rigdda.place import BarrierZone
 
+MOST_BARRIERS = 100
+"""Most slots of a layout; a site has room for a few."""
+
 KINDS = ("fence", "ditch", "embankment", "gravity_wall")
 """Kinds of barrier that are designed if none are named, and mesh where a site has options. Not the
 rigid wall, which nothing moves: it is for experiments."""
@@ -70,3 +73,8 @@ def seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int, ...]:
     if len(drawn) < least:
         raise BadInput(name, drawn, "give at least one")
     return drawn
+
+
+def is_vector(layout: object) -> bool:
+    """Tell whether what is to be evaluated begins with a number."""
+    return isinstance(layout, Sequence) and len(layout) > 0 and isinstance(layout[0], int | float)

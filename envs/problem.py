@@ -21,10 +21,7 @@ from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
 from rigdda.place import BarrierZone
 
 Floats = NDArray[np.float64]
-Ask = tuple[Layout, Mapping[str, Sequence[int]]]
-
-MOST_BARRIERS = 100
-"""Most slots of a layout; a site has room for a few."""
+Ask = tuple[Sequence[Barrier], Mapping[str, Sequence[int]]]
 
 
 @dataclass(frozen=True, slots=True, init=False)
@@ -48,19 +45,10 @@ class DesignProblem:
     fidelity : {"full", "fast"}
         At "fast" a cheaper site stands for it, see `envs.fidelity`.
     zone : (start, end), optional
-        Chainages between which barriers may stand [m], inside the site's own zone.
+        Chainages between which barriers may stand [m], inside the site's own zone; the attribute
+        is that zone so narrowed.
 
-    Attributes
-    ----------
-    site : Site
-        The site as it is simulated.
-    zone : BarrierZone
-        Where barriers may stand.
-
-    Raises
-    ------
-    BadInput
-        If there is no such site, or an argument is outside its range.
+    Raises BadInput if there is no such site, or an argument is outside its range.
     """
 
     site: Site
@@ -85,7 +73,7 @@ class DesignProblem:
         limits = posing.zone(where, zone)
         values = {
             "site": where,
-            "max_barriers": check.integer("max_barriers", max_barriers, 1, MOST_BARRIERS),
+            "max_barriers": check.integer("max_barriers", max_barriers, 1, posing.MOST_BARRIERS),
             "kinds": posing.kinds(where, kinds),
             "targets": posing.targets(where, targets),
             "fidelity": fidelity,
@@ -163,8 +151,7 @@ class DesignProblem:
     @property
     def nothing(self) -> Evaluation:
         """The layout without barriers, known once a site; its outcomes are not kept."""
-        found = self._known.nothing
-        return replace(found, targets=self._state(found))
+        return replace(self._known.nothing, targets=self._state(self._known.nothing))
 
     def evaluate(
         self,
@@ -199,7 +186,7 @@ class DesignProblem:
 
         Raises as `evaluate`, and if there is no such event.
         """
-        return self.sample_many([(self.check(layout), seeds)], executor)[0]
+        return self.sample_many([(layout, seeds)], executor)[0]
 
     def sample_many(self, asks: Sequence[Ask], executor: Executor | None = None) -> list[Sample]:
         """Return what `sample` does of several layouts, simulated together.
@@ -259,9 +246,6 @@ class DesignProblem:
 
     def _standing(self, layout: Sequence[Barrier] | ArrayLike) -> Layout:
         """Return the layout of a vector, or one that was checked."""
-        if isinstance(layout, np.ndarray):
-            return self.decode(layout)
-        members = list(layout) if isinstance(layout, Sequence) else layout
-        if isinstance(members, list) and members and isinstance(members[0], int | float):
-            return self.decode(members)
-        return self.check(members)  # type: ignore[arg-type]  # it says what is wrong
+        if isinstance(layout, np.ndarray) or posing.is_vector(layout):
+            return self.decode(layout)  # type: ignore[arg-type]
+        return self.check(layout)  # type: ignore[arg-type]  # it says what is wrong

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import rigdda
 from envs.evaluation import Evaluation
@@ -14,6 +15,20 @@ from rigdda import BadInput, Site
 from rigdda.barriers import describe
 
 Trigger = Callable[[int], bool]
+
+
+class Shown(NamedTuple):
+    """The release of an episode that its replay shows, of so many."""
+
+    site: Site
+    seed: int
+    event: str
+    releases: int
+
+    @property
+    def words(self) -> str:
+        """Say which it is."""
+        return f"{self.seed}, event {self.event}, which stands for the {self.releases} scored"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,26 +65,30 @@ class Recorder:
         """Return whether episode number `episode` is to be recorded."""
         return self.trigger is None or bool(self.trigger(episode))
 
-    def write(self, episode: int, site: Site, stages: Sequence[Evaluation]) -> Path:
+    def write(
+        self, episode: int, shown: Shown, stages: Sequence[Evaluation], rewards: Sequence[float]
+    ) -> Path:
         """Write the replay of an episode of one step and return its path; no stream stays open.
 
         Parameters
         ----------
         episode : int
             Its number.
-        site : Site
-            Where it was.
+        shown : Shown
+            The release to show.
         stages : sequence of Evaluation
-            What stood at the start, nothing, and in the end, on the same releases.
+            What stood at the start, nothing, and in the end.
+        rewards : sequence of float
+            Of each step.
         """
         from rigdda.replay import Marks
 
-        start, end = stages[0], stages[-1]
-        run, _ = rigdda.release(site, end.layout, end.typical)
+        end, site = stages[-1], shown.site
+        run, _ = rigdda.release(site, end.layout, shown.seed, shown.event)
         notes = {
-            "seed": _seed(end),
+            "seed": shown.words,
             "layout": _words(end),
-            "reward": f"{start.objective - end.objective:+.4f}",
+            "reward": f"{sum(rewards):+.4f}",
             "objective": f"{end.objective:.4f}",
             "debris": f"{end.debris:.4f}",
             "cost": f"{end.cost:.2f}",
@@ -78,34 +97,36 @@ class Recorder:
         run.to_rerun(path, Marks((site.road.start, site.road.end), notes, _title(site, episode)))
         return path
 
-    def write_placements(self, episode: int, site: Site, stages: Sequence[Evaluation]) -> Path:
+    def write_placements(
+        self, episode: int, shown: Shown, stages: Sequence[Evaluation], rewards: Sequence[float]
+    ) -> Path:
         """Write the replay of an episode of several steps and return its path.
 
-        All stages show one release, the one whose debris is nearest the mean in the end.
+        All stages show one release.
 
         Parameters
         ----------
-        episode, site
+        episode, shown, rewards
             See `write`.
         stages : sequence of Evaluation
-            What stood at the start, nothing, and after each step, on the same releases.
+            What stood at the start, nothing, and after each step.
         """
         from rigdda.episode import Placement, write_episode
 
-        end, before = stages[-1], [stages[0], *stages[:-1]]
+        site = shown.site
         placements = [
             Placement(
-                run=rigdda.release(site, now.layout, end.typical)[0],
+                run=rigdda.release(site, now.layout, shown.seed, shown.event)[0],
                 layout=_words(now),
-                reward=former.objective - now.objective,
+                reward=reward,
                 objective=now.objective,
                 debris=now.debris,
                 cost=now.cost,
             )
-            for former, now in zip(before, stages, strict=True)
+            for now, reward in zip(stages, (0.0, *rewards), strict=True)
         ]
         path, road = self._path(episode), (site.road.start, site.road.end)
-        write_episode(path, placements, road, _seed(end), _title(site, episode))
+        write_episode(path, placements, road, shown.words, _title(site, episode))
         return path
 
     def _path(self, episode: int) -> Path:
@@ -120,10 +141,6 @@ def _check_room(folder: Path) -> None:
     except OSError as error:
         mend = f"name a folder that can be made and written into ({error.strerror})"
         raise BadInput("record", str(folder), mend) from None
-
-
-def _seed(end: Evaluation) -> str:
-    return f"{end.typical}, the nearest to the mean of {len(end.seeds)}"
 
 
 def _words(now: Evaluation) -> str:

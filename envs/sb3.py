@@ -7,10 +7,13 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
-from envs.vector import BarrierVector, stack
+from envs.batching import stack
+from envs.vector import BarrierVector
+from rigdda import BadInput
 
 
 class Bridge(VecEnv):
@@ -20,17 +23,25 @@ class Bridge(VecEnv):
     ----------
     batch : BarrierVector
         The environment.
+
+    Raises
+    ------
+    BadInput
+        If its copies do not start anew in the step that ends an episode.
     """
 
     def __init__(self, batch: BarrierVector):
+        if batch.mode is not AutoresetMode.SAME_STEP:
+            mend = f"Stable-Baselines3 needs {AutoresetMode.SAME_STEP.value}"
+            raise BadInput("autoreset_mode", batch.mode.value, mend)
         self.batch = batch
         self.render_mode = batch.render_mode
         super().__init__(batch.num_envs, batch.single_observation_space, batch.single_action_space)
         self._actions: NDArray[np.float32] | None = None
 
-    def reset(self) -> dict[str, NDArray[np.float32]]:
-        """Start an episode in every copy, with the seeds that `seed` gave."""
-        starts = self.batch.start(self._seeds)
+    def reset(self) -> Any:
+        """Start an episode in every copy, with what `seed` and `set_options` gave."""
+        starts = self.batch.start(self._seeds, self._options).values()
         self._reset_seeds()
         self._reset_options()
         self.reset_infos = [info for _, info in starts]
@@ -45,6 +56,7 @@ class Bridge(VecEnv):
         assert self._actions is not None
         shown, rewards, dones, infos = [], [], [], []
         for i, (step, start) in enumerate(self.batch.advance(self._actions)):
+            assert step is not None
             seen, reward, terminated, truncated, info = step
             if start is not None:
                 limited = truncated and not terminated

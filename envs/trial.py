@@ -3,62 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from envs.baseline import outcomes
+from envs import reuse
 from envs.crew import Workers
-from envs.envelope import SEEDS, Envelope, barrier_free, standing
+from envs.envelope import FIRST
 from envs.evaluation import Evaluation
 from envs.problem import DesignProblem
-from rigdda import Layout
+from envs.reuse import Sample
+from rigdda import Layout, Outcome
 
 
 class Ask(NamedTuple):
-    """A layout to evaluate on the releases of `seeds`, and to look at on others if it `looks`."""
+    """A layout to evaluate on the releases of `seeds`, and to look at in `looks` of every event."""
 
     problem: DesignProblem
     layout: Layout
     seeds: tuple[int, ...]
-    looks: bool
+    looks: int
 
 
 class Answer(NamedTuple):
     """What an ask gave.
 
-    `envelope`: what passes the layout in at most 4 releases, as many as were asked for, that are
-    not the scored ones; without a layout in all 4; None if it was not to be looked at.
+    `evaluation`: of the releases of the seeds, None without seeds. `looked`: outcomes of others,
+    that are never scored, the same for all layouts of a site.
     """
 
-    evaluation: Evaluation
-    envelope: Envelope | None
+    evaluation: Evaluation | None
+    looked: Sample
 
 
 def simulate(asks: Sequence[Ask | None], workers: Workers | None = None) -> list[Answer | None]:
-    """Simulate every ask, their releases together in threads over all cores, or in `workers`.
+    """Simulate every ask, their releases together over all cores, or in `workers`.
 
     Raises
     ------
     BadInput, Diverged
         As `DesignProblem.evaluate` does.
     """
-    real = [ask for ask in asks if ask is not None]
-    jobs = [(ask.problem.site, ask.layout, seed) for ask in real for seed in ask.seeds]
-    found, looked = iter(outcomes(jobs, workers)), iter(_envelopes(real, workers))
-    answers: list[Answer | None] = []
+    jobs: list[reuse.Job] = []
+    ends = [0]
     for ask in asks:
-        if ask is None:
-            answers.append(None)
-            continue
-        own = tuple(next(found) for _ in ask.seeds)
-        judged = ask.problem.judge(ask.layout, ask.seeds, own)
-        answers.append(Answer(judged, next(looked) if ask.looks else None))
-    return answers
+        if ask is not None:
+            events = ask.problem.plan(ask.seeds) if ask.seeds else ()
+            drawn = [*zip(ask.seeds, events, strict=True), *_looks(ask)]
+            jobs += [(ask.problem.site, ask.layout, seed, event) for seed, event in drawn]
+            ends += [len(jobs) - len(drawn) + len(ask.seeds), len(jobs)]
+    parts = iter(reuse.outcomes(jobs, workers).split(ends))
+    return [None if ask is None else _answer(ask, next(parts), next(parts)) for ask in asks]
 
 
-def _envelopes(asks: Sequence[Ask], workers: Workers | None) -> list[Envelope]:
-    """Return the envelope of every ask that looks, in order."""
-    asks = [ask for ask in asks if ask.looks]
-    free = iter(barrier_free([ask.problem.site for ask in asks if not ask.layout], workers))
-    cases = [(a.problem.site, a.layout, SEEDS[: len(a.seeds)]) for a in asks if a.layout]
-    with_barriers = iter(standing(cases, workers))
-    return [next(with_barriers if ask.layout else free) for ask in asks]
+def _looks(ask: Ask) -> list[tuple[int, str]]:
+    """Return seed and event of the releases in which a layout is looked at."""
+    seeds = range(FIRST, FIRST + ask.looks)
+    return [(seed, name) for name in ask.problem.site.event_names for seed in seeds]
+
+
+def _answer(ask: Ask, scored: Sample, looked: Sample) -> Answer:
+    judged = ask.problem.judge(ask.layout, scored, ask.seeds) if ask.seeds else None
+    return Answer(judged, looked)
+
+
+def plain(outcomes: Sequence[Outcome]) -> tuple[dict[str, Any], ...]:
+    """Return what outcomes say of the road and of the barriers, as plain numbers."""
+    return tuple(
+        {
+            "event": outcome.event,
+            "reached": outcome.reached,
+            "road_volume": outcome.road_volume,
+            "released_volume": outcome.released_volume,
+            "debris_fraction": outcome.debris_fraction,
+            "max_energy_on_road": outcome.max_energy_on_road,
+            "failed": sum(barrier.failed for barrier in outcome.barriers),
+        }
+        for outcome in outcomes
+    )

@@ -12,11 +12,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from envs import encoding
-from envs.base import BarrierEnv, Info, Step
+from envs import batching, encoding
+from envs.base import BarrierEnv, Info, Observation, Step, look_ahead
+from envs.batching import Options
 from envs.crew import Crew
 from envs.design import BarrierDesign
-from envs.observation import Observation
 from envs.placement import BarrierPlacement
 from envs.recorder import Recorder
 from envs.trial import simulate
@@ -26,17 +26,16 @@ MOST_COPIES = 100_000
 """Most copies; what is above is taken for a slip of the pen."""
 
 Start = tuple[Observation, Info]
-Batch = tuple[
-    Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
-]
+Turn = tuple[Step | None, Start | None]
+"""A copy's step, and the start of its next episode; one of them may be missing."""
+Batch = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
-class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
+class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
     """Copies of one environment that step together, in threads over all cores or in processes.
 
     Each copy gives exactly what it would give alone: copy i of `reset(seed=s)` is the environment
-    after `reset(seed=s + i)`. A copy whose episode ends starts the next in the same step; the last
-    observation and info of the old one are `final_obs` and `final_info` of the infos.
+    after `reset(seed=s + i)`. `reset(options={"site": ...})` is for every copy.
 
     Parameters
     ----------
@@ -45,9 +44,13 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
     max_episode_steps : int, optional
         Steps after which an episode is truncated, as by a TimeLimit.
     processes : int, optional
-        Processes that simulate instead of threads, which share one interpreter's lock: one a core
-        pays from some 8 copies on. A script that asks for them guards its main part with
-        `if __name__ == "__main__"`.
+        Processes that simulate instead of threads. A script that asks for them guards its main
+        part with `if __name__ == "__main__"`.
+    autoreset_mode : AutoresetMode or its value
+        What follows the end of a copy's episode. SAME_STEP: the next begins in the same step, the
+        last observation and info are `final_obs` and `final_info` of the infos. NEXT_STEP: it
+        begins in the next step, whose action for that copy is not read. DISABLED: with
+        `reset(options={"reset_mask": mask})`.
     record : path, optional
         Folder for replays; copy i writes into its folder `copy-i`.
     **keywords
@@ -67,6 +70,7 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         num_envs: int = 1,
         max_episode_steps: int | None = None,
         processes: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         record: str | os.PathLike[str] | None = None,
         **keywords: Any,
     ):
@@ -74,6 +78,8 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         if max_episode_steps is not None:
             check.integer("max_episode_steps", max_episode_steps, 1)
         self.limit = max_episode_steps
+        self.mode = batching.mode(autoreset_mode)
+        self.metadata = type(self).metadata | {"autoreset_mode": self.mode}
         self._crew = None if processes is None else Crew(processes)
         folder = None if record is None else Recorder(record).folder
         folders = [folder and folder / f"copy-{i}" for i in range(num_envs)]
@@ -87,89 +93,106 @@ class BarrierVector(VectorEnv[dict[str, Any], NDArray[np.float32], Any]):
         self.action_space = batch_space(first.action_space, num_envs)
         self.observation_space = batch_space(first.observation_space, num_envs)
         self._elapsed = np.zeros(num_envs, dtype=np.int64)
+        self._ended = np.zeros(num_envs, dtype=np.bool_)
+        self._seen: list[Observation] = []  # of every copy, once all have started
 
     def reset(
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode in every copy; see the class for seeds."""
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode in every copy, or in those of the option `reset_mask`.
+
+        Options: `site` as the keyword, for these episodes; `reset_mask`: (num_envs,) booleans.
+        """
+        mask, own = batching.mask(options, self.num_envs)
         infos: dict[str, Any] = {}
-        starts = self.start(seed)
-        for i, (_, info) in enumerate(starts):
+        for i, (_, info) in self.start(seed, [own] * self.num_envs, mask).items():
             infos = self._add_info(infos, info, i)
-        return stack([seen for seen, _ in starts]), infos
+        return batching.stack(self._seen), infos
 
     def step(self, actions: NDArray[np.float32]) -> Batch:
         """Take a step in every copy, (num_envs, width) actions."""
         infos: dict[str, Any] = {}
-        steps = self.advance(actions)
-        shown = []
-        for i, ((seen, _, _, _, info), start) in enumerate(steps):
+        rewards = np.zeros(self.num_envs)
+        terminated, truncated = np.zeros((2, self.num_envs), dtype=np.bool_)
+        for i, (step, start) in enumerate(self.advance(actions)):
+            if step is not None:
+                seen, rewards[i], terminated[i], truncated[i], info = step
+                if start is not None:
+                    infos = self._add_info(infos, {"final_obs": seen, "final_info": info}, i)
             if start is not None:
-                infos = self._add_info(infos, {"final_obs": seen, "final_info": info}, i)
-                seen, info = start
+                _, info = start
             infos = self._add_info(infos, info, i)
-            shown.append(seen)
-        _, rewards, terminated, truncated, _ = zip(*(step for step, _ in steps), strict=True)
-        flags = np.array(terminated), np.array(truncated)
-        return stack(shown), np.array(rewards, dtype=np.float64), *flags, infos
+        return batching.stack(self._seen), rewards, terminated, truncated, infos
 
-    def start(self, seed: int | Sequence[int | None] | None = None) -> list[Start]:
-        """Start an episode in every copy; return what each says."""
-        seeds = self._seeds(seed)
-        self._elapsed[:] = 0
-        return self._restart(self.copies, seeds)
+    def start(
+        self,
+        seed: int | Sequence[int | None] | None = None,
+        options: Sequence[Options] | None = None,
+        mask: NDArray[np.bool_] | None = None,
+    ) -> dict[int, Start]:
+        """Start an episode in every copy, or in those of a mask; return what each says."""
+        seeds = batching.seeds(seed, self.num_envs)
+        given = [None] * self.num_envs if options is None else options
+        chosen = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
+        if len(chosen) < self.num_envs and not self._seen:
+            raise ResetNeeded("call reset() of all copies before that of some")
+        return self._restart(chosen.tolist(), seeds, given)
 
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        """Return the seed of every copy, None for one that goes on with its random numbers."""
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            first = check.integer("seed", seed, 0)
-            return [first + i for i in range(self.num_envs)]
-        if _rows(seed) != self.num_envs:
-            raise BadInput("seed", seed, f"give one number, or {self.num_envs}, one a copy")
-        return [
-            None if one is None else check.integer(f"seed[{i}]", one, 0)
-            for i, one in enumerate(seed)
-        ]
+    def advance(self, actions: NDArray[np.float32]) -> list[Turn]:
+        """Take a step in every copy; return what each says, see `Turn`.
 
-    def advance(self, actions: NDArray[np.float32]) -> list[tuple[Step, Start | None]]:
-        """Take a step in every copy; return what each says, and the start of its next episode.
-
-        The second is None where the episode goes on.
+        A copy has no step where its episode ended in the step before (NEXT_STEP), and no start
+        where its episode goes on or is not followed by another at once.
         """
-        given = _rows(actions)
+        rows = self._checked(actions)
+        resting = self._ended.copy()
+        live = np.flatnonzero(~resting).tolist()
+        answers = simulate([self.copies[i].ask(rows[i]) for i in live], self._crew)
+        told = {i: self.copies[i].tell(a) for i, a in zip(live, answers, strict=True)}
+        self._elapsed[live] += 1
+        cut = self._elapsed == self.limit
+        steps: dict[int, Step] = {i: (*s[:3], bool(cut[i]), s[4]) for i, s in told.items()}
+        for i, step in steps.items():
+            self._seen[i], self._ended[i] = step[0], step[2] or step[3]
+        anew = self._ended if self.mode is AutoresetMode.SAME_STEP else resting
+        free: list[None] = [None] * self.num_envs
+        starts = self._restart(np.flatnonzero(anew).tolist(), free, free)
+        return [(steps.get(i), starts.get(i)) for i in range(self.num_envs)]
+
+    def _checked(self, actions: NDArray[np.float32]) -> dict[int, NDArray[np.float64]]:
+        """Return the action of every copy whose episode goes on."""
+        given = batching.rows(actions)
         if given != self.num_envs:
             found = actions if given is None else f"{given} rows"
             raise BadInput("actions", found, f"give {self.num_envs} rows, one a copy")
-        if not all(copy.open for copy in self.copies):
+        if not self._seen:
             raise ResetNeeded("call reset() before the first step")
+        if self.mode is AutoresetMode.DISABLED and self._ended.any():
+            ended = np.flatnonzero(self._ended).tolist()
+            raise ResetNeeded(
+                f"copies {ended} have ended: reset them with the option {batching.MASK}"
+            )
         width = self.copies[0].width
-        rows = [encoding.vector(f"actions[{i}]", row, width) for i, row in enumerate(actions)]
-        asks = [copy.ask_step(row) for copy, row in zip(self.copies, rows, strict=True)]
-        told = [
-            copy.tell_step(a)
-            for copy, a in zip(self.copies, simulate(asks, self._crew), strict=True)
-        ]
-        self._elapsed += 1
-        cut = self._elapsed == self.limit
-        steps = [(*step[:3], bool(late), step[4]) for step, late in zip(told, cut, strict=True)]
-        ended = [i for i, step in enumerate(steps) if step[2] or step[3]]
-        self._elapsed[ended] = 0
-        starts = self._restart([self.copies[i] for i in ended], [None] * len(ended))
-        following = dict(zip(ended, starts, strict=True))
-        return [(step, following.get(i)) for i, step in enumerate(steps)]
+        return {
+            i: encoding.vector(f"actions[{i}]", row, width)
+            for i, row in enumerate(actions)
+            if not self._ended[i]
+        }
 
-    def _restart(self, copies: Sequence[BarrierEnv], seeds: Sequence[int | None]) -> list[Start]:
+    def _restart(
+        self, chosen: Sequence[int], seeds: Sequence[int | None], options: Sequence[Options]
+    ) -> dict[int, Start]:
         """Start an episode in some copies; return what each says."""
-        asks = [copy.ask_reset(seed) for copy, seed in zip(copies, seeds, strict=True)]
-        starts = []
-        for copy, answer in zip(copies, simulate(asks, self._crew), strict=True):
-            assert answer is not None
-            starts.append(copy.tell_reset(answer))
+        for i in chosen:
+            self.copies[i].draw(seeds[i], options[i])
+        look_ahead([self.copies[i] for i in chosen], self._crew)
+        starts = {i: self.copies[i].start() for i in chosen}
+        self._seen = self._seen or [seen for seen, _ in starts.values()]
+        for i, (seen, _) in starts.items():
+            self._seen[i], self._elapsed[i], self._ended[i] = seen, 0, False
         return starts
 
     def close_extras(self, **_: Any) -> None:
@@ -194,16 +217,3 @@ class BarrierPlacementVector(BarrierVector):
     """Copies of `BarrierPlacement`."""
 
     single = BarrierPlacement
-
-
-def _rows(values: Any) -> int | None:
-    """Return the length of what should have one entry a copy, None if it has none."""
-    try:
-        return len(values)
-    except TypeError:
-        return None
-
-
-def stack(seen: Sequence[Observation]) -> Observation:
-    """Return the observations of all copies, each array with the copies as its first axis."""
-    return {name: np.stack([one[name] for one in seen]) for name in seen[0]}

@@ -1,38 +1,40 @@
-"""How strong must a fence high on the slope be? Its capacity against the debris on the road.
+"""How strong must a fence on the upper bench be? Its energy class against what a year costs.
 
-Run it: `python examples/study.py`. It prints one line a capacity, and where the objective is least.
+Run it: `python examples/study.py`. It prints one line a class, and where a year costs least.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
 from envs import DesignProblem, Evaluation
 from rigdda import Fence
+from rigdda.barriers import FENCE_CLASSES
 
 
-def study(site: str = "quick", releases: int = 16) -> dict[float, Evaluation]:
-    """Return the evaluation of an upper fence for each capacity [J/m], on the same releases."""
+def study(
+    site: str = "quick", x: float = 17.0, height: float = 2.5, releases: int = 200
+) -> dict[int, Evaluation]:
+    """Return the evaluation of a fence for each energy class [kJ], on the same releases."""
     problem = DesignProblem(site)
-    zone = problem.site.barrier_zone  # the fence stands where it starts
+    fences = {name: Fence(x, height, energy_class=name) for name in FENCE_CLASSES}
     return {
-        capacity: problem.evaluate([Fence(zone.start, zone.max_height, capacity)], range(releases))
-        for capacity in np.geomspace(zone.min_capacity, zone.max_capacity, 5).tolist()
+        name: problem.evaluate((fence,), range(releases))
+        for name, fence in fences.items()
+        if problem.fits((fence,))
     }
 
 
 def main() -> None:
-    """Print the study and its best capacity."""
+    """Print the study and its best class."""
     found = study()
-    for capacity, e in found.items():
-        low, high = (100.0 * share for share in e.debris_ci)
-        failed = np.mean([outcome.barriers[0].failed for outcome in e.outcomes])
+    for name, e in found.items():
+        (low, high), failure = e.ci, e.failure["block"]
         print(
-            f"{capacity / 1e3:6.0f} kJ/m: {100 * e.debris:4.1f} % on the road "
-            f"({low:.1f} to {high:.1f} %), fails in {failed:4.0%}, objective {e.objective:.3f}"
+            f"{name:5d} kJ: Z {e.objective:4.0f} ({low:.0f} to {high:.0f}) EUR per m and year, "
+            f"{e.capital:3.0f} of it capital; fails in {failure.probability:4.0%} of single blocks"
         )
-    best = min(found, key=lambda capacity: found[capacity].objective)
-    print(f"least objective at {best / 1e3:.0f} kJ/m")
+    best = min(found, key=lambda name: found[name].objective)
+    nothing = DesignProblem("quick").nothing
+    print(f"a year costs least with {best} kJ; without a fence Z is {nothing.objective:.0f}")
 
 
 if __name__ == "__main__":

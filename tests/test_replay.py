@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,13 @@ import shapely
 from rerun.chunk import RrdReader
 
 from rigdda import replay
+from rigdda.barriers import Built, Embankment, Fence, GravityWall
 from rigdda.errors import BadInput, Error
+from rigdda.gauges import FAILED
 from rigdda.replay import Marks, open_viewer
 from rigdda.run import CROSSING, EVENT, HIT, Run
 from rigdda.scene import Block, Scene, Surface, Terrain, Wall
+from rigdda.states import states
 
 GRAVITY = 9.81
 SIZES = np.array([[1.0, 2.0], [1.5, 1.0], [2.0, 2.0]])
@@ -129,6 +133,49 @@ def test_scalars_read_back(run: Run, file: Path) -> None:
     np.testing.assert_allclose(lost, potential - potential[0], rtol=1e-9, atol=1e-6)
     np.testing.assert_allclose(read["greatest_speed"], np.hypot(vx, vy).max(axis=1), rtol=1e-12)
     np.testing.assert_array_equal(read["moving"], np.where(np.arange(FRAMES) < 30, 3, 2))
+
+
+def with_barriers(run: Run, *barriers: Built, failed: tuple[tuple[int, float], ...]) -> Run:
+    """Return the run with other barriers, of which some fail at a time."""
+    scene = Scene(run.scene.terrain, run.scene.blocks, barriers=barriers)
+    n = len(barriers)
+    poses = np.tile([27.5, 2.0, 0.0], (FRAMES, n, 1))
+    events = [(when, FAILED, 2, i, 27.0, 2.0, 1.0, 4.0, 5.0) for i, when in failed]
+    changed = {"scene": scene, "barrier_poses": poses, "events": np.array(events, EVENT)}
+    for name in ("absorbed", "thrust"):
+        if name in Run.__slots__:
+            changed[name] = np.zeros(n)
+    return replace(run, **changed)
+
+
+def test_barriers_are_labelled_with_what_they_are_and_their_state_over_time(
+    run: Run, tmp_path: Path
+) -> None:
+    standing = Fence(20.0, 2.0, 4e5), Embankment(25.5, 1.0, 0.5), Wall(29.0, 2.0)
+    broken = with_barriers(run, *standing, failed=((0, 0.5), (1, 1.25)))
+    labels = ("fence 1,000 kJ, 2.0 m high", "embankment 1.0 m high", "wall 2.0 m high")
+    broken.to_rerun(tmp_path / "a.rrd", Marks(labels=labels))
+    told = [
+        [words for (words,) in column(tmp_path / "a.rrd", f"/world/labels/{i}", "Points3D:labels")]
+        for i in range(3)
+    ]
+    assert told == [
+        [f"{labels[0]}: stands", f"{labels[0]}: failed"],
+        [f"{labels[1]}: stands", f"{labels[1]}: pushed"],
+        [f"{labels[2]}: stands"],
+    ]
+    times = column(tmp_path / "a.rrd", "/world/labels/1", "sim_time")
+    assert [t.total_seconds() for t in times] == pytest.approx([0.0, 1.25])
+    colours = column(tmp_path / "a.rrd", "/world/barriers/1", "Mesh3D:albedo_factor")
+    assert colours[0] != colours[1]
+
+
+def test_a_gravity_wall_slides_then_is_overturned(run: Run) -> None:
+    moved = with_barriers(run, GravityWall(27.0, 2.0, 1.0), failed=())
+    moved.barrier_poses[10:, 0, 0] += 0.2
+    assert states(moved, 0) == [(0.0, "stands"), (0.5, "slid")]
+    moved.barrier_poses[20:, 0, 2] += 1.0
+    assert states(moved, 0) == [(0.0, "stands"), (0.5, "slid"), (1.0, "overturned")]
 
 
 def test_debris_is_all_that_ever_passed_the_road(run: Run, file: Path) -> None:

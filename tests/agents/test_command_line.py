@@ -20,8 +20,15 @@ from agents import DESIGNERS
 from rigdda import Site
 from rigdda.barriers import to_tables
 
-TINY = ("--simulations", "24", "--verify", "4")
-COMMANDS = ("sites", "simulate", "design", "study", "train", "evaluate", "validate", "replay")
+TINY = ("--budget", "400", "--verify", "40")
+COMMANDS = (
+    "sites", "simulate", "design", "study", "train", "evaluate", "fidelity", "validate", "replay",
+)  # fmt: skip
+FILES = (
+    "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png",
+    "episode.rrd", "problem.json",
+)  # fmt: skip
+NUMBERS = ("objective", "objective_low", "objective_high", "capital", "harm", "repair", "cost")
 
 
 def rig(*arguments: object, folder: Path, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
@@ -76,43 +83,53 @@ def designed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, run("design", "quick", *TINY, "--seed", 3, "--out", folder, folder=folder)
 
 
+def without_time(file: Path) -> list[dict[str, str]]:
+    """Return the rows of evaluations without the processor time that they took."""
+    return [{k: v for k, v in row.items() if k != "seconds"} for row in rows(file)]
+
+
 def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -> None:
-    folder, words = designed
+    folder, _ = designed
+    assert {path.name for path in folder.iterdir()} == set(FILES)
     layout = rigdda.load_layout(folder / "layout.toml")
     table = rows(folder / "evaluations.csv")
-    stored = [json.loads(line) for line in (folder / "evaluations.jsonl").read_text().splitlines()]
-    told = [
-        (json.loads(row["barriers"]), int(row["releases"]), float(row["objective"]))
-        for row in table
-    ]
-    kept = [line["evaluation"] for line in stored]
-    # what was evaluated before, with the same releases, is told again but stored once
-    known = [(one["layout"], len(one["seeds"]), one["objective"]) for one in kept]
-    assert [one for i, one in enumerate(told) if one not in told[:i]] == known
-    assert {row["stage"] for row in table} == {"search", "final", "verification"}
-    assert [row["stage"] for row in table[-3:]] == 3 * ["verification"]
+    assert [row["stage"] for row in table[-4:]] == 4 * ["verification"]
     assert json.loads(table[-1]["barriers"]) == to_tables(layout)
-    assert int(table[-1]["simulations"]) <= 24
-    for name in ("profile.png", "search.png"):
+    assert json.loads(table[-4]["barriers"]) == []
+    assert int(table[-1]["simulations"]) <= 400
+    for row in table:
+        z, low, high, capital, harm, repair, _ = (float(row[name]) for name in NUMBERS)
+        assert z == pytest.approx(capital + harm + repair)
+        assert low <= z <= high
+    for name in ("section.png", "cost.png"):
         width, height = png_size(folder / name)
         assert 900 <= width <= 2000 and 600 <= height <= 2500
     entities = {chunk.entity_path for chunk in RrdReader(folder / "episode.rrd").stream()}
     assert {"/world/road", "/world/terrain", "/notes"} <= entities
-    for name in ("no barrier", "engineering rule", "optimised (cma)", "cost", "95 %"):
+    assert json.loads((folder / "problem.json").read_text())["site"] == "quick"
+
+
+def test_a_design_says_what_an_engineer_asks(designed: tuple[Path, str]) -> None:
+    folder, words = designed
+    names = ("nothing", "rule", "constant", "optimised (race)", "rock shed", "Z (95 %)")
+    for name in (*names, "reaches road", "barrier fails", "s of processor time"):
         assert name in words
-    assert max(map(len, words.splitlines()[:8])) <= 80
-
-
-def test_a_fence_is_told_with_its_failures(designed: tuple[Path, str]) -> None:
-    assert re.search(r"fence at .* kJ/m, fails in \d+ of \d+ releases", designed[1])
+    assert "what is left" in words or "nothing is left" in words or "nothing pays" in words
+    layout = rigdda.load_layout(folder / "layout.toml")
+    for barrier in layout:
+        assert f"at x = {barrier.x:.1f} m" in words or f"mesh {barrier.option!r}" in words
+    assert max(len(line) for line in words.splitlines() if " ─" in line) <= 80
+    costs = rows(folder / "evaluations.csv")[-4:]
+    told = next(line for line in words.splitlines() if line.startswith(" nothing")).split()
+    assert float(told[1].replace(",", "")) == pytest.approx(float(costs[0]["objective"]), rel=0.01)
 
 
 def test_a_design_repeats_for_its_seed(designed: tuple[Path, str], tmp_path: Path) -> None:
-    folder, words = designed
-    again = run("design", "quick", *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
-    for name in ("layout.toml", "evaluations.csv", "evaluations.jsonl"):
-        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
-    assert again.replace(str(tmp_path), "") == words.replace(str(folder), "")
+    folder, _ = designed
+    run("design", "quick", *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
+    assert (tmp_path / "layout.toml").read_bytes() == (folder / "layout.toml").read_bytes()
+    again, before = (without_time(f / "evaluations.csv") for f in (tmp_path, folder))
+    assert again == before
 
 
 def test_a_killed_design_goes_on(designed: tuple[Path, str], tmp_path: Path) -> None:
@@ -120,23 +137,54 @@ def test_a_killed_design_goes_on(designed: tuple[Path, str], tmp_path: Path) -> 
     lines = (folder / "evaluations.jsonl").read_bytes().splitlines(keepends=True)
     half = len(lines) // 2
     (tmp_path / "evaluations.jsonl").write_bytes(b"".join(lines[:half]) + lines[half][:40])
+    (tmp_path / "problem.json").write_bytes((folder / "problem.json").read_bytes())
     words = run("design", "quick", *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
-    taken = int(re.findall(r"(\d+) releases taken from a former run", words)[0])
-    assert taken == sum(len(json.loads(line)["evaluation"]["seeds"]) for line in lines[:half])
-    for name in ("layout.toml", "evaluations.csv", "evaluations.jsonl"):
-        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+    assert re.search(r"[\d,]+ taken from a former run", words)
+    assert (tmp_path / "layout.toml").read_bytes() == (folder / "layout.toml").read_bytes()
+    again, before = (without_time(f / "evaluations.csv") for f in (tmp_path, folder))
+    assert again == before
 
 
-@pytest.mark.parametrize("designer", [name for name in DESIGNERS if name != "cma"])
-def test_every_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
-    words = run("design", toml, "--designer", designer, *TINY, folder=tmp_path)
-    assert ("engineering rule" if designer == "rule" else f"optimised ({designer})") in words
-    folder = tmp_path / "runs/design-chute"
-    assert (folder / "layout.toml").is_file()
-    if designer == "pareto":
-        assert png_size(folder / "front.png")[0] > 900
-        costs = [float(row["cost"]) for row in rows(folder / "front.csv")]
-        assert costs and costs == sorted(costs)
+@pytest.mark.parametrize(
+    "change, named",
+    [
+        (("verge",), ("site", "'quick'")),
+        (("quick", "--kinds", "ditch"), ("kinds",)),
+        (("quick", "--target", "0.1"), ("targets",)),
+        (("quick", "--zone", "12", "30"), ("zone",)),
+    ],
+)
+def test_a_design_of_another_problem_is_left_alone(
+    change: tuple[str, ...], named: tuple[str, ...], designed: tuple[Path, str]
+) -> None:
+    folder, _ = designed
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    line = refused("design", *change, *TINY, "--out", folder, folder=folder)
+    assert all(word in line for word in ("--out", "another folder", *named)), line
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_folder_that_does_not_tell_its_problem_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "layout.toml").write_text("# mine\n")
+    line = refused("design", "quick", *TINY, "--out", tmp_path, folder=tmp_path)
+    assert "layout.toml" in line and "another folder" in line
+    assert [path.name for path in tmp_path.iterdir()] == ["layout.toml"]
+
+
+def test_kinds_zone_and_target_are_kept_to(tmp_path: Path) -> None:
+    options = ("--kinds", "ditch,embankment", "--zone", 25, 34, "--target", 0.9)
+    words = run("design", "quick", *TINY, *options, "--out", "o", folder=tmp_path)
+    layout = rigdda.load_layout(tmp_path / "o/layout.toml")
+    assert all(b.kind in ("ditch", "embankment") and 25.0 <= b.x <= 34.0 for b in layout)
+    assert re.search(r"target P\(reach\) <= 90 %.*: (met|missed|undecided)", words)
+
+
+@pytest.mark.parametrize("designer", [name for name in DESIGNERS if name != "race"])
+def test_every_designer_can_be_chosen(designer: str, tmp_path: Path) -> None:
+    words = run("design", "quick", "--designer", designer, *TINY, folder=tmp_path)
+    own = designer in ("rule", "constant")
+    assert (designer if own else f"optimised ({designer})") in words
+    assert (tmp_path / "runs/design-quick/layout.toml").is_file()
 
 
 def test_simulate_writes_what_it_says(toml: Path, tmp_path: Path) -> None:
@@ -153,8 +201,8 @@ def test_simulate_writes_what_it_says(toml: Path, tmp_path: Path) -> None:
     assert float(table[0]["debris_fraction"]) == outcome.debris_fraction
     assert float(table[0]["barrier_1_max_energy"]) == outcome.barriers[1].max_energy
     assert first.scene.barriers == (rigdda.Wall(20.0, 2.0), rigdda.Wall(15.0, 1.0))
-    assert png_size(tmp_path / "o/profile.png")[0] > 900
-    for name in ("debris past the road's edge [%]", "95 % interval", "wall at 15.0 m"):
+    assert png_size(tmp_path / "o/section.png")[0] > 900
+    for name in ("a block comes onto the road [%]", "95 % interval", "wall 1.0 m high, at 15.0 m"):
         assert name in words
 
 
@@ -168,9 +216,10 @@ def test_simulate_takes_every_kind(toml: Path, tmp_path: Path) -> None:
     rigdda.save_layout(layout, tmp_path / "layout.json")
     options = ("--releases", 1, "--layout", "layout.json", "--out", "o")
     words = run("simulate", toml, *options, folder=tmp_path)
-    assert rigdda.Run.load(tmp_path / "o/run.npz").scene.barriers == layout
-    assert png_size(tmp_path / "o/profile.png")[0] > 900
-    for name in ("fence at 12.0 m", "gravity wall at", "ditch at", "embankment at", "failed"):
+    kinds = [b.kind for b in rigdda.Run.load(tmp_path / "o/run.npz").scene.barriers]
+    assert kinds == [b.kind for b in layout]
+    assert png_size(tmp_path / "o/section.png")[0] > 900
+    for name in ("fence 50 kJ/m", "gravity wall", "ditch", "embankment", "failed"):
         assert name in words
     made = run("replay", toml, "--layout", "layout.json", "--out", "r", folder=tmp_path)
     assert (tmp_path / made.strip()).is_file()
@@ -183,9 +232,29 @@ def test_replay_makes_an_episode_and_says_where(toml: Path, tmp_path: Path) -> N
     assert any(chunk.entity_path == "/world/road" for chunk in RrdReader(file).stream())
 
 
-def test_sites_lists_every_built_in_site(tmp_path: Path) -> None:
+def test_releases_of_one_event_are_of_that_event(tmp_path: Path) -> None:
+    options = ("--event", "group", "--releases", 3, "--out", "o")
+    run("simulate", "quick", *options, folder=tmp_path)
+    assert {row["event"] for row in rows(tmp_path / "o/outcomes.csv")} == {"group"}
+
+
+def test_sites_lists_every_built_in_site_and_its_events(tmp_path: Path) -> None:
     words = run("sites", folder=tmp_path)
     assert all(name in words for name in rigdda.sites.names())
+    assert "group" in words and "bench" in words
+
+
+def test_designers_are_compared_in_money(tmp_path: Path) -> None:
+    options = ("--designer", "constant", "--designer", "random", "--budget", 60)
+    more = ("--sites", 2, "--verify", 40, "--out", "o")
+    words = run("evaluate", *options, *more, folder=tmp_path)
+    table = rows(tmp_path / "o/scores.csv")
+    assert [row["designer"] for row in table] == 2 * ["constant", "random"]
+    assert len({row["site"] for row in table}) == 2
+    for row in table:
+        fall = float(row["nothing"]) - float(row["objective"])
+        assert float(row["gain"]) == pytest.approx(fall)
+    assert "behind the best" in words or "behind" in words
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -207,7 +276,7 @@ def test_without_a_command_help_is_shown(tmp_path: Path) -> None:
     "change, named",
     [
         (("[road]", "[road]\ncolour = 3"), ("colour",)),
-        (("[1.0, 23.75]", "[9.0, 17.0]"), ("source.polygon", "untangle")),
+        (("[1.0, 23.75]", "[9.0, 17.0]"), ("sources.mass.polygon", "untangle")),
         (("end = 31.0", "end = 310.0"), ("road.end", "310", "at most 70")),
         (("friction_deg = 22.0", "friction_deg = nan"), ("friction_deg", "nan", "finite")),
         (("[road]", "[road"), ("site file", "TOML")),
@@ -253,16 +322,23 @@ def test_a_bad_layout_file_is_one_line(
     [
         (("simulate", "nowhere"), ("site", "nowhere", "quick")),
         (("design", "nowhere.toml"), ("site", "nowhere.toml", "existing")),
-        (("design", "quick", "--designer", "oracle"), ("oracle", "cma")),
-        (("design", "quick", "--simulations", "1"), ("--simulations", "1", "2")),
+        (("design", "quick", "--designer", "oracle"), ("oracle", "race")),
+        (("design", "quick", "--budget", "1"), ("--budget", "1", "2")),
+        (("design", "quick", "--kinds", "net"), ("kinds", "net", "ditch")),
+        (("design", "quick", "--zone", "0", "400"), ("zone", "at least")),
+        (("design", "quick", "--target", "2"), ("--target", "2")),
+        (("simulate", "quick", "--event", "flood"), ("event", "flood", "group")),
+        (("replay", "quick", "--event", "flood"), ("event", "flood", "group")),
+        (("evaluate", "--split", "exam"), ("--split", "exam", "test")),
+        (("fidelity", "nowhere"), ("site", "nowhere")),
         (("simulate", "quick", "--releases", "many"), ("--releases", "many")),
         (("simulate", "quick", "--seed", "-1"), ("--seed", "-1")),
         (("simulate", "quick", "--releases", 10**9), ("--releases", "1000000000")),
-        (("design", "quick", "--simulations", 10**9), ("--simulations", "1000000000")),
+        (("design", "quick", "--budget", 10**9), ("--budget", "1000000000")),
         (("design", "quick", "--seed", 2**32), ("--seed", "4294967296", "4294967295")),
         (("train", "--seed", 10**22), ("--seed",)),
         (("evaluate", "--seed", 2**32), ("--seed", "4294967296")),
-        (("evaluate", "--sites", 10**5), ("sites", "100000", "at most 10000")),
+        (("evaluate", "--sites", 10**5), ("sites", "100000", "at most")),
         (("validate", "--only", ""), ("--only", "''", "free-fall")),
         (("simulate", "quick", "--layout", "none.toml"), ("layout", "none.toml", "existing")),
         (("replay", "none.rrd"), ("none.rrd", "existing")),

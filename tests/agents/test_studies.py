@@ -13,7 +13,7 @@ import pytest
 from test_command_line import refused, rig, rows, run
 
 import rigdda
-from agents import studies
+from agents import studies, study_file
 from agents.tables import write_rows
 from rigdda import Site
 
@@ -27,7 +27,7 @@ name = "nothing"
 
 [[layouts]]
 name = "one"
-barriers = [{ kind = "fence", x = 18.0, height = 2.0, capacity = 4e5 }]
+barriers = [{ kind = "fence", x = 18.0, height = 2.0, energy_class = 500 }]
 
 [[layouts]]
 name = "from a file"
@@ -52,10 +52,12 @@ def test_a_study_is_one_row_a_layout_and_release(folder: Path, site: Site) -> No
         (name, seed) for name in names for seed in range(3, 9)
     ]
     layout = (rigdda.Wall(20.0, 2.0), rigdda.Wall(15.0, 1.0))
-    _, outcome = rigdda.release(site, layout, 8)
+    _, outcome = rigdda.release(site, layout, 8, "mass")
     assert float(table[-1]["debris_fraction"]) == outcome.debris_fraction
     assert float(table[-1]["barrier_1_max_energy"]) == outcome.barriers[1].max_energy
-    assert float(table[-1]["cost"]) == site.cost(layout)
+    assert float(table[-1]["capital"]) == site.capital(layout)
+    assert float(table[-1]["harm"]) == site.bill(layout, outcome).harm
+    assert {row["event"] for row in table} == {"mass"}
     assert table[0]["barrier_0_hits"] == "" and table[6]["barrier_1_hits"] == ""
     assert all(name in words for name in names)
 
@@ -89,7 +91,7 @@ def test_a_killed_study_goes_on_and_ends_the_same(folder: Path) -> None:
 
 
 def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> None:
-    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
+    asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
     assert studies.run(asked, 0, file, lambda *_: None) == 0
     whole = file.read_bytes()
     file.write_bytes(whole[:-9])
@@ -99,7 +101,7 @@ def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> N
     with file.open(newline="") as lines:
         assert {row["seed"] for row in csv.DictReader(lines)} == set("234567")
     (folder / "chute.toml").write_text((folder / "chute.toml").read_text().replace("22.0", "23.0"))
-    assert studies.run(studies.load(folder / "study.toml"), 2, file, lambda *_: None) == 0
+    assert studies.run(study_file.load(folder / "study.toml"), 2, file, lambda *_: None) == 0
 
 
 @pytest.mark.parametrize(
@@ -107,7 +109,9 @@ def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> N
     [
         ("layout", "other"),
         ("seed", "7"),
-        ("cost", "inf"),
+        ("capital", "inf"),
+        ("harm", "nan"),
+        ("event", "flood"),
         ("debris_fraction", "nan"),
         ("debris_fraction", "abc"),
         ("debris_fraction", ""),
@@ -117,7 +121,7 @@ def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> N
     ],
 )
 def test_a_damaged_row_is_simulated_again(column: str, value: str, folder: Path) -> None:
-    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
+    asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
     studies.run(asked, 0, file, lambda *_: None)
     whole, table = file.read_bytes(), rows(file)
     table[6][column] = value  # the first of the layout with one barrier
@@ -130,7 +134,7 @@ def test_a_damaged_row_is_simulated_again(column: str, value: str, folder: Path)
 def test_a_file_that_an_editor_has_saved_keeps_its_rows(folder: Path) -> None:
     text = STUDY.replace('"one"', '"line\\nbreak, \\"größer\\"\\r"')
     (folder / "study.toml").write_text(text, encoding="utf-8")
-    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
+    asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
     assert studies.run(asked, 0, file, lambda *_: None) == 0
     whole = file.read_bytes()
     studies.table(asked, file)
@@ -155,7 +159,7 @@ def test_a_file_of_somebody_else_is_left_alone(content: bytes, folder: Path) -> 
         (("releases = 6", "releases = 0"), ("releases", "0")),
         (("releases = 6", "relases = 6"), ("relases",)),
         (('name = "one"', 'name = "nothing"'), ("layouts[1].name", "nothing")),
-        (("capacity = 4e5", "capacity = -1"), ("fence capacity", "-1")),
+        (("energy_class = 500", "energy_class = 7"), ("fence energy_class", "7")),
         (("x = 18.0", "x = 500.0"), ("x", "500", "terrain")),
         (("walls.json", "none.json"), ("none.json", "existing")),
         (("chute.toml", "nowhere.toml"), ("nowhere.toml", "existing")),
@@ -185,13 +189,26 @@ def example(name: str) -> ModuleType:
     return module
 
 
+def test_a_study_s_table_is_what_the_problem_says(folder: Path, site: Site) -> None:
+    """Z of a study is that of `DesignProblem.judge` of the same outcomes, intervals nearly."""
+    asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
+    studies.run(asked, 0, file, lambda *_: None)
+    table = rows(file)
+    layout = asked.layouts["one"]
+    own = [row for row in table if row["layout"] == "one"]
+    bills = [float(row["harm"]) + float(row["repair"]) for row in own]
+    z = site.annual(layout) + site.rate("mass", layout) * sum(bills) / len(bills)
+    cells = studies.table(asked, file).columns[1]._cells
+    assert float(str(cells[1]).split()[0].replace(",", "")) == pytest.approx(z, rel=0.01)
+
+
 def test_the_example_in_python_says_that_stronger_fences_fail_less() -> None:
-    found = example("study").study(releases=4)
-    failed = [sum(o.barriers[0].failed for o in e.outcomes) for e in found.values()]
-    assert failed == sorted(failed, reverse=True) and failed[0] == 4 > failed[-1]
+    found = example("study").study(releases=40)
+    failed = [e.failure["block"].probability for e in found.values()]
+    assert failed == sorted(failed, reverse=True) and failed[0] > failed[-1]
     assert [e.cost for e in found.values()] == sorted(e.cost for e in found.values())
 
 
 def test_the_example_by_file_is_sound() -> None:
-    asked = studies.load(EXAMPLES / "study.toml")
-    assert len(asked.layouts) == 4 and asked.size == 64
+    asked = study_file.load(EXAMPLES / "study.toml")
+    assert len(asked.layouts) == 4 and asked.size == 4 * 3 * 40

@@ -1,8 +1,9 @@
-"""The one-step environment: rewards, repeatability, pictures and bad input."""
+"""The one-step environment: rewards, sites, repeatability, pictures and bad input."""
 
 from __future__ import annotations
 
 import copy
+import json
 import pickle
 from pathlib import Path
 from typing import Any
@@ -10,19 +11,23 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from cases import FREE, HARMLESS, cut
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import data_equivalence
 
+import rigdda
 from envs import DesignProblem
 from envs.design import BarrierDesign
-from rigdda import BadInput, Fence, Outcome, Site
+from rigdda import BadInput, Fence, sites
 
-ACTION = np.array([0.2, -0.4, -0.3, 0.9, -1.0, 0.0], dtype=np.float32)
+CUT = cut()
+TERMS: dict[str, Any] = {"max_barriers": 2, "kinds": ("fence",), "releases": 10}
+ACTION = np.array([1.0, 0.3, -0.2, -0.6, -1.0, 0.0, 0.0, 0.0], dtype=np.float32)
 
 
 @pytest.fixture
-def env(ramp: Site) -> BarrierDesign:
-    return BarrierDesign(ramp, max_barriers=2, releases=2, risk_weight=2.0, render_mode="rgb_array")
+def env() -> BarrierDesign:
+    return BarrierDesign(CUT, **TERMS, render_mode="rgb_array")
 
 
 def episodes(env: gymnasium.Env, seed: int, n: int = 2) -> list[Any]:
@@ -40,49 +45,131 @@ def same(one: list[Any], other: list[Any]) -> bool:
     )
 
 
-def test_reward_is_the_fall_of_the_objective(env: BarrierDesign, ramp: Site) -> None:
-    problem = DesignProblem(ramp, max_barriers=2, risk_weight=2.0)
+@pytest.mark.parametrize("releases", [1, 10])
+def test_reward_is_the_fall_of_the_cost_over_the_cost_of_nothing(releases: int) -> None:
+    """As scored on the episode's releases, against the site's mean: one simulation a release."""
+    env = BarrierDesign(CUT, **TERMS | {"releases": releases})
+    problem = DesignProblem(CUT, 2, ("fence",))
+    nothing = problem.nothing
     rewards = []
-    for seed in range(6):
+    for seed in range(4):
         _, before = env.reset(seed=seed)
         _, reward, terminated, truncated, after = env.step(ACTION)
-        nothing = problem.evaluate((), env.seeds)
-        design = problem.evaluate(problem.decode(ACTION), env.seeds)
-        assert len(design.layout) == 1
-        assert reward == nothing.objective - design.objective
+        built = problem.evaluate(problem.decode(ACTION), env.seeds)
+        assert len(built.layout) == 1 and built.releases == releases
+        assert reward == pytest.approx(1.0 - built.objective / nothing.objective, abs=1e-12)
         assert type(reward) is float
         assert (terminated, truncated) == (True, False)
-        for info, evaluation in ((before, nothing), (after, design)):
-            assert info == {
-                "objective": evaluation.objective,
-                "cost": evaluation.cost,
-                "layout": evaluation.layout,
-                "outcomes": evaluation.outcomes,
-            }
+        for info, found in ((before, nothing), (after, built)):
+            assert info["layout"] == found.layout
+            for name in ("objective", "cost", "capital", "harm", "repair", "debris"):
+                assert info[name] == getattr(found, name)
         rewards.append(reward)
-    assert len(set(rewards)) > 1  # few blocks: two releases may bring the same debris
+    assert len(set(rewards)) > 1
+
+
+def test_a_reward_costs_one_simulation_a_release(
+    env: BarrierDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    env.reset(seed=0)  # the site is known now
+    seen: list[int] = []
+    once = rigdda.release_many
+    monkeypatch.setattr(rigdda, "release_many", lambda jobs: seen.append(len(jobs)) or once(jobs))
+    env.reset(seed=17)
+    env.step(ACTION)
+    assert sum(seen) <= env.releases
+
+
+def test_without_prices_the_reward_is_the_debris_kept_off() -> None:
+    env = BarrierDesign(cut(FREE, HARMLESS), **TERMS)
+    env.reset(seed=0)
+    _, reward, *_, info = env.step(ACTION)
+    assert reward == pytest.approx(1.0 - info["debris_share"])
 
 
 def test_info_holds_plain_values(env: BarrierDesign) -> None:
-    env.reset(seed=1)
+    _, start = env.reset(seed=1)
+    assert start["outcomes"] == ()
     info = env.step(ACTION)[-1]
-    assert type(info["objective"]) is type(info["cost"]) is float
+    assert start.keys() == info.keys() and info["site"] == "cut"
     assert [type(barrier) for barrier in info["layout"]] == [Fence]
-    assert [type(outcome) for outcome in info["outcomes"]] == [Outcome] * 2
+    assert len(info["outcomes"]) == 10
+    plain = {name: value for name, value in info.items() if name != "layout"}
+    assert json.loads(json.dumps(plain))["outcomes"] == list(info["outcomes"])
+    harmed = [one["road_volume"] > 0.0 for one in info["outcomes"]]
+    assert harmed == [one["reached"] for one in info["outcomes"]]
 
 
 def test_no_barrier_earns_nothing(env: BarrierDesign) -> None:
     env.reset(seed=1)
-    assert env.step(np.full(6, -1.0, np.float32))[1] == 0.0
+    assert env.step(np.full(8, -1.0, np.float32))[1] == 0.0
 
 
-def test_same_seed_same_episodes(env: BarrierDesign, ramp: Site) -> None:
+def test_random_actions_build_from_nothing_to_all() -> None:
+    env = BarrierDesign(CUT, max_barriers=3, releases=1)
+    env.action_space.seed(0)
+    built = [
+        env.slots.decode(env.problem, env.action_space.sample().astype(float)) for _ in range(300)
+    ]
+    assert {len(layout) for layout in built} == {0, 1, 2, 3}
+    assert {barrier.kind for layout in built for barrier in layout} == set(env.problem.kinds)
+
+
+def test_a_reset_may_name_the_site(env: BarrierDesign) -> None:
+    for site, name in (("narrow", "narrow"), (sites.load("bench"), "bench"), (None, "cut")):
+        options = None if site is None else {"site": site}
+        seen, info = env.reset(seed=0, options=options)
+        assert info["site"] == name and seen in env.observation_space
+        assert env.problem.kinds == ("fence",)
+    env.reset(seed=1, options={"site": "test"})
+    assert env.problem.site.name in sites.split("test")
+    with pytest.raises(BadInput, match=r"options = .*weather.*: give nothing but site"):
+        env.reset(options={"weather": 1})
+    with pytest.raises(BadInput, match="site = 'nowhere'"):
+        env.reset(options={"site": "nowhere"})
+    env.reset(options={})
+    assert env.problem.site is CUT
+
+
+@pytest.mark.parametrize("name", ["train", "random", "validation", "test"])
+def test_a_split_draws_another_site_in_every_episode(name: str) -> None:
+    env = BarrierDesign(name, releases=1)
+    assert env.slots.kinds == ("fence", "ditch", "embankment", "gravity_wall", "mesh")
+    drawn: list[str] = []
+    for seed in (0, None, None, 0):
+        env.draw(seed)  # nothing is simulated
+        drawn.append(env.problem.site.name)
+        assert ("mesh" in env.problem.kinds) == bool(env.problem.site.meshes)
+    assert len(set(drawn)) == 3 and drawn[0] == drawn[3]
+    assert set(drawn) <= set(sites.split("train" if name == "random" else name))
+
+
+@pytest.mark.parametrize("site", ["bench", "random", "test"])
+def test_a_spec_survives_as_json(site: str) -> None:
+    terms = {"kinds": ["fence", "ditch"], "max_barriers": 2, "flat": True}
+    env = gymnasium.make("rigdda/BarrierDesign-v0", site=site, **terms)
+    assert env.spec is not None
+    spec = gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json())
+    again = gymnasium.make(spec)
+    assert again.action_space == env.action_space
+    assert again.observation_space == env.observation_space
+
+
+def test_flat_observations_hold_the_same(env: BarrierDesign) -> None:
+    flat = BarrierDesign(CUT, **TERMS, flat=True)
+    seen, _ = env.reset(seed=2)
+    line, _ = flat.reset(seed=2)
+    assert line in flat.observation_space and line.ndim == 1
+    np.testing.assert_array_equal(line, np.concatenate([seen[n] for n in sorted(seen)]))
+
+
+def test_same_seed_same_episodes(env: BarrierDesign) -> None:
     first = episodes(env, 11)
     assert same(first, episodes(env, 11))
-    other = BarrierDesign(ramp, max_barriers=2, releases=2, risk_weight=2.0)
+    other = BarrierDesign(CUT, **TERMS)
     assert same(first, episodes(other, 11))
     assert not same(first, episodes(env, 12))
-    assert first[0][1]["outcomes"] != first[2][1]["outcomes"]  # releases differ by episode
+    assert first[1][4]["outcomes"] != first[3][4]["outcomes"]  # releases differ by episode
 
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
@@ -105,12 +192,13 @@ def test_an_episode_has_one_step(env: BarrierDesign) -> None:
         env.step(ACTION)
 
 
-def test_only_a_time_limit_truncates(ramp: Site) -> None:
+def test_only_a_time_limit_truncates() -> None:
     for limit, truncated in ((1, True), (2, False)):
         env = gymnasium.make(
             "envs:rigdda/BarrierDesign-v0",
-            site=ramp,
+            site=CUT,
             max_barriers=2,
+            kinds=("fence",),
             releases=1,
             max_episode_steps=limit,
         )
@@ -131,8 +219,8 @@ def test_pictures(env: BarrierDesign) -> None:
     env.close()
 
 
-def test_no_picture_without_a_render_mode(ramp: Site) -> None:
-    env = BarrierDesign(ramp)
+def test_no_picture_without_a_render_mode() -> None:
+    env = BarrierDesign(CUT)
     with pytest.warns(UserWarning, match="render_mode"):
         assert env.render() is None
 
@@ -140,8 +228,8 @@ def test_no_picture_without_a_render_mode(ramp: Site) -> None:
 @pytest.mark.parametrize(
     ("action", "message"),
     [
-        (np.zeros(3), r"shape of action = \(3,\): give 6 numbers, shape \(6,\)"),
-        (np.array([0.0, np.nan, 0.0, 0.0, 0.0, 0.0]), r"action\[1\] = nan: give a number"),
+        (np.zeros(3), r"shape of action = \(3,\): give 8 numbers, shape \(8,\)"),
+        (np.array([0.0, np.nan, *[0.0] * 6]), r"action\[1\] = nan: give a number"),
     ],
 )
 def test_bad_actions_are_refused_and_the_episode_goes_on(
@@ -166,6 +254,10 @@ def test_bad_actions_are_refused_and_the_episode_goes_on(
         ({"record": Path("here"), "record_trigger": 2}, "record_trigger = 2: give a function"),
         ({"site": "nowhere"}, "site = 'nowhere'"),
         ({"max_barriers": -1}, "max_barriers = -1"),
+        ({"site": "train", "kinds": "fence"}, "kinds = 'fence': give a sequence"),
+        ({"site": "train", "kinds": ["fence", "fence"]}, "kinds = .*: name each kind once"),
+        ({"site": "bench", "kinds": ["mesh"]}, "kinds = .*: leave mesh out"),
+        ({"fidelity": "coarse"}, "coarse"),
     ],
 )
 def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:

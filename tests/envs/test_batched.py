@@ -14,6 +14,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from cases import cut
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
@@ -21,9 +22,11 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 import envs
 from envs.crew import Crew
 from envs.registration import ENVIRONMENTS
-from rigdda import BadInput, Site
+from rigdda import BadInput, Site, sites
 
+CUT = cut()
 COPIES = 3
+MODES = [*AutoresetMode]
 every = pytest.mark.parametrize("name", ENVIRONMENTS)
 
 
@@ -35,39 +38,67 @@ def batch(name: str, site: Site | str, **keywords: Any) -> Any:
 
 
 @every
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("limit", [None, 2])
-@pytest.mark.parametrize("random", [False, True])
-def test_copies_give_what_singles_give(
-    name: str, limit: int | None, random: bool, ramp: Site
-) -> None:
+def test_copies_give_what_singles_give(name: str, mode: AutoresetMode, limit: int | None) -> None:
     """Five episodes of every copy, bit for bit, the last observations and infos included."""
-    site = "random" if random else ramp
-    together = batch(name, site, fidelity="fast", max_episode_steps=limit)
+    together = batch(name, CUT, max_episode_steps=limit, autoreset_mode=mode.value)
 
     def single() -> gymnasium.Env:
-        terms = {"site": site, "releases": 1, "fidelity": "fast", "max_episode_steps": limit}
+        terms = {"site": CUT, "releases": 1, "max_episode_steps": limit}
         return gymnasium.make(name, **terms, disable_env_checker=True)
 
-    alone = SyncVectorEnv([single] * COPIES, autoreset_mode=AutoresetMode.SAME_STEP)
+    alone = SyncVectorEnv([single] * COPIES, autoreset_mode=mode)
+    assert together.metadata["autoreset_mode"] is mode
     assert together.action_space == alone.action_space
     assert together.observation_space == alone.observation_space
     assert data_equivalence(together.reset(seed=7), alone.reset(seed=7), exact=True)
     together.action_space.seed(1)
-    ended, cut = np.zeros(COPIES, int), 0
-    while ended.min() < (2 if random else 5):
+    ended, cut_short = np.zeros(COPIES, int), 0
+    while ended.min() < 5:
         actions = together.action_space.sample()
         one, other = together.step(actions), alone.step(actions)
         assert data_equivalence(list(one), list(other), exact=True)
         assert one[0] in together.observation_space
         ended += one[2] | one[3]
-        cut += one[3].sum()
-    assert (cut > 0) == (limit is not None and "Placement" in name)
+        cut_short += one[3].sum()
+        if mode is AutoresetMode.DISABLED and (one[2] | one[3]).any():
+            with pytest.raises(ResetNeeded, match="reset_mask"):
+                together.step(actions)
+            start = [
+                env.reset(options={"reset_mask": one[2] | one[3]}) for env in (together, alone)
+            ]
+            assert data_equivalence(*start, exact=True)
+    assert (cut_short > 0) == (limit is not None and "Placement" in name)
 
 
 @every
-def test_processes_give_what_threads_give(name: str, ramp: Site) -> None:
+def test_copies_draw_the_sites_that_singles_draw(name: str) -> None:
+    together, alone = batch(name, "random"), gymnasium.make(name, site="random", releases=1)
+    for i, copy_ in enumerate(together.unwrapped.copies):
+        copy_.draw(3 + i)
+        alone.unwrapped.draw(3 + i)
+        assert copy_.problem == alone.unwrapped.problem
+        assert copy_.problem.site.name in sites.split("train")
+
+
+def test_a_reset_may_name_the_site_of_all_copies() -> None:
+    env = batch("rigdda/BarrierDesign-v0", CUT)
+    _, info = env.reset(seed=0, options={"site": "quick"})
+    assert info["site"].tolist() == ["quick"] * COPIES
+    with pytest.raises(BadInput, match="give nothing but site"):
+        env.reset(options={"weather": 1})
+    for mask in (np.zeros(COPIES, bool), np.ones(2, bool), [1, 0, 0]):
+        with pytest.raises(BadInput, match=r"reset_mask = .*: give 3 booleans"):
+            env.reset(options={"reset_mask": mask})
+    with pytest.raises(BadInput, match=r"autoreset_mode = 'later': choose one of"):
+        batch("rigdda/BarrierDesign-v0", CUT, autoreset_mode="later")
+
+
+@every
+def test_processes_give_what_threads_give(name: str) -> None:
     """Two episodes bit for bit, and a copy of the environment has processes of its own."""
-    threads, processes = batch(name, ramp), batch(name, ramp, processes=2)
+    threads, processes = batch(name, CUT), batch(name, CUT, processes=2)
     assert data_equivalence(threads.reset(seed=3), processes.reset(seed=3), exact=True)
     threads.action_space.seed(1)
     ended = np.zeros(COPIES, int)
@@ -84,14 +115,14 @@ def test_processes_give_what_threads_give(name: str, ramp: Site) -> None:
         env.close()
 
 
-def test_a_crew_shares_jobs_out_evenly_and_keeps_them_at_home(ramp: Site) -> None:
+def test_a_crew_shares_jobs_out_evenly_and_keeps_them_at_home() -> None:
     crew = Crew(2)
     try:
-        jobs = [(ramp, (), seed) for seed in (5, 6, 7, 8)]
+        jobs = [(CUT, (), seed, "small") for seed in (5, 6, 7, 8)]
         first = list(crew.map(worker, jobs))
         assert len(set(first)) == 2 and sorted(map(first.count, set(first))) == [2, 2]
         assert list(crew.map(worker, jobs)) == first
-        one = list(crew.map(worker, [(ramp, (), 5)] * 4))
+        one = list(crew.map(worker, [(CUT, (), 5, "small")] * 4))
         assert sorted(map(one.count, set(one))) == [2, 2]
     finally:
         crew.close()
@@ -145,8 +176,8 @@ def worker(job: object) -> int:
 
 @every
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-def test_a_copy_goes_on_like_the_original(name: str, ramp: Site, clone: Any) -> None:
-    env = batch(name, ramp)
+def test_a_copy_goes_on_like_the_original(name: str, clone: Any) -> None:
+    env = batch(name, CUT)
     env.reset(seed=2)
     env.action_space.seed(0)
     actions = env.action_space.sample()
@@ -155,9 +186,9 @@ def test_a_copy_goes_on_like_the_original(name: str, ramp: Site, clone: Any) -> 
     assert data_equivalence(list(env.step(actions)), list(other.step(actions)), exact=True)
 
 
-def test_bad_input_is_refused_and_changes_nothing(ramp: Site) -> None:
-    env = batch("rigdda/BarrierPlacement-v0", ramp)
-    actions = np.zeros((COPIES, 3), np.float32)
+def test_bad_input_is_refused_and_changes_nothing() -> None:
+    env = batch("rigdda/BarrierPlacement-v0", CUT, kinds=("fence",))
+    actions = np.zeros((COPIES, 4), np.float32)
     with pytest.raises(ResetNeeded):
         env.step(actions)
     for seed in ([1, 2], 1.5, (x for x in "abc"), np.array(1.5), "ab"):
@@ -170,32 +201,32 @@ def test_bad_input_is_refused_and_changes_nothing(ramp: Site) -> None:
     for nothing in (None, 5, np.float32(0.0), (row for row in actions)):
         with pytest.raises(BadInput, match=r"actions = .*: give 3 rows"):
             env.step(nothing)
-    for unsound in ("abc", {0: 0, 1: 1, 2: 2}, [[0.0] * 3, [0.0], None]):
+    for unsound in ("abc", {0: 0, 1: 1, 2: 2}, [[0.0] * 4, [0.0], None]):
         with pytest.raises(BadInput, match=r"actions\[\d\]"):
             env.step(unsound)
     with pytest.raises(BadInput, match=r"shape of actions\[0\] = \(2,\)"):
         env.step(actions[:, :2])
     with pytest.raises(BadInput, match="actions = '2 rows': give 3"):
         env.step(actions[:2])
-    other = batch("rigdda/BarrierPlacement-v0", ramp)
+    other = batch("rigdda/BarrierPlacement-v0", CUT, kinds=("fence",))
     other.reset(seed=4)
     assert data_equivalence(list(env.step(actions)), list(other.step(actions)), exact=True)
     for keywords in (
         {"num_envs": 0}, {"num_envs": 10**9}, {"max_episode_steps": 0}, {"processes": 0},
     ):  # fmt: skip
         with pytest.raises(BadInput, match=r"= (0|10{9}): give a whole number of at least 1"):
-            gymnasium.make_vec("rigdda/BarrierDesign-v0", site=ramp, **keywords)
+            gymnasium.make_vec("rigdda/BarrierDesign-v0", site=CUT, **keywords)
 
 
-def test_every_copy_has_a_picture(ramp: Site) -> None:
-    env = batch("rigdda/BarrierDesign-v0", ramp, render_mode="rgb_array")
+def test_every_copy_has_a_picture() -> None:
+    env = batch("rigdda/BarrierDesign-v0", CUT, render_mode="rgb_array")
     env.reset(seed=0)
     pictures = env.render()
     assert [picture.shape for picture in pictures] == [(450, 800, 3)] * COPIES
 
 
-def test_every_copy_has_a_folder_for_its_replays(ramp: Site, tmp_path: Any) -> None:
-    env = batch("rigdda/BarrierDesign-v0", ramp, record=tmp_path)
+def test_every_copy_has_a_folder_for_its_replays(tmp_path: Any) -> None:
+    env = batch("rigdda/BarrierDesign-v0", CUT, record=tmp_path)
     env.reset(seed=0)
     env.step(np.zeros(env.action_space.shape, np.float32))
     found = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.rrd"))
@@ -204,20 +235,20 @@ def test_every_copy_has_a_folder_for_its_replays(ramp: Site, tmp_path: Any) -> N
 
 @pytest.mark.parametrize("record", [5, "file", "file/deeper"])
 def test_a_folder_for_replays_that_cannot_be_made_is_refused(
-    record: Any, ramp: Site, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+    record: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     with pytest.raises(BadInput, match=r"record = .*: name a folder"):
-        batch("rigdda/BarrierDesign-v0", ramp, record=record)
+        batch("rigdda/BarrierDesign-v0", CUT, record=record)
 
 
-def test_the_bridge_says_what_the_batch_says(ramp: Site) -> None:
+def test_the_bridge_says_what_the_batch_says() -> None:
     """Observations, rewards, ends, what was seen last and why an episode ended."""
     pytest.importorskip("stable_baselines3")
-    name, terms = "rigdda/BarrierPlacement-v0", {"site": ramp, "releases": 1}
+    name, terms = "rigdda/BarrierPlacement-v0", {"site": CUT, "releases": 1}
     bridge = envs.sb3_vec_env(name, COPIES, **terms, max_episode_steps=2)
-    plain = batch(name, ramp, max_episode_steps=2)
+    plain = batch(name, CUT, max_episode_steps=2)
     bridge.seed(3)
     seen, info = plain.reset(seed=3)
     assert data_equivalence(bridge.reset(), seen, exact=True)
@@ -242,9 +273,9 @@ def test_the_bridge_says_what_the_batch_says(ramp: Site) -> None:
 
 
 @every
-def test_ppo_learns_on_copies(name: str, ramp: Site) -> None:
+def test_ppo_learns_on_copies(name: str) -> None:
     ppo = pytest.importorskip("stable_baselines3").PPO
-    env = envs.sb3_vec_env(name, COPIES, site=ramp, releases=1)
+    env = envs.sb3_vec_env(name, COPIES, site=CUT, releases=1)
     model = ppo("MultiInputPolicy", env, n_steps=6, batch_size=9, n_epochs=2, gamma=1.0, seed=0)
     before = [p.detach().clone() for p in model.policy.parameters()]
     model.learn(36)

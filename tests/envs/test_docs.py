@@ -7,25 +7,25 @@ from pathlib import Path
 
 import pytest
 
-from envs.observation import FIELDS, PLACEMENT_FIELDS
+from envs.fields import BOUND, FIELDS, LOOKED
 
 DOCS = Path(__file__).parents[2] / "docs"
-ROW = re.compile(r"^\| `(\w+)` \| ([^|]+) \| ([-\d.]+) \| ([-\d.]+) \|", re.MULTILINE)
+ROW = re.compile(
+    r"^\| `(\w+)` \| ([^|]+) \| ([-\d.]+) \| ([-\d.]+) \| ([-\d.]+) \| ([^|]+) \|$", re.M
+)
+SIZES = {0: "size of all slots", -1: "`max_barriers`"}
 
 
 @pytest.mark.parametrize(
-    ("page", "fields"),
-    [
-        ("BarrierDesign-v0", FIELDS),
-        ("BarrierPlacement-v0", {n: PLACEMENT_FIELDS[n] for n in PLACEMENT_FIELDS.keys() - FIELDS}),
-    ],
+    "page, fields", [("BarrierDesign-v0", FIELDS), ("BarrierPlacement-v0", LOOKED)]
 )
 def test_every_array_is_documented(page: str, fields: dict) -> None:
-    told = {
-        name: (size.strip(), float(low), float(high))
-        for name, size, low, high in ROW.findall((DOCS / f"{page}.md").read_text())
-    }
-    expected = {name: (str(size), low, high) for name, (size, low, high) in fields.items()}
-    if "layout" in expected:
-        expected["layout"] = ("size of all slots", *expected["layout"][1:])
-    assert told == expected
+    told = ROW.findall((DOCS / f"{page}.md").read_text())
+    rows = []
+    for name, field in fields.items():
+        bound = 1.0 if name == "layout" else BOUND
+        size = SIZES.get(field.size, str(field.size))
+        rows.append(
+            (name, size, f"{bound:g}", f"{field.centre:g}", f"{field.spread:g}", field.entries)
+        )
+    assert told == rows

@@ -9,11 +9,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from cases import cut
 
-from envs import baseline
+from envs import reuse
 from envs.registration import ENVIRONMENTS
-from rigdda import Site
-from rigdda.barriers import KINDS
 
 EPISODES, COPIES = 1000, 8
 
@@ -30,23 +29,20 @@ def play(env: Any, episodes: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_a_thousand_random_episodes(name: str, ramp: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_thousand_random_episodes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is remembered on purpose is made small, so that it is full from the start."""
-    from rigdda import site as module
-
-    monkeypatch.setattr(baseline.memory, "room", 16)
-    env = gymnasium.make_vec(name, num_envs=COPIES, site=ramp, kinds=tuple(KINDS), releases=1)
+    for memory in (reuse.free, reuse.held, reuse.spans):
+        monkeypatch.setattr(memory, "room", 16)
+    env = gymnasium.make_vec(name, num_envs=COPIES, site=cut(), releases=1)
     env.reset(seed=0)
     env.action_space.seed(0)
-    play(env, 50)
-    module._drawn.cache_clear()
+    play(env, 300)
     gc.collect()
     tracemalloc.start()
-    play(env, 50)
+    play(env, 100)
     sizes = []
     for _ in range(2):
-        play(env, (EPISODES - 100) // 2)
-        module._drawn.cache_clear()
+        play(env, (EPISODES - 400) // 2)
         gc.collect()
         sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()

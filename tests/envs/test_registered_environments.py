@@ -8,31 +8,38 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
+from cases import cut
 from gymnasium.utils.env_checker import check_env
 
 from envs.registration import ENVIRONMENTS
-from rigdda import Site
 
+CUT = cut()
 every = pytest.mark.parametrize("name", ENVIRONMENTS)
 
 
-@every
-def test_gymnasium_finds_no_fault(name: str) -> None:
-    check_env(gymnasium.make(name, site="quick", releases=1).unwrapped)
+flat = pytest.mark.parametrize("flat", [False, True])
 
 
 @every
-def test_stable_baselines3_finds_no_fault(name: str) -> None:
+@flat
+def test_gymnasium_finds_no_fault(name: str, flat: bool) -> None:
+    check_env(gymnasium.make(name, site="quick", releases=1, flat=flat).unwrapped)
+
+
+@every
+@flat
+def test_stable_baselines3_finds_no_fault(name: str, flat: bool) -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    env = gymnasium.make(name, site="quick", releases=1, render_mode="rgb_array")
+    terms = {"site": "quick", "releases": 1, "render_mode": "rgb_array", "flat": flat}
+    env = gymnasium.make(name, **terms)
     checker.check_env(env.unwrapped, skip_render_check=False)
 
 
 @every
-def test_any_action_gives_an_observation_of_the_space(name: str, ramp: Site) -> None:
-    env = gymnasium.make(name, site=ramp, releases=1)
+def test_any_action_gives_an_observation_of_the_space(name: str) -> None:
+    env = gymnasium.make(name, site=CUT, releases=1)
     env.action_space.seed(0)
-    for i in range(5):
+    for i in range(10):
         seen, _ = env.reset(seed=i)
         assert seen in env.observation_space
         seen, reward, *_ = env.step(env.action_space.sample())
@@ -41,9 +48,9 @@ def test_any_action_gives_an_observation_of_the_space(name: str, ramp: Site) -> 
 
 
 @every
-def test_ppo_takes_200_steps(name: str, ramp: Site) -> None:
+def test_ppo_takes_200_steps(name: str) -> None:
     ppo = pytest.importorskip("stable_baselines3").PPO
-    env = gymnasium.make(name, site=ramp, max_barriers=1, releases=1)
+    env = gymnasium.make(name, site=CUT, max_barriers=1, releases=1)
     model = ppo("MultiInputPolicy", env, n_steps=50, batch_size=50, n_epochs=2, gamma=1.0, seed=0)
     before = [p.detach().clone() for p in model.policy.parameters()]
     model.learn(200)

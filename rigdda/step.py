@@ -11,9 +11,11 @@ from rigdda.constants import (
     AWAKE,
     BAD_STATE,
     CONTACTS_FULL,
+    CUTS,
     DONE,
     EVENTS_FULL,
     HELD,
+    MOST_PARTS,
     OPEN,
     RETIRED,
     SPEED_LIMIT,
@@ -41,6 +43,7 @@ from rigdda.frames import keep_frame
 from rigdda.gauges import barrier_contact, note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel, stage
+from rigdda.lone_block import begin_part, follow_all, recall_all, takes_parts
 from rigdda.motion import kinetic_energy, top_speed
 from rigdda.open_close import let_wait, open_close
 from rigdda.records import (
@@ -237,14 +240,15 @@ def move_island(
 
 @stage
 def solve_and_move(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, system: System, work: Work,
-    gauges: Gauges, time: float, p: Parameters, cutting: bool, counters: NDArray,
-    ledger: NDArray,
+    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts, count: int,
+    before: Contacts, system: System, work: Work, gauges: Gauges, time: float, p: Parameters,
+    part: Parameters, cutting: bool, counters: NDArray, ledger: NDArray,
 ) -> tuple[int, float]:  # fmt: skip
     """Settle every island, note hits, then move its blocks.
 
     Where `cutting`, an island that does not settle, or that goes farther than a step should take
-    it, is left where it is, and marked.
+    it, is left where it is, and marked. A lone block that is struck takes the step in parts, for
+    which `part` is.
 
     Returns
     -------
@@ -260,42 +264,64 @@ def solve_and_move(
     bad, excess = -1, 0.0
     for s in range(found):
         c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
-        settled, islands.relaxed[0] = True, 0
-        if c1 > c0:
-            since = lap(counters, MOTION, since, p.timing)
-            settled = open_close(bodies, contacts, system, islands, rows, s, p, counters)
-            since = lap(counters, OPEN_CLOSE, since, p.timing)
-        struck = apply_forces(bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, p)
-        if c1 > c0:
-            far, early = 0.0, False
-            for attempt in range(2 if cutting else 0):
-                far = too_far(bodies, contacts, motion, islands, s, p)
-                if far <= 1.0 or attempt == 1 or not settled:
-                    break
-                early = act_early(bodies, contacts, motion, islands, s, p)
-                if not early:
-                    break
-            if far > 1.0 or (cutting and not settled):
-                excess = max(excess, far, 1.0)
-                counters[CUT_BACKS] += 1
-                mark_cut(bodies, islands, s)
-                continue
-            if not settled:  # not in a shorter step, either
-                let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
-            if limit_fences(bodies, contacts, system, islands, rows, s, gauges, time, p, counters):
-                struck = apply_forces(
-                    bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, p
+        now, left, parts, cut = p, p.dt, 0, False
+        while left > 0.0 and not cut and bad < 0:
+            settled, islands.relaxed[0] = True, 0
+            if parts > 0:
+                begin_part(
+                    bodies, contacts, interfaces, islands, s, left, parts == MOST_PARTS, part
                 )
-                early = early and act_early(bodies, contacts, motion, islands, s, p)
-            struck = struck or early
-            if len(gauges.target) > 0:
-                counters[EVENTS] = note_hits(
-                    bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
-                )
-        bad = max(
-            bad,
-            move_island(bodies, outlines, contacts, motion, islands, s, struck, gauges, p, ledger),
-        )
+                now = part
+            if c1 > c0:
+                since = lap(counters, MOTION, since, p.timing)
+                settled = open_close(bodies, contacts, system, islands, rows, s, now, counters)
+                since = lap(counters, OPEN_CLOSE, since, p.timing)
+            struck = apply_forces(
+                bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, now
+            )
+            if c1 > c0:
+                far, early = 0.0, False
+                for attempt in range(2 if cutting and parts == 0 else 0):
+                    far = too_far(bodies, contacts, motion, islands, s, p)
+                    if far <= 1.0 or attempt == 1 or not settled:
+                        break
+                    early = act_early(bodies, contacts, motion, islands, s, p)
+                    if not early:
+                        break
+                if far > 1.0 or (cutting and parts == 0 and not settled):
+                    excess = max(excess, far, 1.0)
+                    counters[CUT_BACKS] += 1
+                    mark_cut(bodies, islands, s)
+                    cut = True
+                    continue
+                if parts == 0 and p.post_correction and takes_parts(contacts, islands, s, gauges):
+                    recall_all(contacts, islands, s, before, work.first, p)
+                    parts = 1
+                    continue
+                if not settled:  # not in a shorter step, either
+                    let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
+                if limit_fences(
+                    bodies, contacts, system, islands, rows, s, gauges, time, now, counters
+                ):
+                    struck = apply_forces(
+                        bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, now
+                    )
+                    early = early and act_early(bodies, contacts, motion, islands, s, p)
+                struck = struck or early
+                if len(gauges.target) > 0:
+                    counters[EVENTS] = note_hits(
+                        bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
+                    )
+            bad = max(
+                bad,
+                move_island(
+                    bodies, outlines, contacts, motion, islands, s, struck, gauges, now, ledger
+                ),
+            )
+            left -= now.dt
+            if parts > 0 and left > 0.0:
+                follow_all(bodies, contacts, islands, s, motion, p)
+                parts += 1
     if p.sleeping:
         watch_quiet(bodies, islands, found, p)
         wake_behind(bodies, contacts, count, gauges, p)
@@ -365,8 +391,8 @@ def advance(
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         bad, excess = solve_and_move(
-            bodies, outlines, now, count, system, work, gauges, time, p, level == 0, counters,
-            ledger,
+            bodies, outlines, interfaces, now, count, before, system, work, gauges, time, p,
+            levels[CUTS + 1], level == 0, counters, ledger,
         )  # fmt: skip
         yield_bolts(bodies, links)
         part += 1

@@ -68,7 +68,7 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
 def pack_parameters(
     scene: Scene, settings: Settings, bodies: Bodies, interfaces: Interfaces
 ) -> NDArray[np.void]:
-    """Return the numbers of the scene and the settings, for the step and for its parts."""
+    """Return the numbers of the scene and the settings: for the step, halves of it, and parts."""
     free = [i for i, b in enumerate(scene.blocks) if not b.fixed]
     area = [bodies["mass"][i] / scene.blocks[i].density for i in free]
     size = math.sqrt(np.mean(area))
@@ -114,9 +114,9 @@ def pack_parameters(
     if coarse:
         halvings = round(math.log2(settings.dt / steady))
         numbers["first_cut"] = min(max(1, halvings), CUTS)
-    levels = np.zeros(CUTS + 1, dtype=PARAMETERS)
+    levels = np.zeros(CUTS + 2, dtype=PARAMETERS)
     for name, value in numbers.items():
         levels[name] = value
-    levels["dt"] = settings.dt / 2.0 ** np.arange(CUTS + 1)
+    levels["dt"] = settings.dt / 2.0 ** np.arange(CUTS + 2)
     levels["sinking_limit"][1:] = math.inf  # the parts of a step are not cut back
     return levels.view(np.recarray)

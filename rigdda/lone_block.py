@@ -1,0 +1,107 @@
+"""A lone block that is struck takes its step in parts, each of which ends just after an impact.
+
+An impact turns a block, and another corner of it may strike soon after, faster and from elsewhere
+than it would have without. Solved as one, both impacts would act at once, or the second one would be
+stopped before it; how often they fall into one step depends on the step. In parts a block bounces as
+it does in short steps. What it may touch was foreseen for the whole step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.constants import AFTER_IMPACT, IMPACT, NEW, OPEN, PLAIN_CONTACT
+from rigdda.contact.law import prepare, pull_on, strike, time_of_impact
+from rigdda.contact.transfer import recall
+from rigdda.kernel import inlined, kernel
+from rigdda.records import (
+    Bodies,
+    Contact,
+    Contacts,
+    Gauges,
+    Interfaces,
+    Ints,
+    Islands,
+    Motion,
+    Parameters,
+)
+
+
+@kernel
+def takes_parts(contacts: Contacts, islands: Islands, island: int, gauges: Gauges) -> bool:
+    """Return whether an island is a lone block with an impact, none on a fence that can fail."""
+    if islands.block_start[island + 1] - islands.block_start[island] > 1:
+        return False
+    impact = False
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        c = contacts[islands.contact_item[item]]
+        impact = impact or c.kind == IMPACT
+        if c.b >= 0 and gauges.barrier[c.b] >= 0:
+            if gauges.target[gauges.barrier[c.b]].capacity < math.inf:
+                return False
+    return impact
+
+
+@kernel
+def recall_all(
+    contacts: Contacts, islands: Islands, island: int, before: Contacts, first: Ints, p: Parameters
+) -> None:
+    """Let the contacts of an island be as they were before the step."""
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        k = islands.contact_item[item]
+        recall(contacts, k, k + 1, before, first, p.slack)
+
+
+@inlined
+def follow(bodies: Bodies, c: Contact, motion: Motion, p: Parameters) -> None:
+    """Move a contact with its block, which has moved; apart by more than the slack it is open."""
+    d, besides, a = motion.d[0], motion.besides[0], bodies[c.a]
+    u, v, turn = d[0] + besides[0], d[1] + besides[1], d[2] + besides[2]
+    cos, sin = math.cos(turn), math.sin(turn)
+    side = 0.0 if c.owner == 1 else c.gap  # the corner, or the point of the face that is over it
+    x, y = c.x + side * c.nx - (a.x - u), c.y + side * c.ny - (a.y - v)
+    x, y = a.x + cos * x - sin * y, a.y + sin * x + cos * y
+    if c.owner == 1:
+        c.gap += c.nx * (x - c.x) + c.ny * (y - c.y)
+        c.x, c.y = x, y
+    else:
+        c.nx, c.ny = cos * c.nx - sin * c.ny, sin * c.nx + cos * c.ny
+        c.gap = c.nx * (x - c.x) + c.ny * (y - c.y)
+    if c.gap > p.slack or c.state == OPEN:
+        c.state, c.kind = OPEN, NEW
+        c.memory_normal = c.memory_shear = c.stiffness = 0.0
+        c.start_normal = c.start_shear = c.bond = 0.0
+
+
+@inlined
+def follow_all(
+    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, motion: Motion, p: Parameters
+) -> None:
+    """Move the contacts of a lone block with it."""
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        follow(bodies, contacts[islands.contact_item[item]], motion, p)
+
+
+@inlined
+def begin_part(
+    bodies: Bodies, contacts: Contacts, interfaces: Interfaces, islands: Islands, island: int,
+    left: float, last: bool, part: Parameters,
+) -> None:  # fmt: skip
+    """Set the next part of the step of a lone block: to its first impact, or all that is left [s].
+
+    The contacts are where the block is now.
+    """
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    part.dt = end = left
+    for item in range(c0, c1 if not last else c0):
+        c = contacts[islands.contact_item[item]]
+        if c.restitution == PLAIN_CONTACT:
+            continue
+        pull = pull_on(bodies, c, part)
+        strike(bodies, c, 0.5 * left, pull, part)
+        time = time_of_impact(bodies, c, pull, part)
+        if time >= 0.0:
+            end = min(end, time + AFTER_IMPACT * left)
+    part.dt = end
+    for item in range(c0, c1):
+        prepare(bodies, contacts[islands.contact_item[item]], interfaces, False, part)

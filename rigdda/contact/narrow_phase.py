@@ -18,8 +18,8 @@ from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contact, Contacts, Corners, Outlines, Parameters
 
-NEVER = 2.0
-"""Time of entry, over the step, of what does not come nearer or not soon."""
+NEVER = 1e3
+"""Time of entry, over the step, of what comes nearer no faster than what is at rest may."""
 
 
 @kernel
@@ -69,13 +69,14 @@ def face_of_contact(
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
     (dx, dy) is the displacement of j relative to i over the step if nothing deflects them,
-    (px - turn y, py + turn x) that of its point (x, y), `spread` how far any of their points may
+    (px - turn y, py + turn x) what turning adds to it at (x, y), `spread` how far any of their points may
     come nearer, whatever does.
     The best edge comes with its rank, time of entry and gap, after the greatest gap of any. Edges
     inside the body count as deeper by `sunk`, so that on a tie the real one is best.
 
-    A face that the nearest corner touches, and stays within the slack of, is never entered. By the
-    velocity of that corner: the middle of a block that rolls comes down, where it rests does not.
+    A face is entered when the nearest corner is deeper than the slack: of two that it touches the
+    one that is approached more slowly is the best. By the velocity of that corner then: the middle
+    of a block that rolls comes down, where it rests does not.
 
     The edge that the middle of j is farthest over comes first: most often it is the best one, or
     one that separates them. Others are looked at only as far as the circle in j may be over them.
@@ -91,19 +92,20 @@ def face_of_contact(
             if edge == facing or (most < -slack and (time > 0.0 or most < depth)):
                 continue
         gap, corner = axis_gap(nx, ny, own.x, own.y, outlines.corner, j, corners)
-        approach = -(nx * dx + ny * dy)
         if gap > spread:
             return False, time, depth, apart, edge
         if sunk > 0.0 and own.inner:
             gap -= sunk
         apart = max(apart, gap)
         entry = 0.0
-        if gap > slack:
-            entry = NEVER if approach <= 0.0 else min(gap / approach, NEVER)
-        elif gap >= -slack and not own.inner:
-            x, y = outlines.corner[j, corner].x, outlines.corner[j, corner].y
-            if gap + nx * (px - turn * y) + ny * (py + turn * x) >= -slack:
-                entry = NEVER
+        if gap >= -slack:
+            ux, uy = dx, dy
+            if gap <= slack:
+                ux -= turn * outlines.corner[j, corner].y - px
+                uy += turn * outlines.corner[j, corner].x + py
+            approach = -(nx * ux + ny * uy)
+            late = gap + slack >= NEVER * approach
+            entry = NEVER if late else (gap + slack) / approach
         later = entry > time or (entry == time and gap > depth)
         if later or (entry == time and gap == depth and edge < best):
             time, depth, best, nearest = entry, gap, edge, corner
@@ -244,11 +246,11 @@ def collide_pair(
         fall = 0.0
     spread = path + fall + p.slack
     beside = 0.5 * dt * (abs(one.omega) * one.radius + abs(two.omega) * two.radius)
-    # of a point of b relative to a: turns are about the centroids
+    # both turn about their centroids
     other = two.omega if two.status == AWAKE else 0.0
     turn = (other - one.omega) * dt
-    px = dx + (other * two.y - one.omega * one.y) * dt
-    py = dy - (other * two.x - one.omega * one.x) * dt
+    px = (other * two.y - one.omega * one.y) * dt
+    py = (one.omega * one.x - other * two.x) * dt
     if one.parts == 1 and two.parts == 1:
         return collide_parts(
             bodies, outlines, contacts, k, a, b, a, b, dx, dy, px, py, turn, spread, p.slack, 0.0,
@@ -314,8 +316,8 @@ def collide_parts(
 ) -> int:  # fmt: skip
     """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
 
-    (dx, dy) is the displacement of b relative to a over the step, (px - turn y, py + turn x) that
-    of its point (x, y), see `face_of_contact`, and `beside` half of how far both may turn in it.
+    (dx, dy) is the displacement of b relative to a over the step, (px - turn y, py + turn x) what
+    turning adds to it at (x, y), see `face_of_contact`, and `beside` half of how far both may turn.
     """
     ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
     possible, time_i, gap_i, apart_i, edge_i = face_of_contact(
@@ -332,8 +334,9 @@ def collide_parts(
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
     reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(apart_i, apart_j) <= slack
-    # what touches is where it is
-    time_i, time_j = 0.0 if gap_i <= slack else time_i, 0.0 if gap_j <= slack else time_j
+    # where they touch, not where they are deeper than the slack
+    time_i *= gap_i / (gap_i + slack) if gap_i > slack else 0.0
+    time_j *= gap_j / (gap_j + slack) if gap_j > slack else 0.0
     beside = 0.0 if touching else beside
     # corner beside corner, the better face may miss the other body where the second one does not;
     # and what is beside it at the time of entry may be driven into it from where it is now

@@ -33,7 +33,8 @@ AFTER_IMPACT = 0.02
 is left of the step [-]: corners that strike within it do so at once."""
 
 MOST_PARTS = 8
-"""Most parts of a step of a lone block."""
+"""Most parts of a step of a lone block: corners that strike in turn, ever sooner, do so at once in
+the last one."""
 
 SHOCK_SPEED = 0.1
 """Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft

@@ -1,16 +1,17 @@
 """A lone block that is struck takes its step in parts, each of which ends just after an impact.
 
 An impact turns a block, and another corner of it may strike soon after, faster and from elsewhere
-than it would have without. Solved as one, both impacts would act at once, or the second one would be
-stopped before it; how often they fall into one step depends on the step. In parts a block bounces as
-it does in short steps. What it may touch was foreseen for the whole step.
+than it would have without. Solved as one, both impacts would act at once, or what closes by the
+first one would be slowed down, and never bounce; how many do depends on the step. Single blocks of
+0.1 m2 lost 4.5 % more energy in a bounce in steps of 10 ms than in 0.1 ms, in parts 0.6 % more. What
+a block may touch was foreseen for the whole step.
 """
 
 from __future__ import annotations
 
 import math
 
-from rigdda.constants import AFTER_IMPACT, IMPACT, NEW, OPEN, PLAIN_CONTACT
+from rigdda.constants import AFTER_IMPACT, IMPACT, MOST_PARTS, NEW, OPEN, PLAIN_CONTACT
 from rigdda.contact.law import prepare, pull_on, strike, time_of_impact
 from rigdda.contact.transfer import recall
 from rigdda.kernel import inlined, kernel
@@ -28,9 +29,12 @@ from rigdda.records import (
 
 
 @kernel
-def takes_parts(contacts: Contacts, islands: Islands, island: int, gauges: Gauges) -> bool:
+def takes_parts(
+    contacts: Contacts, islands: Islands, island: int, gauges: Gauges, p: Parameters
+) -> bool:
     """Return whether an island is a lone block with an impact, none on a fence that can fail."""
-    if islands.block_start[island + 1] - islands.block_start[island] > 1:
+    blocks = islands.block_start[island + 1] - islands.block_start[island]
+    if blocks > 1 or not p.post_correction:
         return False
     impact = False
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
@@ -74,28 +78,21 @@ def follow(bodies: Bodies, c: Contact, motion: Motion, p: Parameters) -> None:
 
 
 @inlined
-def follow_all(
-    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, motion: Motion, p: Parameters
-) -> None:
-    """Move the contacts of a lone block with it."""
-    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        follow(bodies, contacts[islands.contact_item[item]], motion, p)
-
-
-@inlined
 def begin_part(
     bodies: Bodies, contacts: Contacts, interfaces: Interfaces, islands: Islands, island: int,
-    left: float, last: bool, part: Parameters,
+    motion: Motion, left: float, number: int, part: Parameters,
 ) -> None:  # fmt: skip
-    """Set the next part of the step of a lone block: to its first impact, or all that is left [s].
+    """Begin part `number` of the step of a lone block: to its next impact, or all that is left [s].
 
-    The contacts are where the block is now.
+    The first one is 1; `motion` is that of the part before.
     """
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     part.dt = end = left
-    for item in range(c0, c1 if not last else c0):
+    for item in range(c0, c1):
         c = contacts[islands.contact_item[item]]
-        if c.restitution == PLAIN_CONTACT:
+        if number > 1:
+            follow(bodies, c, motion, part)
+        if number == MOST_PARTS or c.restitution == PLAIN_CONTACT:
             continue
         pull = pull_on(bodies, c, part)
         strike(bodies, c, 0.5 * left, pull, part)

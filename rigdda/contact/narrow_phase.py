@@ -69,8 +69,8 @@ def face_of_contact(
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
     (dx, dy) is the displacement of j relative to i over the step if nothing deflects them,
-    (px - turn y, py + turn x) what turning adds to it at (x, y), `spread` how far any of their points may
-    come nearer, whatever does.
+    (px - turn y, py + turn x) what turning adds to it at (x, y), `spread` how far any of their
+    points may come nearer, whatever does.
     The best edge comes with its rank, time of entry and gap, after the greatest gap of any. Edges
     inside the body count as deeper by `sunk`, so that on a tie the real one is best.
 

@@ -50,7 +50,7 @@ def over_all_edges(
         if gap > spread:
             return False, 0.0, 0.0, 0.0
         px, py, turn = turning if gap <= SLACK else np.zeros(3)
-        approach = -(way + (px - turn * y, py + turn * x)) @ normal
+        approach = -(way + np.array([px - turn * y, py + turn * x])) @ normal
         late = NEVER if approach <= 0.0 else min((gap + SLACK) / approach, NEVER)
         ranks.append((late if gap >= -SLACK else 0.0, gap))
     return True, *max(ranks), max(gap for _, gap in ranks)

@@ -3,8 +3,8 @@
 An impact turns a block, and another corner of it may strike soon after, faster and from elsewhere
 than it would have without. Solved as one, both impacts would act at once, or what closes by the
 first one would be slowed down, and never bounce; how many do depends on the step. Single blocks of
-0.1 m2 lost 4.5 % more energy in a bounce in steps of 10 ms than in 0.1 ms, in parts 0.6 % more. What
-a block may touch was foreseen for the whole step.
+0.1 m2 lost 4.5 % more energy in a bounce in steps of 10 ms than in 0.1 ms, in parts 0.6 % more.
+What a block may touch was foreseen for the whole step.
 """
 
 from __future__ import annotations

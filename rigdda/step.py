@@ -242,7 +242,7 @@ def watch_step(
     bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, island: int,
     settled: bool, p: Parameters,
 ) -> tuple[float, bool]:  # fmt: skip
-    """Return how far an island goes, over what a step should take it, and if its blow acts early."""
+    """Return how far an island goes over what a step should take it, and if a blow acts early."""
     far, early = 0.0, False
     for attempt in range(2):
         far = too_far(bodies, contacts, motion, islands, island, p)

@@ -50,11 +50,12 @@ class Slide(NamedTuple):
         x, y = 1.3 * down + 0.25 * out
         slider = box(x, y, 1.0, 0.5, -slope, velocity=(*(self.speed * down), 0.0))
         places = [i * down - 0.5 * out for i in range(COURSE)]
-        row = [box(*place, angle=-slope, fixed=not self.free) for place in places]
+        row = [box(x, y, angle=-slope, fixed=not self.free) for x, y in places]
         if not self.free:
             return Scene(None, (slider, *row), rock(self.friction), gravity=self.gravity), down
         # the last one holds the row
-        row.append(box(*(COURSE * down - 0.5 * out), angle=-slope, fixed=True))
+        x, y = COURSE * down - 0.5 * out
+        row.append(box(x, y, angle=-slope, fixed=True))
         ground = Terrain([-3.0 * down - out, 2.0 * COURSE * down - out])
         return Scene(ground, (slider, *row), rock(self.friction)), down
 

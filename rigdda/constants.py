@@ -28,6 +28,14 @@ BLOW_SPEED = 1.0
 foreseen, and closed from afar in the step before. Lower, and contacts of a pressed pile that close
 slowly are never pushed out."""
 
+AFTER_IMPACT = 0.02
+"""Time that a part of a step of a lone block goes on after the impact that it ends with, over what
+is left of the step [-]: corners that strike within it do so at once."""
+
+MOST_PARTS = 8
+"""Most parts of a step of a lone block: corners that strike in turn, ever sooner, do so at once in
+the last one."""
+
 SHOCK_SPEED = 0.1
 """Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
 for what hits the block from the other side, and it is treated as a plastic impact."""

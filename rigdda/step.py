@@ -11,6 +11,7 @@ from rigdda.constants import (
     AWAKE,
     BAD_STATE,
     CONTACTS_FULL,
+    CUTS,
     DONE,
     ENDED,
     EVENTS_FULL,
@@ -43,6 +44,7 @@ from rigdda.frames import keep_frame
 from rigdda.gauges import barrier_contact, is_over, note_hits, note_passage
 from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel, stage
+from rigdda.lone_block import begin_part, recall_all, takes_parts
 from rigdda.motion import retire, top_speed
 from rigdda.open_close import let_wait, open_close
 from rigdda.records import (
@@ -74,7 +76,7 @@ from rigdda.records import (
 )
 from rigdda.shaking import set_field
 from rigdda.sleep import wake_neighbours, watch_quiet
-from rigdda.thrust import note_thrust, watch_thrust
+from rigdda.thrust import press, press_asleep, watch_thrust
 
 
 @kernel
@@ -209,6 +211,8 @@ def move_island(
         if c.state == OPEN:
             continue
         account_contact(c, motion.d, islands, ledger, gauges)
+        if len(gauges.target) > 0:
+            press(c, gauges, p.dt)
         bodies[c.a].touching = 1
         if c.b >= 0:
             bodies[c.b].touching = 1
@@ -228,16 +232,98 @@ def move_island(
     return bad
 
 
+@kernel
+def watch_step(
+    bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, island: int,
+    settled: bool, p: Parameters,
+) -> tuple[float, bool]:  # fmt: skip
+    """Return how far an island goes over what a step should take it, and if a blow acts early."""
+    far, early = 0.0, False
+    for attempt in range(2):
+        far = too_far(bodies, contacts, motion, islands, island, p)
+        if far <= 1.0 or attempt == 1 or not settled:
+            break
+        early = act_early(bodies, contacts, motion, islands, island, p)
+        if not early:
+            break
+    return far, early
+
+
+@stage
+def step_island(
+    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
+    before: Contacts, system: System, work: Work, gauges: Gauges, time: float, s: int,
+    p: Parameters, part: Parameters, cutting: bool, counters: NDArray, ledger: NDArray,
+) -> tuple[int, float]:  # fmt: skip
+    """Settle island s, note its hits, and move its blocks, in one or in parts: see `lone_block`.
+
+    Returns
+    -------
+    bad : int
+        A block that went bad, or -1.
+    excess : float
+        How far the island went, over what a step should take it, at least 1, if it is cut back:
+        left where it is, and marked; else 0.
+    """
+    islands, rows, m, motion = work.islands, work.rows, system.matrix, system.motion
+    c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
+    now, left, parts, bad = p, p.dt, 0, -1
+    since = lap(counters, MOTION, 0, p.timing)
+    while left > 0.0 and bad < 0:
+        settled, early, islands.relaxed[0] = True, False, 0
+        if parts > 0:
+            begin_part(bodies, contacts, interfaces, islands, s, motion, left, parts, part)
+            now = part
+        if c1 > c0:
+            since = lap(counters, MOTION, since, p.timing)
+            settled = open_close(bodies, contacts, system, islands, rows, s, now, counters)
+            since = lap(counters, OPEN_CLOSE, since, p.timing)
+        struck = apply_forces(bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, now)
+        if c1 > c0 and parts == 0:
+            if cutting:
+                far, early = watch_step(bodies, contacts, motion, islands, s, settled, p)
+                if far > 1.0 or not settled:
+                    counters[CUT_BACKS] += 1
+                    mark_cut(bodies, islands, s)
+                    return -1, max(far, 1.0)
+            if takes_parts(contacts, islands, s, p):
+                recall_all(contacts, islands, s, before, work.first, p)
+                parts = 1
+                continue
+        if c1 > c0:
+            if not settled:  # not in a shorter step, either
+                let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
+            if charge_fences(
+                bodies, contacts, system, islands, rows, s, gauges, time, now, counters
+            ):
+                struck = apply_forces(
+                    bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, now
+                )
+                early = early and act_early(bodies, contacts, motion, islands, s, p)
+            struck = struck or early
+            if len(gauges.target) > 0:
+                counters[EVENTS] = note_hits(
+                    bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
+                )
+        bad = move_island(
+            bodies, outlines, contacts, motion, islands, s, struck, gauges, now, ledger
+        )
+        left -= now.dt
+        parts += 1 if parts > 0 else 0
+    lap(counters, MOTION, since, p.timing)
+    return bad, 0.0
+
+
 @stage
 def solve_and_move(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, system: System, work: Work,
-    gauges: Gauges, time: float, p: Parameters, cutting: bool, counters: NDArray,
-    ledger: NDArray,
+    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts, count: int,
+    before: Contacts, system: System, work: Work, gauges: Gauges, time: float, p: Parameters,
+    part: Parameters, cutting: bool, counters: NDArray, ledger: NDArray,
 ) -> tuple[int, float]:  # fmt: skip
-    """Settle every island, note hits, then move its blocks.
+    """Take the step of every island.
 
     Where `cutting`, an island that does not settle, or that goes farther than a step should take
-    it, is left where it is, and marked.
+    it, is left where it is, and marked. `part` is for parts of the step of a lone block.
 
     Returns
     -------
@@ -248,51 +334,20 @@ def solve_and_move(
         none.
     """
     since = lap(counters, MOTION, 0, p.timing)
-    islands, rows, m, motion = work.islands, work.rows, system.matrix, system.motion
-    found = find_islands(bodies, contacts, work.begin, islands, p.blocks, p.islands)
+    found = find_islands(bodies, contacts, work.begin, work.islands, p.blocks, p.islands)
+    since = lap(counters, MOTION, since, p.timing)
     bad, excess = -1, 0.0
     for s in range(found):
-        c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
-        settled, islands.relaxed[0] = True, 0
-        if c1 > c0:
-            since = lap(counters, MOTION, since, p.timing)
-            settled = open_close(bodies, contacts, system, islands, rows, s, p, counters)
-            since = lap(counters, OPEN_CLOSE, since, p.timing)
-        struck = apply_forces(bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, p)
-        if c1 > c0:
-            far, early = 0.0, False
-            for attempt in range(2 if cutting else 0):
-                far = too_far(bodies, contacts, motion, islands, s, p)
-                if far <= 1.0 or attempt == 1 or not settled:
-                    break
-                early = act_early(bodies, contacts, motion, islands, s, p)
-                if not early:
-                    break
-            if far > 1.0 or (cutting and not settled):
-                excess = max(excess, far, 1.0)
-                counters[CUT_BACKS] += 1
-                mark_cut(bodies, islands, s)
-                continue
-            if not settled:  # not in a shorter step, either
-                let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
-            if charge_fences(bodies, contacts, system, islands, rows, s, gauges, time, p, counters):
-                struck = apply_forces(
-                    bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, p
-                )
-                early = early and act_early(bodies, contacts, motion, islands, s, p)
-            struck = struck or early
-            if len(gauges.target) > 0:
-                counters[EVENTS] = note_hits(
-                    bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
-                )
-        bad = max(
-            bad,
-            move_island(bodies, outlines, contacts, motion, islands, s, struck, gauges, p, ledger),
-        )
+        worse, far = step_island(
+            bodies, outlines, interfaces, contacts, before, system, work, gauges, time, s, p, part,
+            cutting, counters, ledger,
+        )  # fmt: skip
+        bad, excess = max(bad, worse), max(excess, far)
     if p.sleeping:
-        watch_quiet(bodies, islands, found, p)
+        since = lap(counters, MOTION, 0, p.timing)
+        watch_quiet(bodies, work.islands, found, p)
         wake_behind(bodies, contacts, count, gauges, p)
-    lap(counters, MOTION, since, p.timing)
+        lap(counters, MOTION, since, p.timing)
     return bad, excess
 
 
@@ -379,13 +434,14 @@ def advance(
             now, before = before, now
             swapped = not swapped
             bad, excess = solve_and_move(
-                bodies, outlines, now, count, system, work, gauges, time, p, level == 0, counters,
-                ledger,
+                bodies, outlines, interfaces, now, count, before, system, work, gauges, time, p,
+                levels[CUTS + 1], level == 0, counters, ledger,
             )  # fmt: skip
             yield_bolts(bodies, links)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
-        note_thrust(bodies, now, count, gauges, level == 0, p)
+        if level == 0:
+            press_asleep(bodies, now, count, gauges, p.dt)
         pushed = False
         part += 1
         if bad < 0 and excess > 0.0:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.constants import ASLEEP, BOLT, HELD, IMPACT, OPEN, PIN, RETIRED, SHOCK, TERRAIN
+from rigdda.constants import ASLEEP, BOLT, IMPACT, OPEN, PIN, RETIRED, SHOCK, TERRAIN
 from rigdda.gauges import FAILED, barrier_contact, write_event
 from rigdda.islands import root
 from rigdda.kernel import kernel, stage
@@ -37,29 +37,29 @@ def pressed(gauges: Gauges, c: Contact) -> int:
     return -1
 
 
+@kernel
+def press(c: Contact, gauges: Gauges, dt: float) -> None:
+    """Add the impulse of a contact in a step, or a part of one [s], to what presses on a barrier."""
+    barrier = pressed(gauges, c)
+    if barrier < 0:
+        return
+    target, hit = gauges.target[barrier], c.kind == IMPACT or c.kind == SHOCK
+    if hit and target.capacity < math.inf:
+        return
+    thrust = c.shear * c.ny - c.normal * c.nx  # on body b
+    if c.b != TERRAIN and barrier_contact(gauges, c.a, c.b)[0] != c.a:
+        thrust = -thrust
+    gauges.push[barrier, HITS if hit else REST] += thrust * dt
+    if thrust > target.most:
+        target.most, target.block, target.x, target.y = thrust, c.a, c.x, c.y
+
+
 @stage
-def note_thrust(
-    bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, whole: bool, p: Parameters
-) -> None:
-    """Add the impulses of the contacts in a step, `whole` or a part of one that is cut back."""
+def press_asleep(bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, dt: float) -> None:
+    """Add the impulses in a step [s] of what sleeps on barriers."""
     for k in range(count if len(gauges.target) > 0 else 0):
-        c = contacts[k]
-        body = bodies[c.a]
-        # what is cut back counts in its parts, what is held or sleeps in the step as a whole
-        if body.cut == 1 if whole else (body.status == HELD or body.status == ASLEEP):
-            continue
-        barrier = pressed(gauges, c)
-        if barrier < 0:
-            continue
-        target, hit = gauges.target[barrier], c.kind == IMPACT or c.kind == SHOCK
-        if hit and target.capacity < math.inf:
-            continue
-        thrust = c.shear * c.ny - c.normal * c.nx  # on body b
-        if c.b != TERRAIN and barrier_contact(gauges, c.a, c.b)[0] != c.a:
-            thrust = -thrust
-        gauges.push[barrier, HITS if hit else REST] += thrust * p.dt
-        if thrust > target.most:
-            target.most, target.block, target.x, target.y = thrust, c.a, c.x, c.y
+        if bodies[contacts[k].a].status == ASLEEP:
+            press(contacts[k], gauges, dt)
 
 
 @kernel

@@ -274,15 +274,42 @@ def strike_at_once(bodies: Bodies, contacts: Contacts, low: int, high: int, p: P
         first = k + 1
 
 
+@kernel
+def pull_on(bodies: Bodies, c: Contact, p: Parameters) -> float:
+    """Return the free relative acceleration that closes a contact [m/s2]: that of gravity."""
+    if c.b >= 0 and bodies[c.b].status == AWAKE:
+        return 0.0
+    return -(p.field_x * c.nx + p.field_y * c.ny)
+
+
+@inlined
+def time_of_impact(bodies: Bodies, c: Contact, pull: float, p: Parameters) -> float:
+    """Return when in the step a contact begins an impact [s], or -1.0.
+
+    Arms and velocities are those of mid-step before, and after if there is none.
+    """
+    threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
+    gap = max(c.gap, 0.0)
+    mean = -c.un + 0.5 * pull * p.dt
+    # what was foreseen may still come fast when it is closed already; but bodies that are in one
+    # another are held apart by the force of the last step, from which an impact would not start
+    least = threshold if c.state == OPEN else max(threshold, BLOW_SPEED)
+    sunk = c.state != OPEN and c.gap < -p.slack
+    if sunk or mean <= least or gap >= mean * p.dt:
+        return -1.0
+    time = gap / mean
+    if strike(bodies, c, time, pull, p) > threshold:
+        return time
+    strike(bodies, c, 0.5 * p.dt, pull, p)
+    return -1.0
+
+
 @inlined
 def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: Parameters) -> None:
     """Set the law of a contact from its geometry and memory; `start` is the very first step."""
     a, b = bodies[c.a], bodies[c.b]
-    # free relative acceleration along the normal is that of gravity
-    pull = -(p.field_x * c.nx + p.field_y * c.ny)
-    mass_b = 0.0
-    if c.b >= 0 and b.status == AWAKE:
-        pull, mass_b = 0.0, b.mass
+    pull = pull_on(bodies, c, p)
+    mass_b = b.mass if c.b >= 0 and b.status == AWAKE else 0.0
     weight = carried_weight(a.mass, mass_b, p)
     most = GREATEST_LOAD * max(weight, p.block_weight)
     c.memory_shear *= most / max(c.memory_normal, most)
@@ -303,20 +330,12 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
     if c.restitution == PLAIN_CONTACT:
         set_plain(c, p)
         return
-    threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
-    gap = max(c.gap, 0.0)
-    mean = -c.un + 0.5 * pull * p.dt
-    # what was foreseen may still come fast when it is closed already; but bodies that are in one
-    # another are held apart by the force of the last step, from which an impact would not start
-    least = threshold if c.state == OPEN else max(threshold, BLOW_SPEED)
-    sunk = c.state != OPEN and c.gap < -p.slack
-    if mean > least and gap < mean * p.dt and not sunk:
-        closing = strike(bodies, c, gap / mean, pull, p)
-        if closing > threshold:
-            set_impact(c, closing, effective_mass(bodies, c), p)
-            c.state = STICK
-            return
-        strike(bodies, c, 0.5 * p.dt, pull, p)
+    time = time_of_impact(bodies, c, pull, p)
+    if time >= 0.0:
+        set_impact(c, -c.un + pull * time, effective_mass(bodies, c), p)
+        c.state = STICK
+        return
+    gap, mean = max(c.gap, 0.0), 0.5 * pull * p.dt - c.un
     set_velocities_at_start(bodies, c, p.dt)
     if c.state != OPEN:
         set_rest(c, weight, most, p)

@@ -5,6 +5,9 @@ stop separating last is the face of contact. An axis along which they are farthe
 paths in this step are long rules the contact out: a fast block cannot pass a thin wall, nor can one
 that a third block deflects within the step be driven into a neighbour.
 
+A face that they touch and do not approach separates them for the whole step: what slides along it
+is not caught by the side of the next body, whose face is flush with it.
+
 Where the last edge to separate two parts, or the one that faces it, is inside its body, the way in
 leads through a neighbouring part, and that one has the contact.
 """
@@ -15,8 +18,8 @@ from rigdda.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Contact, Contacts, Corners, Outlines, Parameters
 
-NEVER = 2.0
-"""Time of entry, over the step, of what does not come nearer or not soon."""
+NEVER = 1e3
+"""Time of entry, over the step, of what comes nearer no faster than what is at rest may."""
 
 
 @kernel
@@ -61,19 +64,24 @@ def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
 @inlined
 def face_of_contact(
     outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
-    spread: float, slack: float, sunk: float,
-) -> tuple[bool, float, float, int]:  # fmt: skip
+    px: float, py: float, turn: float, spread: float, slack: float, sunk: float,
+) -> tuple[bool, float, float, float, int]:  # fmt: skip
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
-    (dx, dy) is the displacement of j relative to i over the step if nothing deflects them, `spread`
-    how far any of their points may come nearer, whatever does.
-    The best edge comes with its rank: time of entry, and its gap for the shallow ones. Edges
+    (dx, dy) is the displacement of j relative to i over the step if nothing deflects them,
+    (px - turn y, py + turn x) what turning adds to it at (x, y), `spread` how far any of their
+    points may come nearer, whatever does.
+    The best edge comes with its rank, time of entry and gap, after the greatest gap of any. Edges
     inside the body count as deeper by `sunk`, so that on a tie the real one is best.
+
+    A face is entered when the nearest corner is deeper than the slack: of two that it touches the
+    one that is approached more slowly is the best. By the velocity of that corner then: the middle
+    of a block that rolls comes down, where it rests does not.
 
     The edge that the middle of j is farthest over comes first: most often it is the best one, or
     one that separates them. Others are looked at only as far as the circle in j may be over them.
     """
-    time, depth, best, nearest = -1.0, -1e300, -1, -1
+    time, depth, best, nearest, apart = -1.0, -1e300, -1, -1, -1e300
     facing = facing_edge(outlines, i, edges, j)
     for visit in range(-1, edges):
         edge = facing if visit < 0 else visit
@@ -81,21 +89,27 @@ def face_of_contact(
         nx, ny = own.normal_x, own.normal_y
         if visit >= 0:
             most = over_edge(outlines, i, edge, j) - outlines.polygon[j].inside
-            if edge == facing or (most <= slack and (time > 0.0 or most < depth)):
+            if edge == facing or (most < -slack and (time > 0.0 or most < depth)):
                 continue
         gap, corner = axis_gap(nx, ny, own.x, own.y, outlines.corner, j, corners)
-        approach = -(nx * dx + ny * dy)
         if gap > spread:
-            return False, time, depth, edge
+            return False, time, depth, apart, edge
         if sunk > 0.0 and own.inner:
             gap -= sunk
+        apart = max(apart, gap)
         entry = 0.0
-        if gap > slack:
-            entry = NEVER if approach <= 0.0 else min(gap / approach, NEVER)
+        if gap >= -slack:
+            ux, uy = dx, dy
+            if gap <= slack:
+                ux -= turn * outlines.corner[j, corner].y - px
+                uy += turn * outlines.corner[j, corner].x + py
+            approach = -(nx * ux + ny * uy)
+            late = gap + slack >= NEVER * approach
+            entry = NEVER if late else (gap + slack) / approach
         later = entry > time or (entry == time and gap > depth)
         if later or (entry == time and gap == depth and edge < best):
             time, depth, best, nearest = entry, gap, edge, corner
-    return True, time, depth, edge_over_corner(outlines, i, best, edges, j, nearest)
+    return True, time, depth, apart, edge_over_corner(outlines, i, best, edges, j, nearest)
 
 
 @kernel
@@ -232,17 +246,24 @@ def collide_pair(
         fall = 0.0
     spread = path + fall + p.slack
     beside = 0.5 * dt * (abs(one.omega) * one.radius + abs(two.omega) * two.radius)
+    # both turn about their centroids
+    other = two.omega if two.status == AWAKE else 0.0
+    turn = (other - one.omega) * dt
+    px = (other * two.y - one.omega * one.y) * dt
+    py = (one.omega * one.x - other * two.x) * dt
     if one.parts == 1 and two.parts == 1:
         return collide_parts(
-            bodies, outlines, contacts, k, a, b, a, b, dx, dy, spread, p.slack, 0.0, beside
-        )
+            bodies, outlines, contacts, k, a, b, a, b, dx, dy, px, py, turn, spread, p.slack, 0.0,
+            beside,
+        )  # fmt: skip
     first = k
     k = collide_all_parts(
-        bodies, outlines, contacts, k, a, b, dx, dy, spread, p.slack, INNER_EDGE * p.slack, beside
-    )
+        bodies, outlines, contacts, k, a, b, dx, dy, px, py, turn, spread, p.slack,
+        INNER_EDGE * p.slack, beside,
+    )  # fmt: skip
     if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
         k = collide_all_parts(
-            bodies, outlines, contacts, k, a, b, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0
+            bodies, outlines, contacts, k, a, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0
         )
     return k
 
@@ -250,7 +271,8 @@ def collide_pair(
 @kernel
 def collide_all_parts(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, dx: float,
-    dy: float, spread: float, slack: float, sunk: float, beside: float,
+    dy: float, px: float, py: float, turn: float, spread: float, slack: float, sunk: float,
+    beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
     first, one, two = k, bodies[a], bodies[b]
@@ -259,8 +281,9 @@ def collide_all_parts(
             if k + 2 > len(contacts):
                 return -1
             found = collide_parts(
-                bodies, outlines, contacts, k, a, b, i, j, dx, dy, spread, slack, sunk, beside
-            )
+                bodies, outlines, contacts, k, a, b, i, j, dx, dy, px, py, turn, spread, slack,
+                sunk, beside,
+            )  # fmt: skip
             for new in range(k, found):
                 k = keep_nearest(contacts, first, k, new)
     return k
@@ -288,28 +311,32 @@ def keep_nearest(contacts: Contacts, first: int, k: int, new: int) -> int:
 @inlined
 def collide_parts(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int, j: int,
-    dx: float, dy: float, spread: float, slack: float, sunk: float, beside: float,
+    dx: float, dy: float, px: float, py: float, turn: float, spread: float, slack: float,
+    sunk: float, beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
 
-    (dx, dy) is the displacement of b relative to a over the step, see `face_of_contact`, and
-    `beside` half of how far both may turn in it.
+    (dx, dy) is the displacement of b relative to a over the step, (px - turn y, py + turn x) what
+    turning adds to it at (x, y), see `face_of_contact`, and `beside` half of how far both may turn.
     """
     ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
-    possible, time_i, gap_i, edge_i = face_of_contact(
-        outlines, i, ni, j, nj, dx, dy, spread, slack, sunk
+    possible, time_i, gap_i, apart_i, edge_i = face_of_contact(
+        outlines, i, ni, j, nj, dx, dy, px, py, turn, spread, slack, sunk
     )
     if not possible:
         return k
-    possible, time_j, gap_j, edge_j = face_of_contact(
-        outlines, j, nj, i, ni, -dx, -dy, spread, slack, sunk
+    possible, time_j, gap_j, apart_j, edge_j = face_of_contact(
+        outlines, j, nj, i, ni, -dx, -dy, -px, -py, -turn, spread, slack, sunk
     )
     if not possible:
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
     reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
-    touching = max(gap_i, gap_j) <= slack
+    touching = max(apart_i, apart_j) <= slack
+    # where they touch, not where they are deeper than the slack
+    time_i *= gap_i / (gap_i + slack) if gap_i > slack else 0.0
+    time_j *= gap_j / (gap_j + slack) if gap_j > slack else 0.0
     beside = 0.0 if touching else beside
     # corner beside corner, the better face may miss the other body where the second one does not;
     # and what is beside it at the time of entry may be driven into it from where it is now

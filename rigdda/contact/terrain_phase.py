@@ -10,9 +10,12 @@ from __future__ import annotations
 import math
 
 from rigdda.constants import LEAN, SAME_FACE, TERRAIN
-from rigdda.contact.narrow_phase import NEVER, add_contact, following, keep_nearest
+from rigdda.contact.narrow_phase import add_contact, following, keep_nearest
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Box, Contacts, Ground, Outlines, Parameters
+
+NEVER = 2.0
+"""Time of entry, over the step, of what does not come nearer or not soon."""
 
 
 @kernel

@@ -108,7 +108,7 @@ def write_rock_numbers(levels: NDArray[np.void], numbers: dict[str, float]) -> N
 def pack_parameters(
     scene: Scene, settings: Settings, bodies: Bodies, interfaces: Interfaces
 ) -> NDArray[np.void]:
-    """Return the numbers of the scene and the settings, for the step and for its parts."""
+    """Return the numbers of the scene and the settings: for the step, halves of it, and parts."""
     gx, gy = scene.gravity_vector
     static = settings.mode == "static"
     shaken = scene.base_motion is not None
@@ -137,9 +137,9 @@ def pack_parameters(
         "floor": floor,
         "bonded": (interfaces["cohesion"] + interfaces["tension"]).any(),
     }
-    levels = np.zeros(CUTS + 1, dtype=PARAMETERS)
+    levels = np.zeros(CUTS + 2, dtype=PARAMETERS)
     for name, value in numbers.items():
         levels[name] = value
-    levels["dt"] = settings.dt / 2.0 ** np.arange(CUTS + 1)
+    levels["dt"] = settings.dt / 2.0 ** np.arange(CUTS + 2)
     write_rock_numbers(levels, rock_numbers(scene, settings, bodies))
     return levels.view(np.recarray)

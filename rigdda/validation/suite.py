@@ -11,6 +11,7 @@ from rigdda.validation import (
     gravity_walls,
     impacts,
     invariance,
+    joints,
     ritchie,
     rocking,
     rolling,
@@ -25,6 +26,7 @@ from rigdda.validation.case import Case
 CASES: tuple[Case, ...] = (
     *flight.CASES,
     *slides.CASES,
+    *joints.CASES,
     *rolling.CASES,
     *rocking.CASES,
     *impacts.CASES,

@@ -40,11 +40,6 @@ def test_corners_that_miss_do_not_snag(speed, clearance):
     assert sim.velocities == pytest.approx(np.array([[0, 0, 0], [speed, 0, 0]]), abs=1e-9)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a corner 0.04 mm below the next block's top is stopped by that block's side: of two "
-    "shallow faces the one that is not approached should be the face of contact",
-)
 def test_square_slides_off_a_row_of_squares():
     """Without friction it keeps its speed over the joints between equal squares."""
     row = [box(float(i), -0.5, fixed=True) for i in range(8)]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigdda import Block, Scene, Settings
-from rigdda.contact.narrow_phase import face_of_contact
+from rigdda.contact.narrow_phase import NEVER, face_of_contact
 from rigdda.correction import place_all_corners
 from rigdda.kernel import from_python
 from rigdda.pack import Arrays, pack
@@ -37,21 +37,23 @@ def two_polygons(rng: np.random.Generator) -> Arrays:
 
 
 def over_all_edges(
-    arrays: Arrays, i: int, j: int, way: np.ndarray, spread: float
-) -> tuple[bool, float, float]:
+    arrays: Arrays, i: int, j: int, way: np.ndarray, turning: np.ndarray, spread: float
+) -> tuple[bool, float, float, float]:
     """Return what `face_of_contact` does, over every edge of i and corner of j."""
     out, count = arrays.outlines, arrays.outlines.polygon.count
     corners = np.stack([out.corner[j, : count[j]].x, out.corner[j, : count[j]].y], axis=1)
     ranks = []
     for edge in range(count[i]):
         normal = np.array([out.corner[i, edge].normal_x, out.corner[i, edge].normal_y])
-        gap = ((corners - (out.corner[i, edge].x, out.corner[i, edge].y)) @ normal).min()
+        gaps = (corners - (out.corner[i, edge].x, out.corner[i, edge].y)) @ normal
+        gap, (x, y) = gaps.min(), corners[gaps.argmin()]
         if gap > spread:
-            return False, 0.0, 0.0
-        approach = -way @ normal
-        late = 2.0 if approach <= 0.0 else min(gap / approach, 2.0)
-        ranks.append((late if gap > SLACK else 0.0, gap))
-    return True, *max(ranks)
+            return False, 0.0, 0.0, 0.0
+        px, py, turn = turning if gap <= SLACK else np.zeros(3)
+        approach = -(way + np.array([px - turn * y, py + turn * x])) @ normal
+        late = NEVER if approach <= 0.0 else min((gap + SLACK) / approach, NEVER)
+        ranks.append((late if gap >= -SLACK else 0.0, gap))
+    return True, *max(ranks), max(gap for _, gap in ranks)
 
 
 @given(st.integers(0, 10**6))
@@ -62,14 +64,16 @@ def test_the_face_of_contact_is_that_of_all_edges(seed: int) -> None:
         for reach in (0.0, 0.5, 3.0):
             way = rng.uniform(-reach, reach, 2)
             spread = math.hypot(*way) + SLACK
-            wanted = over_all_edges(arrays, i, j, way, spread)
+            turning = rng.uniform(-reach, reach, 3)
+            wanted = over_all_edges(arrays, i, j, way, turning, spread)
             count = arrays.outlines.polygon.count
-            possible, time, depth, _ = face(
-                arrays.outlines, i, count[i], j, count[j], *way, spread, SLACK, 0.0
+            possible, time, depth, apart, _ = face(
+                arrays.outlines, i, count[i], j, count[j], *way, *turning, spread, SLACK, 0.0
             )
             assert possible == wanted[0]
             if possible:
-                np.testing.assert_allclose((time, depth), wanted[1:], rtol=1e-9, atol=1e-12)
+                found = time, depth, apart
+                np.testing.assert_allclose(found, wanted[1:], rtol=1e-9, atol=1e-12)
 
 
 def test_the_circle_in_a_square_touches_its_edges() -> None:

@@ -1,0 +1,97 @@
+"""A lone block that is struck takes its step in parts, each of which ends just after an impact.
+
+An impact turns a block, and another corner of it may strike soon after, faster and from elsewhere
+than it would have without. Solved as one, both impacts would act at once, or what closes by the
+first one would be slowed down, and never bounce; how many do depends on the step. Single blocks of
+0.1 m2 lost 4.5 % more energy in a bounce in steps of 10 ms than in 0.1 ms, in parts 0.6 % more.
+What a block may touch was foreseen for the whole step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.constants import AFTER_IMPACT, IMPACT, MOST_PARTS, NEW, OPEN, PLAIN_CONTACT
+from rigdda.contact.law import prepare, pull_on, strike, time_of_impact
+from rigdda.contact.transfer import recall
+from rigdda.kernel import inlined, kernel
+from rigdda.records import (
+    Bodies,
+    Contact,
+    Contacts,
+    Interfaces,
+    Ints,
+    Islands,
+    Motion,
+    Parameters,
+)
+
+
+@kernel
+def takes_parts(contacts: Contacts, islands: Islands, island: int, p: Parameters) -> bool:
+    """Return whether an island is a lone block with an impact."""
+    blocks = islands.block_start[island + 1] - islands.block_start[island]
+    if blocks > 1 or not p.post_correction:
+        return False
+    impact = False
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        impact = impact or contacts[islands.contact_item[item]].kind == IMPACT
+    return impact
+
+
+@kernel
+def recall_all(
+    contacts: Contacts, islands: Islands, island: int, before: Contacts, first: Ints, p: Parameters
+) -> None:
+    """Let the contacts of an island be as they were before the step."""
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        k = islands.contact_item[item]
+        recall(contacts, k, k + 1, before, first, p.slack)
+
+
+@inlined
+def follow(bodies: Bodies, c: Contact, motion: Motion, p: Parameters) -> None:
+    """Move a contact with its block, which has moved; apart by more than the slack it is open."""
+    d, besides, a = motion.d[0], motion.besides[0], bodies[c.a]
+    u, v, turn = d[0] + besides[0], d[1] + besides[1], d[2] + besides[2]
+    cos, sin = math.cos(turn), math.sin(turn)
+    side = 0.0 if c.owner == 1 else c.gap  # the corner, or the point of the face that is over it
+    x, y = c.x + side * c.nx - (a.x - u), c.y + side * c.ny - (a.y - v)
+    x, y = a.x + cos * x - sin * y, a.y + sin * x + cos * y
+    if c.owner == 1:
+        c.gap += c.nx * (x - c.x) + c.ny * (y - c.y)
+        c.x, c.y = x, y
+    else:
+        c.nx, c.ny = cos * c.nx - sin * c.ny, sin * c.nx + cos * c.ny
+        c.gap = c.nx * (x - c.x) + c.ny * (y - c.y)
+    if c.gap > p.slack or c.state == OPEN:
+        c.state, c.kind = OPEN, NEW
+        c.memory_normal = c.memory_shear = c.stiffness = 0.0
+        c.start_normal = c.start_shear = c.bond = 0.0
+
+
+@inlined
+def begin_part(
+    bodies: Bodies, contacts: Contacts, interfaces: Interfaces, islands: Islands, island: int,
+    motion: Motion, left: float, number: int, part: Parameters,
+) -> None:  # fmt: skip
+    """Begin part `number` of the step of a lone block: to its next impact, or all that is left [s].
+
+    The first one is 1; `motion` is that of the part before.
+    """
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    part.dt = end = left
+    for item in range(c0, c1):
+        c = contacts[islands.contact_item[item]]
+        if number > 1:
+            follow(bodies, c, motion, part)
+        if number == MOST_PARTS or c.restitution == PLAIN_CONTACT:
+            continue
+        pull = pull_on(bodies, c, part)
+        strike(bodies, c, 0.5 * left, pull, part)
+        time = time_of_impact(bodies, c, pull, part)
+        if time >= 0.0:
+            end = min(end, time + AFTER_IMPACT * left)
+    part.dt = end
+    for item in range(c0, c1):
+        prepare(bodies, contacts[islands.contact_item[item]], interfaces, False, part)

@@ -167,6 +167,13 @@ SMALL_ISLAND = 2
 ENERGY_HALVINGS = 4
 """Times restitution is halved when an eccentric impact would gain energy; then it is plastic."""
 
+BREAK_TOLERANCE = 1e-3
+"""Share of what it has left by which a failing fence may miss it [-]."""
+
+BREAK_SOLVES = 8
+"""Most solutions of the step in which a fence fails: one without it, then one if nothing bends the
+law by which it takes energy."""
+
 CHAIN = 8
 """Most blocks through which a blow is followed to a fence: each but the first adds its mass, and
 passes on what its contacts turn aside least of."""

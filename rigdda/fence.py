@@ -14,12 +14,8 @@ a step is thrust, or another blow, which counts for itself. So the charge is a s
 it does not matter how many of them fall into one step.
 
 If it is more than is left, the blocks come through with a share s of the velocities that they would
-have without the fence. Impulses in proportion to 1 - s then take
-
-.. math:: W(s) = A (1 - s) - (A - W) (1 - s)^2 ,
-
-with A their first-order work, the sum of impulse times velocity at the start: 2 W without friction,
-for which W(s) = (1 - s^2) W.
+have without the fence, which takes W(s) = (1 - s^2) W of impacts in proportion. Friction and
+neighbours bend this law, so s^2 is mended by what W(s) is off, over W.
 """
 
 from __future__ import annotations
@@ -29,10 +25,21 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.assembly.springs import along, normal_row, shear_row
-from rigdda.constants import ASLEEP, CHAIN, IMPACT, OPEN, RETIRED, SPEED_LIMIT, STICK
+from rigdda.constants import (
+    ASLEEP,
+    BREAK_SOLVES,
+    BREAK_TOLERANCE,
+    CHAIN,
+    IMPACT,
+    NEW,
+    OPEN,
+    RETIRED,
+    SPEED_LIMIT,
+    STICK,
+)
 from rigdda.correction import place_corners
 from rigdda.gauges import FAILED, write_event
-from rigdda.kernel import inlined, kernel, stage
+from rigdda.kernel import kernel, stage
 from rigdda.motion import kinetic_energy
 from rigdda.open_close import open_close
 from rigdda.records import (
@@ -109,84 +116,102 @@ def find_ways(
     return reached
 
 
-@inlined
-def hit(c: Contact, mass: float, d: NDArray, dt: float) -> tuple[float, float]:
-    """Return work and first-order work of an impact of a block of such a mass on a fence [J]."""
-    share = min(-mass * c.un / (c.normal * dt), 1.0)
-    work = c.normal * along(normal_row(c, True), d) + c.shear * along(shear_row(c, True), d)
-    return -share * work, -share * dt * (c.normal * c.un + c.shear * c.us)
-
-
-@inlined
-def blow(bodies: Bodies, c: Contact, islands: Islands, ways: NDArray, dt: float) -> float:
-    """Return the energy that a blow of one block on another passes on to a fence [J]."""
-    a, b = islands.slot[c.a], islands.slot[c.b]
-    on_a = strength(ways[a]) >= strength(ways[b])
-    struck, mass = (a, bodies[c.b].mass) if on_a else (b, bodies[c.a].mass)
-    impulse = min(c.normal * dt, -mass * c.un)
-    share = share_along(c, ways[struck], on_a)
-    return -0.5 * impulse * c.un * share * share * mass / (mass + ways[struck, 0])
-
-
-@stage
-def charge(
-    bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, island: int, fence: int,
-    ways: NDArray, dt: float,
+@kernel
+def hits(
+    bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int,
+    fence: int, dt: float,
 ) -> tuple[float, float, int]:  # fmt: skip
-    """Return what a step of an island takes of a fence.
+    """Return the work of the impacts on a fence in this step, the most of one [J], and that one.
 
-    Returns
-    -------
-    total, first : float
-        Work, and that to first order in the impulses [J].
-    k : int
-        The contact through which most came, or -1.
+    A corner that touches only now counts, too: it may be the second one of a block that hits.
     """
-    total = first = most = 0.0
+    total = most = 0.0
     k = -1
-    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+    for item in range(low, high):
         c = contacts[islands.contact_item[item]]
-        if c.kind != IMPACT or c.state == OPEN or c.normal <= 0.0 or c.un >= 0.0:
+        if c.b != fence or c.state == OPEN or c.normal <= 0.0:
             continue
-        work = work_first = 0.0
-        if c.b == fence:
-            work, work_first = hit(c, bodies[c.a].mass, d[islands.slot[c.a]], dt)
-        elif c.pair >= 0:
-            work = blow(bodies, c, islands, ways, dt)
-            work_first = 2.0 * work
+        if c.kind != IMPACT and c.kind != NEW:
+            continue
+        own, mass = d[islands.slot[c.a]], bodies[c.a].mass
+        share = min(mass * math.hypot(c.un, c.us) / (c.normal * dt), 1.0)
+        work = c.normal * along(normal_row(c, True), own) + c.shear * along(shear_row(c, True), own)
+        total -= share * work
+        if -share * work > most:
+            most, k = -share * work, islands.contact_item[item]
+    return total, most, k
+
+
+@kernel
+def blows(
+    bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, ways: NDArray,
+    dt: float,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Return what blows pass on to a fence in this step, the most of one [J], and that one."""
+    total = most = 0.0
+    k = -1
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.pair < 0 or c.kind != IMPACT or c.state == OPEN or c.un >= 0.0:
+            continue
+        a, b = islands.slot[c.a], islands.slot[c.b]
+        on_a = strength(ways[a]) >= strength(ways[b])
+        struck, mass = (a, bodies[c.b].mass) if on_a else (b, bodies[c.a].mass)
+        impulse = min(c.normal * dt, -mass * c.un)
+        share = share_along(c, ways[struck], on_a)
+        work = -0.5 * impulse * c.un * share * share * mass / (mass + ways[struck, 0])
         total += work
-        first += work_first
         if work > most:
             most, k = work, islands.contact_item[item]
-    return total, min(max(first, total), 2.0 * total), k
+    return total, most, k
+
+
+@kernel
+def aim(
+    contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int, fence: int,
+    first: bool, share: float, dt: float,
+) -> None:  # fmt: skip
+    """Let the contacts with a fence leave a share of the velocities that blocks have without it.
+
+    They begin with no force, whatever comes; so the `first` time it finds these velocities. Those
+    that had not closed in the step stay open.
+    """
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.b != fence:
+            continue
+        if first:
+            c.met, c.free = int(c.state != OPEN), SPEED_LIMIT
+        elif c.met == 1 and c.free == SPEED_LIMIT:
+            c.free = max(c.un - 2.0 * along(normal_row(c, True), d[islands.slot[c.a]]) / dt, 0.0)
+        c.kind, c.flips = IMPACT, 0
+        c.state = STICK if c.free < SPEED_LIMIT else OPEN
+        c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+        c.bias = -dt * (share * c.free if c.free < SPEED_LIMIT else SPEED_LIMIT)
 
 
 @stage
 def break_through(
     bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
-    fence: int, share: float, p: Parameters, counters: NDArray,
-) -> None:  # fmt: skip
-    """Settle an island whose blocks come through a fence with a share of their velocities.
+    fence: int, left: float, struck: float, passed: float, p: Parameters, counters: NDArray,
+) -> float:  # fmt: skip
+    """Settle an island whose blocks come through a fence; returns what that takes of them [J].
 
-    Without the fence first, which gives the velocities of which that is the share. Contacts that
-    it had not reached in this step stay open.
+    It has `left` where it would take the work `struck` of impacts, and what blows pass on.
     """
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
-    for attempt in range(2):
-        for item in range(low, high):
-            c = contacts[islands.contact_item[item]]
-            if c.b != fence:
-                continue
-            speed = SPEED_LIMIT
-            if attempt == 0:
-                c.met, c.state = int(c.state != OPEN), OPEN
-            elif c.met == 1:
-                dn = along(normal_row(c, True), system.motion.d[islands.slot[c.a]])
-                speed, c.state = share * max(c.un - 2.0 * dn / p.dt, 0.0), STICK
-            c.kind, c.flips = IMPACT, 0
-            c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
-            c.bias = -p.dt * speed
+    d, total = system.motion.d, struck + passed
+    taken, square = 0.0, 1.0 - left / total
+    for attempt in range(BREAK_SOLVES if left > 0.0 else 1):
+        aim(contacts, d, islands, low, high, fence, attempt == 0, math.sqrt(square), p.dt)
         open_close(bodies, contacts, system, islands, rows, island, p, counters)
+        if attempt > 0:
+            taken = hits(bodies, contacts, d, islands, low, high, fence, p.dt)[0]
+            taken += (1.0 - square) * passed
+            if abs(taken - left) < BREAK_TOLERANCE * left:
+                break
+            square = min(max(square + (taken - left) / total, 0.0), 1.0)
+    return taken
 
 
 @stage
@@ -198,7 +223,8 @@ def charge_fences(
 
     Returns whether a fence broke, so that the island was settled again.
     """
-    broke, ways = False, system.scratch.residual
+    broke, ways, d = False, system.scratch.residual, system.motion.d
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
     for fence in range(p.blocks, len(bodies) if gauges.fences > 0 else p.blocks):
         barrier = gauges.barrier[fence]
         target = gauges.target[barrier]
@@ -206,29 +232,29 @@ def charge_fences(
             continue
         if not find_ways(bodies, contacts, islands, island, fence, ways):
             continue
-        total, first, k = charge(
-            bodies, contacts, system.motion.d, islands, island, fence, ways, p.dt
-        )
-        left = target.capacity - target.absorbed
-        if total <= left:
-            target.absorbed += total
+        struck, hardest, k = hits(bodies, contacts, d, islands, low, high, fence, p.dt)
+        passed, most, blow = blows(bodies, contacts, islands, low, high, ways, p.dt)
+        left = target.capacity - target.absorbed if bodies[fence].status != RETIRED else 0.0
+        if struck + passed <= left:
+            target.absorbed += max(struck + passed, 0.0)
             continue
-        target.absorbed = target.capacity
         if bodies[fence].status != RETIRED:  # not by another island in this step
             bodies[fence].status = RETIRED
-            c = contacts[k]
-            i = (
-                c.a
-                if c.b == fence or kinetic_energy(bodies[c.a]) > kinetic_energy(bodies[c.b])
-                else c.b
-            )
+            c = contacts[k if hardest >= most else blow]
+            i = c.a  # or, in a blow on a block that leans on the fence, what struck that
+            if c.b != fence and kinetic_energy(bodies[c.b]) > kinetic_energy(bodies[i]):
+                i = c.b
             counters[EVENTS] = write_event(
                 gauges, counters[EVENTS], time, FAILED, bodies[i], i, barrier, c.x, c.y,
                 c.y - target.ground,
             )  # fmt: skip
-        root = math.sqrt(max(first * first - 4.0 * (first - total) * left, 0.0))
-        share = max(1.0 - 2.0 * left / (first + root), 0.0)
-        break_through(bodies, contacts, system, islands, rows, island, fence, share, p, counters)
+        target.absorbed += min(
+            break_through(
+                bodies, contacts, system, islands, rows, island, fence, left, struck, passed, p,
+                counters,
+            ),
+            left,
+        )  # fmt: skip
         broke = True
     return broke
 

@@ -75,6 +75,7 @@ CONTACT = _record(
     friction=float,  # tan phi
     restitution=float,
     bond=float,  # length of joint that the contact stands for and that is not broken [m]
+    free=float,  # closing velocity if that fence were not there [m/s]
     cohesion=float,  # shear force that it bears without normal force [N]
     tension=float,  # tension that it, or a bolt before it yields, bears [N]
     stiffness=float,  # of the contact at rest [N/m]

@@ -369,6 +369,25 @@ def set_out(bodies: Bodies, shaking: Shaking, since: float, time: float, p: Para
         set_field(shaking, since, time, p)
 
 
+@stage
+def end_step(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, work: Work, gauges: Gauges,
+    counters: NDArray, p: Parameters,
+) -> int:  # fmt: skip
+    """Watch what a whole step has brought; returns DONE, GROUND_MOVED or ENDED."""
+    release_all(bodies)
+    counters[STEPS] += 1
+    time = counters[STEPS] * p.dt
+    counters[EVENTS] = note_passage(bodies, gauges, counters[EVENTS], time)
+    counters[EVENTS], pushed = watch_thrust(
+        bodies, contacts, count, gauges, work.islands, counters[EVENTS], counters[STEPS], time, p
+    )
+    lower_fences(bodies, outlines, gauges, p)
+    if pushed:
+        return GROUND_MOVED
+    return ENDED if is_over(bodies, gauges, counters, p) else DONE
+
+
 @entry_kernel
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
@@ -397,16 +416,16 @@ def advance(
     swapped : bool
         Whether `now` and `before` have changed roles.
     """
-    swapped, level, part = False, 0, 0
+    swapped, level, part, reason, bad = False, 0, 0, DONE, -1
     may_fly = len(links) == 0 and len(shaking) == 0 and not levels[0].static
     may_fly = may_fly and levels[0].post_correction
     flyer, flown, flight = -1, 0, 0  # steps of a flight that are taken, and all of them
-    while steps > 0:
+    while steps > 0 and reason == DONE:
         p, parts = levels[level], 2**level
         room = len(gauges.event) - counters[EVENTS]
         if level == 0 and room < (p.blocks + 1) * (len(gauges.station) + len(gauges.target)):
-            land(bodies, outlines, flyer, flown)
-            return EVENTS_FULL, -1, swapped
+            reason = EVENTS_FULL
+            break
         start = counters[STEPS] * parts + part
         time = (start + 1) * p.dt
         if may_fly and level == 0 and flown == flight:
@@ -430,7 +449,8 @@ def advance(
             # a cut-back, which cannot be left, has room to spare
             if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
                 copy_index(work.first, work.begin)
-                return CONTACTS_FULL, -1, swapped
+                reason = CONTACTS_FULL
+                break
             now, before = before, now
             swapped = not swapped
             bad, excess = solve_and_move(
@@ -442,34 +462,17 @@ def advance(
         counters[CONTACT_TOTAL] += count
         if level == 0:
             press_asleep(bodies, now, count, gauges, p.dt)
-        pushed = False
         part += 1
         if bad < 0 and excess > 0.0:
             hold_others(bodies, now, count, before, work.first, p)
             level, part = level_for(excess, p), 0
         elif bad >= 0 or part == parts:
-            release_all(bodies)
             level, part = 0, 0
-            counters[STEPS] += 1
-            counters[EVENTS] = note_passage(
-                bodies, gauges, counters[EVENTS], counters[STEPS] * levels[0].dt
-            )
-            counters[EVENTS], pushed = watch_thrust(
-                bodies, now, count, gauges, work.islands, counters[EVENTS], counters[STEPS], time,
-                levels[0],
-            )  # fmt: skip
-            lower_fences(bodies, outlines, gauges, p)
+            reason = end_step(bodies, outlines, now, count, work, gauges, counters, levels[0])
             steps -= 1
-            if bad < 0 and len(frames) > 0 and steps % stride == 0:
+            if bad >= 0:
+                reason = BAD_STATE
+            elif len(frames) > 0 and steps % stride == 0:
                 keep_frame(bodies, frames[len(frames) - 1 - steps // stride])
-            if bad < 0 and is_over(bodies, gauges, counters, levels[0]):
-                land(bodies, outlines, flyer, flown)
-                return ENDED, -1, swapped
-        if bad >= 0:
-            land(bodies, outlines, flyer, flown)
-            return BAD_STATE, bad, swapped
-        if pushed:
-            land(bodies, outlines, flyer, flown)
-            return GROUND_MOVED, -1, swapped
     land(bodies, outlines, flyer, flown)
-    return DONE, -1, swapped
+    return reason, bad, swapped

@@ -39,7 +39,7 @@ def pressed(gauges: Gauges, c: Contact) -> int:
 
 @kernel
 def press(c: Contact, gauges: Gauges, dt: float) -> None:
-    """Add the impulse of a contact in a step, or a part of one [s], to what presses on a barrier."""
+    """Add the impulse of a contact in a time [s] to what presses on a barrier."""
     barrier = pressed(gauges, c)
     if barrier < 0:
         return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def _largest(problem: DesignProblem, x: float) -> Iterator[Barrier]:
     """Yield the largest barrier of each kind at a place; one that cannot be built there is left."""
     zone = problem.zone
     top = max(FENCE_CLASSES)
-    makers = {
+    makers: dict[str, Callable[[], Barrier]] = {
         "fence": lambda: Fence(
             x, min(zone.max_height, FENCE_CLASSES[top].height), energy_class=top
         ),

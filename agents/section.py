@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from agents.flights import Flights, Floats, fly, reach, sources, stations_of
 from agents.pictures import BARRIER, DPI, FONT, GROUND, ROAD, ZONE, colours, save
 from agents.wording import short, standing
 from rigdda import Barrier, Ditch, Fence, Layout, Site
-from rigdda.barriers import earthworks
+from rigdda.barriers import Earthwork, earthworks
 from rigdda.place import BarrierZone
 
 if TYPE_CHECKING:
@@ -73,7 +73,8 @@ def section(
     tall = min(width / columns * ratio, 7.0)
     with rc_context(FONT):
         figure = Figure((width, rows * (tall + 0.5) + 4.8), dpi=DPI, layout="constrained")
-        upper, lower = figure.subfigures(2, height_ratios=[rows * (tall + 0.5) + 0.4, 4.4])
+        parts: Any = figure.subfigures(2, height_ratios=[rows * (tall + 0.5) + 0.4, 4.4])
+        upper, lower = parts
         grid = upper.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes, panel in zip(grid.flat, panels, strict=True):
             _slope(axes, site, zone, panel, bottom)
@@ -152,7 +153,10 @@ def _along(site: Site, start: float, end: float) -> tuple[Floats, Floats]:
 
 def _barriers(axes: Axes, site: Site, panel: Panel, moved: Mapping[Barrier, Floats]) -> None:
     """Draw what stands and say what it is, in the ground, where nothing else is drawn."""
-    outlines = [moved[b] if b in moved else b.outline(site.profile) for b in standing(panel.layout)]
+    outlines = [
+        moved[b] if isinstance(b, Earthwork) else b.outline(site.profile)
+        for b in standing(panel.layout)
+    ]
     for i, (barrier, outline) in enumerate(zip(standing(panel.layout), outlines, strict=True)):
         dug = isinstance(barrier, Ditch)
         axes.fill(*outline.T, facecolor="white" if dug else BARRIER, edgecolor=BARRIER,

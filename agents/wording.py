@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Site
+from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Mesh, Site
+from rigdda.barriers import Built
 
 
-def standing(layout: Iterable[Barrier]) -> Layout:
+def standing(layout: Iterable[Barrier]) -> tuple[Built, ...]:
     """Return the barriers of a layout that are in a scene, in its order: all but meshes."""
     return tuple(barrier for barrier in layout if not isinstance(barrier, Mesh))
 

@@ -49,6 +49,8 @@ LAYER = {"terrain": 0.0, "barriers": 0.02, "road": 0.04, "blocks": 0.06}
 LABEL = 0.05
 """Height of a label above the top of its barrier, as a share of the view; every third is as
 high."""
+DOT = -3.0
+"""Radius of the dot of a label: negative numbers are points of the screen."""
 EDGE = 0.01
 """z of a layer, and of an outline above its fill [m]."""
 
@@ -275,7 +277,7 @@ def _log_state(
             positions=[place] * len(changes),
             labels=[f"{label}: {state}" for _, state in changes],
             colors=colours,
-            radii=[rr.Radius.ui_points(3.0)] * len(changes),
+            radii=[DOT] * len(changes),
             show_labels=[True] * len(changes),
         ),
     )

@@ -276,12 +276,12 @@ def test_without_a_command_help_is_shown(tmp_path: Path) -> None:
     "change, named",
     [
         (("[road]", "[road]\ncolour = 3"), ("colour",)),
-        (("[1.0, 23.75]", "[9.0, 17.0]"), ("sources.mass.polygon", "untangle")),
-        (("end = 31.0", "end = 310.0"), ("road.end", "310", "at most 70")),
-        (("friction_deg = 22.0", "friction_deg = nan"), ("friction_deg", "nan", "finite")),
+        (("[1.0, 7.5]", "[7.5, 1.0]"), ("sources.face.band",)),
+        (("end = 44.8", "end = 448.0"), ("road.end", "448", "at most 80")),
+        (("friction_deg = 28.0", "friction_deg = nan"), ("friction_deg", "nan", "finite")),
         (("[road]", "[road"), ("site file", "TOML")),
     ],
-    ids=["unknown field", "self-crossing source", "road off the profile", "NaN", "TOML"],
+    ids=["unknown field", "band uphill", "road off the profile", "NaN", "TOML"],
 )
 def test_a_bad_site_file_is_one_line(
     change: tuple[str, str], named: tuple[str, ...], toml: Path, tmp_path: Path

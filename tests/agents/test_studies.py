@@ -49,16 +49,16 @@ def test_a_study_is_one_row_a_layout_and_release(folder: Path, site: Site) -> No
     table = rows(folder / "o/study.csv")
     names = ["nothing", "one", "from a file"]
     assert [(r["layout"], int(r["seed"])) for r in table] == [
-        (name, seed) for name in names for seed in range(3, 9)
+        (name, seed) for name in names for _ in site.events for seed in range(3, 9)
     ]
     layout = (rigdda.Wall(20.0, 2.0), rigdda.Wall(15.0, 1.0))
-    _, outcome = rigdda.release(site, layout, 8, "mass")
+    _, outcome = rigdda.release(site, layout, 8, site.event_names[-1])
     assert float(table[-1]["debris_fraction"]) == outcome.debris_fraction
     assert float(table[-1]["barrier_1_max_energy"]) == outcome.barriers[1].max_energy
     assert float(table[-1]["capital"]) == site.capital(layout)
     assert float(table[-1]["harm"]) == site.bill(layout, outcome).harm
-    assert {row["event"] for row in table} == {"mass"}
-    assert table[0]["barrier_0_hits"] == "" and table[6]["barrier_1_hits"] == ""
+    assert {row["event"] for row in table} == set(site.event_names)
+    assert table[0]["barrier_0_hits"] == "" and table[6 * len(site.events)]["barrier_1_hits"] == ""
     assert all(name in words for name in names)
 
 
@@ -70,7 +70,7 @@ def test_names_are_written_whatever_the_locale(
     for name, value in {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}.items():
         monkeypatch.setenv(name, value)
     assert "gr??er" in run("study", "study.toml", "--out", "o", folder=folder)
-    assert "größer,0" in (folder / "o/study.csv").read_text(encoding="utf-8")
+    assert "größer,block,0" in (folder / "o/study.csv").read_text(encoding="utf-8")
 
 
 def test_a_killed_study_goes_on_and_ends_the_same(folder: Path) -> None:
@@ -97,10 +97,10 @@ def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> N
     file.write_bytes(whole[:-9])
     assert studies.run(asked, 0, file, lambda *_: None) == asked.size - 1
     assert file.read_bytes() == whole
-    assert studies.run(asked, 2, file, lambda *_: None) == 3 * 4
+    assert studies.run(asked, 2, file, lambda *_: None) == 3 * 4 * len(asked.site.events)
     with file.open(newline="") as lines:
         assert {row["seed"] for row in csv.DictReader(lines)} == set("234567")
-    (folder / "chute.toml").write_text((folder / "chute.toml").read_text().replace("22.0", "23.0"))
+    (folder / "chute.toml").write_text((folder / "chute.toml").read_text().replace("28.0", "29.0"))
     assert studies.run(study_file.load(folder / "study.toml"), 2, file, lambda *_: None) == 0
 
 
@@ -124,7 +124,8 @@ def test_a_damaged_row_is_simulated_again(column: str, value: str, folder: Path)
     asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
     studies.run(asked, 0, file, lambda *_: None)
     whole, table = file.read_bytes(), rows(file)
-    table[6][column] = value  # the first of the layout with one barrier
+    first = 6 * len(asked.site.events)  # the first of the layout with one barrier
+    table[first][column] = value
     write_rows(file, table)
     assert studies.run(asked, 0, file, lambda *_: None) == asked.size - 1
     assert file.read_bytes() == whole
@@ -196,8 +197,11 @@ def test_a_study_s_table_is_what_the_problem_says(folder: Path, site: Site) -> N
     table = rows(file)
     layout = asked.layouts["one"]
     own = [row for row in table if row["layout"] == "one"]
-    bills = [float(row["harm"]) + float(row["repair"]) for row in own]
-    z = site.annual(layout) + site.rate("mass", layout) * sum(bills) / len(bills)
+    bills = {name: [r for r in own if r["event"] == name] for name in site.event_names}
+    z = site.annual(layout) + sum(
+        site.rate(name, layout) * sum(float(r["harm"]) + float(r["repair"]) for r in found) / 6
+        for name, found in bills.items()
+    )
     cells = studies.table(asked, file).columns[1]._cells
     assert float(str(cells[1]).split()[0].replace(",", "")) == pytest.approx(z, rel=0.01)
 

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 RELEASES = 60
 """Releases of an event in an ensemble: three of them are beyond the 95 % quantile."""
-SHARE = 8
+SHARE = 16
 """The ensemble takes at most one part in so many of a budget."""
 
 CROSSING = np.dtype(

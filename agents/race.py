@@ -31,7 +31,7 @@ from agents.store import Store
 from envs import DesignProblem
 from rigdda import Barrier, Layout
 
-SINGLES, PAIRS, NEARBY, FINAL = 0.40, 0.14, 0.24, 0.10
+SINGLES, PAIRS, NEARBY, FINAL = 0.38, 0.14, 0.30, 0.08
 """Shares of the budget: races of singles, pairs and neighbours, and the choice among the best; the
 rest is for the ensemble and the report."""
 
@@ -95,8 +95,8 @@ def design(
 def singles(menu: Menu, ledger: Ledger, n: int) -> list[Layout]:
     """Return about `n` layouts to begin with: one barrier of every kind here and there.
 
-    Of each kind, from the part that the ensemble says is better, as different ones as can be; of
-    fences the best at stations apart. The rule's layout and the best constant are among them.
+    As different ones as can be, of each kind half from the part that the ensemble says is better;
+    of fences the best at stations apart. The rule's layout and the best constant are among them.
     """
     problem = ledger.problem
     ensemble = ensemble_for(ledger, menu.stations)
@@ -105,8 +105,13 @@ def singles(menu: Menu, ledger: Ledger, n: int) -> list[Layout]:
     for kind in problem.kinds:
         table = tabulate(problem, ensemble, menu.lone(kind))
         order = np.argsort(table.objective, kind="stable").tolist()
-        better = [table.barriers[i] for i in order[: max(each, int(BETTER * len(order)))]]
-        lists.append(_apart(better, each) if kind == "fence" else spread(better, each))
+        ranked = [table.barriers[i] for i in order]
+        better = ranked[: max(each, int(BETTER * len(ranked)))]
+        if kind == "fence":
+            lists.append(_apart(better, each))
+        else:
+            half = spread(better, (each + 1) // 2)
+            lists.append([*half, *(b for b in spread(ranked, each) if b not in half)][:each])
     mixed = [(b,) for row in itertools.zip_longest(*lists) for b in row if b is not None]
     known = [rule(problem, ensemble, menu), constant(problem, menu)]
     return [layout for layout in dict.fromkeys([*known, *mixed]) if problem.fits(layout)]

@@ -23,6 +23,7 @@ from agents.menu import Menu
 from agents.protocol import DesignResult, Ledger, Progress
 from agents.store import Store
 from envs import DesignProblem
+from envs.building import MIN_HEIGHT
 from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Site, Wall
 from rigdda.barriers import FENCE_CLASSES
 
@@ -86,9 +87,7 @@ def rule(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> Layout:
     fences = [f for x, e, h in asked for f in _fences(menu, x, e, h)] if _may(menu, "fence") else []
     if fences:
         return (min(fences, key=lambda fence: problem.site.capital((fence,))),)
-    for barrier in _others(menu, asked):
-        return (barrier,)
-    return ()
+    return instead(menu, *asked[-1][::2])
 
 
 def demands(ensemble: Ensemble, events: list[int]) -> list[tuple[float, float, float]]:
@@ -135,27 +134,23 @@ def _fences(menu: Menu, x: float, energy: float, height: float) -> Iterator[Fenc
                 yield fence
 
 
-def _others(
-    menu: Menu, asked: list[tuple[float, float, float]]
-) -> Iterator[Ditch | Embankment | GravityWall | Wall]:
-    """Yield what may be built instead of a fence, the nearest to the road first."""
-    zone = menu.zone
+def instead(menu: Menu, x: float, height: float) -> Layout:
+    """Return what is built where no fence fits: a ditch at the toe, else what is as high."""
+    zone, toe = menu.zone, menu.problem.site.slope.toe
     width, depth = ritchie(menu.problem.site)
     width = min(max(width, zone.min_width), zone.max_width)
-    ditch = Ditch(zone.start, min(depth, zone.max_depth), width)
+    tall = min(max(height, MIN_HEIGHT), zone.max_height)
     thick = min(max(1.0, zone.min_thickness), zone.max_thickness)
-    for kind in ("ditch", "embankment", "gravity_wall", "wall"):
-        for x, _, height in reversed(asked) if _may(menu, kind) else ():
-            tall = min(height, zone.max_height)
-            made = {
-                "ditch": ditch,
-                "embankment": Embankment(x, tall, thick),
-                "gravity_wall": GravityWall(x, tall, thick),
-                "wall": Wall(x, tall, thick),
-            }[kind]
-            found = menu.put(made, x)
-            if isinstance(found, type(made)):
-                yield found
+    for barrier, at in (
+        (Ditch(x, min(depth, zone.max_depth), width), toe),
+        (Embankment(x, tall, thick), x),
+        (GravityWall(x, tall, thick), x),
+        (Wall(x, tall, thick), x),
+    ):
+        found = menu.nearest(barrier, at) if _may(menu, barrier.kind) else None
+        if found is not None:
+            return (found,)
+    return ()
 
 
 def ritchie(site: Site) -> tuple[float, float]:

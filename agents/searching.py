@@ -84,13 +84,15 @@ def search(
         As `DesignProblem.evaluate` does.
     """
     plan = Plan.of(ledger.left, most)
-    layout = next(proposals)
+    first = layout = next(proposals)
     while ledger.left >= plan.reserve + plan.releases:
         evaluation = ledger.evaluate(layout, "search", plan.releases)
         try:
             layout = proposals.send(evaluation)
         except StopIteration:
             break
+    if not ledger.entries:  # too small a budget to compare anything
+        return ledger.result(ledger.evaluate(first, "report", ledger.left))
     return finish(ledger, plan, choose)
 
 

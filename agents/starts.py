@@ -15,6 +15,7 @@ from agents.rule import rule
 from envs import DesignProblem
 from envs.building import MIN_HEIGHT
 from rigdda import Fence, Layout
+from rigdda.barriers import FENCE_CLASSES
 
 CHEAPER = ((0, 1), (1, 0), (1, 1), (0, 2))
 """Steps of height and of class by which the rule's fence is tried smaller."""
@@ -50,6 +51,7 @@ def _smaller(layout: Layout, lower: int, weaker: int) -> Layout:
     for b in layout:
         if isinstance(b, Fence) and b.energy_class is not None:
             name = CLASSES[max(0, CLASSES.index(b.energy_class) - weaker)]
-            b = Fence(b.x, max(MIN_HEIGHT, b.height - lower * STEP), energy_class=name)
+            tall = min(max(MIN_HEIGHT, b.height - lower * STEP), FENCE_CLASSES[name].height)
+            b = Fence(b.x, tall, energy_class=name)
         out.append(b)
     return tuple(out)

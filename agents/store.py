@@ -23,8 +23,9 @@ from envs import DesignProblem, Evaluation
 from rigdda import Layout, Outcome, __version__
 from rigdda.kernel import source_hash
 
-INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
-"""Constants of JSON lines: an interval may have no end. Nothing that is kept is NaN."""
+CONSTANTS = {"Infinity": math.inf, "-Infinity": -math.inf, "NaN": math.nan}
+"""Constants of JSON lines: an interval may have no end, an event no release. One NaN for all, so
+that what is read equals what was written."""
 
 
 class Release(NamedTuple):
@@ -83,7 +84,7 @@ class Store:
         whole = text.rfind(b"\n") + 1
         for line in text[:whole].splitlines():
             try:
-                data = json.loads(line, parse_constant=INFINITE.__getitem__)
+                data = json.loads(line, parse_constant=CONSTANTS.__getitem__)
                 if data["sum"] == _sum(data["key"], data["batch"]):
                     self._known[data["key"]] = msgspec.convert(data["batch"], Batch)
             except (ValueError, KeyError, TypeError, RecursionError, msgspec.ValidationError):

@@ -4,64 +4,95 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from valley import SITE
 
 from agents.crossings import CROSSING, Ensemble
-from agents.rule import rule
-from rigdda import Fence, Site, Wall
+from agents.menu import Menu
+from agents.rule import ENERGY, FREEBOARD, MASS, SPEED, demands, ritchie, rule
+from envs import DesignProblem
+from rigdda import Ditch, Embankment, Fence, Site
 
-STATIONS = np.array([12.0, 16.0, 20.0])
-
-
-def crossings(energies: dict[int, float], height: float, radius: float = 0.5) -> Ensemble:
-    """Return 20 crossings at some stations, all of the same energy there."""
-    table = np.zeros(20 * len(energies), dtype=CROSSING)
-    table["station"] = np.repeat(list(energies), 20)
-    table["energy"] = np.repeat(list(energies.values()), 20)
-    table["height"], table["radius"] = height, radius
-    return Ensemble(STATIONS, table, np.array([1e5]), radius)
+STATIONS = np.array([14.0, 20.0, 27.0])
 
 
-def test_the_wall_stands_where_energy_is_least_above_the_bounce(site: Site) -> None:
-    assert rule(site, crossings({0: 5.0, 1: 2.0, 2: 3.0}, 1.5), "wall") == (Wall(16.0, 2.5, 0.5),)
+def crossings(speeds: dict[int, float], height: float = 1.0, mass: float = 1000.0) -> Ensemble:
+    """Return 20 blocks of the first event that cross some stations and the road."""
+    places = [*speeds, len(STATIONS)]
+    table = np.zeros(20 * len(places), dtype=CROSSING)
+    table["station"] = np.repeat(places, 20)
+    table["release"] = np.tile(np.arange(20), len(places))
+    table["speed"] = np.repeat([*speeds.values(), 1.0], 20)
+    table["height"], table["radius"], table["mass"] = height, 0.4, mass
+    return Ensemble(STATIONS, table, np.zeros(20, dtype=int), np.ones(20))
 
 
-def test_equal_energies_are_settled_towards_the_toe(site: Site) -> None:
-    assert rule(site, crossings({0: 2.0, 1: 2.0, 2: 2.0}, 1.5), "wall")[0].x == 20.0
+def build(ensemble: Ensemble, kinds: tuple[str, ...] = ("fence",), site: Site = SITE) -> tuple:
+    problem = DesignProblem(site, kinds=kinds)
+    return rule(problem, ensemble, Menu(problem))
 
 
-def test_the_freeboard_grows_with_large_blocks(site: Site) -> None:
-    (wall,) = rule(site, crossings({1: 2.0}, 1.0, radius=1.6), "wall")
-    assert wall.height == pytest.approx(1.0 + 1.6 + 0.8)
+def test_what_is_asked_is_worked_out_by_hand() -> None:
+    (asked,) = demands(crossings({1: 10.0}), [0])
+    assert asked[0] == 20.0
+    assert asked[1] == pytest.approx(0.5 * (1000.0 * MASS) * (10.0 * SPEED) ** 2)
+    assert asked[2] == pytest.approx(1.0 * SPEED + FREEBOARD)
 
 
-def test_no_wall_is_higher_than_the_site_allows(site: Site) -> None:
-    assert rule(site, crossings({1: 2.0}, 9.0), "wall")[0].height == site.barrier_zone.max_height
+def test_the_quantile_leaves_out_the_rarest_block() -> None:
+    looked = crossings({1: 10.0})
+    looked.crossings["speed"][0] = 40.0
+    (asked,) = demands(looked, [0])
+    fast = np.quantile([40.0] + 19 * [10.0], 0.95)
+    assert asked[1] == pytest.approx(0.5 * (1000.0 * MASS) * (fast * SPEED) ** 2)
 
 
-def test_a_station_that_needs_too_high_a_wall_is_passed_over(site: Site) -> None:
-    looked = crossings({0: 1.0, 1: 2.0, 2: 3.0}, 1.5)
-    looked.crossings["height"][:20] = 9.0
-    assert rule(site, looked, "wall")[0].x == 16.0
+def test_the_class_takes_the_energy_with_its_factor() -> None:
+    for energy in (80e3, 90e3, 200e3, 210e3, 1600e3):
+        speed = np.sqrt(2.0 * energy / (1000.0 * MASS)) / SPEED
+        (fence,) = build(crossings({1: speed}))
+        assert isinstance(fence, Fence) and fence.x == 20.0
+        assert fence.height == 2.0  # 1.62 m, in steps of half a metre
+        least = [c for c in (100, 250, 500, 1000, 1500, 2000, 3000) if 1e3 * c / ENERGY > energy]
+        assert fence.energy_class == least[0]
 
 
-def test_the_quantile_leaves_out_the_rarest_bounce(site: Site) -> None:
-    looked = crossings({1: 2.0}, 1.0)
-    looked.crossings["height"][0] = 4.0
-    (wall,) = rule(site, looked, "wall")
-    assert wall.height == pytest.approx(np.quantile([4.0] + 19 * [1.0], 0.95) + 0.5 + 0.5)
+def test_a_low_class_is_passed_over_where_it_is_too_low() -> None:
+    (fence,) = build(crossings({1: 5.0}, height=2.6))
+    assert fence.height == 3.5 and fence.energy_class == 500
 
 
-def test_where_nothing_comes_nothing_is_built(site: Site) -> None:
-    assert rule(site, crossings({}, 1.0), "wall") == ()
+def test_of_all_stations_the_cheapest_fence_is_built() -> None:
+    (fence,) = build(crossings({0: 10.0, 1: 40.0, 2: 30.0}))
+    assert fence.x == 14.0
+    (fence,) = build(crossings({0: 10.0, 1: 10.0, 2: 10.0}))
+    assert fence.x == 27.0  # access is cheaper
 
 
-def test_a_fence_has_the_capacity_for_all_that_a_release_brings(site: Site) -> None:
-    looked = crossings({0: 5e5, 1: 2e4, 2: 3e5}, 1.5)
-    (fence,) = rule(site, looked, "fence")
-    assert isinstance(fence, Fence) and (fence.x, fence.height) == (16.0, 2.5)
-    assert fence.capacity == pytest.approx(20 * 2e4)
-    looked.crossings["height"][20:30] = 2.6  # above its top
-    assert rule(site, looked, "fence")[0].height > 2.6
-    zone = site.barrier_zone
-    for energy, capacity in ((1.0, zone.min_capacity), (1e7, zone.max_capacity)):
-        assert rule(site, crossings({1: energy}, 1.5), "fence")[0].capacity == capacity
+def test_a_station_below_which_blocks_start_is_passed_over() -> None:
+    looked = crossings({0: 5.0, 1: 10.0})
+    looked.crossings["release"][:10] += 100  # half of what crosses there does not reach the road
+    looked = Ensemble(STATIONS, looked.crossings, np.zeros(200, dtype=int), np.ones(200))
+    (fence,) = build(looked)
+    assert fence.x == 20.0
+
+
+def test_where_nothing_comes_nothing_is_built() -> None:
+    looked = crossings({1: 5.0})
+    empty = Ensemble(STATIONS, looked.crossings[:0], looked.event, looked.width)
+    assert build(empty) == ()
+
+
+def test_where_no_fence_takes_it_a_ditch_or_an_embankment_is_built(site: Site) -> None:
+    huge = crossings({1: 90.0, 2: 90.0}, mass=1e6)
+    assert build(huge) == ()
+    (ditch,) = build(huge, ("fence", "ditch", "embankment"))
+    width, depth = ritchie(site)
+    assert isinstance(ditch, Ditch) and ditch.width == width and ditch.depth <= depth
+    assert abs(ditch.x - site.slope.toe) < 1.0
+    (dam,) = build(huge, ("fence", "embankment"))
+    assert isinstance(dam, Embankment) and dam.height == pytest.approx(SPEED + FREEBOARD)
+
+
+def test_ritchie_widens_with_the_height(site: Site) -> None:
+    width, depth = ritchie(site)
+    assert (width, depth) in ((4.6, 1.8), (6.1, 1.8))

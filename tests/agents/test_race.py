@@ -1,0 +1,152 @@
+"""The race finds a known optimum, tells what it is worth, and says where its answer comes from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from valley import SITE, Barren, Valley
+
+from agents import race, random
+from agents.arms import Arm, behind
+from agents.bounds import on_bound
+from agents.menu import Menu, spread
+from agents.protocol import Entry
+from agents.reuse import Reuse
+from agents.store import Release, Store
+from envs import DesignProblem
+from envs.targets import Targets
+from rigdda import Ditch, Fence, GravityWall, Site
+from rigdda.barriers import KINDS
+
+
+def least(valley: Valley) -> float:
+    """Return the least Z of all single barriers of the menu."""
+    menu = Menu(valley)
+    return min(valley.truth((b,)) for kind in valley.kinds for b in menu.lone(kind))
+
+
+def test_the_race_finds_a_known_optimum(valley: Valley) -> None:
+    nothing, best = valley.truth(()), least(valley)
+    lost = [valley.truth(race.design(valley, 6000, seed).layout) - best for seed in range(3)]
+    assert np.median(lost) < 0.2 * (nothing - best)
+
+
+def test_the_race_beats_random_search(valley: Valley) -> None:
+    seeds = range(3)
+    raced = [valley.truth(race.design(valley, 2500, seed).layout) for seed in seeds]
+    drawn = [valley.truth(random.design(valley, 2500, seed).layout) for seed in seeds]
+    assert np.mean(raced) < np.mean(drawn)
+
+
+@pytest.mark.parametrize("name", ["race", "random"])
+def test_what_is_reported_does_not_flatter(name: str, valley: Valley) -> None:
+    apart, inside = [], 0
+    for seed in range(12):
+        found = {"race": race, "random": random}[name].design(valley, 600, seed)
+        truth = valley.truth(found.layout)
+        low, high = found.evaluation.ci
+        inside += low <= truth <= high
+        apart.append((found.evaluation.objective - truth) / valley.nothing.objective)
+    assert abs(np.mean(apart)) < 3.0 * np.std(apart) / np.sqrt(len(apart))
+    assert inside >= 9
+
+
+def test_where_nothing_helps_nothing_is_built(site: Site) -> None:
+    found = race.design(Barren(site), 2000)
+    assert found.layout == () and found.origin == "start" and found.on_bound == ()
+    finals = [e.evaluation.layout for e in found.history.stage("final")]
+    assert () in finals
+
+
+@pytest.mark.parametrize("simulations", [2, 5, 17, 64, 300, 1000, 2345])
+def test_the_budget_is_kept_and_progress_told(simulations: int, valley: Valley) -> None:
+    told: list[Entry] = []
+    found = race.design(valley, simulations, progress=told.append)
+    assert tuple(told) == found.history.entries
+    used = [entry.simulations for entry in told]
+    assert used == sorted(used) and used[-1] == found.simulations <= simulations
+    assert told[-1].stage == "report" and told[-1].evaluation == found.evaluation
+    searched = {(s, n) for e in told[:-1] for s, n in [(e.evaluation.layout, e.stage)]}
+    assert (found.layout, "report") not in searched
+
+
+def test_the_race_repeats_and_resumes(valley: Valley, tmp_path: Path) -> None:
+    file = tmp_path / "store.jsonl"
+    whole = race.design(valley, 1500, 3, store=Store(file))
+    assert race.design(valley, 1500, 3) == whole
+    lines = file.read_bytes().splitlines(keepends=True)
+    file.write_bytes(b"".join(lines[: len(lines) // 2]) + b'{"key": "12')
+    store = Store(file)
+    assert race.design(valley, 1500, 3, store=store) == whole
+    assert store.resumed > 0 and store.simulated > 0
+    assert file.read_bytes() == b"".join(lines)
+    assert file.stat().st_size < 200 * whole.simulations
+
+
+def test_a_target_is_met_where_it_can_be(site: Site) -> None:
+    free = race.design(Valley(site), 3000)
+    strict = Valley(site, targets=Targets(reach=0.05))
+    found = race.design(strict, 6000)
+    assert strict.chance(found.layout) < 0.05 < strict.chance(free.layout)
+    assert found.evaluation.targets == "met"
+
+
+def test_a_search_says_where_its_layout_comes_from(valley: Valley) -> None:
+    found = race.design(valley, 3000)
+    first = {
+        e.evaluation.layout for e in found.history.stage("search") if len(e.evaluation.layout) == 1
+    }
+    assert (found.origin == "search") or found.layout in first
+
+
+def test_what_lies_on_a_bound_is_named(site: Site) -> None:
+    problem = DesignProblem(site)
+    zone = problem.zone
+    inside = problem.place.put(Ditch(30.0, 1.5, 3.0), 30.0)
+    assert inside is not None and on_bound(problem, (inside,)) == ()
+    fence = Fence(zone.start, 2.5, energy_class=100)
+    assert on_bound(problem, (fence,)) == (
+        "fence: start of the zone",
+        "fence: greatest height",
+        "fence: lowest class",
+    )
+    wall = GravityWall(zone.end - zone.min_thickness, 2.0, zone.min_thickness)
+    found = on_bound(problem, (wall,))
+    assert found == ("gravity wall: end of the zone", "gravity wall: least thickness")
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "mesh"])
+def test_all_on_the_menu_may_be_built(kind: str) -> None:
+    problem = DesignProblem(SITE, kinds=(kind,))
+    menu = Menu(problem)
+    found = menu.lone(kind)
+    assert found and all(problem.fits((b,)) for b in found[::7])
+    some = spread(found, 5)
+    assert len(set(some)) == len(some) <= 5
+    near = list(menu.neighbours((some[0],), 1.0, 1))
+    assert near and all(problem.fits(layout) and layout != (some[0],) for layout in near)
+
+
+def test_a_weaker_fence_that_holds_is_not_counted(site: Site) -> None:
+    reuse = Reuse(site)
+    held, failed = Release(0.0, 0.0, False, False), Release(9.0, 1.0, True, True)
+    strong, weak = Fence(16.0, 2.0, energy_class=1000), Fence(16.0, 2.0, energy_class=250)
+    seeds = {"block": (1, 2, 3), "group": (1,)}
+    first = {"block": (held, held, held), "group": (held,)}
+    assert reuse.spared((strong,), seeds, first) == 0
+    second = {"block": (held, failed, held), "group": (held,)}
+    assert reuse.spared((weak,), seeds, second) == 2  # a group is never known
+    assert reuse.spared((Fence(16.5, 2.0, energy_class=250),), seeds, second) == 0
+
+
+def test_an_arm_is_behind_by_its_paired_difference(valley: Valley) -> None:
+    nothing, other = Arm(valley, ()), Arm(valley, ())
+    reached, stopped = Release(100.0, 1.0, True, False), Release(0.0, 0.0, False, False)
+    names = valley.site.event_names
+    nothing.add({name: [reached, stopped] * 50 for name in names})
+    other.add({name: [stopped, stopped] * 50 for name in names})
+    assert behind(other, nothing, nothing) < -5.0 < 5.0 < behind(nothing, other, nothing)
+    rates = sum(valley.site.rate(name, ()) for name in names)
+    assert nothing.objective() == pytest.approx(50.0 * rates)

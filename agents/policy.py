@@ -10,6 +10,7 @@ import os
 from functools import lru_cache
 
 import numpy as np
+from msgspec.structs import replace
 
 from agents.features import WIDTH, features
 from agents.network import Network
@@ -64,16 +65,18 @@ def decide(network: Network, problem: DesignProblem) -> Layout:
 
     Raises
     ------
-    Diverged
-        If a simulation of what is seen diverges.
+    BadInput, Diverged
+        If a problem allows no kind that policies build; if a simulation of what is seen diverges.
     """
-    seen = features(observe(problem, problem.nothing, np.zeros(0)))
-    used = SLOTS.width * min(SLOTS.count, problem.max_barriers)
-    numbers = np.clip(ANCHOR + network(seen), -1.0, 1.0)[:used]
-    named = Slots(tuple(dict.fromkeys([*SLOTS.kinds, *problem.kinds])), SLOTS.count)
-    rows = numbers.reshape(-1, SLOTS.width)
-    absent = np.full((len(rows), named.width - SLOTS.width), -1.0)  # scores of "wall"
-    return named.decode(problem, np.hstack([rows, absent]).ravel())
+    kinds = [kind for kind in problem.kinds if kind in SLOTS.kinds]
+    if not kinds:
+        mend = "allow a kind that policies build: " + ", ".join(SLOTS.kinds)
+        raise BadInput("kinds", problem.kinds, mend)
+    site = replace(problem.site, barrier_zone=problem.zone)  # what is seen is seen across it
+    posed = DesignProblem(site, min(problem.max_barriers, SLOTS.count), kinds)
+    seen = features(observe(posed, problem.nothing, np.zeros(0)))
+    numbers = np.clip(ANCHOR + network(seen), -1.0, 1.0)
+    return SLOTS.decode(posed, numbers[: posed.max_barriers * SLOTS.width])
 
 
 @lru_cache(maxsize=4)

@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 
 import rigdda
 from envs import encoding, observation
-from envs.crew import Workers
-from envs.envelope import barrier_free
 from envs.evaluation import Evaluation
 from envs.picture import picture
 from envs.places import Place, Venue
 from envs.recorder import Recorder, Shown, Trigger
 from envs.reuse import Sample
-from envs.trial import Answer, Ask, plain, simulate
+from envs.trial import Answer, Ask, look_ahead, plain, simulate
 from rigdda import BadInput, Run, check
 
 Action = NDArray[np.floating[Any]]
@@ -112,8 +110,8 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         `options`: `site`, as the keyword, for this episode.
         """
         self.draw(seed, options)
-        look_ahead([self])
-        return self.start()
+        (looked,) = look_ahead([(self.problem, self.sights)])
+        return self.start(looked)
 
     def step(self, action: Action) -> Step:
         """Simulate the episode's releases with what `action` adds."""
@@ -128,15 +126,11 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self.problem = self.venue.draw(self.np_random, options)
         self.seeds = tuple(self.np_random.integers(SCORED_SEEDS, size=self.releases).tolist())
 
-    def seen(self, looked: Sample) -> None:
-        """Take what was seen of the site without barriers."""
-        self._looked = looked
-
-    def start(self) -> tuple[Observation, Info]:
-        """Start the episode that was drawn; return its first observation and info."""
+    def start(self, looked: Sample) -> tuple[Observation, Info]:
+        """Start the episode that was drawn and looked at; return its first observation and info."""
         self._numbers = self._asked = np.zeros(0)
         self._stages, self.open, self._wanted = [self.problem.nothing], True, None
-        self._rewards = []
+        self._rewards, self._looked = [], looked
         return self._show()
 
     def ask(self, action: Action) -> Ask | None:
@@ -171,8 +165,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self._stages.append(now)
         reward = self.problem.reward(now) - self.problem.reward(before)
         self._rewards.append(float(reward))
-        added = self.slots.decode(self.problem, self._numbers[-self.width :])
-        terminated = len(self._numbers) == self.slots.size or not added
+        terminated = len(self._numbers) == self.slots.size or answer is None
         seen, info = self._show()
         if terminated:
             self._end()
@@ -248,18 +241,3 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
     def _record(self, recorder: Recorder) -> None:
         """Write the replay of the episode that has ended."""
         raise NotImplementedError
-
-
-def look_ahead(copies: Sequence[BarrierEnv], workers: Workers | None = None) -> None:
-    """Look at the sites of drawn episodes before they start, all together.
-
-    Raises
-    ------
-    Diverged
-        If a simulation diverges.
-    """
-    barrier_free([copy.problem.site for copy in copies], workers)
-    asks = [Ask(copy.problem, (), (), copy.sights) for copy in copies]
-    for copy, answer in zip(copies, simulate(asks, workers), strict=True):
-        assert answer is not None
-        copy.seen(answer.looked)

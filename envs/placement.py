@@ -24,7 +24,7 @@ class BarrierPlacement(BarrierEnv):
         same releases, those of the episode, so that its rewards add up to
         (Z of nothing - Z of the layout) / Z of nothing.
     Termination
-        When an absent barrier is placed or the last slot is used. Truncated by a TimeLimit only.
+        When a step adds no barrier or the last slot is used. Truncated by a TimeLimit only.
     Info
         As of `BarrierDesign`, for what stands.
     Randomness

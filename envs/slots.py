@@ -56,8 +56,9 @@ class Slots:
         return problem.decode(vector.ravel())
 
     def encode(self, problem: DesignProblem, layout: Layout) -> Floats:
-        """Return the numbers of all slots that `decode` turns into a layout."""
-        vector = problem.encode(layout).reshape(problem.max_barriers, -1)
+        """Return the numbers of all slots that `decode` turns into a layout that it gave."""
+        place, slots, kinds = problem.place, problem.max_barriers, problem.kinds
+        vector = encoding.encode(place, layout, slots, kinds).reshape(slots, -1)
         numbers = np.full((self.count, self.width), -1.0)
         numbers[:, self._columns(problem.kinds)] = vector
         return numbers.ravel()

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from envs import reuse
 from envs.crew import Workers
-from envs.envelope import FIRST
+from envs.envelope import FIRST, barrier_free
 from envs.evaluation import Evaluation
 from envs.problem import DesignProblem
 from envs.reuse import Sample
@@ -63,6 +63,26 @@ def _looks(ask: Ask) -> list[tuple[int, str]]:
 def _answer(ask: Ask, scored: Sample, looked: Sample) -> Answer:
     judged = ask.problem.judge(ask.layout, scored, ask.seeds) if ask.seeds else None
     return Answer(judged, looked)
+
+
+def look_ahead(
+    sights: Sequence[tuple[DesignProblem, int]], workers: Workers | None = None
+) -> list[Sample]:
+    """Look at the sites of new episodes, all together: at their envelopes, and in releases.
+
+    Parameters
+    ----------
+    sights : sequence of (DesignProblem, int)
+        Of each episode its problem, and the releases of every event to look at without barriers.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    barrier_free([problem.site for problem, _ in sights], workers)
+    answers = simulate([Ask(problem, (), (), looks) for problem, looks in sights], workers)
+    return [answer.looked for answer in answers if answer is not None]
 
 
 def plain(outcomes: Sequence[Outcome]) -> tuple[dict[str, Any], ...]:

@@ -13,13 +13,13 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from envs import batching, encoding
-from envs.base import BarrierEnv, Info, Observation, Step, look_ahead
+from envs.base import BarrierEnv, Info, Observation, Step
 from envs.batching import Options
 from envs.crew import Crew
 from envs.design import BarrierDesign
 from envs.placement import BarrierPlacement
 from envs.recorder import Recorder
-from envs.trial import simulate
+from envs.trial import look_ahead, simulate
 from rigdda import BadInput, check
 
 MOST_COPIES = 100_000
@@ -188,8 +188,9 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         """Start an episode in some copies; return what each says."""
         for i in chosen:
             self.copies[i].draw(seeds[i], options[i])
-        look_ahead([self.copies[i] for i in chosen], self._crew)
-        starts = {i: self.copies[i].start() for i in chosen}
+        sights = [(self.copies[i].problem, self.copies[i].sights) for i in chosen]
+        looked = look_ahead(sights, self._crew)
+        starts = {i: self.copies[i].start(seen) for i, seen in zip(chosen, looked, strict=True)}
         self._seen = self._seen or [seen for seen, _ in starts.values()]
         for i, (seen, _) in starts.items():
             self._seen[i], self._elapsed[i], self._ended[i] = seen, 0, False

@@ -1,9 +1,15 @@
-"""Episodes a second of the environments: one copy, and batches as Stable-Baselines3 steps them.
+"""Episodes a second of the environments, and the variance of their reward.
 
-Every batch plays 64 episodes or more (8 with --quick) of random actions on the site quick, of one
-release each, at fidelity "fast", in threads and in as many processes as there are cores; no two
-batches share a seed, so that none finds what another has simulated. Speed-up: episodes a second
-over those of one copy, which plays last as well as first. Writes throughput_envs.csv.
+Batches as Stable-Baselines3 steps them play 256 episodes or more (16 with --quick) of random
+actions of one release each, in threads and in as many processes as there are cores; no two batches
+share a seed, so that none finds what another has simulated. On the site quick with its groups and
+its jointed mass, and on it with single blocks alone. `times_before`: episodes a second of processor
+time, which other jobs disturb less, over those of 64 copies at commit 78de9db, when every episode
+was one release of the mass of quick at fidelity "fast"; not told in processes.
+
+Variance: of the reward of one release against the site's mean of nothing, and against nothing in
+the same release as it was before; means over random layouts, and of the best of them, on quick and
+on generated sites. Writes throughput_envs.csv and reward_variance.csv.
 """
 
 from __future__ import annotations
@@ -14,16 +20,38 @@ from pathlib import Path
 from typing import Any
 
 import click
+import msgspec
 import numpy as np
 
 import envs
+from envs import DesignProblem
 from envs.registration import ENVIRONMENTS
+from envs.trial import Ask, simulate
 from experiments.script import folder, options, write
+from rigdda import Layout, Site, sites
 
-BATCHES = ((1, False), (8, False), (64, False), (8, True), (64, True), (1, False))
+BATCHES = ((1, False), (8, False), (64, False), (64, True), (1, False))
 """Copies, and whether they are simulated in processes."""
 
-EPISODES = 64
+EPISODES = 256
+
+BEFORE = {"rigdda/BarrierDesign-v0": 9.0, "rigdda/BarrierPlacement-v0": 5.6}
+"""Episodes a second of processor time before; 5.7 and 2.3 at fidelity "full", which is played now."""
+
+LAYOUTS, SAMPLES, SITES = 8, 128, 6
+"""Random layouts of a site, episodes of each, and generated sites behind the variances."""
+
+
+def places() -> dict[str, Site]:
+    """Return the sites to play on: quick, and quick with single blocks alone."""
+    quick = sites.load("quick")
+    single = tuple(e for e in quick.events if e.area is not None and e.number == (1, 1))
+    used = {event.source for event in single}
+    rock = tuple(source for source in quick.sources if source.name in used)
+    alone = msgspec.structs.replace(
+        quick, name="quick, blocks", sources=rock, events=single, meshes=()
+    )
+    return {"quick": quick, "quick, single blocks": alone}
 
 
 def play(env: Any, episodes: int) -> tuple[int, int]:
@@ -37,19 +65,17 @@ def play(env: Any, episodes: int) -> tuple[int, int]:
 
 
 def measure(
-    name: str, copies: int, processes: int | None, episodes: int, seed: int
+    name: str, site: Site, copies: int, processes: int | None, episodes: int, seed: int
 ) -> dict[str, Any]:
-    """Return the row of one batch; in processes the first step, which starts them, counts not."""
-    env = envs.sb3_vec_env(
-        name, copies, site="quick", releases=1, fidelity="fast", processes=processes
-    )
+    """Return what one batch did; in processes the first step, which starts them, counts not."""
+    env = envs.sb3_vec_env(name, copies, site=site, releases=1, processes=processes)
     env.seed(seed)
     env.action_space.seed(seed)
     env.reset()
     play(env, copies)
-    wall = time.perf_counter()
+    wall, busy = time.perf_counter(), time.process_time()
     ended, steps = play(env, episodes)
-    wall = time.perf_counter() - wall
+    wall, busy = time.perf_counter() - wall, time.process_time() - busy
     env.close()
     return {
         "environment": name,
@@ -61,25 +87,68 @@ def measure(
         "seconds": round(wall, 3),
         "episodes_per_second": round(ended / wall, 3),
         "steps_per_second": round(steps / wall, 3),
+        "episodes_per_processor_second": None if processes else round(ended / busy, 3),
+        "times_before": None if processes else round(ended / busy / BEFORE[name], 2),
     }
+
+
+def throughput(episodes: int) -> list[dict[str, Any]]:
+    """Return the rows of all batches."""
+    measure("rigdda/BarrierPlacement-v0", places()["quick"], 2, None, 4, 0)  # compiles
+    rows: list[dict[str, Any]] = []
+    for label, site in places().items():
+        for name in ENVIRONMENTS:
+            for copies, crew in BATCHES:
+                workers = os.cpu_count() if crew else None
+                seed = 1000 * (len(rows) + 1)
+                row = {"site": label} | measure(name, site, copies, workers, episodes, seed)
+                rows.append(row)
+                click.echo(row)
+    return rows
+
+
+def rewards(problem: DesignProblem, layout: Layout, seeds: range) -> np.ndarray:
+    """Return the reward of a layout in each of some episodes of one release."""
+    asks = [Ask(problem, layout, (seed,), 0) for seed in seeds]
+    answers = [answer.evaluation for answer in simulate(asks) if answer is not None]
+    return np.array([problem.reward(found) for found in answers if found is not None])
+
+
+def variance(name: str, layouts: int, samples: int) -> dict[str, Any]:
+    """Return the variances of the reward at a site."""
+    problem, rng = DesignProblem(name), np.random.default_rng(0)
+    drawn: list[Layout] = []
+    while len(drawn) < layouts:
+        layout = problem.decode(rng.uniform(*problem.bounds))
+        drawn += [layout] if layout else []
+    free = rewards(problem, (), range(samples))
+    fixed = [rewards(problem, layout, range(samples)) for layout in drawn]
+    now = np.array([reward.var(ddof=1) for reward in fixed])
+    before = np.array([(reward - free).var(ddof=1) for reward in fixed])
+    best = int(np.argmax([reward.mean() for reward in fixed]))
+    row = {
+        "site": name,
+        "layouts": layouts,
+        "episodes": samples,
+        "variance": round(float(now.mean()), 4),
+        "variance_same_release": round(float(before.mean()), 4),
+        "ratio": round(float(now.mean() / before.mean()), 3),
+        "ratio_best_layout": round(float(now[best] / before[best]), 3),
+        "reward_best_layout": round(float(fixed[best].mean()), 3),
+    }
+    click.echo(row)
+    return row
 
 
 @click.command(help=__doc__)
 @options
 def main(quick: bool, out: Path | None) -> None:
-    """Measure all batches and write the table."""
-    measure("rigdda/BarrierPlacement-v0", 2, None, 4, 0)  # compiles
-    rows: list[dict[str, Any]] = []
-    for name in ENVIRONMENTS:
-        batches = []
-        for copies, crew in BATCHES:
-            workers = os.cpu_count() if crew else None
-            seed = 1000 * (len(rows) + len(batches) + 1)
-            batches.append(measure(name, copies, workers, 8 if quick else EPISODES, seed))
-            click.echo(batches[-1])
-        one = np.mean([row["episodes_per_second"] for row in batches if row["copies"] == 1])
-        rows += [row | {"speed_up": round(row["episodes_per_second"] / one, 3)} for row in batches]
-    write(folder(quick, out) / "throughput_envs.csv", rows)
+    """Measure all and write the tables."""
+    to, names = folder(quick, out), ["quick", *sites.split("test")[:SITES]]
+    write(to / "throughput_envs.csv", throughput(16 if quick else EPISODES))
+    layouts, samples = (2, 8) if quick else (LAYOUTS, SAMPLES)
+    some = names[:1] if quick else names
+    write(to / "reward_variance.csv", [variance(name, layouts, samples) for name in some])
 
 
 if __name__ == "__main__":

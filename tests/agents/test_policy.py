@@ -11,58 +11,58 @@ import pytest
 from safetensors.numpy import save_file
 
 from agents import policy
-from agents.crossings import ensemble
-from agents.features import WIDTH, features, rule_slot
+from agents.features import NAMES, WIDTH, features
 from agents.network import Network
-from agents.policy import SHIPPED, anchor, decide
-from agents.rule import QUANTILE, rule
-from envs import DesignProblem, fidelity
+from agents.policy import ANCHOR, SLOTS, decide
+from envs import DesignProblem
+from envs.fields import FIELDS
 from envs.observation import observe
-from rigdda import BadInput, Fence, Site, __version__
+from rigdda import BadInput, Site
 
 
-def network(outputs: np.ndarray, inputs: int) -> Network:
+def network(outputs: np.ndarray, inputs: int = WIDTH) -> Network:
     """A network that always says the same."""
     layer = (np.zeros((len(outputs), inputs), np.float32), outputs.astype(np.float32))
     zeros, ones = np.zeros(inputs, np.float32), np.ones(inputs, np.float32)
     return Network(zeros, ones, [layer], {})
 
 
-@pytest.fixture
-def fences(site: Site) -> DesignProblem:
-    return DesignProblem(site)
+def saying(*slots: tuple[float, float, float, float, str]) -> Network:
+    """A network that asks for barriers: presence, station, height, size and kind of each."""
+    wanted = np.full((SLOTS.count, SLOTS.width), -1.0)
+    for row, (*numbers, kind) in zip(wanted, slots, strict=False):
+        row[: len(numbers)], row[len(numbers) + SLOTS.kinds.index(kind)] = numbers, 1.0
+    return network(wanted.ravel() - ANCHOR)
 
 
-def test_features_lie_at_the_stations_of_the_zone(fences: DesignProblem, site: Site) -> None:
-    seen = features(observe(fences, ()))
-    assert seen.dtype == np.float32 and np.isfinite(seen).all()
-    zone, ground = site.barrier_zone, site.profile
-    x = np.linspace(zone.start, zone.end, 16)
-    elevation = [(ground.height(at) - ground.height(site.road.start)) / 100.0 for at in x]
-    assert seen[:16] == pytest.approx(elevation, abs=0.012)  # from the 33 points of the profile
-    assert seen[17:24] == pytest.approx(np.full(7, 25.0 / 20.0), abs=0.35)
-    assert seen[32:35] == pytest.approx([0.12, 0.1, 10.0 / 12.0], abs=1e-6)
+def seen_at(problem: DesignProblem) -> np.ndarray:
+    return features(observe(problem, problem.nothing, np.zeros(0)))
 
 
-def test_the_shipped_policy_says_how_it_was_made() -> None:
-    notes = Network.load(SHIPPED).notes
-    assert notes["command"].startswith("rigdda train --sites")
-    assert notes["version"] == __version__ and notes["seed"].isdigit()
-    assert SHIPPED.stat().st_size < 200_000
+def test_features_are_what_is_seen_of_the_site(site: Site) -> None:
+    problem = DesignProblem(site)
+    seen = observe(problem, problem.nothing, np.zeros(0))
+    line = features(seen)
+    assert line.shape == (WIDTH,) and line.dtype == np.float32 and np.isfinite(line).all()
+    assert set(FIELDS) - set(NAMES) == {"layout", "spent"}
+    np.testing.assert_array_equal(line[: FIELDS[NAMES[0]].size], seen[NAMES[0]])
 
 
-def test_it_decides_without_torch_or_a_search() -> None:
+def test_it_decides_without_torch_or_a_search(tmp_path: Path) -> None:
+    file = tmp_path / "it.safetensors"
+    saying((1.0, 0.5, 0.0, 0.0, "ditch")).save(file)
     code = (
         "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
         "from envs import DesignProblem; from agents import policy\n"
-        "found = policy.design(DesignProblem('quick'), 8)\n"
+        f"found = policy.using(policy.load({str(file)!r}))(DesignProblem('quick'), 8)\n"
         "assert found.simulations == 8 and len(found.history.entries) == 1\n"
+        "assert [b.kind for b in found.layout] == ['ditch']\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_a_policy_survives_its_file(fences: DesignProblem, tmp_path: Path) -> None:
-    seen = features(observe(fences, ()))
+def test_a_policy_survives_its_file(site: Site, tmp_path: Path) -> None:
+    seen = seen_at(DesignProblem(site))
     rng = np.random.default_rng(0)
     layers = [
         (rng.normal(0, 0.2, (8, len(seen))).astype(np.float32), np.zeros(8, np.float32)),
@@ -79,27 +79,8 @@ def test_a_policy_survives_its_file(fences: DesignProblem, tmp_path: Path) -> No
     assert read(1e9 * seen) == pytest.approx(read(1e6 * seen))  # features are clipped
 
 
-def test_a_network_that_adds_nothing_builds_nearly_what_the_rule_does() -> None:
-    posed = DesignProblem(fidelity.at(Site.load("quick"), "fast"))
-    zeros = network(np.zeros(9), len(features(observe(posed, ()))))
-    (fence,) = decide(zeros, posed)
-    crossings = ensemble(posed.site, range(16))
-    (ruled,) = rule(posed.site, crossings, "fence")
-    assert isinstance(ruled, Fence) and isinstance(fence, Fence)
-
-    def energy_at(x: float) -> float:
-        k = int(np.abs(np.array(crossings.stations) - x).argmin())
-        return float(np.quantile(crossings.at(k)["energy"], QUANTILE))
-
-    # two stations may be as good as one another; the network knows fewer releases
-    assert energy_at(fence.x) < 1.2 * energy_at(ruled.x)
-    assert fence.height == pytest.approx(ruled.height, rel=0.3)
-    assert 0.25 < fence.capacity / ruled.capacity < 4.0
-
-
-def test_where_nothing_comes_the_rule_it_starts_from_builds_nothing(fences: DesignProblem) -> None:
-    seen = observe(fences, ()) | {"energy": np.zeros(16, np.float32)}
-    assert rule_slot(seen).tolist() == [0.0, -1.0, 0.0]
+def test_a_network_that_adds_nothing_builds_one_barrier(site: Site) -> None:
+    assert len(decide(network(np.zeros(SLOTS.size)), DesignProblem(site))) == 1
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no tensors"])
@@ -112,38 +93,42 @@ def test_another_file_is_refused(content: bytes | None, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("slots", [1, 2, 3, 5])
-@pytest.mark.parametrize("kinds", [("fence",), ("wall", "fence")])
-def test_it_fits_any_number_of_slots(slots: int, kinds: tuple[str, ...], site: Site) -> None:
+@pytest.mark.parametrize("kinds", [None, ("fence",), ("wall", "ditch")])
+def test_it_fits_any_problem(slots: int, kinds: tuple[str, ...] | None, site: Site) -> None:
     problem = DesignProblem(site, slots, kinds)
-    wanted = np.array([-1, 0, 0, 0, 1.0, 0, 1, 0.5, 0])
-    seen = features(observe(DesignProblem(site), ()))
-    layout = decide(network(wanted - anchor(seen), len(seen)), problem)
-    assert len(layout) == min(slots, 3)
-    heights = sorted(b.height for b in layout if isinstance(b, Fence))
-    assert heights == pytest.approx([2.5, 3.75, 5.0][-slots:])
-    assert problem.decode(problem.encode(layout)) == pytest.approx(layout) or len(kinds) > 1
+    asked = [(1.0, -0.9, -0.5, -0.9, "fence"), (1.0, 0.0, 0.0, -0.9, "fence")]
+    layout = decide(saying(*asked, (1.0, 1.0, -0.5, -0.9, "ditch")), problem)
+    assert problem.fits(layout) and 0 < len(layout) <= min(slots, 3)
+    assert {barrier.kind for barrier in layout} <= set(problem.kinds) - {"wall"}
 
 
-def test_what_it_cannot_build_or_pay_is_refused(site: Site) -> None:
-    with pytest.raises(BadInput, match="= 'fence': choose one of wall"):
-        policy.design(DesignProblem(site, kinds=("wall",)), 40)
-    with pytest.raises(BadInput, match="simulations = 4: give at least 5"):
-        policy.design(DesignProblem(site), 4)
+def test_what_it_cannot_build_is_refused(site: Site) -> None:
+    with pytest.raises(BadInput, match=r"kinds = \('wall',\): allow a kind"):
+        decide(saying(), DesignProblem(site, kinds=("wall",)))
 
 
-def test_a_network_of_another_shape_is_refused(tmp_path):
+def test_it_keeps_to_the_zone(site: Site) -> None:
+    problem = DesignProblem(site, zone=(14.0, 22.0))
+    (ditch,) = decide(saying((1.0, -1.0, 0.0, -0.9, "ditch")), problem)
+    assert ditch.x >= 14.0 and problem.fits((ditch,))
+
+
+SHAPE = f"{WIDTH} features and {SLOTS.size} outputs"
+
+
+def test_a_network_of_another_shape_is_refused(tmp_path: Path) -> None:
     network(np.zeros(9), 4).save(tmp_path / "small.safetensors")
-    with pytest.raises(BadInput, match="120 features and 9 outputs"):
+    with pytest.raises(BadInput, match=SHAPE):
         policy.load(tmp_path / "small.safetensors")
 
 
 @pytest.mark.parametrize(
     "change, words",
     [
-        ({"mean": np.float32(0.0)}, "120 features and 9 outputs"),
-        ({"bias": np.float32(0.0)}, "120 features and 9 outputs"),
-        ({"bias": np.full(9, np.nan)}, "finite numbers"),
-        ({"weight": np.full((9, WIDTH), np.inf)}, "finite numbers"),
+        ({"mean": np.float32(0.0)}, SHAPE),
+        ({"bias": np.float32(0.0)}, SHAPE),
+        ({"bias": np.full(SLOTS.size, np.nan)}, "finite numbers"),
+        ({"weight": np.full((SLOTS.size, WIDTH), np.inf)}, "finite numbers"),
         ({"scale": np.zeros(WIDTH)}, "scales above 0"),
     ],
 )
@@ -151,7 +136,7 @@ def test_a_damaged_network_is_refused(
     change: dict[str, np.ndarray], words: str, tmp_path: Path
 ) -> None:
     whole = {"mean": np.zeros(WIDTH), "scale": np.ones(WIDTH)}
-    whole |= {"weight": np.zeros((9, WIDTH)), "bias": np.zeros(9)} | change
+    whole |= {"weight": np.zeros((SLOTS.size, WIDTH)), "bias": np.zeros(SLOTS.size)} | change
     names = {"weight": "weight 0", "bias": "bias 0"}
     file = tmp_path / "damaged.safetensors"
     save_file({names.get(k, k): np.array(v, np.float32) for k, v in whole.items()}, file)

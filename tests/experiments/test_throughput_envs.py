@@ -1,4 +1,4 @@
-"""The table of episodes a second has a row for every batch."""
+"""The table of episodes a second has a row for every batch, that of variances one for a site."""
 
 from __future__ import annotations
 
@@ -22,6 +22,11 @@ def test_every_batch_is_measured(tmp_path, monkeypatch):
         rows = list(csv.DictReader(file))
     played = [("1", "0"), ("2", str(os.cpu_count()))]
     batches = [(row["environment"], row["copies"], row["processes"]) for row in rows]
-    assert batches == [(name, *each) for name in ENVIRONMENTS for each in played]
-    assert all(int(row["episodes"]) >= 8 for row in rows)
+    assert batches == 2 * [(name, *each) for name in ENVIRONMENTS for each in played]
+    assert all(int(row["episodes"]) >= 16 for row in rows)
     assert all(float(row["episodes_per_second"]) > 0.0 for row in rows)
+    with (tmp_path / "reward_variance.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert row["site"] == "quick"
+    ratio = float(row["variance"]) / float(row["variance_same_release"])
+    assert float(row["ratio"]) == pytest.approx(ratio, abs=0.01)

@@ -21,6 +21,7 @@ from rigdda.barriers import (
     Ditch,
     Embankment,
     Fence,
+    GravityWall,
     Layout,
     Mesh,
     earthworks,
@@ -228,18 +229,41 @@ def bill(site: Site, layout: Layout, outcome: Outcome) -> Bill:
     """Return what a release with a layout costs.
 
     Of what failed, the length that the event was wide is built anew, but at least a panel or an
-    element; what the barriers hold is carried off.
+    element; what the barriers hold is carried off. A gravity wall that came onto the road blocks it
+    as rock does.
     """
-    harm = site.consequences.harm(outcome.road_volume, outcome.reached)
+    volume, reached = outcome.road_volume, outcome.reached
     repair = site.prices.removal * outcome.held_fraction * outcome.released_volume
-    built = [b for b in layout if not isinstance(b, Mesh)]
     if any(found.failed for found in outcome.barriers):
-        cost = dict(zip(layout, capitals(site, layout), strict=True))
+        built = [b for b in layout if not isinstance(b, Mesh)]
+        cost = _capital_of(site, layout)
         for barrier, found in zip(built, outcome.barriers, strict=True):
-            if found.failed:
-                least = PANEL if isinstance(barrier, Fence) else ELEMENT
-                repair += cost[barrier] * max(outcome.width, least)
-    return Bill(harm, repair)
+            if not found.failed:
+                continue
+            length = max(outcome.width, PANEL if isinstance(barrier, Fence) else ELEMENT)
+            repair += cost[barrier] * length
+            if (
+                isinstance(barrier, GravityWall)
+                and barrier.end + found.displacement > site.road.start
+            ):
+                volume, reached = volume + barrier.height * barrier.thickness * length, True
+    return Bill(site.consequences.harm(volume, reached), repair)
+
+
+_last: tuple[Site, Layout, dict[Barrier, float]] | None = None
+
+
+def _capital_of(site: Site, layout: Layout) -> dict[Barrier, float]:
+    """Return the price of each barrier [EUR/m], kept until another layout is asked for.
+
+    A layout has thousands of releases, and earthworks take longer to price than a block to fall.
+    """
+    global _last
+    known = _last
+    if known is None or known[0] is not site or known[1] != layout:
+        known = site, layout, dict(zip(layout, capitals(site, layout), strict=True))
+        _last = known
+    return known[2]
 
 
 def _price(site: Site, barrier: Barrier, outline: Floats | None) -> float:

@@ -140,6 +140,17 @@ def test_the_bill_of_a_release_mends_what_failed_and_empties_what_holds():
         assert bill.repair == pytest.approx(repair * price + 100.0 * 4.0)
 
 
+def test_a_wall_that_slid_onto_the_road_blocks_it():
+    layout = (GravityWall(31.0, 1.0, 0.5),)
+    found = outcome_of(layout)
+    fields = {name: getattr(found.barriers[0], name) for name in type(found.barriers[0]).__slots__}
+    still = {"road_volume": 0.0, "reached": False, "held_fraction": 0.0, "width": 2.0}
+    road = FLAT.road.start
+    for moved, harm in ((road - 31.6, 0.0), (road - 31.4, FLAT.consequences.harm(2.5, True))):
+        barrier = type(found.barriers[0])(**{**fields, "failed": True, "displacement": moved})
+        assert FLAT.bill(layout, outcome_of(layout, **still, barriers=(barrier,))).harm == harm
+
+
 def test_the_bill_of_no_barrier_is_harm():
     outcome = outcome_of((), road_volume=2.0, reached=True, held_fraction=0.0)
     days = 0.2 + 0.15 * 2.0**0.6

@@ -98,6 +98,17 @@ class Arm:
         return self.shortfall(), self.objective(nothing)
 
 
+def error(arm: Arm, nothing: Arm) -> float:
+    """Return the variance of the estimate of Z of an arm, as if nothing had happened once more."""
+    total = 0.0
+    for name, rate in arm.rates.items():
+        own = arm.bills(name)
+        if len(own):
+            squares = float(np.square(own - own.mean()).sum()) + nothing.spread(name) ** 2
+            total += rate * rate * squares / len(own) ** 2
+    return total
+
+
 def behind(arm: Arm, other: Arm, nothing: Arm) -> float:
     """Return by how many standard errors an arm is behind another of the same releases.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from envs import DesignProblem
 from envs.building import MIN_HEIGHT
-from rigdda import Barrier, Fence, Layout, Mesh
+from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
 from rigdda.barriers import FENCE_CLASSES
 
 NEAR = 0.05
@@ -33,8 +33,10 @@ def _place(problem: DesignProblem, barrier: Barrier) -> list[str]:
         found.append("start of the zone")
     if zone.end - end <= NEAR:
         found.append("end of the zone")
-    if isinstance(barrier, Fence) and road - end - barrier.elongation <= NEAR:
-        found.append("clearance to the road")
+    if isinstance(barrier, Fence):
+        assert barrier.elongation is not None  # of its class
+        if road - end - barrier.elongation <= NEAR:
+            found.append("clearance to the road")
     return found
 
 
@@ -49,10 +51,11 @@ def _size(problem: DesignProblem, barrier: Barrier) -> list[str]:
         if barrier.energy_class in (classes[0], classes[-1]):
             found.append("lowest class" if barrier.energy_class == classes[0] else "highest class")
         return found
-    if barrier.kind == "ditch":
+    if isinstance(barrier, Ditch):
         depth = _ends(barrier.depth, MIN_HEIGHT, zone.max_depth, "depth")
         return depth + _ends(barrier.width, zone.min_width, zone.max_width, "width")
-    what = "width" if barrier.kind == "embankment" else "thickness"
+    assert isinstance(barrier, Embankment | GravityWall | Wall)
+    what = "width" if isinstance(barrier, Embankment) else "thickness"
     height = _ends(barrier.height, MIN_HEIGHT, zone.max_height, "height")
     least, most = zone.min_thickness, zone.max_thickness
     return height + _ends(getattr(barrier, what), least, most, what)

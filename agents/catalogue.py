@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from agents.crossings import Ensemble
 from agents.menu import Menu
 from envs import DesignProblem
-from rigdda import Barrier, Ditch, Fence, GravityWall, Mesh, Site
+from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Mesh, Site, Wall
 from rigdda.economy import ELEMENT, PANEL
 
 Floats = NDArray[np.float64]
@@ -111,7 +112,8 @@ class Effects:
         self._at = [table[table["station"] == k] for k in stations]
         self._risky = [risky[table["station"] == k] for k in stations]
         road = ensemble.at(len(ensemble.stations))
-        self._volume = np.bincount(road["release"], road["volume"], minlength=count)
+        volume = np.bincount(road["release"], road["volume"], minlength=count)
+        self._volume = volume.astype(np.float64)
         self.base = self._harm(self._volume)
 
     def of(self, barrier: Barrier) -> tuple[Floats, Floats]:
@@ -124,22 +126,22 @@ class Effects:
         k = int(np.argmin(np.abs(self.ensemble.stations - barrier.x)))
         table, risky = self._at[k], self._risky[k]
         stopped, broken = self._stopped(barrier, table)
-        taken = np.bincount(
-            table["release"], table["volume"] * (stopped & risky), minlength=len(self.base)
-        )
+        volume = table["volume"] * (stopped & risky)
+        taken = np.bincount(table["release"], volume, minlength=len(self.base))
         left = self._volume - taken
-        harm = self._harm(np.where(left > 1e-9 * self._volume, left, 0.0))
+        gone = left <= 1e-9 * self._volume
+        harm = self._harm(np.where(gone, 0.0, left).astype(np.float64))
         least = PANEL if isinstance(barrier, Fence) else ELEMENT
         failed = np.bincount(table["release"], broken, minlength=len(self.base)) > 0
-        return harm, failed * np.maximum(self.ensemble.width, least)
+        mended: Floats = np.where(failed, np.maximum(self.ensemble.width, least), 0.0)
+        return harm, mended
 
-    def _stopped(
-        self, barrier: Barrier, table: NDArray[np.void]
-    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return which crossings a barrier stops, and which break it, each (E,)."""
+    def _stopped(self, barrier: Barrier, table: NDArray[np.void]) -> tuple[Any, Any]:
+        """Return which crossings a barrier stops, and which break it, each (E,) of bool."""
         none = np.zeros(len(table), dtype=bool)
         if isinstance(barrier, Ditch):
             return self._lands(barrier, table), none
+        assert isinstance(barrier, Fence | GravityWall | Embankment | Wall)
         low = table["height"] <= barrier.height
         width = self.ensemble.width[table["release"]]
         if isinstance(barrier, Fence):
@@ -154,7 +156,7 @@ class Effects:
             return low, low & (speed**2 > 2.0 * BASE * GRAVITY * SLID)
         return low, none
 
-    def _lands(self, ditch: Ditch, table: NDArray[np.void]) -> NDArray[np.bool_]:
+    def _lands(self, ditch: Ditch, table: NDArray[np.void]) -> Any:
         """Return which crossings end in a ditch: they fall into it, and do not leap out."""
         fall = np.maximum(table["height"] - table["radius"], 0.0) + ditch.depth
         lands = table["speed"] * np.sqrt(2.0 * fall / GRAVITY) <= ditch.width

@@ -15,7 +15,7 @@ from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Wall
 CONSTANTS: tuple[tuple[Barrier, float], ...] = (
     (GravityWall(0.0, 2.0, 1.0), 1.0),
     (Ditch(0.0, 1.5, 4.0), 0.75),
-    (Fence(0.0, 3.0, energy_class=500.0), 0.5),
+    (Fence(0.0, 3.0, energy_class=500), 0.5),
     (Embankment(0.0, 2.0, 1.0), 1.0),
     (Wall(0.0, 2.0, 1.0), 1.0),
 )

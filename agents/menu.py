@@ -88,6 +88,7 @@ class Menu:
         """Return the last chainages where a barrier may stand, as far as is told without trying."""
         last = self.zone.end - barrier.extent
         if isinstance(barrier, Fence):
+            assert barrier.elongation is not None  # of its class
             last = min(last, self.problem.site.road.start - barrier.extent - barrier.elongation)
         return [math.floor(10.0 * last + 1e-6) / 10.0]
 
@@ -190,7 +191,7 @@ def spread(barriers: Sequence[Barrier], n: int) -> list[Barrier]:
     """
     if len(barriers) <= n:
         return list(barriers)
-    table = np.array([_numbers(b) for b in barriers])
+    table = np.array([numbers(b) for b in barriers])
     table = (table - table.min(axis=0)) / np.maximum(np.ptp(table, axis=0), 1e-9)
     table[:, 0] *= 2.0
     centres = table[_far_apart(table, n)]
@@ -223,7 +224,7 @@ def _distances(table: Floats, centres: Floats) -> Floats:
     return apart
 
 
-def _numbers(barrier: Barrier) -> list[float]:
+def numbers(barrier: Barrier) -> list[float]:
     """Return the numbers of a barrier that are decided."""
     match barrier:
         case Ditch():

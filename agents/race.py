@@ -15,21 +15,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 
-import numpy as np
-
 from agents.arms import Arm
-from agents.catalogue import tabulate
-from agents.constant import constant
 from agents.crossings import ensemble_for
-from agents.menu import FINEST, Menu, spread
+from agents.menu import FINEST, Menu
 from agents.protocol import DesignResult, Ledger, Progress
 from agents.racing import Track
-from agents.rule import rule
+from agents.scouting import scout
 from agents.searching import search
 from agents.starts import offered
 from agents.store import Store
 from envs import DesignProblem
-from rigdda import Barrier, Layout
+from rigdda import Layout
 
 SINGLES, PAIRS, NEARBY, FINAL = 0.38, 0.14, 0.30, 0.08
 """Shares of the budget: races of singles, pairs and neighbours, and the choice among the best; the
@@ -77,54 +73,18 @@ def design(
     if simulations < 20 * first:
         return search(ledger, offered(ledger))
     menu, track = Menu(problem), Track(ledger)
-    start = singles(menu, ledger, int(SINGLES * simulations / first))
-    ledger.starts |= set(start)
-    best = track.race([(), *start], int(SINGLES * simulations), first, keep=2 * FINALISTS)
-    lone = list(track.seen.values())
+    ensemble = ensemble_for(ledger, menu.stations)
+    lone = scout(track, menu, ensemble, int(SINGLES * simulations), first)
+    ledger.starts |= {arm.layout for arm in lone}
     pairs = foretold(problem, lone, lone, track.nothing, int(PAIRS * simulations / first))
-    seen = [arm.layout for arm in best]
-    best = track.race([*seen[:2], *pairs], int(PAIRS * simulations), first, keep=FINALISTS)
-    seen = [*(arm.layout for arm in best), *seen]
+    seen = [arm.layout for arm in lone if arm.layout]
+    best = track.race([*seen[:3], *pairs], int(PAIRS * simulations), first, keep=FINALISTS)
+    seen = [*(arm.layout for arm in best), *seen[:2]]
     near = nearby(track, menu, best, lone, int(NEARBY * simulations), first)
     finalists = list(dict.fromkeys([(), *(arm.layout for arm in near), *seen]))[:FINALISTS]
     budget = int(FINAL * simulations)
     chosen = track.race(finalists, budget, first, keep=1, stage="final", strict=True)[0]
     return ledger.result(ledger.evaluate(chosen.layout, "report", ledger.left))
-
-
-def singles(menu: Menu, ledger: Ledger, n: int) -> list[Layout]:
-    """Return about `n` layouts to begin with: one barrier of every kind here and there.
-
-    As different ones as can be, of each kind half from the part that the ensemble says is better;
-    of fences the best at stations apart. The rule's layout and the best constant are among them.
-    """
-    problem = ledger.problem
-    ensemble = ensemble_for(ledger, menu.stations)
-    each = max(2, n // len(problem.kinds))
-    lists = []
-    for kind in problem.kinds:
-        table = tabulate(problem, ensemble, menu.lone(kind))
-        order = np.argsort(table.objective, kind="stable").tolist()
-        ranked = [table.barriers[i] for i in order]
-        better = ranked[: max(each, int(BETTER * len(ranked)))]
-        if kind == "fence":
-            lists.append(_apart(better, each))
-        else:
-            half = spread(better, (each + 1) // 2)
-            lists.append([*half, *(b for b in spread(ranked, each) if b not in half)][:each])
-    mixed = [(b,) for row in itertools.zip_longest(*lists) for b in row if b is not None]
-    known = [rule(problem, ensemble, menu), constant(problem, menu)]
-    return [layout for layout in dict.fromkeys([*known, *mixed]) if problem.fits(layout)]
-
-
-def _apart(barriers: Sequence[Barrier], n: int) -> list[Barrier]:
-    """Return at most `n` of some barriers, the best first: half of them best of stations apart."""
-    best: dict[float, Barrier] = {}
-    for barrier in barriers:
-        best.setdefault(barrier.x, barrier)
-    chosen = spread(list(best.values()), max(1, n // 2))
-    rest = [barrier for barrier in barriers if barrier not in chosen]
-    return [*chosen, *rest][:n]
 
 
 def foretold(

@@ -84,6 +84,13 @@ class Track:
             alive = self._survivors(alive, keep, done == rounds - 1, done == 0)
         return sorted(alive, key=lambda arm: arm.key(self.nothing))[:keep]
 
+    def look(self, layouts: Iterable[Layout], each: int, budget: int) -> list[Arm]:
+        """Return candidates that were given as many releases each, as far as a budget goes."""
+        budget = min(budget, self.ledger.left)
+        arms = [Arm(self.problem, layout) for layout in dict.fromkeys(layouts)]
+        arms = arms[: budget // max(1, each)]
+        return arms if self._round(arms, each, self.ledger.left - budget, "search", []) else []
+
     def _round(self, alive: list[Arm], each: int, end: int, stage: str, leaders: list[Arm]) -> bool:
         """Give every candidate the same releases, at least two of each event; False if it cannot.
 

@@ -1,0 +1,142 @@
+"""Singles of a catalogue, looked at where they promise most: the first part of a race.
+
+At first barriers of every kind as different as can be, then in batches those that may be the best
+as far as their neighbours tell, see `agents.surface`: of least mean less one standard deviation.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.arms import Arm, error
+from agents.catalogue import Catalogue, tabulate
+from agents.constant import constant
+from agents.crossings import Ensemble
+from agents.menu import Menu, spread
+from agents.racing import Track
+from agents.rule import rule
+from agents.surface import Surface
+from rigdda import Barrier, Layout
+
+SPREAD_OUT = 0.5
+"""Share of the budget that goes to barriers as different as can be."""
+BATCHES = 4
+"""In how many batches the rest goes to those that promise most."""
+TRUST = {"fence": 1.0, "mesh": 1.0}
+"""How far what the ensemble says of a kind is believed beforehand; of all others by half."""
+BOLD = 1.0
+"""Standard deviations below its mean that a barrier is hoped to be."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kind:
+    """All barriers of a kind: what they cost a year, and what is known of the rest of Z."""
+
+    barriers: list[Barrier]
+    annual: list[float]
+    surface: Surface
+    order: list[int]
+
+    def believed(self, hope: float) -> list[tuple[float, Barrier]]:
+        """Return Z of every barrier, `hope` standard deviations below its mean."""
+        left = self.surface.mean - hope * self.surface.deviation
+        return list(zip((np.array(self.annual) + left).tolist(), self.barriers, strict=True))
+
+
+def scout(track: Track, menu: Menu, ensemble: Ensemble, budget: int, first: int) -> list[Arm]:
+    """Return the singles that were looked at, what is believed to be the best first."""
+    problem = track.problem
+    lists = {kind: menu.lone(kind) for kind in problem.kinds}
+    kinds = [_kind(track, menu, ensemble, barriers) for barriers in lists.values() if barriers]
+    end = track.ledger.left - budget
+    count = int(SPREAD_OUT * budget / first)
+    arms = track.look([(), *_apart(track, menu, ensemble, kinds, count)], first, budget)
+    for i in range(BATCHES):
+        _learn(kinds, arms, track.nothing)
+        each = (track.ledger.left - end) // (BATCHES - i)
+        wanted = _promising(kinds, arms, max(1, each // first), track.nothing)
+        more = track.look(wanted, first, track.ledger.left - end)
+        arms += more
+    _learn(kinds, arms, track.nothing)
+    value: dict[Layout, float] = {(b,): z for kind in kinds for z, b in kind.believed(0.0)}
+    return sorted(arms, key=lambda arm: (arm.shortfall(), value.get(arm.layout, arm.objective())))
+
+
+def _kind(track: Track, menu: Menu, ensemble: Ensemble, barriers: list[Barrier]) -> Kind:
+    """Return a kind with what the ensemble says of its barriers."""
+    problem, nothing = track.problem, track.problem.nothing.objective
+    annual = np.array([problem.site.annual((b,)) for b in barriers])
+    barriers = [b for b, cost in zip(barriers, annual, strict=True) if cost < nothing] or barriers
+    table: Catalogue = tabulate(problem, ensemble, barriers)
+    annual = np.array([problem.site.annual((b,)) for b in barriers])
+    without = float(table.weight @ table.base)
+    share = (table.objective - annual) / without if without > 0.0 else np.ones(len(barriers))
+    trust = TRUST.get(barriers[0].kind, 0.5)
+    expected = nothing * (trust * share + 1.0 - trust)
+    length = menu.zone.end - menu.zone.start
+    order = np.argsort(table.objective, kind="stable").tolist()
+    return Kind(barriers, annual.tolist(), Surface(barriers, expected, nothing, length), order)
+
+
+def _apart(
+    track: Track, menu: Menu, ensemble: Ensemble, kinds: Sequence[Kind], n: int
+) -> list[Layout]:
+    """Return the rule's layout, the best constant, and different barriers of every kind."""
+    each = max(2, n // max(1, len(kinds)))
+    lists = [spread(_plausible(kind), each) for kind in kinds]
+    mixed = [(b,) for row in itertools.zip_longest(*lists) for b in row if b is not None]
+    known = [rule(track.problem, ensemble, menu), constant(track.problem, menu)]
+    return [layout for layout in dict.fromkeys([*known, *mixed]) if track.problem.fits(layout)]
+
+
+def _plausible(kind: Kind) -> list[Barrier]:
+    """Return barriers of a kind to spread: of fences the best size at every station."""
+    if kind.barriers[0].kind != "fence":
+        return kind.barriers
+    best: dict[float, Barrier] = {}
+    for i in kind.order:
+        best.setdefault(kind.barriers[i].x, kind.barriers[i])
+    return list(best.values())
+
+
+def _learn(kinds: Sequence[Kind], arms: Sequence[Arm], nothing: Arm) -> None:
+    """Let every kind learn from what was seen of its barriers."""
+    for kind in kinds:
+        kind.surface.learn(_seen(kind, arms, nothing))
+
+
+def _seen(kind: Kind, arms: Sequence[Arm], nothing: Arm) -> list[tuple[Barrier, float, float]]:
+    return [
+        (arm.layout[0], arm.objective(nothing) - arm.annual, error(arm, nothing))
+        for arm in arms
+        if len(arm.layout) == 1 and kind.surface.knows(arm.layout[0])
+    ]
+
+
+def _promising(kinds: Sequence[Kind], arms: Sequence[Arm], n: int, nothing: Arm) -> list[Layout]:
+    """Return the `n` barriers that may be the best, each as if the ones before were as expected."""
+    seen = {id(kind): _seen(kind, arms, nothing) for kind in kinds}
+    taken = {arm.layout for arm in arms}
+    noise = float(np.median([error(arm, nothing) for arm in arms])) if arms else 1.0
+    found: list[Layout] = []
+    for _ in range(n):
+        offers = [
+            (z, i, k)
+            for k, kind in enumerate(kinds)
+            for i, (z, b) in enumerate(kind.believed(BOLD))
+            if (b,) not in taken
+        ]
+        if not offers:
+            break
+        _, i, k = min(offers)
+        kind = kinds[k]
+        barrier = kind.barriers[i]
+        found.append((barrier,))
+        taken.add((barrier,))
+        seen[id(kind)].append((barrier, float(kind.surface.mean[i]), noise))
+        kind.surface.learn(seen[id(kind)])
+    return found

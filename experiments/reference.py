@@ -1,9 +1,9 @@
 """The reference of each built-in design site: a catalogue of all kinds, raced on unseen releases.
 
-`python -m experiments.reference [--quick] [--out DIR]`. All singles of every kind and size over some
-24 stations race first, then promising pairs, then neighbours of the best. The best of every kind,
-the best for single blocks alone and the constants of `agents.constant` are verified on fresh
-releases, until half the 95 % interval of the best is below 1 % of Z of nothing.
+`python -m experiments.reference [--quick] [--out DIR]`. All singles of every kind and size over 24
+stations race first, then promising pairs, then neighbours of the best. The best of every kind, the
+best for single blocks alone and the constants of `agents.constant` are verified on fresh releases,
+until half the 95 % interval of the best is below 1 % of Z of nothing.
 
 Writes reference.csv, a row a layout, and reference.png. Goes on where it was stopped: a site whose
 rows were made by the kernels of today is not computed again.
@@ -14,19 +14,17 @@ from __future__ import annotations
 import csv
 import json
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 from msgspec.structs import replace
 
-from agents.arms import Arm
 from agents.constant import CONSTANTS, place
 from agents.menu import Menu
-from agents.protocol import Ledger
-from agents.race import foretold, nearby
-from agents.racing import Track
+from agents.seeds import release_seeds
 from agents.store import Store, mechanics
 from agents.verify import verify
 from envs import DesignProblem, Evaluation
@@ -36,14 +34,18 @@ from rigdda.barriers import describe, from_table, to_tables
 
 STATIONS, QUICK_STATIONS = 24, 6
 """Chainages across the zone at which singles are tried."""
-FIRST, QUICK_FIRST = 30, 4
-"""Releases an event, on average, before a candidate is dropped."""
-BUDGET, QUICK_BUDGET = 400_000, 6_000
-"""Releases of the search for the reference of a site; a fifth as many for single blocks alone."""
-KEPT = 24
-"""Singles, pairs and neighbours that a race keeps."""
-PAIRS = 300
+FIRST, QUICK_FIRST = 40, 8
+"""Releases of a candidate, over all events, in the first round; twice as many in each later one."""
+KEPT = 0.3
+"""Share of the candidates that goes on to the next round."""
+LEFT = 16
+"""Candidates that end a race."""
+PAIR_STATIONS = 8
+"""Parts of the zone in each of which the best single of a kind is paired with others."""
+PAIRS = 400
 """Pairs that are raced, the most promising."""
+CHUNK = 20_000
+"""Releases that are simulated together: their outcomes are kept until they are summed up."""
 WANTED, QUICK_WANTED = 0.01, 0.2
 """Half of the interval of a reference over Z of nothing that ends its verification [-]."""
 LEAST, MOST, QUICK_MOST = 2_000, 64_000, 1_000
@@ -70,26 +72,94 @@ def catalogue(menu: Menu, stations: int) -> list[Layout]:
     return [(barrier,) for barrier in singles]
 
 
-def contenders(problem: DesignProblem, budget: int, stations: int, first: int) -> list[Layout]:
-    """Return the best layouts of every combination of kinds, two each, the best first."""
-    menu, track = Menu(problem), Track(Ledger(problem, budget, 0, None, Store()))
-    releases = first * len(problem.site.events)
-    track.race(catalogue(menu, stations), budget // 2, releases, keep=KEPT)
-    lone = list(track.seen.values())
-    pairs = foretold(problem, lone, lone, PAIRS)
-    best = track.race(pairs, budget // 4, releases, keep=KEPT // 4)
-    singles = sorted(lone, key=lambda arm: arm.key())[: KEPT // 4]
-    nearby(track, menu, [*best, *singles], lone, track.ledger.left, releases)
-    return best_by_kind(track.seen.values())
+class Candidate:
+    """A layout and its mean bill by event so far."""
+
+    def __init__(self, problem: DesignProblem, layout: Layout):
+        site = problem.site
+        self.problem, self.layout, self.annual = problem, layout, site.annual(layout)
+        self.rates = {name: site.rate(name, layout) for name in site.event_names}
+        self.bills: dict[str, list[float]] = {name: [] for name in self.rates}
+
+    @property
+    def z(self) -> float:
+        """Z so far [EUR per metre of road and year]."""
+        means = ((r, self.bills[name]) for name, r in self.rates.items())
+        return self.annual + sum(r * float(np.mean(b)) for r, b in means if b)
 
 
-def best_by_kind(arms: Iterable[Arm]) -> list[Layout]:
-    """Return the two best layouts of every combination of kinds, the best first."""
+def look(problem: DesignProblem, field: Sequence[Candidate], n: int) -> None:
+    """Give each candidate `n` releases in all, the same for all; more than it has."""
+    counts = problem.allocation(n)
+    seeds = {name: release_seeds("search", 0, count) for name, count in counts.items()}
+    for low in range(0, len(field), max(1, CHUNK // n)):
+        part = field[low : low + max(1, CHUNK // n)]
+        asks = [(c.layout, {k: own[len(c.bills[k]) :] for k, own in seeds.items()}) for c in part]
+        for candidate, sample in zip(part, problem.sample_many(asks), strict=True):
+            for outcome in sample:
+                bill = problem.site.bill(candidate.layout, outcome)
+                candidate.bills[outcome.event].append(sum(bill))
+
+
+def race(problem: DesignProblem, layouts: Iterable[Layout], first: int) -> list[Candidate]:
+    """Return all candidates of a race by sequential halving, the best of the last round first."""
+    field = [Candidate(problem, layout) for layout in dict.fromkeys(layouts)]
+    alive, n = field, first
+    out: list[Candidate] = []
+    while True:
+        look(problem, alive, n)
+        alive = sorted(alive, key=lambda c: c.z)
+        if len(alive) <= LEFT:
+            return alive + out[::-1]
+        kept = max(LEFT, int(KEPT * len(alive)))
+        out += alive[kept:][::-1]
+        alive, n = alive[:kept], 2 * n
+
+
+def pairs(problem: DesignProblem, singles: Sequence[Candidate]) -> list[Layout]:
+    """Return the most promising pairs: of what one lets past, the other lets past its share."""
+    nothing = Candidate(problem, ())
+    look(problem, [nothing], max(sum(map(len, c.bills.values())) for c in singles))
+    zone, best = problem.zone, dict[tuple[str, int], Candidate]()
+    for c in sorted(singles, key=lambda c: c.z):
+        part = int(PAIR_STATIONS * (c.layout[0].x - zone.start) / (zone.end - zone.start))
+        best.setdefault((c.layout[0].kind, part), c)
+    found: dict[Layout, float] = {}
+    for one in best.values():
+        for two in best.values():
+            both = tuple(sorted((*one.layout, *two.layout), key=lambda b: b.x))
+            if one is two or both in found or not problem.fits(both):
+                continue
+            value = one.annual + two.annual
+            for name, rate in nothing.rates.items():
+                base, shares = np.mean(nothing.bills[name]), (one.bills[name], two.bills[name])
+                value += rate * float(np.prod([np.mean(b) for b in shares]) / base) if base else 0.0
+            found[both] = value
+    return sorted(found, key=lambda layout: found[layout])[:PAIRS]
+
+
+def contenders(problem: DesignProblem, stations: int, first: int) -> list[Layout]:
+    """Return the best layouts of every combination of kinds, two each."""
+    menu = Menu(problem)
+    singles = race(problem, [(), *catalogue(menu, stations)], first)
+    built = [c for c in singles if c.layout]
+    double = race(problem, pairs(problem, built), first)
+    near: list[Layout] = []
+    length = problem.zone.end - problem.zone.start
+    for centre in [*singles[:3], *double[:3]]:
+        for step, level in ((length / 40.0, 1), (length / 80.0, 1)):
+            near += menu.neighbours(centre.layout, step, level)
+    last = race(problem, [*near, *(c.layout for c in [*singles[:LEFT], *double[:LEFT]])], 4 * first)
+    return best_by_kind([*last, *double, *singles])
+
+
+def best_by_kind(candidates: Iterable[Candidate]) -> list[Layout]:
+    """Return the first two layouts of every combination of kinds."""
     kept: dict[str, list[Layout]] = {}
-    for arm in sorted(arms, key=lambda arm: arm.objective()):
-        own = kept.setdefault(kinds_of(arm.layout), [])
-        if len(own) < 2:
-            own.append(arm.layout)
+    for candidate in candidates:
+        own = kept.setdefault(kinds_of(candidate.layout), [])
+        if len(own) < 2 and candidate.layout not in own:
+            own.append(candidate.layout)
     return [layout for group in kept.values() for layout in group]
 
 
@@ -128,11 +198,10 @@ def study(name: str, quick: bool) -> list[dict[str, Any]]:
     """Return the rows of a site: nothing, the best, the best of each kind, and what to beat."""
     begun, problem = time.process_time(), DesignProblem(name)
     stations, first = (QUICK_STATIONS, QUICK_FIRST) if quick else (STATIONS, FIRST)
-    budget = QUICK_BUDGET if quick else BUDGET
     say(f"{name}: racing")
-    field = contenders(problem, budget, stations, first)
+    field = contenders(problem, stations, first)
     blocks = DesignProblem(of_single_blocks(problem.site))
-    alone = contenders(blocks, budget // 5, stations, first)
+    alone = contenders(blocks, stations, first)
     wanted, most = (QUICK_WANTED, QUICK_MOST) if quick else (WANTED, MOST)
     say(f"{name}: single blocks alone")
     for_blocks = min(settle(blocks, alone, wanted, most).values(), key=lambda e: e.objective).layout
@@ -208,7 +277,8 @@ def words(recorded: Row) -> str:
 
 def run(quick: bool, out: Path) -> Number:
     """Write reference.csv and reference.png."""
-    path, rows = out / "reference.csv", []
+    path = out / "reference.csv"
+    rows: list[Any] = []
     known = [r for r in load(path) if r["mechanics"] == mechanics()]
     for name in sites.design_names():
         own: list[Any] = [r for r in known if r["site"] == name]

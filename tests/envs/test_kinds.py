@@ -69,7 +69,7 @@ def test_encoding_is_undone_by_decoding(vector):
     again = encoding.decode(ZONE, code, ALL)
     assert [b.kind for b in again] == [b.kind for b in layout]
     for one, two in zip(again, layout, strict=True):
-        numbers = [[getattr(b, f) for f in b.__struct_fields__] for b in (one, two)]
+        numbers = [[getattr(b, f) or 0.0 for f in b.__struct_fields__] for b in (one, two)]
         np.testing.assert_allclose(*numbers, rtol=1e-7, atol=1e-7)
 
 

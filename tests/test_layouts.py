@@ -52,8 +52,8 @@ def test_a_table_without_kind_is_a_wall(tmp_path):
     [
         ('kind = "moat"\nx = 1.0\nheight = 1.0', ["barriers[0].kind", "moat", "gravity_wall"]),
         ("x = 1.0\nheight = 1.0\ncapacity = 3.0", ["barriers[0]", "capacity"]),
-        ('kind = "fence"\nx = 1.0\nheight = 1.0', ["barriers[0]", "capacity"]),
-        ('kind = "fence"\nx = 1.0\nheight = 1.0\ncapacity = -1.0', ["fence capacity", "above 0"]),
+        ('kind = "fence"\nx = 1.0\nheight = 1.0', ["fence capacity", "energy_class"]),
+        ('kind = "fence"\nx = 1.0\nheight = 1.0\ncapacity = -1.0', ["fence capacity", "at least"]),
         ('kind = "ditch"\nx = 1.0\ndepth = "1.0"\nwidth = 3.0', ["barriers[0]", "depth"]),
         ('x = "1.0"\nheight = 1.0', ["barriers[0]", "$.x"]),
         ('kind = "gravity_wall"\nx = 1.0\nheight = 1.0\ndensity = nan', ["gravity wall density"]),
@@ -90,8 +90,12 @@ def test_every_kind_reports(released):
     assert fence.max_energy > 0.0
     for earthwork in (ditch, dam):
         assert (earthwork.hits, earthwork.absorbed_energy) == (0, 0.0)
-        assert earthwork.state == "stands"
-    assert ditch.caught > 0.0
+        assert math.isinf(earthwork.resistance) == (earthwork is ditch)
+    assert (ditch.state, ditch.thrust, ditch.left_height) == ("stands", 0.0, 0.0)
+    assert dam.failed == (dam.state == "pushed") == (dam.thrust > dam.resistance)
+    assert fence.left_height == 0.0 < wall.left_height == LAYOUT[0].height
+    assert heavy.failed and heavy.resistance > 0.0 < wall.thrust
+    assert rigdda.release(QUICK, (LAYOUT[3],), 2)[1].barriers[0].caught > 0.0
     shares = ("slope_fraction", "held_fraction", "road_fraction", "beyond_fraction")
     assert sum(getattr(outcome, name) for name in shares) == 1.0
     assert outcome.held_fraction >= ditch.caught

@@ -77,7 +77,7 @@ def test_a_slow_blow_stops_a_corner_at_once():
     assert sim.diagnostics.cut_backs == 0
 
 
-@pytest.mark.parametrize("barriers", [(), (Fence(1.0, 2.0, 1e6, 0.2),)])
+@pytest.mark.parametrize("barriers", [(), (Fence(1.0, 2.0, 1e6),)])
 @pytest.mark.parametrize("bolt", [False, True])
 def test_a_slow_blow_beside_a_fence_or_on_a_bolt_stops_a_corner_at_once(barriers, bolt):
     block = box(0.4, 0.505, velocity=(-1.0 if bolt else 0.02, -0.3, 0.0))

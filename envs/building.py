@@ -11,8 +11,9 @@ import numpy as np
 from envs.rules import MIN_GAP, MIN_HEIGHT, STEEPEST, TOLERANCE, Rules, Span, meet, room
 from rigdda import BadInput, Barrier, Ditch, Fence, Mesh
 
-MIN_FLOOR = 0.3
-"""Least width of the floor of a ditch that a vector stands for [m]: a shovel's."""
+MIN_FLOOR = 1.0
+"""Least width of the floor of a ditch that is designed [m]: a machine empties it, and what falls
+into a notch stops it up."""
 
 STEP = 0.25
 """Distance of the places that are looked at for a barrier that does not fit [m]."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from envs.memory import Memory
-from rigdda import BarrierOutcome, Ditch, Embankment, Fence, Outcome, Site
-from rigdda.barriers import Built, earthworks
+from rigdda import BarrierOutcome, Ditch, Embankment, Fence, GravityWall, Outcome, Site
+from rigdda.barriers import Built, Earthwork, earthworks
 from rigdda.resistance import resistance
 
 MARGIN = 0.1
@@ -137,9 +137,10 @@ def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[Standi
 
 def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) -> Standing:
     """Return where a barrier stands, with the corners of the earth moved for it."""
-    corners = moved if moved is not None else barrier.outline(site.profile)
-    start, end = float(corners[:, 0].min()), float(corners[:, 0].max())
-    top = float(corners[:, 1].max())
+    if moved is None:
+        assert not isinstance(barrier, Earthwork)
+        moved = barrier.outline(site.profile)
+    (start, _), (end, top) = moved.min(axis=0).tolist(), moved.max(axis=0).tolist()
     face = start
     if isinstance(barrier, Embankment):
         face += barrier.side_slope * barrier.height
@@ -151,8 +152,10 @@ def _idle(built: Built, barrier: Built, there: Standing, holds: bool) -> Barrier
     bears = there.bears
     if isinstance(built, Fence):
         bears = built.resistance
-    elif not isinstance(built, Ditch) and hasattr(built, "density"):
-        bears *= built.density / barrier.for_width(UNIT).density
+    elif isinstance(built, GravityWall | Embankment):
+        unit = barrier.for_width(UNIT)
+        assert isinstance(unit, GravityWall | Embankment)
+        bears *= built.density / unit.density
     return BarrierOutcome(
         hits=0,
         max_energy=0.0,

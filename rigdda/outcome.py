@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigdda.barriers import Barrier, Ditch, Embankment, Fence, GravityWall
+from rigdda.barriers import Barrier, Ditch, Embankment, Fence, GravityWall, Mesh
 from rigdda.gauges import CROSSING, FAILED, HIT
 from rigdda.geometry import polygon_properties
 from rigdda.resistance import resistance
@@ -318,9 +318,9 @@ def _barrier(run: Run, index: int, state: str, log: _Log, caught: float) -> Barr
 
 
 def _left_height(run: Run, index: int, state: str) -> float:
-    """Return the height that is left of a barrier at the end [m]."""
+    """Return the height that is left of a barrier at the end [m]; a ditch has none."""
     barrier = run.scene.barriers[index]
-    if state in GONE or isinstance(barrier, Ditch):
+    if state in GONE or isinstance(barrier, Ditch | Mesh):
         return 0.0
     if isinstance(barrier, Fence):
         return barrier.left_height(float(run.absorbed[index]))

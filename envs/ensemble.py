@@ -36,11 +36,12 @@ FIRST, ALL = 32, 2048
 """Releases of each event from which the spread of its cost is judged, and of all together."""
 
 FLOOR = 0.2
-"""Least share of an event, over an equal share: one that costs nothing without barriers, or happens
-seldom, is looked at, too."""
+"""Least share of an event of single blocks, over an equal share, less of others as they take more
+time: one that costs nothing without barriers, or happens seldom, is looked at, too."""
 
-OWN_TIME = 1.0
-"""Processor time of a release beyond that of its blocks, over that of a block [-]."""
+OWN_TIME, CROWDED = 1.0, 1.2
+"""Processor time of a release beyond that of its blocks, over that of a block, and the power of
+their number by which that of blocks grows [-]: on `shu-hwa` 1.5, 5 and 450 ms for 1, 7 and 120."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,8 +134,8 @@ def _known(values: np.ndarray) -> Known:
 def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
     """Return the share of the releases for each event.
 
-    In proportion to rate x spread / root of the time of a release (Neyman's allocation), and at
-    least `FLOOR` times an equal share. The spread is the greatest that a layout can give the cost
+    In proportion to rate x spread / root of the time of a release (Neyman's allocation), and no
+    less than a floor. The spread is the greatest that a layout can give the cost
     of the event which lets it onto the road at most as often as nothing does: barriers make sure
     harm a matter of chance.
     """
@@ -144,11 +145,17 @@ def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
         dear = fact.volume if free else fact.harm
         chance = min((fact.reached + 0.5) / (fact.releases + 1.0), 0.5)
         spread = dear.mean * math.sqrt(chance * (1.0 - chance) + chance * dear.variation**2)
-        weight[name] = site.rate(name, ()) * spread / math.sqrt(OWN_TIME + fact.blocks)
+        weight[name] = site.rate(name, ()) * spread / math.sqrt(_time(fact))
     whole = sum(weight.values())
     equal = 1.0 / len(weight)
-    raised = {n: max(w / whole if whole else equal, FLOOR * equal) for n, w in weight.items()}
+    least = {name: FLOOR * equal * (OWN_TIME + 1.0) / _time(fact) for name, fact in facts.items()}
+    raised = {n: max(w / whole if whole else equal, least[n]) for n, w in weight.items()}
     return {name: share / sum(raised.values()) for name, share in raised.items()}
+
+
+def _time(fact: Facts) -> float:
+    """Return the processor time of a release of an event, over that of a block [-]."""
+    return float(OWN_TIME + fact.blocks**CROWDED)
 
 
 def _shared(shares: Mapping[str, float], releases: int) -> dict[str, int]:

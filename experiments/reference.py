@@ -89,8 +89,11 @@ class Candidate:
 
 
 def look(problem: DesignProblem, field: Sequence[Candidate], n: int) -> None:
-    """Give each candidate `n` releases in all, the same for all; more than it has."""
-    counts = problem.allocation(n)
+    """Give each candidate `n` releases in all, the same for all; more than it has.
+
+    None of an event that would have no more than two: a mass takes as long as hundreds of blocks.
+    """
+    counts = {name: count for name, count in problem.allocation(n).items() if count > 2}
     seeds = {name: release_seeds("search", 0, count) for name, count in counts.items()}
     for low in range(0, len(field), max(1, CHUNK // n)):
         part = field[low : low + max(1, CHUNK // n)]

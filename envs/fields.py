@@ -32,14 +32,14 @@ FIELDS: dict[str, Field] = {
     ),
     "incline": Field(STATIONS, 0.6, 0.5, "inclination of the ground across the zone [rad]"),
     "ground": Field(
-        4, 0.4, 0.2, "tan of the friction angle and restitution at the zone's start and at its end"
+        4, 0.45, 0.2, "tan of the friction angle and restitution at the zone's start and at its end"
     ),
     "road": Field(1, 0.92, 0.06, "log10 of the width of the road [m]"),
-    "closure": Field(1, 4.7, 0.1, "log10 of the cost of a day of closure [EUR]"),
-    "nothing": Field(1, 2.4, 0.3, "log10 of Z without barriers [EUR per metre and year]"),
-    "groups": Field(1, 0.4, 0.3, "share of groups in Z without barriers"),
+    "closure": Field(1, 4.75, 0.12, "log10 of the cost of a day of closure [EUR]"),
+    "nothing": Field(1, 2.7, 0.25, "log10 of Z without barriers [EUR per metre and year]"),
+    "groups": Field(1, 0.3, 0.2, "share of groups in Z without barriers"),
     "rates": Field(
-        2, -0.5, 0.7, "log10 of how often single blocks and groups fall [1/year per 100 m]"
+        2, -0.2, 0.7, "log10 of how often single blocks and groups fall [1/year per 100 m]"
     ),
     "often": Field(
         2 * STATIONS, -0.2, 0.6,
@@ -58,12 +58,12 @@ FIELDS: dict[str, Field] = {
         "start to the road's downhill edge, and beyond",
     ),
     "prices": Field(
-        3, -0.5, 0.5,
+        3, -1.2, 0.6,
         "log10 of what a fence of 1,000 kJ and 3 m, 10 m3 of embankment and 10 m3 of ditch cost a "
         "year over Z without barriers",
     ),
     "mesh": Field(
-        2, 0.0, 0.5,
+        2, 0.15, 0.3,
         "greatest share of Z without barriers that an option of mesh takes off, and what that one "
         "costs a year over Z",
     ),

@@ -36,7 +36,7 @@ BATCHES = ((1, False), (8, False), (64, False), (64, True), (1, False))
 EPISODES = 256
 
 BEFORE = {"rigdda/BarrierDesign-v0": 9.0, "rigdda/BarrierPlacement-v0": 5.6}
-"""Episodes a second of processor time before; 5.7 and 2.3 at fidelity "full", which is played now."""
+"""Episodes a second of processor time before; 5.7 and 2.3 at fidelity "full", as is played now."""
 
 LAYOUTS, SAMPLES, SITES = 8, 128, 6
 """Random layouts of a site, episodes of each, and generated sites behind the variances."""

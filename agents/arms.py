@@ -16,7 +16,7 @@ from rigdda import Layout
 Floats = NDArray[np.float64]
 
 TRUSTED = 8
-"""Releases of an event below which a candidate borrows the mean and the spread of no barriers."""
+"""Releases of an event below which a candidate borrows from the mean without barriers."""
 
 
 class Arm:
@@ -29,11 +29,14 @@ class Arm:
     ----------
     releases : dict of str to list of Release
         By name of event, in the order of the seeds, the same for all candidates of a race.
+    scale : float
+        What its mean bills are believed to be, over what they were.
     """
 
     def __init__(self, problem: DesignProblem, layout: Layout, strict: bool = False):
         site = problem.site
         self.problem, self.layout, self.strict = problem, layout, strict
+        self.scale = 1.0
         self.priced = problem.nothing.objective > 0.0
         self.annual = site.annual(layout) if self.priced else 0.0
         self.rates = {name: site.rate(name, layout) for name in site.event_names}
@@ -59,17 +62,24 @@ class Arm:
             self._arrays[event] = np.array(found, dtype=np.float64)
         return self._arrays[event]
 
-    def mean(self, event: str, nothing: Arm | None = None) -> float:
+    def mean(self, event: str) -> float:
         """Return the mean bill of an event [EUR]; of few releases drawn towards that of nothing."""
         own = self.bills(event)
-        if nothing is None or len(own) >= TRUSTED:
-            return float(own.mean()) if len(own) else 0.0
-        return float((own.sum() + (TRUSTED - len(own)) * nothing.mean(event)) / TRUSTED)
+        if len(own) >= TRUSTED:
+            return float(own.mean())
+        return float((own.sum() + (TRUSTED - len(own)) * self._without(event)) / TRUSTED)
 
-    def objective(self, nothing: Arm | None = None) -> float:
+    def _without(self, event: str) -> float:
+        """Return the mean bill of an event without barriers, known of the problem [EUR]."""
+        rate = self.problem.site.rate(event, ())
+        if not self.priced or rate == 0.0:
+            return 0.0
+        return self.problem.nothing.by_event[event] / rate
+
+    def objective(self) -> float:
         """Return Z [EUR per m and year]."""
         events = self.rates.items()
-        return self.annual + math.fsum(rate * self.mean(name, nothing) for name, rate in events)
+        return self.annual + math.fsum(rate * self.mean(name) for name, rate in events)
 
     def spread(self, event: str) -> float:
         """Return the standard deviation of the bill of an event [EUR], 0 of less than two."""
@@ -93,9 +103,9 @@ class Arm:
                         over.append(share - wanted)
         return max(over)
 
-    def key(self, nothing: Arm | None = None) -> tuple[float, float]:
+    def key(self) -> tuple[float, float]:
         """Return what candidates are ranked by: how far a target is missed, then Z."""
-        return self.shortfall(), self.objective(nothing)
+        return self.shortfall(), self.objective()
 
 
 def error(arm: Arm, nothing: Arm) -> float:
@@ -124,7 +134,7 @@ def behind(arm: Arm, other: Arm, nothing: Arm) -> float:
         apart = own[:n] - its[:n]
         squares = float(((apart - apart.mean()) ** 2).sum()) + (rate * nothing.spread(name)) ** 2
         variance += squares / (n * n)
-    gap = arm.objective(nothing) - other.objective(nothing)
+    gap = arm.objective() - other.objective()
     return gap / math.sqrt(variance) if variance > 0.0 else math.copysign(math.inf, gap)
 
 
@@ -132,20 +142,22 @@ def allocation(problem: DesignProblem, n: int, leaders: Sequence[Arm]) -> dict[s
     """Return how many of `n` releases go to each event: half as for nothing, half by the leaders.
 
     Releases go where rate times spread is large. What no barrier stops has the spread that it has
-    without; what the leaders stop tells them apart no more.
+    without; what the leaders stop tells them apart no more. An event that would have no more than
+    the two of every plan has none: a large mass takes as long as hundreds of blocks, and is the
+    same for all candidates until there are releases enough to tell.
     """
-    counts = problem.allocation(n)
+    counts = {name: count if count > 2 else 0 for name, count in problem.allocation(n).items()}
     if not leaders:
         return counts
     weight = {
         name: float(np.mean([arm.rates[name] * arm.spread(name) for arm in leaders]))
-        for name in counts
+        for name, count in counts.items()
+        if count
     }
     total = sum(weight.values())
     if total <= 0.0:
         return counts
-    spare = n - 2 * len(counts)
-    half = {name: 0.5 * max(0, count - 2) for name, count in counts.items()}
     return {
-        name: 2 + int(max(0.0, half[name] + 0.5 * spare * weight[name] / total)) for name in counts
+        name: max(2, int(0.5 * count + 0.5 * n * weight[name] / total)) if count else 0
+        for name, count in counts.items()
     }

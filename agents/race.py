@@ -1,21 +1,21 @@
 """The default designer: a catalogue of all kinds, raced; pairs of the best; their neighbours.
 
-Singles of every allowed kind over stations and sizes race on common releases, see `agents.racing`.
-Pairs of the best of each kind are foretold from them: of what one lets past, the other lets past
-its share. The promising ones race, and then neighbours of the best: other stations and sizes, with
-ever smaller steps, a barrier more or less. Each race meets fresh releases, and no barrier at all
-runs in each. The best few are chosen from on releases of their own, and the chosen one is reported
-on others again, which chose nothing: so its value does not flatter.
-
-What a barrier-free ensemble says of fences, see `agents.catalogue`, spares the race most of them.
+Singles of every allowed kind over stations and sizes are looked at where they promise most, as far
+as a barrier-free ensemble and their neighbours tell, see `agents.scouting`. Pairs of the best of
+each kind are foretold from them: of what one lets past, the other lets past its share. The
+promising ones race on common releases, see `agents.racing`, and then neighbours of the best: other
+stations and sizes, with ever smaller steps, a barrier more or less. Each race meets fresh releases.
+The best few, and no barrier at all, are chosen from on releases of their own, and the chosen one is
+reported on others again, which chose nothing: so its value does not flatter.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from agents.arms import Arm
+from agents.arms import Arm, behind
 from agents.crossings import ensemble_for
 from agents.menu import FINEST, Menu
 from agents.protocol import DesignResult, Ledger, Progress
@@ -28,8 +28,8 @@ from envs import DesignProblem
 from rigdda import Layout
 
 SINGLES, PAIRS, NEARBY, FINAL = 0.38, 0.14, 0.30, 0.08
-"""Shares of the budget: races of singles, pairs and neighbours, and the choice among the best; the
-rest is for the ensemble and the report."""
+"""Shares of the budget: singles, races of pairs and of neighbours, and the choice among the best;
+the rest is for the ensemble and the report."""
 
 RELEASES = 30
 """Releases an event, on average, before anything is dropped."""
@@ -45,10 +45,10 @@ LEAST = 8
 """Candidates that a round of neighbours should have."""
 ADDED = 3
 """Barriers that are tried beside the best layout in every round."""
+AS_GOOD = 0.5
+"""Standard errors behind the best within which a layout with fewer barriers is built instead."""
 BEST_OF = 8
 """Singles of a kind of which pairs are made."""
-BETTER = 0.4
-"""Part of what may be built of a kind that is looked at, by what the ensemble says of it."""
 
 
 def design(
@@ -83,8 +83,18 @@ def design(
     near = nearby(track, menu, best, lone, int(NEARBY * simulations), first)
     finalists = list(dict.fromkeys([(), *(arm.layout for arm in near), *seen]))[:FINALISTS]
     budget = int(FINAL * simulations)
-    chosen = track.race(finalists, budget, first, keep=1, stage="final", strict=True)[0]
-    return ledger.result(ledger.evaluate(chosen.layout, "report", ledger.left))
+    ends = track.race(finalists, budget, first, keep=2, stage="final", strict=True)
+    return ledger.result(ledger.evaluate(simplest(ends, track.nothing), "report", ledger.left))
+
+
+def simplest(ends: Sequence[Arm], nothing: Arm) -> Layout:
+    """Return the layout of the best, or of one with fewer barriers that is as good."""
+    as_good = [
+        arm
+        for arm in ends
+        if arm.shortfall() <= ends[0].shortfall() and behind(arm, ends[0], nothing) < AS_GOOD
+    ]
+    return min([*ends[:1], *as_good], key=lambda arm: len(arm.layout)).layout if ends else ()
 
 
 def foretold(
@@ -92,9 +102,10 @@ def foretold(
 ) -> list[Layout]:
     """Return at most `n` layouts of one arm and another together, the most promising first.
 
-    Of an event the mean bill of both is foretold as the product of theirs over that of nothing.
+    Of an event the mean bill of both is foretold as the product of theirs over that of nothing. At
+    most a third are of the same kinds.
     """
-    firsts, seconds = _best_of(arms, nothing), _best_of(others, nothing)
+    firsts, seconds = _best_of(arms), _best_of(others)
     found: dict[Layout, float] = {}
     for one, two in itertools.product(firsts, seconds):
         both = tuple(sorted((*one.layout, *two.layout), key=lambda b: b.x))
@@ -103,16 +114,24 @@ def foretold(
         value = one.annual + two.annual
         for name in problem.site.event_names:
             base = nothing.mean(name)
-            share = one.mean(name) * two.mean(name) / base if base > 0.0 else 0.0
+            both_pass = one.scale * one.mean(name) * two.scale * two.mean(name)
+            share = both_pass / base if base > 0.0 else 0.0
             value += problem.site.rate(name, both) * share
         found[both] = value
-    return sorted(found, key=lambda layout: found[layout])[:n]
+    chosen: list[Layout] = []
+    kinds: Counter[tuple[str, ...]] = Counter()
+    for both in sorted(found, key=lambda layout: found[layout]):
+        alike = tuple(barrier.kind for barrier in both)
+        if kinds[alike] < max(2, n // 3):
+            chosen.append(both)
+            kinds[alike] += 1
+    return chosen[:n]
 
 
-def _best_of(arms: Sequence[Arm], nothing: Arm) -> list[Arm]:
-    """Return the best `BEST_OF` arms of every kind, nothing left out."""
+def _best_of(arms: Sequence[Arm]) -> list[Arm]:
+    """Return the first `BEST_OF` arms of every kind, nothing left out; the best come first."""
     kept: dict[tuple[str, ...], list[Arm]] = {}
-    for arm in sorted(arms, key=lambda arm: arm.key(nothing)):
+    for arm in arms:
         if arm.layout and len(kept.setdefault(arm.kinds, [])) < BEST_OF:
             kept[arm.kinds].append(arm)
     return [arm for group in kept.values() for arm in group]
@@ -124,7 +143,9 @@ def nearby(
     """Return the best of rounds of neighbours around the best, the best first."""
     zone = menu.zone
     step, level = max(FINEST, (zone.end - zone.start) / 16.0), 2
-    centres, tried = best[:2], set(track.seen)
+    centres, raced, tried = best[:2], best, set(track.seen)
+    if not centres:
+        return []
     end = track.ledger.left - budget
     rounds = min(ROUNDS, max(1, budget // (LEAST * first)))
     for i in range(rounds):
@@ -133,11 +154,14 @@ def nearby(
         layouts = [layout for layout in dict.fromkeys(around) if layout not in tried]
         field = [*(arm.layout for arm in centres), *layouts]
         found = track.race(field, left // (rounds - i), first, keep=3)
+        if not found:
+            break
+        raced = found
         tried |= set(track.seen)
         if found[0].layout == centres[0].layout:
             step, level = max(FINEST, 0.5 * step), 1
         centres = found[:1] if found[0].layout else centres
-    return found
+    return raced
 
 
 def _around(

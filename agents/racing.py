@@ -51,7 +51,7 @@ class Track:
         stage: str = "search",
         strict: bool = False,
     ) -> list[Arm]:
-        """Return the best `keep` candidates of a race, the best first.
+        """Return the best `keep` candidates of a race, the best first; none if none can be paid.
 
         Parameters
         ----------
@@ -80,9 +80,10 @@ class Track:
             if done == 0 and rounds > 1:
                 each = max(first, each)
             if not self._round(alive, each, end, stage, alive[: 2 * keep] if done else []):
+                alive = alive if done else []
                 break
             alive = self._survivors(alive, keep, done == rounds - 1, done == 0)
-        return sorted(alive, key=lambda arm: arm.key(self.nothing))[:keep]
+        return sorted(alive, key=lambda arm: arm.key())[:keep]
 
     def look(self, layouts: Iterable[Layout], each: int, budget: int) -> list[Arm]:
         """Return candidates that were given as many releases each, as far as a budget goes."""
@@ -92,7 +93,7 @@ class Track:
         return arms if self._round(arms, each, self.ledger.left - budget, "search", []) else []
 
     def _round(self, alive: list[Arm], each: int, end: int, stage: str, leaders: list[Arm]) -> bool:
-        """Give every candidate the same releases, at least two of each event; False if it cannot.
+        """Give every candidate the same releases; False if they cannot be paid.
 
         Of fences the strongest come first: what they hold serves the weaker ones.
         """
@@ -115,7 +116,7 @@ class Track:
     def _survivors(self, alive: list[Arm], keep: int, final: bool, protect: bool) -> list[Arm]:
         """Return who goes on, the best first."""
         nothing = self.nothing
-        order = sorted(alive, key=lambda arm: arm.key(nothing))
+        order = sorted(alive, key=lambda arm: arm.key())
         if final:
             return order
         best, count = order[0], max(keep, math.ceil(KEPT * len(order)))

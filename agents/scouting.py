@@ -26,7 +26,7 @@ SPREAD_OUT = 0.5
 """Share of the budget that goes to barriers as different as can be."""
 BATCHES = 4
 """In how many batches the rest goes to those that promise most."""
-TRUST = {"fence": 1.0, "mesh": 1.0}
+TRUST = {"fence": 0.7, "mesh": 1.0}
 """How far what the ensemble says of a kind is believed beforehand; of all others by half."""
 BOLD = 1.0
 """Standard deviations below its mean that a barrier is hoped to be."""
@@ -63,6 +63,10 @@ def scout(track: Track, menu: Menu, ensemble: Ensemble, budget: int, first: int)
         arms += more
     _learn(kinds, arms, track.nothing)
     value: dict[Layout, float] = {(b,): z for kind in kinds for z, b in kind.believed(0.0)}
+    for arm in arms:
+        left = arm.objective() - arm.annual
+        if left > 0.0 and arm.layout in value:
+            arm.scale = max(0.0, value[arm.layout] - arm.annual) / left
     return sorted(arms, key=lambda arm: (arm.shortfall(), value.get(arm.layout, arm.objective())))
 
 
@@ -87,20 +91,25 @@ def _apart(
 ) -> list[Layout]:
     """Return the rule's layout, the best constant, and different barriers of every kind."""
     each = max(2, n // max(1, len(kinds)))
-    lists = [spread(_plausible(kind), each) for kind in kinds]
+    lists = [_different(kind, each) for kind in kinds]
     mixed = [(b,) for row in itertools.zip_longest(*lists) for b in row if b is not None]
     known = [rule(track.problem, ensemble, menu), constant(track.problem, menu)]
     return [layout for layout in dict.fromkeys([*known, *mixed]) if track.problem.fits(layout)]
 
 
-def _plausible(kind: Kind) -> list[Barrier]:
-    """Return barriers of a kind to spread: of fences the best size at every station."""
+def _different(kind: Kind, n: int) -> list[Barrier]:
+    """Return about `n` barriers of a kind as different as can be.
+
+    Half of the fences are those of the best size at their station, as the ensemble sees it.
+    """
     if kind.barriers[0].kind != "fence":
-        return kind.barriers
+        return spread(kind.barriers, n)
     best: dict[float, Barrier] = {}
     for i in kind.order:
         best.setdefault(kind.barriers[i].x, kind.barriers[i])
-    return list(best.values())
+    lists = spread(list(best.values()), (n + 1) // 2), spread(kind.barriers, n // 2)
+    both = [b for row in itertools.zip_longest(*lists) for b in row if b is not None]
+    return list(dict.fromkeys(both))
 
 
 def _learn(kinds: Sequence[Kind], arms: Sequence[Arm], nothing: Arm) -> None:
@@ -111,7 +120,7 @@ def _learn(kinds: Sequence[Kind], arms: Sequence[Arm], nothing: Arm) -> None:
 
 def _seen(kind: Kind, arms: Sequence[Arm], nothing: Arm) -> list[tuple[Barrier, float, float]]:
     return [
-        (arm.layout[0], arm.objective(nothing) - arm.annual, error(arm, nothing))
+        (arm.layout[0], arm.objective() - arm.annual, error(arm, nothing))
         for arm in arms
         if len(arm.layout) == 1 and kind.surface.knows(arm.layout[0])
     ]

@@ -28,6 +28,10 @@ CONSTANTS = {"Infinity": math.inf, "-Infinity": -math.inf, "NaN": math.nan}
 that what is read equals what was written."""
 
 
+LENT = (0, 1)
+"""Seeds of the releases without barriers that stand for those of an event which has none."""
+
+
 class Release(NamedTuple):
     """What is kept of a release.
 
@@ -116,7 +120,8 @@ class Store:
         Parameters
         ----------
         seeds : mapping of str to sequence of int
-            Release seeds by name of event; of every event as many as are wanted.
+            Release seeds by name of event; of every event as many as are wanted. The evaluation
+            takes an event that has none as if nothing stood.
 
         Raises
         ------
@@ -131,7 +136,9 @@ class Store:
             for outcome in outcomes:
                 found[outcome.event].append(_release(problem, layout, outcome))
             kept = {name: tuple(releases) for name, releases in found.items()}
-            return Batch(problem.judge(layout, outcomes), kept)
+            missing = {name: LENT for name in problem.site.event_names if not asked.get(name)}
+            lent = problem.sample((), missing) if missing else ()
+            return Batch(problem.judge(layout, (*outcomes, *lent)), kept)
 
         count = sum(map(len, asked.values()))
         found = self._recall(_key(problem, layout, sorted(asked.items())), count, simulate)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from valley import SITE, Valley
+from valley import SITE, Valley, seen
 
 from envs import DesignProblem
 from rigdda import Site
@@ -20,5 +20,6 @@ def problem(site: Site) -> DesignProblem:
 
 
 @pytest.fixture
-def valley(site: Site) -> Valley:
+def valley(site: Site, monkeypatch: pytest.MonkeyPatch) -> Valley:
+    monkeypatch.setattr("agents.crossings.ensemble", seen)
     return Valley(site)

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 import rigdda
+from agents import crossings
 from envs import DesignProblem, Evaluation, ensemble
 from envs.estimator import judge
 from envs.samples import Sample
@@ -84,6 +85,24 @@ class Valley(DesignProblem):
         pairs = zip(drawn, self.plan(drawn), strict=True)
         found = Sample([self.outcome(standing, seed, event) for seed, event in pairs])
         return self.judge(standing, found, drawn)
+
+
+def seen(
+    site: Site, seeds: Mapping[str, Sequence[int]], stations: Sequence[float]
+) -> crossings.Ensemble:
+    """Return crossings that say of standing barriers what holds in the valley."""
+    x = np.asarray(stations, dtype=np.float64)
+    jobs = [(i, seed) for i, own in enumerate(seeds.values()) for seed in own]
+    table = np.zeros((len(jobs), len(x) + 1), dtype=crossings.CROSSING)
+    table["release"] = np.arange(len(jobs))[:, None]
+    table["station"] = np.arange(len(x) + 1)
+    table["time"] = np.arange(len(x) + 1)
+    table["speed"], table["energy"], table["mass"], table["volume"] = 1.0, 1.0, 1.0, 1.0
+    stopped = CATCH * np.exp(-(((x - BEST) / WIDE) ** 2))
+    dice = [np.random.default_rng([seed, i]).random(len(x)) for i, seed in jobs]
+    table["height"][:, :-1] = HEIGHT * np.array(dice) / stopped
+    event = np.array([i for i, _ in jobs])
+    return crossings.Ensemble(x, table.ravel(), event, np.ones(len(jobs)))
 
 
 KNOWN: dict[type, ensemble.Ensemble] = {}

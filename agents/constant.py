@@ -13,13 +13,20 @@ from envs import DesignProblem
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Wall
 
 CONSTANTS: tuple[tuple[Barrier, float], ...] = (
+    (Embankment(0.0, 2.5, 1.0), 1.0),
+    (Ditch(0.0, 1.0, 2.0), 0.3),
     (GravityWall(0.0, 2.0, 1.0), 1.0),
-    (Ditch(0.0, 1.5, 4.0), 0.75),
-    (Fence(0.0, 3.0, energy_class=500), 0.5),
-    (Embankment(0.0, 2.0, 1.0), 1.0),
+    (Fence(0.0, 2.0, energy_class=250), 0.5),
     (Wall(0.0, 2.0, 1.0), 1.0),
 )
-"""Barriers, wherever they stand, and their stations as shares of the zone, the best first."""
+"""Barriers, wherever they stand, and their stations as shares of the zone, the best first.
+
+Found over the six design sites, 150 releases each of 30 constants (three walls at the downhill end,
+three ditches, three embankments and four fences at two or three stations each; what does not fit is
+nothing), by the mean distance (Z - Z_race) / (Z_nothing - Z_race) from what `race` finds with 8000
+releases: .64 (bench .58, talus .47, verge -.02, narrow 1, cliff 1, shu-hwa .81), .70, .77, .78. The
+rigid wall was not tried.
+"""
 
 
 def design(

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from agents.store import Store
     from envs import DesignProblem
 
-BUDGET = 30_000
+BUDGET = 20_000
 """Default budget of a search: about a minute for a built-in site on two cores."""
 
-RELEASES = 8_000
+RELEASES = 3_000
 """Default number of releases that each layout is verified on: Z to some per cent."""
 
 CASES = 4

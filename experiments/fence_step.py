@@ -71,7 +71,7 @@ def row(name: str, dt: float, releases: int) -> Row:
     site, layout = LAYOUTS[name]
     found = Site.load(site)
     found = replace(found, motion=replace(found.motion, dt=dt, damping_when="contact"))
-    outcomes = release_many([(found, layout, seed) for seed in range(releases)])
+    outcomes = release_many([(found, layout, seed, "mass") for seed in range(releases)])
     debris, half = interval(outcome.debris_fraction for outcome in outcomes)
     failures, half_failures = interval(sum(b.failed for b in o.barriers) for o in outcomes)
     return {

@@ -19,6 +19,7 @@ from rigdda.records import (
     Bodies,
     Contact,
     Contacts,
+    Gauges,
     Interfaces,
     Ints,
     Islands,
@@ -28,14 +29,23 @@ from rigdda.records import (
 
 
 @kernel
-def takes_parts(contacts: Contacts, islands: Islands, island: int, p: Parameters) -> bool:
-    """Return whether an island is a lone block with an impact."""
+def takes_parts(
+    contacts: Contacts, islands: Islands, island: int, gauges: Gauges, p: Parameters
+) -> bool:
+    """Return whether an island is a lone block with an impact, none on a fence.
+
+    A fence is charged for a step as a whole, and its impacts are plastic.
+    """
     blocks = islands.block_start[island + 1] - islands.block_start[island]
     if blocks > 1 or not p.post_correction:
         return False
     impact = False
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        impact = impact or contacts[islands.contact_item[item]].kind == IMPACT
+        c = contacts[islands.contact_item[item]]
+        impact = impact or c.kind == IMPACT
+        if c.b >= 0 and gauges.barrier[c.b] >= 0:
+            if gauges.target[gauges.barrier[c.b]].capacity < math.inf:
+                return False
     return impact
 
 

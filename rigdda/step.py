@@ -286,7 +286,7 @@ def step_island(
                     counters[CUT_BACKS] += 1
                     mark_cut(bodies, islands, s)
                     return -1, max(far, 1.0)
-            if takes_parts(contacts, islands, s, p):
+            if takes_parts(contacts, islands, s, gauges, p):
                 recall_all(contacts, islands, s, before, work.first, p)
                 parts = 1
                 continue

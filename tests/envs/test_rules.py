@@ -121,7 +121,7 @@ def test_the_nearest_place(problem: DesignProblem) -> None:
 def test_a_ditch_gets_the_sides_and_the_depth_of_its_ground(problem: DesignProblem) -> None:
     ditch = problem.place.put(Ditch(0.0, 3.0, 3.0), 11.0)
     assert ditch.side_slope == 0.67
-    assert ditch.depth == pytest.approx(0.5 * (2.7 / 0.67), abs=0.05)
+    assert ditch.depth == pytest.approx(0.5 * (2.0 / 0.67), abs=0.05)
     assert problem.fits([ditch])
     assert problem.place.put(Ditch(0.0, 3.0, 0.5), 11.0) is None
     rocky = msgspec.structs.replace(

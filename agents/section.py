@@ -206,7 +206,8 @@ def _envelopes(
             energies.plot(barrier.x, barrier.energy_class, "D", color=BARRIER, markersize=8)
         else:
             energies.axvline(barrier.x, color=BARRIER, linewidth=1, linestyle=":")
-    energies.set_yscale("log")
+    if any((flights.energy > 0.0).any() for flights in envelopes):  # else there is nothing to see
+        energies.set_yscale("log")
     heights.set_ylim(bottom=0.0)
     heights.set_title("Without barriers: 95 % of block tops pass below [m above ground]",
                       loc="left", fontsize=10)  # fmt: skip

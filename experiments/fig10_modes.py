@@ -9,7 +9,6 @@ from the slope than it is large, and the touches in a turn, are told beside it.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,9 @@ DRAWN, EVERY, STRIDE, WATCHED = 3, 0.2, 4, 8.0
 def site_of(slope_deg: int, restitution: float | None) -> Site:
     """Return the cut with this angle, all surfaces with this restitution."""
     site = Site.load(f"ritchie-{slope_deg}")
-    surfaces = {k: replace(s, restitution=restitution) for k, s in site.surfaces.items()}
+    surfaces = {
+        k: msgspec.structs.replace(s, restitution=restitution) for k, s in site.surfaces.items()
+    }
     return msgspec.structs.replace(site, surfaces=surfaces)
 
 

@@ -139,8 +139,10 @@ def test_releases_spread_over_events_and_a_part_of_them_too(problem: DesignProbl
     shares = problem._known.shares
     assert sum(shares.values()) == pytest.approx(1.0)
     whole = problem.plan(range(400))
+    facts = problem._known.facts
     for name, share in shares.items():
-        assert share >= 0.9 * ensemble.FLOOR / 4
+        time = facts[name].blocks ** ensemble.CROWDED  # less of what takes longer
+        assert share >= 0.9 * ensemble.FLOOR / 4 * 2.0 / (1.0 + time)
         assert whole.count(name) == pytest.approx(400 * share, abs=2.5)
     assert problem.plan(range(20)) == whole[:20]
     assert min(Counter(problem.plan(range(8))).values()) == 2

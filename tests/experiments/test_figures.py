@@ -24,8 +24,9 @@ def table(path: Path) -> list[dict[str, str]]:
 
 
 AMISS = {
+    "fence_step": "with the events and the kernels of today debris differs by 2.4 of its interval",
     "hard_cases": "hopper-1000 sinks by 0.11 at 25 ms, bar 0.05, with the kernels that mend "
-    "sliding over joints; at 5 ms all cases hold"
+    "sliding over joints; at 5 ms all cases hold",
 }
 """What is known to miss its target, and why."""
 

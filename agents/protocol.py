@@ -18,9 +18,6 @@ from agents.store import Batch, Store
 from envs import DesignProblem, Evaluation
 from rigdda import Layout, check
 
-DEFAULT_RELEASES = 20_000
-"""Budget of a search if none is given: about a minute for a built-in site on two cores."""
-
 Origin = Literal["start", "search"]
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from agents import extra
-from agents.protocol import DEFAULT_RELEASES
+from agents.designing import BUDGET
 from agents.store import Store, mechanics
 from agents.verify import verify
 from envs import DesignProblem
@@ -47,7 +47,7 @@ COLOURS = {
 FREE = ("constant", "rule")
 """Designers that search nothing: one budget and one seed tell all."""
 SEEDS, QUICK_SEEDS = 5, 1
-BUDGETS, QUICK_BUDGETS = (DEFAULT_RELEASES // 10, DEFAULT_RELEASES), (600,)
+BUDGETS, QUICK_BUDGETS = (BUDGET // 10, BUDGET), (600,)
 VERIFY, QUICK_VERIFY = 20_000, 800
 TARGET = 0.05
 """Distance of the default designer at its default budget that is asked, on five of six sites."""

@@ -38,8 +38,6 @@ FLAT = replace(
 )
 """A plane slope with level ground at its toe."""
 
-CLASS = "energy_class" in Fence.__struct_fields__
-
 
 def test_annuity_pays_back_a_loan():
     rate, life = PRICES.interest, PRICES.life
@@ -94,7 +92,6 @@ def test_mesh_costs_its_area_and_makes_events_rarer():
         FLAT.rate("block", mesh * 2)
 
 
-@pytest.mark.skipif(not CLASS, reason="fences have no classes yet")
 def test_a_fence_is_priced_by_its_class():
     fence = Fence(32.0, 3.0, energy_class=500)
     assert FLAT.capital((fence,)) == pytest.approx(300.0 + 250.0 * 3.0)

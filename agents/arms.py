@@ -15,6 +15,10 @@ from rigdda import Layout
 
 Floats = NDArray[np.float64]
 
+PLANNED = 1000
+"""Releases of the plan whose shares are taken: of few, every event has two."""
+LEFT = 0.05
+"""Least spread of an event that is believed of leaders, over that without barriers [-]."""
 TRUSTED = 8
 """Releases of an event below which a candidate borrows from the mean without barriers."""
 
@@ -138,26 +142,22 @@ def behind(arm: Arm, other: Arm, nothing: Arm) -> float:
     return gap / math.sqrt(variance) if variance > 0.0 else math.copysign(math.inf, gap)
 
 
-def allocation(problem: DesignProblem, n: int, leaders: Sequence[Arm]) -> dict[str, int]:
-    """Return how many of `n` releases go to each event: half as for nothing, half by the leaders.
+def allocation(
+    problem: DesignProblem, n: int, leaders: Sequence[Arm], nothing: Arm
+) -> dict[str, int]:
+    """Return how many of `n` releases go to each event: as for nothing, by what the leaders leave.
 
-    Releases go where rate times spread is large. What no barrier stops has the spread that it has
-    without; what the leaders stop tells them apart no more. An event that would have no more than
+    Releases go where rate times spread is large, over the root of their time, see
+    `DesignProblem.allocation`. An event whose cost with the leaders spreads less than without them
+    has less: what the leaders stop tells them apart no more. An event that would have no more than
     the two of every plan has none: a large mass takes as long as hundreds of blocks, and is the
     same for all candidates until there are releases enough to tell.
     """
-    counts = {name: count if count > 2 else 0 for name, count in problem.allocation(n).items()}
-    if not leaders:
-        return counts
-    weight = {
-        name: float(np.mean([arm.rates[name] * arm.spread(name) for arm in leaders]))
-        for name, count in counts.items()
-        if count
-    }
-    total = sum(weight.values())
-    if total <= 0.0:
-        return counts
-    return {
-        name: max(2, int(0.5 * count + 0.5 * n * weight[name] / total)) if count else 0
-        for name, count in counts.items()
-    }
+    shares = {name: float(count) for name, count in problem.allocation(max(n, PLANNED)).items()}
+    for name in shares:
+        seen = [arm.spread(name) for arm in leaders if len(arm.bills(name)) >= TRUSTED]
+        if seen and len(nothing.bills(name)) >= TRUSTED and nothing.spread(name) > 0.0:
+            shares[name] *= min(1.0, max(LEFT, float(np.mean(seen)) / nothing.spread(name)))
+    whole = sum(shares.values())
+    counts = {name: int(n * share / whole) for name, share in shares.items()}  # never more than n
+    return {name: count if count > 2 else 0 for name, count in counts.items()}

@@ -8,6 +8,7 @@ import numpy as np
 
 from agents.seeds import release_seeds
 from envs import DesignProblem
+from envs.rules import SLENDER
 from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, GravityWall, Layout
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.geometry import polygon_properties
@@ -39,7 +40,9 @@ def _largest(problem: DesignProblem, x: float) -> Iterator[Barrier]:
         ),
         "ditch": lambda: Ditch(x, zone.max_depth, zone.max_width),
         "embankment": lambda: Embankment(x, zone.max_height, zone.max_thickness),
-        "gravity_wall": lambda: GravityWall(x, zone.max_height, zone.max_thickness),
+        "gravity_wall": lambda: GravityWall(
+            x, min(zone.max_height, zone.max_thickness / SLENDER), zone.max_thickness
+        ),
     }
     for kind, make in makers.items():
         if kind in problem.kinds:

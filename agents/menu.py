@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from envs import DesignProblem
-from envs.building import MIN_HEIGHT
+from envs.rules import MIN_HEIGHT, SLENDER
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
 from rigdda.barriers import FENCE_CLASSES
 
@@ -24,11 +24,9 @@ STATIONS = 32
 """Stations across the zone."""
 
 HEIGHTS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
-"""Heights of barriers [m]; fences begin at 1.5."""
-DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0), (2.0, 3.0, 4.0, 6.0, 8.0)
+"""Heights of barriers [m]."""
+DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 """Depths and widths of ditches [m]."""
-SLENDER = 0.4
-"""Thickness over height of a gravity wall."""
 CREST = 1.0
 """Width of the crest of an embankment [m]."""
 
@@ -60,7 +58,8 @@ class Menu:
         zone = self.zone
         corners = [x for x, _ in self.problem.site.slope.points if zone.start < x < zone.end]
         even = np.linspace(zone.start, zone.end, STATIONS)
-        return np.unique(np.round([*even, *corners], 2))
+        apart = [x for x in even if not corners or np.abs(np.subtract(corners, x)).min() >= FINEST]
+        return np.unique(np.round([*apart, *corners], 2))
 
     def lone(self, kind: str) -> list[Barrier]:
         """Return every barrier of a kind that may be built, over stations and sizes."""
@@ -99,7 +98,7 @@ class Menu:
         if kind == "fence":
             for name, row in FENCE_CLASSES.items():
                 for h in heights:
-                    if 1.5 <= h <= row.height:
+                    if row.lowest <= h <= row.height:
                         yield Fence(x, h, energy_class=name)
         elif kind == "ditch":
             for depth in DEPTHS:
@@ -148,7 +147,8 @@ class Menu:
             at = CLASSES.index(barrier.energy_class)
             for other in (at - level, at + level):
                 if 0 <= other < len(CLASSES):
-                    tall = min(barrier.height, FENCE_CLASSES[CLASSES[other]].height)
+                    row = FENCE_CLASSES[CLASSES[other]]
+                    tall = min(max(barrier.height, row.lowest), row.height, self.zone.max_height)
                     yield Fence(barrier.x, tall, energy_class=CLASSES[other])
 
     def _put(self, barrier: Barrier, x: float) -> list[Barrier]:
@@ -177,7 +177,8 @@ class Menu:
             low, high = MIN_HEIGHT, zone.max_height
             if isinstance(barrier, Fence):
                 assert barrier.energy_class is not None
-                high = min(high, FENCE_CLASSES[barrier.energy_class].height)
+                row = FENCE_CLASSES[barrier.energy_class]
+                low, high = row.lowest, min(high, row.height)
         else:
             low, high = zone.min_thickness, zone.max_thickness
         return msgspec.structs.replace(barrier, **{name: min(max(value, low), high)})

@@ -45,7 +45,7 @@ LEAST = 8
 """Candidates that a round of neighbours should have."""
 ADDED = 3
 """Barriers that are tried beside the best layout in every round."""
-AS_GOOD = 0.5
+AS_GOOD = 1.0
 """Standard errors behind the best within which a layout with fewer barriers is built instead."""
 BEST_OF = 8
 """Singles of a kind of which pairs are made."""
@@ -78,12 +78,16 @@ def design(
     ledger.starts |= {arm.layout for arm in lone}
     pairs = foretold(problem, lone, lone, track.nothing, int(PAIRS * simulations / first))
     seen = [arm.layout for arm in lone if arm.layout]
-    best = track.race([*seen[:3], *pairs], int(PAIRS * simulations), first, keep=FINALISTS)
+    field = [*(arm.layout for arm in _first_of_kinds(lone, 1)), *seen[:3], *pairs]
+    budget, leaders = int(PAIRS * simulations), lone[:FINALISTS]
+    best = track.race(field, budget, first, keep=FINALISTS, leaders=leaders)
     seen = [*(arm.layout for arm in best), *seen[:2]]
-    near = nearby(track, menu, best, lone, int(NEARBY * simulations), first)
-    finalists = list(dict.fromkeys([(), *(arm.layout for arm in near), *seen]))[:FINALISTS]
-    budget = int(FINAL * simulations)
-    ends = track.race(finalists, budget, first, keep=2, stage="final", strict=True)
+    near = nearby(track, menu, best, lone, int(NEARBY * simulations), first // 2)
+    last = [arm.layout for arm in near]
+    fewer = [less for layout in last[:1] for less in _fewer(layout) if less]
+    finalists = list(dict.fromkeys([(), *last[:1], *fewer, *last[1:], *seen]))[:FINALISTS]
+    budget, keep = int(FINAL * simulations), len(finalists)
+    ends = track.race(finalists, budget, first, keep, stage="final", strict=True, leaders=near)
     return ledger.result(ledger.evaluate(simplest(ends, track.nothing), "report", ledger.left))
 
 
@@ -105,7 +109,7 @@ def foretold(
     Of an event the mean bill of both is foretold as the product of theirs over that of nothing. At
     most a third are of the same kinds.
     """
-    firsts, seconds = _best_of(arms), _best_of(others)
+    firsts, seconds = _first_of_kinds(arms, BEST_OF), _first_of_kinds(others, BEST_OF)
     found: dict[Layout, float] = {}
     for one, two in itertools.product(firsts, seconds):
         both = tuple(sorted((*one.layout, *two.layout), key=lambda b: b.x))
@@ -128,11 +132,11 @@ def foretold(
     return chosen[:n]
 
 
-def _best_of(arms: Sequence[Arm]) -> list[Arm]:
-    """Return the first `BEST_OF` arms of every kind, nothing left out; the best come first."""
+def _first_of_kinds(arms: Sequence[Arm], n: int) -> list[Arm]:
+    """Return the first `n` arms of every kind, nothing left out; the best come first."""
     kept: dict[tuple[str, ...], list[Arm]] = {}
     for arm in arms:
-        if arm.layout and len(kept.setdefault(arm.kinds, [])) < BEST_OF:
+        if arm.layout and len(kept.setdefault(arm.kinds, [])) < n:
             kept[arm.kinds].append(arm)
     return [arm for group in kept.values() for arm in group]
 
@@ -143,7 +147,7 @@ def nearby(
     """Return the best of rounds of neighbours around the best, the best first."""
     zone = menu.zone
     step, level = max(FINEST, (zone.end - zone.start) / 16.0), 2
-    centres, raced, tried = best[:2], best, set(track.seen)
+    centres, raced, tried = _leaders(best), best, set(track.seen)
     if not centres:
         return []
     end = track.ledger.left - budget
@@ -153,15 +157,25 @@ def nearby(
         around = itertools.chain.from_iterable(_around(track, menu, centres, lone, step, level))
         layouts = [layout for layout in dict.fromkeys(around) if layout not in tried]
         field = [*(arm.layout for arm in centres), *layouts]
-        found = track.race(field, left // (rounds - i), first, keep=3)
+        found = track.race(field, left // (rounds - i), first, keep=3, leaders=raced)
         if not found:
             break
         raced = found
         tried |= set(track.seen)
         if found[0].layout == centres[0].layout:
             step, level = max(FINEST, 0.5 * step), 1
-        centres = found[:1] if found[0].layout else centres
+        centres = _leaders(found) or centres
     return raced
+
+
+def _leaders(arms: Sequence[Arm]) -> list[Arm]:
+    """Return the best arm, and the best one of other kinds; the best come first."""
+    return _first_of_kinds(arms, 1)[:2]
+
+
+def _fewer(layout: Layout) -> list[Layout]:
+    """Return a layout without each of its barriers."""
+    return [(*layout[:i], *layout[i + 1 :]) for i in range(len(layout))]
 
 
 def _around(
@@ -172,6 +186,6 @@ def _around(
     if layout:
         yield foretold(menu.problem, centres[:1], lone, track.nothing, ADDED)
     if len(layout) > 1:
-        yield [(*layout[:i], *layout[i + 1 :]) for i in range(len(layout))]
+        yield _fewer(layout)
     for centre in centres:
         yield menu.neighbours(centre.layout, step, level)

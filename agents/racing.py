@@ -7,7 +7,7 @@ with more releases each; who is far behind goes at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from agents.arms import Arm, allocation, behind
 from agents.protocol import Ledger
@@ -50,6 +50,7 @@ class Track:
         keep: int,
         stage: str = "search",
         strict: bool = False,
+        leaders: Sequence[Arm] = (),
     ) -> list[Arm]:
         """Return the best `keep` candidates of a race, the best first; none if none can be paid.
 
@@ -68,6 +69,8 @@ class Track:
             Stream of the releases.
         strict : bool
             Whether a target counts as missed unless its upper bound meets it.
+        leaders : sequence of Arm
+            Who led the races before: they tell which events are left.
         """
         budget = min(budget, self.ledger.left)
         end = self.ledger.left - budget
@@ -79,7 +82,7 @@ class Track:
             each = (self.ledger.left - end) // ((rounds - done) * max(1, len(alive)))
             if done == 0 and rounds > 1:
                 each = max(first, each)
-            if not self._round(alive, each, end, stage, alive[: 2 * keep] if done else []):
+            if not self._round(alive, each, end, stage, alive[: 2 * keep] if done else leaders):
                 alive = alive if done else []
                 break
             alive = self._survivors(alive, keep, done == rounds - 1, done == 0)
@@ -92,14 +95,16 @@ class Track:
         arms = arms[: budget // max(1, each)]
         return arms if self._round(arms, each, self.ledger.left - budget, "search", []) else []
 
-    def _round(self, alive: list[Arm], each: int, end: int, stage: str, leaders: list[Arm]) -> bool:
+    def _round(
+        self, alive: list[Arm], each: int, end: int, stage: str, leaders: Sequence[Arm]
+    ) -> bool:
         """Give every candidate the same releases; False if they cannot be paid.
 
         Of fences the strongest come first: what they hold serves the weaker ones.
         """
         least = 2 * len(self.problem.site.events)
         room = (self.ledger.left - end) // max(1, len(alive))
-        counts = allocation(self.problem, max(min(each, room), least), leaders)
+        counts = allocation(self.problem, max(min(each, room), least), leaders, self.nothing)
         if not alive or sum(counts.values()) > room:
             return False
         start = {name: self._next.get((stage, name), 0) for name in counts}

@@ -126,8 +126,9 @@ def _may(menu: Menu, kind: str) -> bool:
 
 def _fences(menu: Menu, x: float, energy: float, height: float) -> Iterator[Fence]:
     """Yield the fences that may stand at a chainage and take an energy at a height."""
-    tall = max(1.0, math.ceil(2.0 * height - 1e-9) / 2.0)  # in steps of half a metre
+    wanted = math.ceil(2.0 * height - 1e-9) / 2.0  # in steps of half a metre
     for name, row in FENCE_CLASSES.items():
+        tall = max(row.lowest, wanted)
         if energy < 1e3 * name / ENERGY and tall <= min(row.height, menu.zone.max_height):
             fence = menu.put(Fence(x, tall, energy_class=name), x)
             if isinstance(fence, Fence):

@@ -20,7 +20,7 @@ from agents.menu import Menu, spread
 from agents.racing import Track
 from agents.rule import rule
 from agents.surface import Surface
-from rigdda import Barrier, Layout
+from rigdda import Barrier, Ditch, Layout
 
 SPREAD_OUT = 0.5
 """Share of the budget that goes to barriers as different as can be."""
@@ -28,6 +28,8 @@ BATCHES = 4
 """In how many batches the rest goes to those that promise most."""
 TRUST = {"fence": 0.7, "mesh": 1.0}
 """How far what the ensemble says of a kind is believed beforehand; of all others by half."""
+NEAR = 0.05
+"""Distance within which a ditch is dug at the toe [m]."""
 BOLD = 1.0
 """Standard deviations below its mean that a barrier is hoped to be."""
 
@@ -91,23 +93,27 @@ def _apart(
 ) -> list[Layout]:
     """Return the rule's layout, the best constant, and different barriers of every kind."""
     each = max(2, n // max(1, len(kinds)))
-    lists = [_different(kind, each) for kind in kinds]
+    toe = track.problem.site.slope.toe
+    lists = [_different(kind, each, toe) for kind in kinds]
     mixed = [(b,) for row in itertools.zip_longest(*lists) for b in row if b is not None]
     known = [rule(track.problem, ensemble, menu), constant(track.problem, menu)]
     return [layout for layout in dict.fromkeys([*known, *mixed]) if track.problem.fits(layout)]
 
 
-def _different(kind: Kind, n: int) -> list[Barrier]:
-    """Return about `n` barriers of a kind as different as can be.
+def _different(kind: Kind, n: int, toe: float) -> list[Barrier]:
+    """Return about `n` barriers of a kind as different as can be, half of them where they belong.
 
-    Half of the fences are those of the best size at their station, as the ensemble sees it.
+    Of fences that half are those of the best size at their station, as the ensemble sees it; of
+    ditches those that are dug at the toe, the deepest of each width.
     """
-    if kind.barriers[0].kind != "fence":
-        return spread(kind.barriers, n)
-    best: dict[float, Barrier] = {}
-    for i in kind.order:
-        best.setdefault(kind.barriers[i].x, kind.barriers[i])
-    lists = spread(list(best.values()), (n + 1) // 2), spread(kind.barriers, n // 2)
+    own: dict[float, Barrier] = {}
+    if kind.barriers[0].kind == "fence":
+        for i in kind.order:
+            own.setdefault(kind.barriers[i].x, kind.barriers[i])
+    elif kind.barriers[0].kind == "ditch":
+        dug = [b for b in kind.barriers if isinstance(b, Ditch) and abs(b.x - toe) < NEAR]
+        own = {b.width: b for b in sorted(dug, key=lambda b: b.depth)}
+    lists = spread(list(own.values()), (n + 1) // 2), spread(kind.barriers, n // 2 if own else n)
     both = [b for row in itertools.zip_longest(*lists) for b in row if b is not None]
     return list(dict.fromkeys(both))
 

@@ -13,7 +13,6 @@ from agents.menu import CLASSES, STEP, Menu
 from agents.protocol import Ledger, Proposals
 from agents.rule import rule
 from envs import DesignProblem
-from envs.building import MIN_HEIGHT
 from rigdda import Fence, Layout
 from rigdda.barriers import FENCE_CLASSES
 
@@ -51,7 +50,8 @@ def _smaller(layout: Layout, lower: int, weaker: int) -> Layout:
     for b in layout:
         if isinstance(b, Fence) and b.energy_class is not None:
             name = CLASSES[max(0, CLASSES.index(b.energy_class) - weaker)]
-            tall = min(max(MIN_HEIGHT, b.height - lower * STEP), FENCE_CLASSES[name].height)
+            row = FENCE_CLASSES[name]
+            tall = min(max(row.lowest, b.height - lower * STEP), row.height)
             b = Fence(b.x, tall, energy_class=name)
         out.append(b)
     return tuple(out)

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from envs.rules import MIN_GAP, MIN_HEIGHT, STEEPEST, TOLERANCE, Rules, Span, meet, room
-from rigdda import BadInput, Barrier, Ditch, Fence, Mesh
+from envs.rules import MIN_GAP, MIN_HEIGHT, SLENDER, STEEPEST, TOLERANCE, Rules, Span, meet, room
+from rigdda import BadInput, Barrier, Ditch, Fence, GravityWall, Mesh
 
 MIN_FLOOR = 1.0
 """Least width of the floor of a ditch that is designed [m]: a machine empties it, and what falls
@@ -39,8 +39,13 @@ class Room(Rules):
     def put(self, barrier: Barrier, x: float) -> Barrier | None:
         """Return a barrier moved to `x`; a ditch with the sides that it needs there.
 
-        It is as deep as these sides allow; None if that is less than `MIN_HEIGHT`.
+        It is as deep as these sides allow; None if that is less than `MIN_HEIGHT`. A gravity wall
+        is as thick as its height needs, as high as the greatest thickness allows.
         """
+        if isinstance(barrier, GravityWall):
+            tall = min(barrier.height, self.zone.max_thickness / SLENDER)
+            thick = max(barrier.thickness, SLENDER * tall)
+            return msgspec.structs.replace(barrier, x=x, height=tall, thickness=thick)
         if not isinstance(barrier, Ditch):
             return msgspec.structs.replace(barrier, x=x)
         end = x + barrier.width

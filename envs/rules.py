@@ -9,7 +9,18 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, Layout, Mesh, Site, check
+from rigdda import (
+    BadInput,
+    Barrier,
+    Ditch,
+    Embankment,
+    Fence,
+    GravityWall,
+    Layout,
+    Mesh,
+    Site,
+    check,
+)
 from rigdda.barriers import MeshOption, as_layout
 from rigdda.place import BarrierZone
 
@@ -20,8 +31,16 @@ STEEPEST = {"ditch": 30.0, "embankment": 25.0, "gravity_wall": 30.0, "wall": 30.
 """Greatest mean inclination of the ground under a barrier [deg]. On steeper ground fill slides,
 and what is dug or founded there starts a fall itself. Fences stand on posts, anywhere."""
 
+MACHINE = 3.0
+"""Width of a machine that builds, empties and mends what is dug, filled or cast [m]: so much ground
+that it can stand on lies beside the works, above and below together."""
+
 MIN_HEIGHT = 0.5
 """Least height of a barrier that is designed, and depth of a ditch [m]."""
+
+SLENDER = 0.4
+"""Least thickness over height of a gravity wall [-]: it stands by its weight, also in the wind and
+on ground that gives."""
 
 MIN_GAP = 0.5
 """Least distance between the works of two barriers [m]."""
@@ -59,6 +78,25 @@ class Rules:
             mend = f"leave room in {site.rooms}: elsewhere loose rock lies"
             raise BadInput("zone", (zone.start, zone.end), mend)
         self._x, self._y = site.profile.points.T
+        self._gentle = {angle: self._stretches(angle) for angle in set(STEEPEST.values())}
+
+    def _stretches(self, steepest: float) -> list[Span]:
+        """Return the stretches of the ground that are at most so steep [deg], each whole."""
+        rise, run = np.abs(np.diff(self._y)), np.diff(self._x)
+        found: list[Span] = []
+        for k in np.flatnonzero(rise <= run * math.tan(math.radians(steepest)) + TOLERANCE):
+            low, high = float(self._x[k]), float(self._x[k + 1])
+            if found and found[-1][1] == low:
+                low = found.pop()[0]
+            found.append((low, high))
+        return found
+
+    def beside(self, start: float, end: float, steepest: float) -> float:
+        """Return how wide the ground beside works is, that is at most so steep [deg]: [m]."""
+        gentle = self._gentle[steepest]
+        above = max((start - low for low, high in gentle if low <= start <= high), default=0.0)
+        below = max((high - end for low, high in gentle if low <= end <= high), default=0.0)
+        return above + below
 
     def level(self, x: Floats) -> Floats:
         """Return the elevation of the natural ground at chainages [m]."""
@@ -147,6 +185,12 @@ class Rules:
             if angle > steepest + TOLERANCE:
                 mend = f"put it where the ground is at most {steepest:g} deg steep, not {angle:.1f}"
                 raise BadInput(f"{where}.x", barrier.x, mend)
+            beside = self.beside(start, end, steepest)
+            if beside < MACHINE - TOLERANCE:
+                mend = (
+                    f"put it where {MACHINE:g} m beside it are left to a machine, not {beside:.1f}"
+                )
+                raise BadInput(f"{where}.x", barrier.x, mend)
         if isinstance(barrier, Ditch | Embankment):
             try:
                 barrier.build(self.site.profile, self.site.soil)
@@ -164,6 +208,11 @@ class Rules:
         if isinstance(barrier, Fence) and barrier.energy_class is None:
             mend = "give its energy class instead of a capacity"
             raise BadInput(f"{where}.capacity", barrier.capacity, mend)
+        if isinstance(barrier, GravityWall):
+            least = SLENDER * barrier.height
+            if barrier.thickness < least - TOLERANCE:
+                mend = f"give at least {least:g}: a gravity wall stands by its weight"
+                raise BadInput(f"{where}.thickness", barrier.thickness, mend)
         if isinstance(barrier, Ditch):
             least = self.site.ditch_side(barrier.x, barrier.width)
             if barrier.side_slope < least - TOLERANCE:

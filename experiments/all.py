@@ -26,6 +26,7 @@ SCRIPTS = (
     "ablation",
     "outcome_step",
     "fence_step",
+    "thrust",
     "hard_cases",
     "speed_error",
 )

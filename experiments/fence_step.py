@@ -99,7 +99,8 @@ def difference(rows: list[Row]) -> float:
 
 def picture(figure: Figure, rows: list[Row]) -> None:
     """Draw debris and failures against the step."""
-    for axes, what in zip(figure.subplots(1, 2), ("debris", "failures"), strict=True):
+    left, right = figure.subplots(1, 2)
+    for axes, what in ((left, "debris"), (right, "failures")):
         for name, colour in zip(LAYOUTS, COLOURS, strict=True):
             here = [r for r in rows if r["layout"] == name]
             dt, value, half = (
@@ -113,7 +114,7 @@ def picture(figure: Figure, rows: list[Row]) -> None:
         axes.set_ylabel(
             "share past the road's edge [-]" if what == "debris" else "barriers that fail"
         )
-    axes.legend()
+    left.legend(loc="lower left", ncols=2)
 
 
 def run(quick: bool, out: Path) -> Number:

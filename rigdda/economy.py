@@ -17,6 +17,7 @@ import numpy as np
 
 from rigdda import check
 from rigdda.barriers import (
+    FENCE_CLASSES,
     Barrier,
     Ditch,
     Embankment,
@@ -274,7 +275,7 @@ def _price(site: Site, barrier: Barrier, outline: Floats | None) -> float:
             option = site.mesh(barrier)
             return option.area * option.price
         case Fence():
-            return _fence(prices, barrier) * barrier.height + prices.fence_base
+            return _fence(prices, barrier) + prices.fence_base
         case Ditch():
             assert outline is not None
             return prices.ditch_base + _dug(site, outline)
@@ -285,14 +286,17 @@ def _price(site: Site, barrier: Barrier, outline: Floats | None) -> float:
 
 
 def _fence(prices: Prices, fence: Fence) -> float:
-    """Return the price of a fence [EUR/m2]."""
+    """Return the price of a fence, without its foundations [EUR/m].
+
+    One that is lower than any of its class costs as much as the lowest.
+    """
     if fence.energy_class is None:
         mend = "give an energy_class instead: only a certified fence has a price"
         raise BadInput("fence capacity", fence.capacity, mend)
     name = f"{fence.energy_class:g}"
     if name not in prices.fence:
         raise BadInput("fence energy_class", fence.energy_class, f"add {name} to prices.fence")
-    return prices.fence[name]
+    return prices.fence[name] * max(fence.height, FENCE_CLASSES[fence.energy_class].lowest)
 
 
 def _dug(site: Site, outline: Floats) -> float:

@@ -168,7 +168,7 @@ def fly(
     body.path = body.lately * p.dt
     apply_forces(bodies, contacts, m, motion, islands, 0, False, p)
     account_block(body, motion, 0, p, ledger)
-    body.touching = 0
+    body.apart += p.dt
     body.wait = max(body.wait - 1, 0)
     move_block(body, motion, 0, p.dt)
     body.quiet = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.constants import AWAKE, END_CHECK, NEW_HIT_TIME, OPEN
+from rigdda.constants import APART, AWAKE, END_CHECK, OPEN
 from rigdda.kernel import inlined, kernel
 from rigdda.motion import kinetic_energy
 from rigdda.records import (
@@ -65,7 +65,7 @@ def note_hits(
         i, barrier = barrier_contact(gauges, c.a, c.b)
         if barrier < 0 or c.state == OPEN:
             continue
-        if time - gauges.last_touch[i, barrier] > NEW_HIT_TIME:
+        if time - gauges.last_touch[i, barrier] > APART:
             height = c.y - gauges.target[barrier].ground
             events = write_event(gauges, events, time, HIT, bodies[i], i, barrier, c.x, c.y, height)
         gauges.last_touch[i, barrier] = time

@@ -193,8 +193,8 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping : float
         Mass-proportional damping [1/s].
     damping_when : str
-        "contact": of blocks that touch something; "always": the paper's, in flight, too, with which
-        energies at a barrier are four to ten times too low.
+        "contact": of blocks that touch something, or did within 0.1 s; "always": the paper's, in
+        flight, too, with which energies at a barrier are four to ten times too low.
     duration : float
         Longest simulated time [s].
     dt : float

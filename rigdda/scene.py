@@ -181,7 +181,7 @@ class Scene:
         Mass-proportional damping coefficient alpha [1/s] (Koo and Chern 1998, damping force).
     damping_when : {"always", "contact"}
         "always" is the paper's: a fall is capped at g/alpha, 16 m/s for 0.6 1/s, so energies at a
-        barrier stay low. "contact" damps only blocks that touch something.
+        barrier stay low. "contact" damps only blocks that touch something, or did within 0.1 s.
     base_motion : (m, 3) array_like, optional
         Time [s] and acceleration of the ground, x and y [m/s2]; linear in between, a repeated time
         makes a jump; before and after it the ground does not accelerate. Motion is computed

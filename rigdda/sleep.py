@@ -40,7 +40,7 @@ def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> 
         least = 1e300
         for place in range(islands.block_start[s], islands.block_start[s + 1]):
             body = bodies[islands.block_item[place]]
-            quiet = body.touching == 1 and top_speed(body) < SLEEP_SPEED
+            quiet = body.apart == 0.0 and top_speed(body) < SLEEP_SPEED
             body.quiet = body.quiet + p.dt if quiet else 0.0
             least = min(least, body.quiet)
         if least < SLEEP_TIME:

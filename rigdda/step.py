@@ -204,7 +204,7 @@ def move_island(
     for s in range(b1 - b0):
         block = bodies[islands.block_item[b0 + s]]
         account_block(block, motion, s, p, ledger)
-        block.touching = 0
+        block.apart += p.dt
     for item in range(c0, c1):
         c = contacts[islands.contact_item[item]]
         keep_memory(c, struck, islands.relaxed[0] == 1)
@@ -213,9 +213,9 @@ def move_island(
         account_contact(c, motion.d, islands, ledger, gauges)
         if len(gauges.target) > 0:
             press(c, gauges, p.dt)
-        bodies[c.a].touching = 1
+        bodies[c.a].apart = 0.0
         if c.b >= 0:
-            bodies[c.b].touching = 1
+            bodies[c.b].apart = 0.0
     for s in range(b1 - b0):
         i = islands.block_item[b0 + s]
         block = bodies[i]

@@ -54,6 +54,11 @@ def test_concrete_is_paid_by_the_cubic_metre():
         assert FLAT.capital((kind(32.0, 2.0, 0.5),)) == pytest.approx(350.0)
 
 
+def test_a_fence_costs_at_least_the_lowest_of_its_class():
+    prices = [FLAT.capital((Fence(31.0, h, energy_class=1500),)) for h in (2.0, 3.0, 4.0)]
+    assert prices == pytest.approx([300.0 + 420.0 * h for h in (3.0, 3.0, 4.0)])
+
+
 def test_access_makes_barriers_dearer_with_height():
     x = 29.8 * (1.0 - 30.0 / 45.0)  # 30 m above the road
     assert FLAT.access(x) == pytest.approx(1.0 + 1.5 * 30.0 / 60.0)

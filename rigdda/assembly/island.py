@@ -6,7 +6,7 @@ import math
 
 from rigdda.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.assembly.springs import add_block, add_force, normal_row, shear_row
-from rigdda.constants import BOLT, OPEN, SLIP, SMALL_ISLAND, STICK
+from rigdda.constants import APART, BOLT, OPEN, SLIP, SMALL_ISLAND, STICK
 from rigdda.kernel import inlined, kernel
 from rigdda.records import Bodies, Body, Contact, Contacts, Islands, Matrix, Parameters
 
@@ -14,7 +14,7 @@ from rigdda.records import Bodies, Body, Contact, Contacts, Islands, Matrix, Par
 @kernel
 def damping_of(body: Body, p: Parameters) -> float:
     """Return the damping coefficient of a block in this step [1/s]."""
-    if p.damping_in_contact_only and body.touching == 0:
+    if p.damping_in_contact_only and body.apart > APART:
         return 0.0
     return p.damping
 

@@ -157,6 +157,8 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
 class FenceClass(NamedTuple):
     """What fences of an energy class are like."""
 
+    lowest: float
+    """Least height that is made [m]: a lower one costs as much."""
     height: float
     """Greatest height [m]."""
     elongation: float
@@ -164,15 +166,15 @@ class FenceClass(NamedTuple):
 
 
 FENCE_CLASSES = {
-    100: FenceClass(2.5, 2.0),
-    250: FenceClass(3.0, 2.5),
-    500: FenceClass(4.0, 3.5),
-    1000: FenceClass(5.0, 4.5),
-    1500: FenceClass(5.0, 5.0),
-    2000: FenceClass(6.0, 5.5),
-    3000: FenceClass(6.0, 6.5),
-    5000: FenceClass(7.0, 7.5),
-    8500: FenceClass(8.0, 9.0),
+    100: FenceClass(1.5, 2.5, 2.0),
+    250: FenceClass(2.0, 3.0, 2.5),
+    500: FenceClass(2.0, 4.0, 3.5),
+    1000: FenceClass(3.0, 5.0, 4.5),
+    1500: FenceClass(3.0, 5.0, 5.0),
+    2000: FenceClass(4.0, 6.0, 5.5),
+    3000: FenceClass(4.0, 6.0, 6.5),
+    5000: FenceClass(5.0, 7.0, 7.5),
+    8500: FenceClass(6.0, 8.0, 9.0),
 }
 """Fences on the market by the energy of the impact that they stop [kJ], as EAD 340059 classifies
 kits; heights and elongations are orders of magnitude, from memory."""

@@ -109,6 +109,7 @@ def write_bodies(corners: NDArray, traits: NDArray, bodies: Bodies, outlines: Ou
         body.mass, body.inertia = density * area, density * second
         body.vx, body.vy, body.omega = traits[i, 1], traits[i, 2], traits[i, 3]
         body.surface, body.status = int(traits[i, 4]), int(traits[i, 5])
+        body.apart = math.inf
         farthest = 0.0
         for k in range(low, high):
             dx, dy = corners[k, 0] - body.x, corners[k, 1] - body.y

@@ -9,7 +9,7 @@ import pytest
 from valley import SITE, Barren, Valley
 
 from agents import race, random
-from agents.arms import Arm, behind
+from agents.arms import Arm, allocation, behind
 from agents.bounds import on_bound
 from agents.menu import Menu, spread
 from agents.protocol import Entry
@@ -151,3 +151,11 @@ def test_an_arm_is_behind_by_its_paired_difference(valley: Valley) -> None:
     assert behind(other, nothing, nothing) < -5.0 < 5.0 < behind(nothing, other, nothing)
     rates = sum(valley.site.rate(name, ()) for name in names)
     assert nothing.objective() == pytest.approx(50.0 * rates)
+
+
+def test_an_allocation_never_asks_for_more_than_it_may() -> None:
+    """A race that cannot be paid by one release ends without an answer."""
+    problem = DesignProblem("verge")
+    nothing = Arm(problem, ())
+    for n in range(10, 400):
+        assert sum(allocation(problem, n, [], nothing).values()) <= n

@@ -11,6 +11,7 @@ from agents.menu import Menu
 from agents.rule import ENERGY, FREEBOARD, MASS, SPEED, demands, ritchie, rule
 from envs import DesignProblem
 from rigdda import Ditch, Embankment, Fence, Site
+from rigdda.barriers import FENCE_CLASSES
 
 STATIONS = np.array([14.0, 20.0, 27.0])
 
@@ -51,7 +52,8 @@ def test_the_class_takes_the_energy_with_its_factor() -> None:
         speed = np.sqrt(2.0 * energy / (1000.0 * MASS)) / SPEED
         (fence,) = build(crossings({1: speed}))
         assert isinstance(fence, Fence) and fence.x == 20.0
-        assert fence.height == 2.0  # 1.62 m, in steps of half a metre
+        # 1.62 m, in steps of half a metre, and no lower than its class is made
+        assert fence.height == max(2.0, FENCE_CLASSES[fence.energy_class].lowest)
         least = [c for c in (100, 250, 500, 1000, 1500, 2000, 3000) if 1e3 * c / ENERGY > energy]
         assert fence.energy_class == least[0]
 

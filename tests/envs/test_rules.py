@@ -60,6 +60,7 @@ def test_sound_layouts_may_be_built(problem: DesignProblem, layout: Layout) -> N
         # sizes
         ([Wall(14.0, 5.5)], r"layout\[0\]\.height = 5\.5: .* at most 5$"),
         ([Wall(14.0, 2.0, 0.4)], r"layout\[0\]\.thickness = 0\.4"),
+        ([GravityWall(14.0, 3.0, 1.0)], r"layout\[0\]\.thickness = 1\.0: give at least 1\.2"),
         ([Ditch(11.0, 3.5, 7.0, 0.67)], r"layout\[0\]\.depth = 3\.5"),
         ([Ditch(11.0, 1.0, 6.0)], r"layout\[0\]\.side_slope = 0\.25: give at least 0\.67"),
         ([Ditch(11.0, 1.0, 1.2, 0.67)], r"layout\[0\]: ditch width = 1\.2"),
@@ -134,3 +135,21 @@ def test_a_ditch_gets_the_sides_and_the_depth_of_its_ground(problem: DesignProbl
 def test_mesh_hangs_over_the_rock_that_it_holds(problem: DesignProblem) -> None:
     assert problem.place.mesh(0) == Mesh(1.5, "light")
     assert math.isfinite(problem.site.capital([problem.place.mesh(0)]))
+
+
+def test_a_machine_needs_room_beside_works() -> None:
+    """The upper bench of bench is 2 m wide: a fence may stand there, what is dug or cast not."""
+    bench = DesignProblem("bench")
+    assert bench.fits((Fence(14.5, 3.0, energy_class=1000),))
+    for works in (GravityWall(14.2, 1.0, 0.5), Embankment(14.2, 0.5, 0.5)):
+        with pytest.raises(BadInput, match="3 m beside it are left to a machine"):
+            bench.check((works,))
+    assert bench.fits((GravityWall(31.0, 1.0, 0.5),))
+
+
+def test_a_gravity_wall_is_put_as_thick_as_it_needs() -> None:
+    room = DesignProblem("verge").place
+    put = room.put(GravityWall(0.0, 2.0, 0.5), 9.0)
+    assert isinstance(put, GravityWall) and (put.height, put.thickness) == (2.0, 0.8)
+    tall = room.put(GravityWall(0.0, 9.0, 0.5), 9.0)
+    assert isinstance(tall, GravityWall) and (tall.height, tall.thickness) == (5.0, 2.0)

@@ -24,8 +24,6 @@ def table(path: Path) -> list[dict[str, str]]:
 
 
 AMISS = {
-    "fence_step": "without barriers the mass of quick brings .48, .53, .60 of it onto the road at "
-    "10, 5, 2.5 ms, 6 releases: 2.4 of the interval; all barriers agree",
     "hard_cases": "hopper-1000 sinks by 0.11 at 25 ms, bar 0.05, with the kernels that mend "
     "sliding over joints; at 5 ms all cases hold",
 }

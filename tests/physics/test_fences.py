@@ -235,7 +235,8 @@ def test_classes():
     assert fence.for_width(25.0).capacity == 1e5
     given = Fence(5.0, 4.0, 2e5)
     assert given.for_width(3.0) is given and math.isinf(given.resistance)
-    heights, elongations = np.array(list(FENCE_CLASSES.values())).T
+    lowest, heights, elongations = np.array(list(FENCE_CLASSES.values())).T
+    assert (np.diff(lowest) >= 0.0).all() and (lowest < heights).all()
     assert (np.diff(heights) >= 0.0).all() and (np.diff(elongations) > 0.0).all()
 
 

@@ -109,4 +109,5 @@ def test_nothing_low_holds_a_jammed_mass(barrier, dt):
     site = replace(site, motion=replace(site.motion, dt=dt, damping_when="contact", duration=12.0))
     (found,) = release(site, (barrier,), 0, "mass")[1].barriers
     assert found.failed and found.state in ("pushed", "slid", "overturned")
-    assert found.thrust > found.resistance
+    # a wall may be knocked over before anything thrusts
+    assert found.state == "overturned" or found.thrust > found.resistance

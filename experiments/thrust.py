@@ -1,0 +1,113 @@
+"""Thrust against resistance: what a mass of rock pushes with, and what the catalogue bears.
+
+Fences, embankments and gravity walls of every height of the catalogue, each alone under the mass of
+`shu-hwa` and of `quick`, on a bench or at the toe, in steps of 10 and 2.5 ms. Thrust is the
+greatest mean over a second, resistance is weight times friction or the mean braking force of the
+class, see `rigdda.resistance`. Judged by the barriers that stand although the thrust was beyond
+what they bear. Drawn at 0.01: what failed by energy before anything leaned on it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from msgspec.structs import replace
+
+from agents.menu import HEIGHTS
+from envs.rules import SLENDER
+from experiments.script import BLUE, GREEN, RED, Number, draw, main, say, write
+from rigdda import Barrier, Embankment, Fence, GravityWall, Site
+from rigdda.barriers import FENCE_CLASSES, describe
+from rigdda.release import release_many
+
+Row = dict[str, float | str]
+
+SITES = {"shu-hwa": 83.6, "quick": 23.0}
+"""Sites with a mass, and where the barriers stand [m]: at the toe, and on a bench."""
+STEPS, QUICK_STEPS = (1e-2, 2.5e-3), (1e-2,)
+"""Steps [s]."""
+RELEASES, QUICK_RELEASES = 6, 2
+COLOURS = {"fence": BLUE, "embankment": GREEN, "gravity_wall": RED}
+BEYOND = 1.1
+"""Thrust over resistance that is clearly beyond what a barrier bears [-]: friction of rock that
+lies on a wall, and its inertia, bear a little."""
+
+
+def barriers(x: float, highest: float) -> Iterator[Barrier]:
+    """Yield the barriers of the catalogue of every height up to the highest, at a chainage [m]."""
+    for name, row in FENCE_CLASSES.items():
+        yield Fence(x, row.height, energy_class=name)
+    for h in (0.6, *HEIGHTS):
+        if h <= highest:
+            yield Embankment(x, h)
+            yield GravityWall(x, h, max(0.5, SLENDER * h))
+
+
+def row(site: Site, barrier: Barrier, releases: int) -> Row:
+    """Return what a barrier bore in releases of the mass of a site; forces in kN/m."""
+    outcomes = release_many([(site, (barrier,), seed, "mass") for seed in range(releases)])
+    found = [outcome.barriers[0] for outcome in outcomes]
+    thrust = np.array([f.thrust for f in found])
+    wrong = sum(f.thrust > BEYOND * f.resistance and not f.failed for f in found)
+    return {
+        "site": site.name,
+        "barrier": describe(barrier),
+        "kind": barrier.kind,
+        "height_m": float(getattr(barrier, "height", 0.0)),
+        "dt_ms": 1e3 * site.motion.dt,
+        "releases": releases,
+        "thrust_kn": round(1e-3 * float(thrust.mean()), 2),
+        "greatest_thrust_kn": round(1e-3 * float(thrust.max()), 2),
+        "resistance_kn": round(1e-3 * found[0].resistance, 2),
+        "failed": sum(f.failed for f in found),
+        "stand_beyond_resistance": wrong,
+    }
+
+
+def picture(figure: Figure, rows: list[Row]) -> None:
+    """Draw thrust over resistance against height, open where some stand and filled where none."""
+    names = list(dict.fromkeys(str(r["site"]) for r in rows))
+    panels = figure.subplots(1, len(names), squeeze=False)[0]
+    for axes, name in zip(panels, names, strict=True):
+        for kind, colour in COLOURS.items():
+            own = [r for r in rows if r["site"] == name and r["kind"] == kind]
+            for r in own:
+                ratio = float(r["greatest_thrust_kn"]) / float(r["resistance_kn"])
+                gone = float(r["failed"]) / float(r["releases"])
+                face = colour if gone == 1.0 else "none"
+                small = float(r["dt_ms"]) < 10.0
+                axes.plot(
+                    float(r["height_m"]), max(ratio, 1e-2), "s" if small else "o",
+                    color=colour, markerfacecolor=face, markersize=5 if small else 7,
+                )  # fmt: skip
+            axes.plot([], [], "o", color=colour, label=kind.replace("_", " "))
+        axes.axhline(1.0, color="0.8", zorder=0)
+        axes.set(title=f"mass of {name}", xlabel="height [m]", yscale="log")
+        axes.set_ylabel("greatest thrust over resistance [-]")
+        axes.legend(title="filled: fails in every release")
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Write thrust.csv and thrust.png."""
+    rows: list[Row] = []
+    for name, x in SITES.items():
+        base = Site.load(name)
+        for dt in QUICK_STEPS if quick else STEPS:
+            site = replace(base, motion=replace(base.motion, dt=dt))
+            say(f"thrust against resistance: {name}, {1e3 * dt:g} ms")
+            some = barriers(x, base.barrier_zone.max_height)
+            rows += [row(site, b, QUICK_RELEASES if quick else RELEASES) for b in some]
+    write(out / "thrust.csv", rows)
+    draw(out / "thrust.png", (11.0, 4.5), lambda figure: picture(figure, rows))
+    wrong = sum(float(r["stand_beyond_resistance"]) for r in rows)
+    ratio = [float(r["greatest_thrust_kn"]) / float(r["resistance_kn"]) for r in rows]
+    note = f"thrust over resistance up to {max(ratio):.1f}" if math.isfinite(max(ratio)) else ""
+    return Number("barriers that stand beyond what they bear", wrong, high=0.0, note=note)
+
+
+if __name__ == "__main__":
+    main(run)

@@ -92,11 +92,13 @@ def design(
 
 
 def simplest(ends: Sequence[Arm], nothing: Arm) -> Layout:
-    """Return the layout of the best, or of one with fewer barriers that is as good."""
+    """Return the layout of the best, or of one with fewer barriers, but not none, that is as good."""
     as_good = [
         arm
         for arm in ends
-        if arm.shortfall() <= ends[0].shortfall() and behind(arm, ends[0], nothing) < AS_GOOD
+        if arm.layout
+        and arm.shortfall() <= ends[0].shortfall()
+        and behind(arm, ends[0], nothing) < AS_GOOD
     ]
     return min([*ends[:1], *as_good], key=lambda arm: len(arm.layout)).layout if ends else ()
 

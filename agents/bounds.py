@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from envs import DesignProblem
-from envs.building import MIN_HEIGHT
+from envs.encoding import CLASSES
+from envs.rules import MIN_HEIGHT
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
-from rigdda.barriers import FENCE_CLASSES
 
 NEAR = 0.05
 """Distance from a bound at which a length lies on it [m]."""
@@ -14,7 +14,8 @@ NEAR = 0.05
 def on_bound(problem: DesignProblem, layout: Layout) -> tuple[str, ...]:
     """Return what lies on a bound of the zone, of its kind or of the list of classes, in words.
 
-    The bounds of mesh, and those by what stands next to a barrier, do not count.
+    The bounds of mesh, and those by what stands next to a barrier, do not count; nor does the
+    greatest height of a class of fence, as the next class is higher and dearer.
     """
     names = []
     for barrier in layout:
@@ -44,12 +45,10 @@ def _size(problem: DesignProblem, barrier: Barrier) -> list[str]:
     """Return which sizes of a barrier are the least or greatest."""
     zone = problem.zone
     if isinstance(barrier, Fence):
-        classes = tuple(FENCE_CLASSES)
         assert barrier.energy_class is not None
-        tallest = FENCE_CLASSES[barrier.energy_class].height
-        found = _ends(barrier.height, MIN_HEIGHT, min(tallest, zone.max_height), "height")
-        if barrier.energy_class in (classes[0], classes[-1]):
-            found.append("lowest class" if barrier.energy_class == classes[0] else "highest class")
+        found = _ends(barrier.height, MIN_HEIGHT, zone.max_height, "height")
+        if barrier.energy_class in (CLASSES[0], CLASSES[-1]):
+            found.append("lowest class" if barrier.energy_class == CLASSES[0] else "highest class")
         return found
     if isinstance(barrier, Ditch):
         depth = _ends(barrier.depth, MIN_HEIGHT, zone.max_depth, "depth")

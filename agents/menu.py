@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from envs import DesignProblem
+from envs.encoding import CLASSES
 from envs.rules import MIN_HEIGHT, SLENDER
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
 from rigdda.barriers import FENCE_CLASSES
@@ -25,18 +26,15 @@ STATIONS = 32
 
 HEIGHTS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Heights of barriers [m]."""
-DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 """Depths and widths of ditches [m]."""
 CREST = 1.0
-"""Width of the crest of an embankment [m]."""
+"""Least width of the crest of an embankment [m]: a machine builds it from above."""
 
 FINEST = 0.1
 """Least step of a station in a search [m]; places in it are rounded to it."""
 STEP = 0.5
 """Step of heights, depths and widths in a search [m]; of thickness half as much."""
-
-CLASSES = tuple(FENCE_CLASSES)
-"""Energy classes of fences [kJ], ascending."""
 
 
 class Menu:
@@ -60,6 +58,11 @@ class Menu:
         even = np.linspace(zone.start, zone.end, STATIONS)
         apart = [x for x in even if not corners or np.abs(np.subtract(corners, x)).min() >= FINEST]
         return np.unique(np.round([*apart, *corners], 2))
+
+    @property
+    def crest(self) -> float:
+        """Least width of the crest of an embankment [m]."""
+        return min(max(CREST, self.zone.min_thickness), self.zone.max_thickness)
 
     def lone(self, kind: str) -> list[Barrier]:
         """Return every barrier of a kind that may be built, over stations and sizes."""
@@ -106,8 +109,7 @@ class Menu:
                     if depth <= zone.max_depth and zone.min_width <= width <= zone.max_width:
                         yield Ditch(x, depth, width)
         elif kind == "embankment":
-            crest = min(max(CREST, zone.min_thickness), zone.max_thickness)
-            yield from (Embankment(x, h, crest) for h in heights)
+            yield from (Embankment(x, h, self.crest) for h in heights)
         else:
             for h in heights:
                 thick = round(SLENDER * h, 1)
@@ -181,6 +183,8 @@ class Menu:
                 low, high = row.lowest, min(high, row.height)
         else:
             low, high = zone.min_thickness, zone.max_thickness
+            if isinstance(barrier, Embankment):
+                low = self.crest
         return msgspec.structs.replace(barrier, **{name: min(max(value, low), high)})
 
 

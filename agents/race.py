@@ -92,7 +92,7 @@ def design(
 
 
 def simplest(ends: Sequence[Arm], nothing: Arm) -> Layout:
-    """Return the layout of the best, or of one with fewer barriers, but not none, that is as good."""
+    """Return the layout of the best, or of one as good with fewer barriers (but not none)."""
     as_good = [
         arm
         for arm in ends

@@ -9,10 +9,11 @@ from __future__ import annotations
 from agents import convex
 from agents.constant import constant
 from agents.crossings import Ensemble, ensemble_for
-from agents.menu import CLASSES, STEP, Menu
+from agents.menu import STEP, Menu
 from agents.protocol import Ledger, Proposals
 from agents.rule import rule
 from envs import DesignProblem
+from envs.encoding import CLASSES
 from rigdda import Fence, Layout
 from rigdda.barriers import FENCE_CLASSES
 

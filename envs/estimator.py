@@ -9,6 +9,7 @@ releases for that, each has drawn its event with a known chance; it then counts 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -161,7 +162,11 @@ def _weighted(
     facts: Mapping[str, Facts],
     shares: Mapping[str, float],
 ) -> Sums:
-    """Return sums in which each release counts with the rate of its event over its chance."""
+    """Return sums in which each release counts with the rate of its event over its chance.
+
+    What events cost without barriers is known, so that releases tell only what barriers change (a
+    control variate); else which events are drawn would decide most of a sum. It may be negative.
+    """
     rate = {name: site.rate(name, layout) for name in site.event_names}
     weight = np.array([rate[name] / shares[name] for name in found.event.tolist()])
     drawn = Account(
@@ -174,9 +179,17 @@ def _weighted(
     )
     mixed = _mixture(rate, facts, shares) if facts else None
     harm, repair, both, volume = _means(drawn, mixed, _mending(site, layout) * sum(rate.values()))
+    often = {name: rate[name] * fact.reached / fact.releases for name, fact in facts.items()}
+    seen = {n: float((found.event == n).mean()) / shares[n] for n in often}
+    dear = {n: (1.0 - seen[n]) * often[n] * facts[n].harm.mean for n in often}
+    much = math.fsum((1.0 - seen[n]) * often[n] * facts[n].volume.mean for n in often)
     spent = drawn.harm + drawn.repair
-    by_event = {n: float(spent[found.event == n].sum() / len(spent)) for n in site.event_names}
-    return Sums(harm, repair, both, volume, by_event)
+    by_event = {
+        n: float(spent[found.event == n].sum() / len(spent)) + dear.get(n, 0.0)
+        for n in site.event_names
+    }
+    more = math.fsum(dear.values())
+    return Sums(harm.moved(more), repair, both.moved(more), volume.moved(much), by_event)
 
 
 def _mixture(

@@ -89,6 +89,11 @@ class Mean(NamedTuple):
         """Return the mean of what is `factor` (at least 0) times as much."""
         return Mean(factor * self.value, factor * self.low, factor * self.high)
 
+    def moved(self, by: float) -> Mean:
+        """Return a mean that is `by` greater, and an interval that holds it and all it held."""
+        value = self.value + by
+        return Mean(value, min(self.low, value), max(self.high, value))
+
     @property
     def interval(self) -> Interval:
         """The 95 % interval."""

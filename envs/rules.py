@@ -21,7 +21,7 @@ from rigdda import (
     Site,
     check,
 )
-from rigdda.barriers import MeshOption, as_layout
+from rigdda.barriers import MeshOption, as_layout, earthworks
 from rigdda.place import BarrierZone
 
 Floats = NDArray[np.float64]
@@ -193,7 +193,7 @@ class Rules:
                 raise BadInput(f"{where}.x", barrier.x, mend)
         if isinstance(barrier, Ditch | Embankment):
             try:
-                barrier.build(self.site.profile, self.site.soil)
+                earthworks(self.site.profile, (barrier,), self.site.soil)
             except BadInput as bad:
                 raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
         return start, end

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import msgspec
@@ -59,10 +60,22 @@ def earthworks(
     BadInput
         If one does not fit.
     """
-    outlines: dict[Barrier, Floats] = {}
-    for barrier in sorted((b for b in layout if isinstance(b, Earthwork)), key=lambda b: b.x):
-        outlines[barrier], terrain = barrier.build(terrain, surface)
-    return terrain, outlines
+    works = sorted((b for b in layout if isinstance(b, Earthwork)), key=lambda b: b.x)
+    ground, outlines = _graded(terrain, tuple(works), surface)
+    return ground, dict(zip(works, outlines, strict=True))
+
+
+@lru_cache(maxsize=64)
+def _graded(
+    terrain: Terrain, works: tuple[Ditch | Embankment, ...], surface: str
+) -> tuple[Terrain, tuple[Floats, ...]]:
+    """Return the ground after earthworks, and their outlines: asked for by every release."""
+    outlines: list[Floats] = []
+    for work in works:
+        outline, terrain = work.build(terrain, surface)
+        outline.flags.writeable = False
+        outlines.append(outline)
+    return terrain, tuple(outlines)
 
 
 def as_layout(layout: Any) -> Layout:

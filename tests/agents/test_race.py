@@ -107,12 +107,10 @@ def test_what_lies_on_a_bound_is_named(site: Site) -> None:
     zone = problem.zone
     inside = problem.place.put(Ditch(30.0, 1.5, 3.0), 30.0)
     assert inside is not None and on_bound(problem, (inside,)) == ()
-    fence = Fence(zone.start, 2.5, energy_class=100)
-    assert on_bound(problem, (fence,)) == (
-        "fence: start of the zone",
-        "fence: greatest height",
-        "fence: lowest class",
-    )
+    fence = Fence(zone.start, 2.5, energy_class=100)  # higher ones are of the next class
+    assert on_bound(problem, (fence,)) == ("fence: start of the zone", "fence: lowest class")
+    tall = Fence(12.0, zone.max_height, energy_class=1000)
+    assert on_bound(problem, (tall,)) == ("fence: greatest height",)
     wall = GravityWall(zone.end - zone.min_thickness, 2.0, zone.min_thickness)
     found = on_bound(problem, (wall,))
     assert found == ("gravity wall: end of the zone", "gravity wall: least thickness")

@@ -135,6 +135,22 @@ def test_a_few_releases_cost_what_many_do_on_the_average(
     assert np.mean(values) == pytest.approx(true, abs=4.0 * np.std(values) / math.sqrt(3000))
 
 
+def test_a_release_tells_only_what_barriers_change(problem: DesignProblem) -> None:
+    """Whatever event is drawn: as usual, Z is that of nothing; stopped, it falls by its share."""
+    free, known = problem.nothing, problem._known
+    for name, fact in known.facts.items():
+        chance = fact.reached / fact.releases
+        usual = cases.outcome(name, 1.0)
+        harm = problem.site.bill((), usual).harm
+        one = problem.judge((), [usual])
+        rest = (harm - chance * fact.harm.mean) * problem.site.rate(name, ()) / known.shares[name]
+        assert one.objective == pytest.approx(free.objective + rest)
+        stopped = problem.judge((), [cases.outcome(name, 0.0)])
+        assert problem.reward(stopped) == pytest.approx(
+            free.by_event[name] / known.shares[name] / free.objective, rel=1e-6
+        )
+
+
 def test_releases_spread_over_events_and_a_part_of_them_too(problem: DesignProblem) -> None:
     shares = problem._known.shares
     assert sum(shares.values()) == pytest.approx(1.0)
@@ -246,7 +262,7 @@ def test_vectors_and_layouts_are_evaluated_alike(problem: DesignProblem) -> None
     one, two = problem.evaluate(FENCE, [4]), problem.evaluate(vector.tolist(), [4])
     assert one.outcomes == two.outcomes
     assert one.typical == (4, problem.plan([4])[0])
-    assert one.ci[1] > one.ci[0] >= one.capital
+    assert one.ci[0] <= one.objective <= one.ci[1] and one.ci[0] < one.ci[1]
 
 
 def test_samples_of_chosen_events_are_judged(problem: DesignProblem) -> None:

@@ -158,9 +158,6 @@ SHORT_PROFILE = 40
 """Mean length of the rows of a matrix, in numbers, up to which it is factorised [-]: about 13
 blocks to the left of the diagonal. Longer, and conjugate gradients are cheaper."""
 
-PIN_RECOVERY = 0.2
-"""Share of the distance of a fixed point from its place that is mended in a step [-]."""
-
 SMALL_ISLAND = 2
 """Most blocks of an island that is solved as a whole at any speed."""
 

@@ -32,7 +32,7 @@ from rigdda.constants import (
     SOFT,
     TERRAIN,
 )
-from rigdda.contact.links import bolt_energy
+from rigdda.contact.links import pull_of_bolts
 from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.frames import frame_of, no_frames, pieces
 from rigdda.gauges import FAILED
@@ -260,21 +260,32 @@ class Simulation:
         return out
 
     def supports(self) -> NDArray[np.float64]:
-        """Return the force of each support on its (first) block in the last step, (S, 2) [N]."""
+        """Return the force of each support on its (first) block, (S, 2) [N].
+
+        Of bolts the one at the end of the last step, of pins the mean over it.
+        """
         c = self._now[: self._counters[CONTACTS]]
-        c = c[(c["kind"] == BOLT) | (c["kind"] == PIN)]
-        out = np.zeros((len(self.scene.supports), 2))
+        c = c[c["kind"] == PIN]
+        out = self._pull_of_bolts()
         fx = c["normal"] * c["nx"] - c["shear"] * c["ny"]
         fy = c["normal"] * c["ny"] + c["shear"] * c["nx"]
-        out[self._arrays.links["number"][-1 - c["key"]]] = np.stack([fx, fy], axis=1)
+        out[-1 - c["key"]] = np.stack([fx, fy], axis=1)
+        return out[np.argsort(self._arrays.links["number"])]
+
+    def _pull_of_bolts(self) -> NDArray[np.float64]:
+        """Return the force of each bolt, 0 for pins, in the order of the links, (S, 2) [N]."""
+        out = np.zeros((len(self._arrays.links), 2))
+        pull_of_bolts(self._arrays.bodies, self._arrays.links, out)
         return out
 
     def _elastic(self) -> float:
         """Return the energy stored in bolts and plain contacts now [J]."""
-        b, links = self._arrays.bodies, self._arrays.links
+        links = self._arrays.links
         if len(links) + self._counters[CONTACTS] == 0:
             return 0.0
-        total = bolt_energy(b, links) if len(links) else 0.0
+        bolts = links["kind"] == BOLT
+        pull = self._pull_of_bolts()[bolts]
+        total = 0.5 * ((pull**2).sum(axis=1) / links["stiffness"][bolts]).sum()
         c = self._now[: self._counters[CONTACTS]]
         c = c[(c["kind"] == PLAIN) & (c["state"] != OPEN)]
         return float(total + 0.5 * (c["stiffness"] * np.minimum(c["gap"], 0.0) ** 2).sum())

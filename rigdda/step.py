@@ -24,7 +24,7 @@ from rigdda.constants import (
 from rigdda.contact.broad_phase import partners_of_bodies, sweep_and_prune
 from rigdda.contact.joint import bond_joints
 from rigdda.contact.law import prepare, strike_at_once
-from rigdda.contact.links import add_link, yield_bolts
+from rigdda.contact.links import add_link, mend_links
 from rigdda.contact.narrow_phase import collide_pair
 from rigdda.contact.terrain_phase import collide_terrain
 from rigdda.contact.transfer import copy_contact, recall
@@ -457,7 +457,7 @@ def advance(
                 bodies, outlines, interfaces, now, count, before, system, work, gauges, time, p,
                 levels[CUTS + 1], level == 0, counters, ledger,
             )  # fmt: skip
-            yield_bolts(bodies, links)
+            ledger[4] += mend_links(bodies, outlines, links, p.gravity_x, p.gravity_y)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         if level == 0:

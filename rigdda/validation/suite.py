@@ -18,6 +18,7 @@ from rigdda.validation import (
     rotation,
     slides,
     stacks,
+    supports,
     toppling,
     walls,
 )
@@ -38,6 +39,7 @@ CASES: tuple[Case, ...] = (
     *fences.CASES,
     *energy.CASES,
     *stacks.CASES,
+    *supports.CASES,
     *arches.CASES,
     *toppling.CASES,
     *ritchie.CASES,

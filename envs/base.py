@@ -84,7 +84,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (self.width,), np.float32)
         self._space = observation.space(self.slots.size, max_barriers, self.looks)
-        self.flat = flat
+        self.flat = check.boolean("flat", flat)
         self.observation_space = spaces.flatten_space(self._space) if flat else self._space
         self._episode = 0
         self._numbers = np.zeros(0)  # of this episode's actions

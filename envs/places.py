@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from envs.fidelity import FIDELITIES
 from envs.problem import DesignProblem
 from envs.slots import KINDS, Slots, named
-from rigdda import BadInput, Site, sites
+from rigdda import BadInput, Site, check, sites
 
 Place = str | os.PathLike[str] | Site
 """Name of a built-in or generated site, a TOML file, a site, or what `drawn_from` knows."""
@@ -82,7 +83,7 @@ class Venue:
     """
 
     def __init__(self, site: Place, max_barriers: int, kinds: Sequence[str] | None, fidelity: str):
-        self.fidelity = fidelity
+        self.fidelity = check.one_of("fidelity", fidelity, FIDELITIES)
         self.home: DesignProblem | None = None
         self._drawn = drawn_from(site)
         if self._drawn:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rigdda.barriers import Barrier, Mesh, as_layout
-from rigdda.errors import Error
+from rigdda.errors import BadInput, Error
 from rigdda.events import Drawn
 from rigdda.outcome import Outcome, leave, measure, stations, watch
 from rigdda.pack.again import Template
@@ -19,6 +19,19 @@ There are about as many kinds of them as numbers of blocks and of corners."""
 
 Job = tuple[Site, Sequence[Barrier], int, str | None]
 """A site, a layout, a seed and the name of an event, None for one that the seed draws."""
+
+
+def as_site(site: Site) -> Site:
+    """Return a site.
+
+    Raises
+    ------
+    BadInput
+        If it is none.
+    """
+    if not isinstance(site, Site):
+        raise BadInput("site", site, "give a site: rigdda.Site.load(name) gives one")
+    return site
 
 
 class Batch:
@@ -36,7 +49,7 @@ class Batch:
     """
 
     def __init__(self, site: Site, layout: Sequence[Barrier]):
-        self._site, self._layout = site, as_layout(layout)
+        self._site, self._layout = as_site(site), as_layout(layout)
         self._standing = [b for b in self._layout if not isinstance(b, Mesh)]
         self._settings, self._watch = site.settings(), watch(site)
         self._base: tuple[Scene, float] | None = None

@@ -80,6 +80,19 @@ def _set(record: object, name: str, value: Any) -> None:
         object.__setattr__(record, name, value)
 
 
+def boolean(field: str, value: Any) -> bool:
+    """Return `value` as a bool.
+
+    Raises
+    ------
+    BadInput
+        If it is neither True nor False.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise BadInput(field, value, "give True or False")
+    return bool(value)
+
+
 def set_booleans(record: object, *names: str) -> None:
     """Set fields of a frozen dataclass, each to its value as a bool.
 
@@ -89,10 +102,7 @@ def set_booleans(record: object, *names: str) -> None:
         If one is neither True nor False.
     """
     for name in names:
-        value = getattr(record, name)
-        if not isinstance(value, bool | np.bool_):
-            raise BadInput(name, value, "give True or False")
-        _set(record, name, bool(value))
+        _set(record, name, boolean(name, getattr(record, name)))
 
 
 def set_integers(what: str, record: object, *names: str) -> None:
@@ -247,6 +257,6 @@ def one_of(field: str, value: Any, choices: Iterable[str]) -> str:
         If it is none of them.
     """
     known = sorted(choices)
-    if value not in known:
+    if not isinstance(value, str) or value not in known:
         raise BadInput(field, value, "choose one of " + ", ".join(known))
     return value

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from rigdda.barriers import Barrier, Layout, as_layout
-from rigdda.batch import Batch, Job, outcomes, simulation
+from rigdda.batch import Batch, Job, as_site, outcomes, simulation
 from rigdda.errors import Error
 from rigdda.outcome import Outcome, measure
 from rigdda.run import Run
@@ -40,7 +40,7 @@ def release(
     Diverged
         If the simulation diverges.
     """
-    drawn = site.draw(seed, event)
+    drawn = as_site(site).draw(seed, event)
     scene = site.scene(drawn, site.built(layout, drawn.width))
     run = simulation(site, scene).run(site.motion.duration, EVERY, progress)
     return run, measure(site, run, drawn.event, drawn.width)

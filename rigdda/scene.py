@@ -118,7 +118,7 @@ class Block:
         )
         object.__setattr__(self, "surface", str(surface))
         object.__setattr__(self, "velocity", (vx, vy, omega))
-        object.__setattr__(self, "fixed", bool(fixed))
+        object.__setattr__(self, "fixed", check.boolean("block fixed", fixed))
 
     @classmethod
     def sound(

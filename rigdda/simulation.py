@@ -445,6 +445,7 @@ class Simulation:
         most = MOST_STEPS * self.settings.dt
         check.number("duration", duration, 0.0, most, open_low=True)
         check.number("every", every, 0.0, open_low=True)
+        check.boolean("progress", progress)
         stride = max(1, round(every / self.settings.dt))
         steps = max(1, round(duration / self.settings.dt))
         start, bodies = self._counters[STEPS], self._arrays.bodies

@@ -164,10 +164,10 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     def index(self, name: str) -> int:
         """Return the place of an event among the events. Raises as `event` does."""
-        for i, event in enumerate(self.events):
-            if event.name == name:
-                return i
-        raise BadInput("event", name, "choose one of " + ", ".join(self.event_names))
+        names = self.event_names
+        if not isinstance(name, str) or name not in names:
+            raise BadInput("event", name, "choose one of " + ", ".join(names))
+        return names.index(name)
 
     def source(self, name: str) -> Source:
         """Return a source by its name.

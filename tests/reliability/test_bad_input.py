@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from physics.helpers import FLAT, box, rock
 
+import rigdda
 from rigdda import (
     BadInput,
     Block,
@@ -106,6 +108,15 @@ CASES = {
     "friction 95": (lambda _: Surface(friction_deg=95.0), "friction_deg"),
     "restitution 1.5": (lambda _: Surface(restitution=1.5), "restitution"),
     "NaN friction": (lambda _: Surface(friction_deg=NAN), "friction_deg"),
+    "array for a flag": (lambda _: Settings(sleeping=np.array([True, False])), "sleeping"),
+    "array for a choice": (lambda _: Settings(solver=np.array(["pcg", "sor"])), "solver"),
+    "array for fixed": (lambda _: Block(UNIT, fixed=np.array([True, False])), "block fixed"),
+    "number for progress": (lambda _: Simulation(scene()).run(0.1, progress=2), "progress"),
+    "name for a site": (lambda _: rigdda.release("quick"), "site"),
+    "array for an event": (
+        lambda _: rigdda.release(rigdda.Site.load("quick"), event=np.array(["a", "b"])),
+        "event",
+    ),
     "dt 0": (lambda _: Settings(dt=0.0), "dt"),
     "dt too long": (lambda _: Settings(dt=0.11), "dt"),
     "dt too long for a pebble": (pebble, "dt"),

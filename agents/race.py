@@ -22,12 +22,12 @@ from agents.protocol import DesignResult, Ledger, Progress
 from agents.racing import Track
 from agents.scouting import scout
 from agents.searching import search
-from agents.starts import offered
+from agents.starts import offered, unsearched
 from agents.store import Store
 from envs import DesignProblem
 from rigdda import Layout
 
-SINGLES, PAIRS, NEARBY, FINAL = 0.38, 0.14, 0.30, 0.08
+SINGLES, PAIRS, NEARBY, FINAL = 0.36, 0.14, 0.30, 0.10
 """Shares of the budget: singles, races of pairs and of neighbours, and the choice among the best;
 the rest is for the ensemble and the report."""
 
@@ -38,7 +38,10 @@ FEWEST = 8
 FIELD = 150
 """A budget that is this many times as large affords `RELEASES`."""
 
-FINALISTS = 5
+FINALISTS = 7
+"""Layouts of the final: nothing, the rule's and the constant among them."""
+LEADERS = 5
+"""Layouts that a race of pairs keeps."""
 ROUNDS = 6
 """Rounds of neighbours: at each at which none is better the step is halved."""
 LEAST = 8
@@ -74,18 +77,19 @@ def design(
         return search(ledger, offered(ledger))
     menu, track = Menu(problem), Track(ledger)
     ensemble = ensemble_for(ledger, menu.stations)
-    lone = scout(track, menu, ensemble, int(SINGLES * simulations), first)
+    known = unsearched(problem, ensemble, menu)
+    lone = scout(track, menu, ensemble, known, int(SINGLES * simulations), first)
     ledger.starts |= {arm.layout for arm in lone}
     pairs = foretold(problem, lone, lone, track.nothing, int(PAIRS * simulations / first))
     seen = [arm.layout for arm in lone if arm.layout]
     field = [*(arm.layout for arm in _first_of_kinds(lone, 1)), *seen[:3], *pairs]
-    budget, leaders = int(PAIRS * simulations), lone[:FINALISTS]
-    best = track.race(field, budget, first, keep=FINALISTS, leaders=leaders)
+    budget, leaders = int(PAIRS * simulations), lone[:LEADERS]
+    best = track.race(field, budget, first, keep=LEADERS, leaders=leaders)
     seen = [*(arm.layout for arm in best), *seen[:2]]
     near = nearby(track, menu, best, lone, int(NEARBY * simulations), first // 2)
     last = [arm.layout for arm in near]
     fewer = [less for layout in last[:1] for less in _fewer(layout) if less]
-    finalists = list(dict.fromkeys([(), *last[:1], *fewer, *last[1:], *seen]))[:FINALISTS]
+    finalists = list(dict.fromkeys([(), *known, *last[:1], *fewer, *last[1:], *seen]))[:FINALISTS]
     budget, keep = int(FINAL * simulations), len(finalists)
     ends = track.race(finalists, budget, first, keep, stage="final", strict=True, leaders=near)
     return ledger.result(ledger.evaluate(simplest(ends, track.nothing), "report", ledger.left))

@@ -14,11 +14,9 @@ import numpy as np
 
 from agents.arms import Arm, error
 from agents.catalogue import Catalogue, tabulate
-from agents.constant import constant
 from agents.crossings import Ensemble
 from agents.menu import Menu, spread
 from agents.racing import Track
-from agents.rule import rule
 from agents.surface import Surface
 from rigdda import Barrier, Ditch, Layout
 
@@ -49,14 +47,16 @@ class Kind:
         return list(zip((np.array(self.annual) + left).tolist(), self.barriers, strict=True))
 
 
-def scout(track: Track, menu: Menu, ensemble: Ensemble, budget: int, first: int) -> list[Arm]:
-    """Return the singles that were looked at, what is believed to be the best first."""
+def scout(
+    track: Track, menu: Menu, ensemble: Ensemble, known: Sequence[Layout], budget: int, first: int
+) -> list[Arm]:
+    """Return what was looked at, singles and the `known`, what is believed to be the best first."""
     problem = track.problem
     lists = {kind: menu.lone(kind) for kind in problem.kinds}
     kinds = [_kind(track, menu, ensemble, barriers) for barriers in lists.values() if barriers]
     end = track.ledger.left - budget
     count = int(SPREAD_OUT * budget / first)
-    arms = track.look([(), *_apart(track, menu, ensemble, kinds, count)], first, budget)
+    arms = track.look([(), *known, *_apart(track, kinds, count)], first, budget)
     for i in range(BATCHES):
         _learn(kinds, arms, track.nothing)
         each = (track.ledger.left - end) // (BATCHES - i)
@@ -88,16 +88,13 @@ def _kind(track: Track, menu: Menu, ensemble: Ensemble, barriers: list[Barrier])
     return Kind(barriers, annual.tolist(), Surface(barriers, expected, nothing, length), order)
 
 
-def _apart(
-    track: Track, menu: Menu, ensemble: Ensemble, kinds: Sequence[Kind], n: int
-) -> list[Layout]:
-    """Return the rule's layout, the best constant, and different barriers of every kind."""
+def _apart(track: Track, kinds: Sequence[Kind], n: int) -> list[Layout]:
+    """Return different barriers of every kind."""
     each = max(2, n // max(1, len(kinds)))
     toe = track.problem.site.slope.toe
     lists = [_different(kind, each, toe) for kind in kinds]
     mixed = [(b,) for row in itertools.zip_longest(*lists) for b in row if b is not None]
-    known = [rule(track.problem, ensemble, menu), constant(track.problem, menu)]
-    return [layout for layout in dict.fromkeys([*known, *mixed]) if track.problem.fits(layout)]
+    return [layout for layout in mixed if track.problem.fits(layout)]
 
 
 def _different(kind: Kind, n: int, toe: float) -> list[Barrier]:

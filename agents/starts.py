@@ -31,6 +31,12 @@ def starts(ledger: Ledger) -> list[Layout]:
     return found
 
 
+def unsearched(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> list[Layout]:
+    """Return the layouts that every search must beat: the rule's and the best constant."""
+    layouts = rule(problem, ensemble, menu), constant(problem, menu)
+    return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]
+
+
 def known(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> list[Layout]:
     """Return the layouts that need no search: the rule's, it smaller, and the best constant."""
     one = rule(problem, ensemble, menu)

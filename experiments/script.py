@@ -20,9 +20,13 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from rigdda.files import atomic
+from rigdda.kernel import source_hash
 
 RESULTS = Path("experiments/results")
 """Where results are recorded; quick ones go into its folder `quick`."""
+
+KERNELS = "kernels.csv"
+"""Which kernels made each table of a folder."""
 
 BLUE, RED, GREEN, ORANGE, GREY = "#1c5aa0", "#c0392b", "#2e8b57", "#e85d04", "#68584a"
 """Colours of curves."""
@@ -112,12 +116,28 @@ def say(what: str) -> None:
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows as CSV and note beside it which kernels made them, see `made_by`."""
+    _write(path, rows)
+    made = made_by(path.parent) | {path.name: source_hash()}
+    _write(path.parent / KERNELS, [{"table": k, "kernels": made[k]} for k in sorted(made)])
+
+
+def _write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows as CSV, a column a key, numbers to six digits; whole or not at all."""
     with atomic(path) as part, part.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         for row in rows:
             writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
+
+
+def made_by(folder: Path) -> dict[str, str]:
+    """Return the hash of the kernels that made each table of a folder, of those that are known."""
+    path = folder / KERNELS
+    if not path.is_file():
+        return {}
+    with path.open(newline="") as file:
+        return {row["table"]: row["kernels"] for row in csv.DictReader(file)}
 
 
 def draw(

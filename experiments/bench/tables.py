@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -12,19 +11,13 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from experiments import script
 from experiments.bench.levels import Level
 
 
 def write(path: Path, rows: Sequence[Any]) -> None:
-    """Write dataclasses as CSV, a column a field; numbers to six digits."""
-    table = [
-        {k: f"{v:.6g}" if isinstance(v, float) else v for k, v in asdict(row).items()}
-        for row in rows
-    ]
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(table[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table)
+    """Write dataclasses as CSV, a column a field, see `experiments.script.write`."""
+    script.write(path, [asdict(row) for row in rows])
 
 
 def show_levels(console: Console, rows: Sequence[Level]) -> None:

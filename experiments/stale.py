@@ -1,0 +1,35 @@
+"""Which recorded results the kernels of today did not make.
+
+`python -m experiments.stale [--out DIR]`. A table that was written before such notes were kept counts as made by others.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from experiments.script import KERNELS, RESULTS, made_by
+from rigdda.kernel import source_hash
+
+
+def stale(folder: Path) -> list[Path]:
+    """Return the tables below a folder that other kernels made, or that nobody knows of."""
+    tables = sorted(path for path in folder.rglob("*.csv") if path.name != KERNELS)
+    return [path for path in tables if made_by(path.parent).get(path.name) != source_hash()]
+
+
+@click.command(help=__doc__)
+@click.option("--out", type=click.Path(path_type=Path), default=RESULTS, show_default=True,
+              help="Folder of results.")  # fmt: skip
+def main(out: Path) -> None:
+    """List them; exits with 1 if there are any."""
+    found = stale(out)
+    for path in found:
+        click.echo(f"{path}: {made_by(path.parent).get(path.name, 'not known by which kernels')}")
+    sys.exit(bool(found))
+
+
+if __name__ == "__main__":
+    main()

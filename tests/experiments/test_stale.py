@@ -1,0 +1,26 @@
+"""Results that other kernels made are listed."""
+
+from __future__ import annotations
+
+from click.testing import CliRunner
+
+from experiments import script, stale
+
+
+def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(script, "source_hash", lambda: "0ld")
+        script.write(tmp_path / "old.csv", [{"a": 1.0}])
+    script.write(tmp_path / "new.csv", [{"a": 1.0}])
+    (tmp_path / "bench").mkdir()
+    (tmp_path / "bench" / "unknown.csv").write_text("a\n1\n")
+    told = CliRunner().invoke(stale.main, ["--out", str(tmp_path)])
+    assert told.exit_code == 1
+    assert [line.split(": ")[1] for line in told.output.splitlines()] == [
+        "not known by which kernels",
+        "0ld",
+    ]
+    for name in ("old.csv", "bench/unknown.csv"):
+        script.write(tmp_path / name, [{"a": 2.0}])
+    told = CliRunner().invoke(stale.main, ["--out", str(tmp_path)])
+    assert told.exit_code == 0 and not told.output

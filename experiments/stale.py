@@ -1,6 +1,7 @@
 """Which recorded results the kernels of today did not make.
 
-`python -m experiments.stale [--out DIR]`. A table that was written before such notes were kept counts as made by others.
+`python -m experiments.stale [--out DIR]`. A table that was written before such notes were kept
+counts as made by others.
 """
 
 from __future__ import annotations

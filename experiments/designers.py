@@ -63,8 +63,9 @@ def cases(quick: bool) -> list[tuple[int, int, str]]:
         for budget in (budgets if name in MANY else budgets[-1:])
         for seed in range(seeds if name in MANY else 1)
     ]
-    first = (*FREE, *MANY)
-    return sorted(found, key=lambda case: (case[2] not in first, case[0], case[1]))
+    order = {name: i for i, name in enumerate((*FREE, *MANY))}
+    rest = len(order)
+    return sorted(found, key=lambda c: (c[2] not in order, c[0], order.get(c[2], rest), c[1]))
 
 
 class Contest:

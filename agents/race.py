@@ -15,7 +15,7 @@ import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from agents.arms import Arm, behind
+from agents.arms import Arm
 from agents.crossings import ensemble_for
 from agents.menu import FINEST, Menu
 from agents.protocol import DesignResult, Ledger, Progress
@@ -48,8 +48,9 @@ LEAST = 8
 """Candidates that a round of neighbours should have."""
 ADDED = 3
 """Barriers that are tried beside the best layout in every round."""
-AS_GOOD = 1.0
-"""Standard errors behind the best within which a layout with fewer barriers is built instead."""
+AS_GOOD = 0.01
+"""Share of Z of nothing within which of the best a layout with fewer barriers is built instead, as
+in the reference (`experiments.reference`)."""
 BEST_OF = 8
 """Singles of a kind of which pairs are made."""
 
@@ -97,14 +98,15 @@ def design(
 
 def simplest(ends: Sequence[Arm], nothing: Arm) -> Layout:
     """Return the layout of the best, or of one as good with fewer barriers (but not none)."""
+    if not ends:
+        return ()
+    most = ends[0].objective() + AS_GOOD * nothing.objective()
     as_good = [
         arm
         for arm in ends
-        if arm.layout
-        and arm.shortfall() <= ends[0].shortfall()
-        and behind(arm, ends[0], nothing) < AS_GOOD
+        if arm.layout and arm.shortfall() <= ends[0].shortfall() and arm.objective() < most
     ]
-    return min([*ends[:1], *as_good], key=lambda arm: len(arm.layout)).layout if ends else ()
+    return min([*ends[:1], *as_good], key=lambda arm: len(arm.layout)).layout
 
 
 def foretold(

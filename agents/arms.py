@@ -17,8 +17,9 @@ Floats = NDArray[np.float64]
 
 PLANNED = 1000
 """Releases of the plan whose shares are taken: of few, every event has two."""
-LEFT = 0.05
-"""Least spread of an event that is believed of leaders, over that without barriers [-]."""
+LEFT = 0.3
+"""Least share of the releases that an event has without leaders that leaders leave to it [-]: else
+what they stop would not tell them from what does not stop it."""
 TRUSTED = 8
 """Releases of an event below which a candidate borrows from the mean without barriers."""
 
@@ -145,7 +146,7 @@ def behind(arm: Arm, other: Arm, nothing: Arm) -> float:
 def allocation(
     problem: DesignProblem, n: int, leaders: Sequence[Arm], nothing: Arm
 ) -> dict[str, int]:
-    """Return how many of `n` releases go to each event: as for nothing, by what the leaders leave.
+    """Return how many of `n` releases go to each event: fewer to what the leaders stop.
 
     Releases go where rate times spread is large, over the root of their time, see
     `DesignProblem.allocation`. An event whose cost with the leaders spreads less than without them

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from agents.menu import Menu
 from envs import DesignProblem
 from envs.encoding import CLASSES
 from envs.rules import MIN_HEIGHT
@@ -56,7 +57,8 @@ def _size(problem: DesignProblem, barrier: Barrier) -> list[str]:
     assert isinstance(barrier, Embankment | GravityWall | Wall)
     what = "width" if isinstance(barrier, Embankment) else "thickness"
     height = _ends(barrier.height, MIN_HEIGHT, zone.max_height, "height")
-    least, most = zone.min_thickness, zone.max_thickness
+    crest = Menu(problem).crest if isinstance(barrier, Embankment) else 0.0
+    least, most = max(crest, zone.min_thickness), zone.max_thickness
     return height + _ends(getattr(barrier, what), least, most, what)
 
 

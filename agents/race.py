@@ -92,7 +92,7 @@ def design(
     fewer = [less for layout in last[:1] for less in _fewer(layout) if less]
     finalists = list(dict.fromkeys([(), *known, *last[:1], *fewer, *last[1:], *seen]))[:FINALISTS]
     budget, keep = int(FINAL * simulations), len(finalists)
-    ends = track.race(finalists, budget, first, keep, stage="final", strict=True, leaders=near)
+    ends = track.race(finalists, budget, first, keep, stage="final", strict=True)
     return ledger.result(ledger.evaluate(simplest(ends, track.nothing), "report", ledger.left))
 
 
@@ -191,8 +191,7 @@ def _around(
 ) -> Iterator[Iterable[Layout]]:
     """Yield what may be tried: a barrier more, one less, neighbours of the best and of the next."""
     layout = centres[0].layout
-    if layout:
-        yield foretold(menu.problem, centres[:1], lone, track.nothing, ADDED)
+    yield foretold(menu.problem, centres[:1], lone, track.nothing, ADDED)
     if len(layout) > 1:
         yield _fewer(layout)
     for centre in centres:

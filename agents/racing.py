@@ -105,7 +105,7 @@ class Track:
         least = 2 * len(self.problem.site.events)
         room = (self.ledger.left - end) // max(1, len(alive))
         counts = allocation(self.problem, max(min(each, room), least), leaders, self.nothing)
-        if not alive or sum(counts.values()) > room:
+        if not alive or not 0 < sum(counts.values()) <= room:
             return False
         start = {name: self._next.get((stage, name), 0) for name in counts}
         for arm in sorted(alive, key=_strength, reverse=True):

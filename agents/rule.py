@@ -141,7 +141,7 @@ def instead(menu: Menu, x: float, height: float) -> Layout:
     width, depth = ritchie(menu.problem.site)
     width = min(max(width, zone.min_width), zone.max_width)
     tall = min(max(height, MIN_HEIGHT), zone.max_height)
-    thick = min(max(1.0, zone.min_thickness), zone.max_thickness)
+    thick = menu.crest
     for barrier, at in (
         (Ditch(x, min(depth, zone.max_depth), width), toe),
         (Embankment(x, tall, thick), x),

@@ -1,9 +1,10 @@
 """Designers by their distance from the reference, against the releases that they may use.
 
 `python -m experiments.designers [--quick] [--out DIR]`, after `python -m experiments.reference`. On
-every built-in design site each designer searches with several seeds at several budgets. What it
-gives is verified on fresh releases, the reference and no barriers on the same ones. The distance is
-(Z - Z of the reference) / (Z of nothing - Z of the reference): 0 is as good, 1 gains nothing.
+every built-in design site `race` and `random` search with several seeds at two budgets, the others
+once at the default. What they find is verified on fresh releases, the reference and no barriers on
+the same ones. The distance is (Z - Z of the reference) / (Z of nothing - Z of the reference): 0 is
+as good, 1 gains nothing.
 
 Writes designers.csv, a row a search, and designers.png. Goes on where it was stopped.
 """

@@ -135,11 +135,11 @@ def pairs(problem: DesignProblem, singles: Sequence[Candidate]) -> list[Layout]:
             if one is two or both in found or not problem.fits(both):
                 continue
             value = one.annual + two.annual
-            for name, rate in nothing.rates.items():
+            for name in nothing.rates:
                 bills = nothing.bills[name], one.bills[name], two.bills[name]
                 if all(bills) and any(bills[0]):
                     base, first, second = (float(np.mean(b)) for b in bills)
-                    value += rate * first * second / base
+                    value += problem.site.rate(name, both) * first * second / base
             found[both] = value
     return sorted(found, key=lambda layout: found[layout])[:PAIRS]
 
@@ -218,11 +218,11 @@ def study(name: str, quick: bool) -> list[dict[str, Any]]:
     for_blocks = min(settle(blocks, alone, wanted, most).values(), key=lambda e: e.objective).layout
     menu = Menu(problem)
     constants = [place(menu, barrier, share) for barrier, share in CONSTANTS]
-    first = constant(problem, menu)
+    usual = constant(problem, menu)
     say(f"{name}: verifying {len(field)} layouts")
-    found = settle(problem, [(), *field, for_blocks, first, *constants], wanted, most)
+    found = settle(problem, [(), *field, for_blocks, usual, *constants], wanted, most)
     labels = {"nothing": (), SINGLE: for_blocks}
-    labels |= {"constant": first}
+    labels |= {"constant": usual}
     labels |= {f"constant {i}": layout for i, layout in enumerate(constants)}
     least = min(e.objective for e in found.values()) + WANTED * problem.nothing.objective
     as_good = [layout for layout in found if found[layout].objective <= least]

@@ -225,8 +225,8 @@ WAKE_SPEED = 0.05
 APART = 0.1
 """Time since the last touch after which a block is apart [s]: from a barrier, so that it may hit it
 anew; from everything, so that damping in contact ends. Were that to end with the touch, a block
-that rattles down were damped in proportion to the step: of a mass .50 / .53 / .54 / .57 reached the
-road of `quick` at 10 / 5 / 2.5 / 1.25 ms; like this .43 / .43 / .45 / .42, +- .02."""
+that rattles down would be damped in proportion to the step: of a mass .50 / .53 / .54 / .57 reached
+the road of `quick` at 10 / 5 / 2.5 / 1.25 ms; like this .43 / .43 / .45 / .42, +- .02."""
 
 LONGEST_FLIGHT = 64
 """Steps for which a flight is looked ahead: the more, the wider the search for what may be met."""

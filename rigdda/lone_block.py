@@ -11,7 +11,16 @@ from __future__ import annotations
 
 import math
 
-from rigdda.constants import AFTER_IMPACT, IMPACT, MOST_PARTS, NEW, OPEN, PLAIN_CONTACT
+from rigdda.constants import (
+    AFTER_IMPACT,
+    BOLT,
+    IMPACT,
+    MOST_PARTS,
+    NEW,
+    OPEN,
+    PIN,
+    PLAIN_CONTACT,
+)
 from rigdda.contact.law import prepare, pull_on, strike, time_of_impact
 from rigdda.contact.transfer import recall
 from rigdda.kernel import inlined, kernel
@@ -32,9 +41,10 @@ from rigdda.records import (
 def takes_parts(
     contacts: Contacts, islands: Islands, island: int, gauges: Gauges, p: Parameters
 ) -> bool:
-    """Return whether an island is a lone block with an impact, none on a fence.
+    """Return whether an island is a lone block with an impact, none on a fence, without supports.
 
-    A fence is charged for a step as a whole, and its impacts are plastic.
+    A fence is charged for a step as a whole, and its impacts are plastic; supports are no contacts
+    that could be prepared anew.
     """
     blocks = islands.block_start[island + 1] - islands.block_start[island]
     if blocks > 1 or not p.post_correction:
@@ -43,6 +53,8 @@ def takes_parts(
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
         impact = impact or c.kind == IMPACT
+        if c.kind == BOLT or c.kind == PIN:
+            return False
         if c.b >= 0 and gauges.barrier[c.b] >= 0:
             if gauges.target[gauges.barrier[c.b]].capacity < math.inf:
                 return False

@@ -262,7 +262,8 @@ class Simulation:
     def supports(self) -> NDArray[np.float64]:
         """Return the force of each support on its (first) block, (S, 2) [N].
 
-        Of bolts the one at the end of the last step, of pins the mean over it.
+        Of bolts the one at the end of the last step, of pins the mean over it; if it was taken in
+        parts, over the last one.
         """
         c = self._now[: self._counters[CONTACTS]]
         c = c[c["kind"] == PIN]

@@ -457,7 +457,7 @@ def advance(
                 bodies, outlines, interfaces, now, count, before, system, work, gauges, time, p,
                 levels[CUTS + 1], level == 0, counters, ledger,
             )  # fmt: skip
-            ledger[4] += mend_links(bodies, outlines, links, p.gravity_x, p.gravity_y)
+            ledger[4] += mend_links(bodies, outlines, links, p)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         if level == 0:

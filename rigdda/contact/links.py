@@ -96,11 +96,11 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) ->
 
 
 @kernel
-def mend_links(bodies: Bodies, outlines: Outlines, links: Links, gx: float, gy: float) -> float:
+def mend_links(bodies: Bodies, outlines: Outlines, links: Links, p: Parameters) -> float:
     """Yield bolts whose tension is above yield now, perfectly plastic; put pins in their place.
 
-    A turning block goes the arc of its pin only to second order. Returns the work of moving it
-    there against gravity [J].
+    A turning block goes the arc of its pin only to second order; without post-correction it stays
+    where that brings it. Returns the work of moving it against gravity [J].
     """
     work = 0.0
     for q in range(len(links)):
@@ -110,10 +110,10 @@ def mend_links(bodies: Bodies, outlines: Outlines, links: Links, gx: float, gy: 
         if link.kind == BOLT:
             excess = tension(link, math.hypot(ax - bx, ay - by)) - link.yielding
             link.length += max(excess, 0.0) / link.stiffness
-        elif ax != bx or ay != by:
+        elif p.post_correction and (ax != bx or ay != by):
             body = bodies[link.a]
             body.x += bx - ax
             body.y += by - ay
-            work -= body.mass * (gx * (bx - ax) + gy * (by - ay))
+            work -= body.mass * (p.gravity_x * (bx - ax) + p.gravity_y * (by - ay))
             place_corners(bodies, outlines, link.a)
     return work

@@ -140,8 +140,8 @@ def set_spring(
     """Write what a visit needs of the spring of a contact, see contact.law.
 
     In a single substep every contact is one: its displacement is dt times the end velocity, but for
-    what its velocity at the start is not that of the bodies along its row. A plain contact is one
-    on the displacement of the step, in the law with a factor of 2.
+    what its velocity at the start is not that of the bodies along its row. Plain contacts and bolts
+    are springs on the displacement of the step: of 2 and 4 times the stiffness in the law.
     """
     normal = shear = c.kappa
     free, slid = c.bias, 0.0
@@ -152,9 +152,10 @@ def set_spring(
     if not is_elastic(c):
         normal, shear = RELAXATION_STIFFNESS / flexible, RELAXATION_STIFFNESS / rolling
         free += c.memory_normal * (1.0 / normal - 1.0 / c.kappa)
-    elif c.kind == PLAIN and substeps > 1:
-        normal = shear = 2.0 * c.kappa
-        free = 0.5 * c.bias
+    elif c.kind != PIN and substeps > 1:
+        factor = 2.0 if c.kind == PLAIN else 4.0
+        normal = shear = factor * c.kappa
+        free = c.bias / factor
     row[KEEP] = normal * flexible / (1.0 + normal * flexible)
     row[KEEP_SHEAR] = shear * rolling / (1.0 + shear * rolling)
     row[GAIN], row[GAIN_SHEAR] = row[KEEP] / flexible, row[KEEP_SHEAR] / rolling

@@ -157,3 +157,4 @@ def test_an_allocation_never_asks_for_more_than_it_may() -> None:
     nothing = Arm(problem, ())
     for n in range(10, 400):
         assert sum(allocation(problem, n, [], nothing).values()) <= n
+        assert sum(allocation(problem, n, [], nothing).values()) >= 0.6 * n or n < 100

@@ -88,8 +88,7 @@ def test_groups_carry_much_and_ask_for_other_barriers(rows):
 
 @pytest.mark.xfail(
     strict=True,
-    reason="ditches of talus and shu-hwa are as deep as allowed, the wall of cliff is at the road, "
-    "the fence of narrow is as high as its class is made",
+    reason="ditches of talus and shu-hwa are as deep as allowed, the wall of cliff is at the road",
 )
 def test_class_height_and_station_are_within_their_bounds_on_most(rows):
     bounds = ("zone", "class", "height", "depth", "clearance")

@@ -89,6 +89,31 @@ def test_a_bolt_hangs_a_block():
     assert sim.energy().elastic == pytest.approx(0.5 * WEIGHT**2 / 1e6, rel=1e-3)
 
 
+@pytest.mark.parametrize("speed", [0.01, 10.0])  # as a whole, and relaxed in substeps
+def test_bolts_between_blocks_give_no_energy_and_swing_as_they_should(speed):
+    """Three blocks in a row, the outer ones pulled by bolts: they swing with w^2 = k/m."""
+    stiffness = 1e5
+    blocks = (
+        box(-3.0, 0.0, velocity=(speed - 0.1, 0.0, 0.0)),
+        box(0.0, 0.0, velocity=(speed, 0.0, 0.0)),
+        box(3.0, 0.0, velocity=(speed + 0.1, 0.0, 0.0)),
+    )
+    bolts = (
+        Bolt(0, (-3.0, 0.0), 1, (0.0, 0.0), stiffness),
+        Bolt(1, (0.0, 0.0), 2, (3.0, 0.0), stiffness),
+    )
+    sim = Simulation(Scene(None, blocks, rock(), supports=bolts, gravity=0.0))
+    period, start = 2.0 * math.pi * math.sqrt(2600.0 / stiffness), sum(sim.energy()[:3])
+    apart = []
+    for _ in range(round(3.0 * period / sim.settings.dt)):
+        sim.step()
+        apart.append(sim.poses[2, 0] - sim.poses[1, 0] - 3.0)
+    swing = 0.1 / math.sqrt(stiffness / 2600.0)
+    assert max(apart) == pytest.approx(swing, rel=0.05)
+    assert min(apart) == pytest.approx(-swing, rel=0.15)
+    assert sum(sim.energy()[:3]) <= start + 1e-3 * 2600.0 * 0.1**2
+
+
 def test_forces_of_supports_are_in_the_order_of_the_scene():
     blocks = (box(0.0, 0.5), box(3.0, 0.5, density=5200.0))
     bolts = (Bolt(1, (3.0, 1.0), None, (3.0, 3.0), 1e6), Bolt(0, (0.0, 1.0), None, (0.0, 3.0), 1e6))

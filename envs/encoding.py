@@ -12,7 +12,7 @@ kind          height                               size
 fence         height, up to that of its class      energy class, equal parts of the range
 ditch         depth, up to what its sides allow    width, least to greatest
 embankment    height                               width of the crest, in the range of thickness
-gravity_wall  height                               thickness, least to greatest
+gravity_wall  height, up to what thickness allows  thickness, at least 0.4 times the height
 wall          height                               thickness, least to greatest
 mesh          not used, nor is the station         option of the site, equal parts of the range
 ============  ===================================  =============================================

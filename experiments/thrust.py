@@ -1,6 +1,7 @@
 """Thrust against resistance: what a mass of rock pushes with, and what the catalogue bears.
 
-Fences, embankments and gravity walls of every height of the catalogue, each alone under the mass of
+Embankments and gravity walls of every height of the catalogue, low walls, and fences of every class
+at their greatest height, each alone under the mass of
 `shu-hwa` and of `quick`, on a bench or at the toe, in steps of 10 and 2.5 ms. Thrust is the
 greatest mean over a second, resistance is weight times friction or the mean braking force of the
 class, see `rigdda.resistance`. Judged by the barriers that stand although the thrust was beyond

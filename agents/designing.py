@@ -126,6 +126,7 @@ def _tell(done: Study, store: Store, verify: int, folder: Path) -> None:
     cases = [(case.name, case.evaluation) for case in done.cases]
     lines = [findings.limits(result, cases, done.left)]
     lines += [
+        *findings.cheaper(cases),
         *findings.failing(done.problem.site, chosen),
         findings.undecided(done.problem, chosen),
     ]

@@ -57,6 +57,23 @@ def _pays(nothing: Evaluation, chosen: Evaluation) -> str:
     )
 
 
+def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
+    """Return lines that name what costs as little a year, as far as is told, and less to build.
+
+    Parameters
+    ----------
+    cases : sequence of (str, Evaluation)
+        Verified layouts: nothing the first, the found one the last.
+    """
+    chosen = cases[-1][1]
+    return [
+        f"{name} may cost as little a year ({span(other.ci)} against {span(chosen.ci)}), and costs "
+        f"{euros(other.cost)} instead of {euros(chosen.cost)} EUR per metre to build"
+        for name, other in cases[1:-1]
+        if other.ci[0] <= chosen.ci[1] and other.cost < chosen.cost
+    ]
+
+
 def left_over(evaluation: Evaluation) -> str:
     """Return in words what is left of the risk, and which event makes most of it."""
     left, most = evaluation.by_event, worst(evaluation)

@@ -48,9 +48,9 @@ LEAST = 8
 """Candidates that a round of neighbours should have."""
 ADDED = 3
 """Barriers that are tried beside the best layout in every round."""
-AS_GOOD = 0.01
-"""Share of Z of nothing within which of the best a layout with fewer barriers is built instead, as
-in the reference (`experiments.reference`)."""
+AS_GOOD = 0.02
+"""Share of Z of nothing within which of the best a layout with fewer barriers is built instead: what
+a final tells apart."""
 BEST_OF = 8
 """Singles of a kind of which pairs are made."""
 

@@ -132,7 +132,7 @@ def _ensemble(
         scene = site.realise((), seed, event)
         width = site.draw(seed, event).width
         duration = site.motion.duration
-        run = Simulation(scene, site.settings(), lines).run(duration, every=duration)
+        run = Simulation(scene, site.settings(scene), lines).run(duration, every=duration)
         area, radius = np.array([_area_and_radius(b.vertices) for b in scene.blocks]).T
         density = np.array([b.density for b in scene.blocks])
         out = np.zeros(len(run.events), dtype=CROSSING)

@@ -89,7 +89,7 @@ def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int], stations: 
 
 def _run(site: Site, layout: Layout, event: str, seed: int, stations: Floats) -> Run:
     scene = site.realise(layout, seed, event)
-    simulation = Simulation(scene, site.settings(), tuple(stations.tolist()))
+    simulation = Simulation(scene, site.settings(scene), tuple(stations.tolist()))
     return simulation.run(site.motion.duration, EVERY)
 
 

@@ -141,7 +141,8 @@ def _transit(job: Job) -> Transit:
     """Simulate a release and return what passed."""
     site, layout, seed, event = job
     lines = stations(site).tolist()
-    simulation = Simulation(site.realise(layout, seed, event), site.settings(), lines)
+    scene = site.realise(layout, seed, event)
+    simulation = Simulation(scene, site.settings(scene), lines)
     run = simulation.run(site.motion.duration, site.motion.duration)
     passing = [run.crossings(i) for i in range(STATIONS)]
     energy, bounce = ([p[name] for p in passing] for name in ("energy", "height"))

@@ -63,11 +63,6 @@ PARTS = (
     AS_IT_IS,
     Part("no islands", "switched off", settings=lambda s: replace(s, islands=False)),
     Part("no sleep", "switched off", settings=lambda s: replace(s, sleeping=False)),
-    Part(
-        "no limit of displacement",
-        "switched off",
-        settings=lambda s: replace(s, displacement_limit=1e6),
-    ),
     Part("no correction", "switched off", settings=lambda s: replace(s, post_correction=False)),
     Part("a bolt", "idle", _bolt),
     Part("a load", "idle", _load),

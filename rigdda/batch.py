@@ -51,9 +51,9 @@ class Batch:
     def __init__(self, site: Site, layout: Sequence[Barrier]):
         self._site, self._layout = as_site(site), as_layout(layout)
         self._standing = [b for b in self._layout if not isinstance(b, Mesh)]
-        self._settings, self._watch = site.settings(), watch(site)
+        self._watch = watch(site)
         self._base: tuple[Scene, float] | None = None
-        self._templates: dict[tuple[int, int], Template] = {}
+        self._templates: dict[tuple[int, int, float], Template] = {}
 
     def outcome(self, seed: int, event: str | None = None) -> Outcome:
         """Return the outcome of one release. Raises as `rigdda.release` does."""
@@ -79,20 +79,21 @@ class Batch:
         """Return the simulation of such a scene; that of the one before is of no more use."""
         if len(scene.blocks) > MOST_BLOCKS:
             return simulation(self._site, scene)
-        key = len(scene.blocks), max(len(b.vertices) for b in scene.blocks)
+        settings = self._site.settings(scene)
+        key = len(scene.blocks), max(len(b.vertices) for b in scene.blocks), settings.dt
         template = self._templates.get(key)
         if template is None or not template.fits(scene):
             lines = chainages(stations(self._site, scene.barriers))
             beyond = leave(self._site, scene)
-            template = Template(scene, self._settings, lines, self._watch, beyond)
+            template = Template(scene, settings, lines, self._watch, beyond)
             self._templates[key] = template
-        return Simulation(scene, self._settings, template=template)
+        return Simulation(scene, settings, template=template)
 
 
 def simulation(site: Site, scene: Scene) -> Simulation:
     """Return a simulation of a scene of a site that watches what its outcome needs."""
     lines = stations(site, scene.barriers)
-    return Simulation(scene, site.settings(), lines, watch(site), leave(site, scene))
+    return Simulation(scene, site.settings(scene), lines, watch(site), leave(site, scene))
 
 
 def outcomes(jobs: Sequence[Job], places: Iterable[int]) -> list[tuple[int, Outcome | Error]]:

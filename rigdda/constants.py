@@ -36,6 +36,9 @@ MOST_PARTS = 8
 """Most parts of a step of a lone block: corners that strike in turn, ever sooner, do so at once in
 the last one."""
 
+TURN = 0.15
+"""Greatest turn of a lone block in contact in a part of its step [rad]."""
+
 SHOCK_SPEED = 0.1
 """Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
 for what hits the block from the other side, and it is treated as a plastic impact."""
@@ -197,10 +200,6 @@ LATELY = 0.7
 """Share of a body's greatest speed of late that counts on in the next step [-]. In a pile blocks
 are stopped and driven on step by step: the path of one that stands for a moment is not nothing."""
 
-DEFLECTED = 0.03
-"""How much farther than foreseen a corner may go in a step, over the block size [-], before its
-island is cut back: it may meet what was no candidate for a contact."""
-
 SLIDING = 0.01
 """Share of what gravity adds to a speed in a step at which a contact that slipped still slides [-].
 One that hardly does may as well stick now; one or two blocks that begin with the wrong friction
@@ -240,26 +239,8 @@ SPEED_LIMIT = 1e4
 WAIT_STEPS = 40
 """Steps for which an island that did not settle as a whole is relaxed before it is tried again."""
 
-CUTS = 5
-"""Most halvings of the step of an island that one step would take too far."""
-
-STEADY_STEP = 0.055
-"""Longest step, over the time in which a block falls by half its size, sqrt(size / g), in which
-contacts are left to sink in [-]: blocks of 1 m, 18 ms. In longer ones an island of which one sinks
-takes steps about as long as this, unless it is a lone block whose blow can act early; unchecked, 20
-of 141 hard cases at 25 to 100 ms sink too deep."""
-
-SINKING = 2.5e-4
-"""Sinking over block size that such a step may bring [-], a few times that of a contact at rest:
-with ten times as much 6 of 141 hard cases at 25 and 100 ms sink too deep or do not come to rest."""
-
-MOVING_SINKING = 0.5
-"""Sinking of an island in motion over this bound and over its number of blocks [-]. Were they all
-cut back at the bound itself, an avalanche would take five times as long, and 1,000 blocks in a
-hopper would be kept from rest; without any bound a row of dominoes sinks too deep."""
-
 # status of a body
-AWAKE, ASLEEP, FIXED, RETIRED, HELD = 0, 1, 2, 3, 4
+AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3
 # state of a contact
 OPEN, STICK, SLIP = 0, 1, 2
 # kind of a contact in one step

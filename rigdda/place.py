@@ -198,7 +198,7 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     duration : float
         Longest simulated time [s].
     dt : float
-        Time step [s].
+        Time step [s], of small blocks the longest whole part of it that suits their size.
 
     Raises
     ------

@@ -38,8 +38,7 @@ BODY = _record(
     part=int,  # first polygon of its convex parts: itself where it is convex
     parts=int,  # number of them
     surface=int,  # index of the surface
-    status=int,  # AWAKE, ASLEEP, FIXED, RETIRED, HELD while other islands are cut back
-    cut=int,  # 1 if its island is to be cut back in this step
+    status=int,  # AWAKE, ASLEEP, FIXED, RETIRED
     island=int,  # island in which a sleeping body fell asleep
     apart=float,  # time since a contact of it was closed, 0 if one was in the last step [s]
     wait=int,  # steps until its island is solved as a whole again
@@ -185,10 +184,6 @@ INTERFACE = _record(
 PARAMETERS = _record(
     blocks=int,  # bodies that may move: the blocks of the scene and its gravity walls
     dt=float,
-    displacement_limit=float,  # of a corner off its straight path, before a cut-back [m]
-    deflection_limit=float,  # of the way of a corner over its path, before a cut-back [m]
-    sinking_limit=float,  # of a contact in a step, before a cut-back [m]; inf: not watched
-    first_cut=int,  # least halvings of a step that is cut back
     gravity_x=float,  # [m/s2]
     gravity_y=float,
     gravity=float,  # its magnitude
@@ -233,7 +228,7 @@ Interfaces = NDArray[np.void]
 Box = Any
 """One BOX."""
 Parameters = Any
-"""One PARAMETERS: of a step, or of its half, quarter, ..., for islands that are cut back."""
+"""One PARAMETERS: of a step, or of the part of it that a lone block takes."""
 
 POLYGON = _record(
     count=int,  # corners
@@ -402,14 +397,14 @@ class Gauges(NamedTuple):
 LEDGER = ("friction", "impact", "damping", "external", "links")
 """Work done on the blocks so far [J]: entries of the ledger array."""
 
-COUNTERS = 15
+COUNTERS = 14
 """Length of the counter array. Its entries:"""
 
 STEPS, ITERATIONS, RELAXED, SOLVES, SOLVER_ITERATIONS = 0, 1, 2, 3, 4
-CONTACTS, EVENTS, CONTACT_TOTAL, SWEEPS, CUT_BACKS, STILL = 5, 6, 7, 8, 9, 10
+CONTACTS, EVENTS, CONTACT_TOTAL, SWEEPS, STILL = 5, 6, 7, 8, 9
 """Steps; open-close iterations; islands relaxed; systems solved and iterations of their solver;
-contacts now; events not yet read; contacts, sweeps of relaxation and cut-backs so far; steps since
-anything moved that matters."""
+contacts now; events not yet read; contacts and sweeps of relaxation so far; steps since anything
+moved that matters."""
 
-BROAD_PHASE, NARROW_PHASE, OPEN_CLOSE, MOTION = 11, 12, 13, 14
+BROAD_PHASE, NARROW_PHASE, OPEN_CLOSE, MOTION = 10, 11, 12, 13
 """Processor cycles by phase of the step, if they are timed."""

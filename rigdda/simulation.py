@@ -46,7 +46,6 @@ from rigdda.records import (
     CONTACT_TOTAL,
     CONTACTS,
     COUNTERS,
-    CUT_BACKS,
     EVENTS,
     ITERATIONS,
     LEDGER,
@@ -117,15 +116,13 @@ class Diagnostics(NamedTuple):
 
     `penetration` is the greatest depth of a vertex inside another polygon or the terrain [m];
     `relaxed` counts islands whose contact forces were relaxed, since they move or their open-close
-    iteration did not settle; `cut_backs` counts islands that took shorter steps. `compression` is
-    how far contacts at rest give way now: their median, of plain ones the greatest, over the mean
-    block size [-].
+    iteration did not settle. `compression` is how far contacts at rest give way now: their median,
+    of plain ones the greatest, over the mean block size [-].
     `seconds` is the processor time by phase [s], nothing without `Settings.timing`.
     """
 
     steps: int
     open_close_iterations: int
-    cut_backs: int
     relaxed: int
     sweeps: int
     solves: int
@@ -159,8 +156,8 @@ class Simulation:
     Raises
     ------
     BadInput
-        If stations are not ascending, the watched interval is empty, or the step so long that
-        gravity moves the smallest block by a quarter of its size in it.
+        If stations are not ascending, the watched interval is empty, or the step is too long for
+        the size of the blocks.
     """
 
     def __init__(
@@ -318,7 +315,6 @@ class Simulation:
         return Diagnostics(
             int(count[STEPS]),
             int(count[ITERATIONS]),
-            int(count[CUT_BACKS]),
             int(count[RELAXED]),
             int(count[SWEEPS]),
             int(count[SOLVES]),

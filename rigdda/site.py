@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from functools import lru_cache
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
+import numpy as np
 import tomli_w
 
 from rigdda import economy, realisation, sites
@@ -17,9 +19,10 @@ from rigdda.economy import Bill, Consequences, Prices
 from rigdda.errors import BadInput
 from rigdda.events import Drawn, Event
 from rigdda.files import atomic, read
+from rigdda.geometry import polygon_properties
 from rigdda.place import BarrierZone, Interface, Motion, Road, Scatter, Slope, Stretch
 from rigdda.scene import Scene, Surface
-from rigdda.settings import Settings
+from rigdda.settings import Settings, longest_step
 from rigdda.soundness import check_site
 from rigdda.source import Point, Source
 from rigdda.terrain import Terrain
@@ -198,9 +201,15 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         """
         return realisation.rooms(self)
 
-    def settings(self) -> Settings:
-        """Return the numerical settings of this site's releases."""
-        return Settings(dt=self.motion.dt)
+    def settings(self, scene: Scene) -> Settings:
+        """Return the numerical settings of the scene of a release.
+
+        The step is that of the site, or the longest whole part of it that is not too long for the
+        blocks.
+        """
+        areas = [polygon_properties(b.vertices)[0] for b in scene.blocks if not b.fixed]
+        most = longest_step(np.array(areas), math.hypot(*scene.gravity_vector))
+        return Settings(dt=self.motion.dt / max(1, math.ceil(self.motion.dt / most)))
 
     def draw(self, seed: int = 0, event: str | None = None) -> Drawn:
         """Return what a seed draws of an event, or of one that it draws by rate.

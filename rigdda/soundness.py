@@ -13,6 +13,7 @@ from rigdda import boulders, check
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
 from rigdda.place import check_surface
+from rigdda.settings import Settings
 from rigdda.source import NEAR, Point, Source
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def check_site(site: Site) -> None:
         )
     if 0.0 < site.consequences.closure < CHEAPEST:
         _doubt("consequences.closure", "give EUR a day, not thousands")
-    site.settings()
+    Settings(dt=motion.dt)
 
 
 def _doubt(field: str, mend: str) -> None:

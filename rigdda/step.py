@@ -11,12 +11,10 @@ from rigdda.constants import (
     AWAKE,
     BAD_STATE,
     CONTACTS_FULL,
-    CUTS,
     DONE,
     ENDED,
     EVENTS_FULL,
     GROUND_MOVED,
-    HELD,
     OPEN,
     SPEED_LIMIT,
     TERRAIN,
@@ -37,7 +35,6 @@ from rigdda.correction import (
     move_corners,
     place_corners,
 )
-from rigdda.cut_back import act_early, hold_others, level_for, mark_cut, release_all, too_far
 from rigdda.fence import charge_fences, lower_fences, wake_behind
 from rigdda.flight import fly, keep_touch, land, take_off
 from rigdda.frames import keep_frame
@@ -51,7 +48,6 @@ from rigdda.records import (
     BROAD_PHASE,
     CONTACT_TOTAL,
     CONTACTS,
-    CUT_BACKS,
     EVENTS,
     MOTION,
     NARROW_PHASE,
@@ -105,16 +101,6 @@ def keep_asleep(
             block, barrier = barrier_contact(gauges, a, b)
             if barrier >= 0:
                 gauges.last_touch[block, barrier] = time
-    return count
-
-
-@kernel
-def keep_held(contacts: Contacts, count: int, old: Contacts, first: Ints, a: int) -> int:
-    """Keep the contacts of block a, which has taken its step; returns the new number."""
-    for k in range(first[a], first[a + 1]):
-        if count < len(contacts):
-            contacts[count] = old[k]
-            count += 1
     return count
 
 
@@ -185,8 +171,6 @@ def detect(
                 count += 1
         elif bodies[a].status == ASLEEP:
             count = keep_asleep(bodies, contacts, count, old, work.first, a, gauges, time)
-        elif bodies[a].status == HELD:
-            count = keep_held(contacts, count, old, work.first, a)
     work.begin[p.blocks] = count
     lap(counters, NARROW_PHASE, since, p.timing)
     return count
@@ -232,45 +216,22 @@ def move_island(
     return bad
 
 
-@kernel
-def watch_step(
-    bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, island: int,
-    settled: bool, p: Parameters,
-) -> tuple[float, bool]:  # fmt: skip
-    """Return how far an island goes over what a step should take it, and if a blow acts early."""
-    far, early = 0.0, False
-    for attempt in range(2):
-        far = too_far(bodies, contacts, motion, islands, island, p)
-        if far <= 1.0 or attempt == 1 or not settled:
-            break
-        early = act_early(bodies, contacts, motion, islands, island, p)
-        if not early:
-            break
-    return far, early
-
-
 @stage
 def step_island(
     bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
     before: Contacts, system: System, work: Work, gauges: Gauges, time: float, s: int,
-    p: Parameters, part: Parameters, cutting: bool, counters: NDArray, ledger: NDArray,
-) -> tuple[int, float]:  # fmt: skip
+    p: Parameters, part: Parameters, counters: NDArray, ledger: NDArray,
+) -> int:  # fmt: skip
     """Settle island s, note its hits, and move its blocks, in one or in parts: see `lone_block`.
 
-    Returns
-    -------
-    bad : int
-        A block that went bad, or -1.
-    excess : float
-        How far the island went, over what a step should take it, at least 1, if it is cut back:
-        left where it is, and marked; else 0.
+    Returns a block that went bad, or -1.
     """
     islands, rows, m, motion = work.islands, work.rows, system.matrix, system.motion
     c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
     now, left, parts, bad = p, p.dt, 0, -1
     since = lap(counters, MOTION, 0, p.timing)
     while left > 0.0 and bad < 0:
-        settled, early, islands.relaxed[0] = True, False, 0
+        settled, islands.relaxed[0] = True, 0
         if parts > 0:
             begin_part(bodies, contacts, interfaces, islands, s, motion, left, parts, part)
             now = part
@@ -279,19 +240,13 @@ def step_island(
             settled = open_close(bodies, contacts, system, islands, rows, s, now, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
         struck = apply_forces(bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, now)
-        if c1 > c0 and parts == 0:
-            if cutting:
-                far, early = watch_step(bodies, contacts, motion, islands, s, settled, p)
-                if far > 1.0 or not settled:
-                    counters[CUT_BACKS] += 1
-                    mark_cut(bodies, islands, s)
-                    return -1, max(far, 1.0)
-            if takes_parts(contacts, islands, s, gauges, p):
-                recall_all(contacts, islands, s, before, work.first, p)
-                parts = 1
-                continue
+        if c1 > c0 and parts == 0 and takes_parts(bodies, contacts, islands, s, gauges, p):
+            recall_all(contacts, islands, s, before, work.first, p)
+            part.field_x, part.field_y = p.field_x, p.field_y
+            parts = 1
+            continue
         if c1 > c0:
-            if not settled:  # not in a shorter step, either
+            if not settled:
                 let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
             if charge_fences(
                 bodies, contacts, system, islands, rows, s, gauges, time, now, counters
@@ -299,8 +254,6 @@ def step_island(
                 struck = apply_forces(
                     bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, now
                 )
-                early = early and act_early(bodies, contacts, motion, islands, s, p)
-            struck = struck or early
             if len(gauges.target) > 0:
                 counters[EVENTS] = note_hits(
                     bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
@@ -311,44 +264,35 @@ def step_island(
         left -= now.dt
         parts += 1 if parts > 0 else 0
     lap(counters, MOTION, since, p.timing)
-    return bad, 0.0
+    return bad
 
 
 @stage
 def solve_and_move(
     bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts, count: int,
     before: Contacts, system: System, work: Work, gauges: Gauges, time: float, p: Parameters,
-    part: Parameters, cutting: bool, counters: NDArray, ledger: NDArray,
-) -> tuple[int, float]:  # fmt: skip
-    """Take the step of every island.
+    part: Parameters, counters: NDArray, ledger: NDArray,
+) -> int:  # fmt: skip
+    """Take the step of every island; `part` is for parts of the step of a lone block.
 
-    Where `cutting`, an island that does not settle, or that goes farther than a step should take
-    it, is left where it is, and marked. `part` is for parts of the step of a lone block.
-
-    Returns
-    -------
-    bad : int
-        A block that went bad, or -1.
-    excess : float
-        How far the islands left went, over what a step should take them, at least 1; 0 if there are
-        none.
+    Returns a block that went bad, or -1.
     """
     since = lap(counters, MOTION, 0, p.timing)
     found = find_islands(bodies, contacts, work.begin, work.islands, p.blocks, p.islands)
     since = lap(counters, MOTION, since, p.timing)
-    bad, excess = -1, 0.0
+    bad = -1
     for s in range(found):
-        worse, far = step_island(
+        worse = step_island(
             bodies, outlines, interfaces, contacts, before, system, work, gauges, time, s, p, part,
-            cutting, counters, ledger,
+            counters, ledger,
         )  # fmt: skip
-        bad, excess = max(bad, worse), max(excess, far)
+        bad = max(bad, worse)
     if p.sleeping:
         since = lap(counters, MOTION, 0, p.timing)
         watch_quiet(bodies, work.islands, found, p)
         wake_behind(bodies, contacts, count, gauges, p)
         lap(counters, MOTION, since, p.timing)
-    return bad, excess
+    return bad
 
 
 @kernel
@@ -356,8 +300,7 @@ def rest_all(bodies: Bodies) -> None:
     """Take the velocity from every block: static mode."""
     for i in range(len(bodies)):
         body = bodies[i]
-        if body.status != HELD:
-            body.vx = body.vy = body.omega = 0.0
+        body.vx = body.vy = body.omega = 0.0
 
 
 @kernel
@@ -375,7 +318,6 @@ def end_step(
     counters: NDArray, p: Parameters,
 ) -> int:  # fmt: skip
     """Watch what a whole step has brought; returns DONE, GROUND_MOVED or ENDED."""
-    release_all(bodies)
     counters[STEPS] += 1
     time = counters[STEPS] * p.dt
     counters[EVENTS] = note_passage(bodies, gauges, counters[EVENTS], time)
@@ -392,15 +334,15 @@ def end_step(
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
     shaking: Shaking, now: Contacts, before: Contacts, system: System, work: Work, gauges: Gauges,
-    levels: NDArray[np.void], counters: NDArray, ledger: NDArray, deepest: NDArray,
+    parameters: NDArray[np.void], counters: NDArray, ledger: NDArray, deepest: NDArray,
     steps: int, frames: NDArray, stride: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Take up to `steps` steps, and keep a frame whenever a multiple of `stride` is left.
 
     Parameters
     ----------
-    levels : array of PARAMETERS
-        Of the step, then of its halves, quarters, ..., which are for islands that are cut back.
+    parameters : array of PARAMETERS
+        Of the step, and of the part of it that a lone block takes.
     counters, ledger, deepest : arrays
         See `records.COUNTERS`, `records.LEDGER`; deepest[0] is the greatest penetration [m].
     frames : (F, M, 6) array
@@ -416,19 +358,16 @@ def advance(
     swapped : bool
         Whether `now` and `before` have changed roles.
     """
-    swapped, level, part, reason, bad = False, 0, 0, DONE, -1
-    may_fly = len(links) == 0 and len(shaking) == 0 and not levels[0].static
-    may_fly = may_fly and levels[0].post_correction
+    swapped, reason, bad, p = False, DONE, -1, parameters[0]
+    may_fly = len(links) == 0 and len(shaking) == 0 and not p.static and p.post_correction
     flyer, flown, flight = -1, 0, 0  # steps of a flight that are taken, and all of them
     while steps > 0 and reason == DONE:
-        p, parts = levels[level], 2**level
         room = len(gauges.event) - counters[EVENTS]
-        if level == 0 and room < (p.blocks + 1) * (len(gauges.station) + len(gauges.target)):
+        if room < (p.blocks + 1) * (len(gauges.station) + len(gauges.target)):
             reason = EVENTS_FULL
             break
-        start = counters[STEPS] * parts + part
-        time = (start + 1) * p.dt
-        if may_fly and level == 0 and flown == flight:
+        time = (counters[STEPS] + 1) * p.dt
+        if may_fly and flown == flight:
             land(bodies, outlines, flyer, flown)
             flyer, flight = take_off(bodies, outlines, ground, work.islands, work.begin, p)
             flown = 0
@@ -436,43 +375,34 @@ def advance(
             flown += 1
             count = counters[CONTACTS]
             keep_touch(bodies, now, count, gauges, time)
-            excess = 0.0
             bad = fly(bodies, flyer, now, system.matrix, system.motion, work.islands, p, ledger)
             flight = flight if bodies[flyer].status == AWAKE else flown
         else:
-            set_out(bodies, shaking, start * p.dt, time, p)
+            set_out(bodies, shaking, counters[STEPS] * p.dt, time, p)
             copy_index(work.begin, work.first)
             count = detect(
                 bodies, outlines, ground, interfaces, links, before, now, work, gauges, time, p,
                 counters, deepest,
             )  # fmt: skip
-            # a cut-back, which cannot be left, has room to spare
-            if count < 0 or (level == 0 and 4 * count > 3 * len(now)):
+            if count < 0:
                 copy_index(work.first, work.begin)
                 reason = CONTACTS_FULL
                 break
             now, before = before, now
             swapped = not swapped
-            bad, excess = solve_and_move(
+            bad = solve_and_move(
                 bodies, outlines, interfaces, now, count, before, system, work, gauges, time, p,
-                levels[CUTS + 1], level == 0, counters, ledger,
+                parameters[1], counters, ledger,
             )  # fmt: skip
             ledger[4] += mend_links(bodies, outlines, links, p)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
-        if level == 0:
-            press_asleep(bodies, now, count, gauges, p.dt)
-        part += 1
-        if bad < 0 and excess > 0.0:
-            hold_others(bodies, now, count, before, work.first, p)
-            level, part = level_for(excess, p), 0
-        elif bad >= 0 or part == parts:
-            level, part = 0, 0
-            reason = end_step(bodies, outlines, now, count, work, gauges, counters, levels[0])
-            steps -= 1
-            if bad >= 0:
-                reason = BAD_STATE
-            elif len(frames) > 0 and steps % stride == 0:
-                keep_frame(bodies, frames[len(frames) - 1 - steps // stride])
+        press_asleep(bodies, now, count, gauges, p.dt)
+        reason = end_step(bodies, outlines, now, count, work, gauges, counters, p)
+        steps -= 1
+        if bad >= 0:
+            reason = BAD_STATE
+        elif len(frames) > 0 and steps % stride == 0:
+            keep_frame(bodies, frames[len(frames) - 1 - steps // stride])
     land(bodies, outlines, flyer, flown)
     return reason, bad, swapped

@@ -15,7 +15,7 @@ CASES: tuple[Case, ...] = (
     *supports.CASES,
 )
 
-STEPS = (1e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 2.5e-2, 5e-2, 1e-1)
-"""Steps of the sweep [s]: whole parts of the longest one."""
+STEPS = (1e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 2e-2, 1e-1)
+"""Steps of the sweep [s]: whole parts of the longest one, which is to be refused."""
 
-QUICK_STEPS = (5e-3, 2.5e-2, 1e-1)
+QUICK_STEPS = (5e-3, 2e-2, 1e-1)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from rigdda.constants import AWAKE, HELD, LATELY, RETIRED
+from rigdda.constants import AWAKE, LATELY, RETIRED
 from rigdda.kernel import kernel
 from rigdda.motion import top_speed
 from rigdda.records import Bodies, Boxes, Parameters, Polygons
@@ -25,7 +25,7 @@ def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) 
         box.low_x, box.high_x = outline.low_x - grow, outline.high_x + grow
         box.low_y, box.high_y = outline.low_y - grow, outline.high_y + grow
         box.body, box.awake = i, body.status == AWAKE
-        if body.status == RETIRED or body.status == HELD:  # nothing overlaps it
+        if body.status == RETIRED:  # nothing overlaps it
             box.low_y, box.high_y = math.inf, -math.inf
 
 

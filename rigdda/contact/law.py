@@ -14,7 +14,8 @@ at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n
          shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
          on, the rest viscous (Kelvin and Voigt's solid). Penetration beyond what N_0 explains is
          pushed out slowly, a small gap closed so. u_0 is that of the points that touch at the
-         start of the step, see `set_velocities_at_start`. What an open gap gives: see `closing`.
+         start of the step, see `set_velocities_at_start`. An open gap gives b = -g: what would
+         close within the step is slowed down to the speed that closes it in one more.
 impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
          impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
@@ -53,7 +54,6 @@ from rigdda.constants import (
     START_STIFFNESS,
     STICK,
     STIFFNESS_CHANGE,
-    TERRAIN,
     TOUCHING,
     UNLOADED,
 )
@@ -181,20 +181,6 @@ def recovery(surplus: float, dt: float) -> float:
 
 
 @kernel
-def closing(c: Contact, p: Parameters) -> float:
-    """Return the bias with which an open contact closes at the end of the step, or stops [m].
-
-    It bears force if it would close within the step, u_0 + u_1 < -2 g / dt, and where that would
-    send it back, u_1 > 0, only what stops it: b = -2 g - dt u_0, at most 0. In fine steps, in which
-    nothing watches what sinks in next, and between blocks, of which many strike at a time, it is
-    slowed down before, to the speed that would close it in one more step: b = -g.
-    """
-    if p.sinking_limit == math.inf or c.b != TERRAIN:
-        return -c.gap
-    return min(-2.0 * c.gap - p.dt * c.un, 0.0)
-
-
-@kernel
 def set_rest(c: Contact, weight: float, most: float, p: Parameters) -> None:
     """Make a contact a spring that carries on with the force of the last step.
 
@@ -206,7 +192,7 @@ def set_rest(c: Contact, weight: float, most: float, p: Parameters) -> None:
     elastic = c.memory_normal / c.stiffness
     if c.gap > p.penetration and c.bond == 0.0:
         c.memory_normal = c.start_normal = 0.0
-        c.bias = closing(c, p)
+        c.bias = -c.gap
     else:
         c.bias = c.memory_normal / c.kappa
         if PUSHED * weight < c.memory_normal < most:
@@ -221,7 +207,7 @@ def set_new(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
     stiffness = impact_stiffness(effective_mass(bodies, c), p.dt)
     c.kappa = max(START_STIFFNESS * stiffness if start else stiffness, c.stiffness)
     # a gap of rounding would be a force in so stiff a spring
-    c.bias = closing(c, p) if c.gap > TOUCHING * p.penetration else 0.0
+    c.bias = -c.gap if c.gap > TOUCHING * p.penetration else 0.0
 
 
 @kernel

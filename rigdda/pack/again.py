@@ -12,7 +12,7 @@ from rigdda.geometry import is_convex
 from rigdda.pack import Arrays, pack
 from rigdda.pack.bodies import barrier_trait, block_traits, write_polygons
 from rigdda.pack.gauges import start_rock, start_targets
-from rigdda.pack.parameters import frictions, rock_numbers, write_rock_numbers
+from rigdda.pack.parameters import frictions, rock_numbers
 from rigdda.scene import Scene
 from rigdda.settings import Settings
 
@@ -57,7 +57,7 @@ class Template:
                 self._arrays.parameters,
             )
         ]
-        self._bodies, self._polygons, self._rock, self._levels = plain
+        self._bodies, self._polygons, self._rock, self._parameters = plain
 
     def fits(self, scene: Scene) -> bool:
         """Return whether a scene of `with_rock` can be written into these arrays."""
@@ -81,7 +81,7 @@ class Template:
         Raises
         ------
         BadInput
-            If its smallest block is too small for the step.
+            If the step is too long for its blocks.
         """
         arrays = self._arrays
         self._memory[:] = self._fresh
@@ -100,7 +100,8 @@ class Template:
         if scene.surfaces is not self.scene.surfaces:
             arrays.interfaces["friction"] = frictions(scene, len(arrays.interfaces))
         start_rock(self._rock, bodies, self._stations)
-        write_rock_numbers(self._levels, rock_numbers(scene, self._settings, bodies))
+        for name, value in rock_numbers(scene, self._settings, bodies).items():
+            self._parameters[name] = value
         return arrays
 
 

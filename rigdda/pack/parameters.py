@@ -9,13 +9,9 @@ from numpy.typing import NDArray
 
 from rigdda.barriers import Fence
 from rigdda.constants import (
-    CUTS,
-    DEFLECTED,
     PENETRATION_RATIO,
     PLAIN_CONTACT,
-    SINKING,
     SLACK_RATIO,
-    STEADY_STEP,
 )
 from rigdda.errors import BadInput
 from rigdda.pack.bodies import free_bodies
@@ -26,24 +22,22 @@ from rigdda.records import (
     Interfaces,
 )
 from rigdda.scene import Scene
-from rigdda.settings import SOLVERS, Settings
-
-LARGEST_FALL = 0.25
-"""Greatest displacement that gravity gives a block in a step, over its size [-]. With 0.31 thin
-blocks sink into one another, with more than a half they go through the ground."""
-
+from rigdda.settings import EARTH, SOLVERS, Settings, longest_step
 
 FALL_BELOW = 20.0
 """Depth below the lowest terrain at which a block that left the site is retired [m]."""
 
 
-def check_step(settings: Settings, block: int, size: float, gravity: float) -> None:
-    """Refuse a step in which gravity alone moves the smallest block by most of its size [m]."""
-    fall = gravity * settings.dt**2
-    if fall > LARGEST_FALL * size and settings.mode == "dynamic":
-        most = math.sqrt(LARGEST_FALL * size / gravity)
-        mend = f"give at most {most:.2g} s: block {block} is small, {size:.2g} m, and would fall "
-        raise BadInput("dt", settings.dt, mend + f"{fall:.2g} m more in every step")
+def check_step(settings: Settings, areas: NDArray[np.float64], gravity: float) -> None:
+    """Refuse a step that is too long for free blocks of these areas [m2]."""
+    most = longest_step(areas, gravity)
+    if settings.dt > most and settings.mode == "dynamic":
+        sizes = np.sqrt(areas)
+        mend = (
+            f"give at most {math.floor(1e5 * most) / 1e5:g} s: the blocks are {sizes.min():.2g} to "
+            f"{sizes.max():.2g} m large, and contacts would sink in"
+        )
+        raise BadInput("dt", settings.dt, mend)
 
 
 def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
@@ -78,37 +72,18 @@ def rock_numbers(scene: Scene, settings: Settings, bodies: Bodies) -> dict[str, 
     area = mass / [scene.blocks[i].density for i in free]
     size = math.sqrt(np.add.reduce(area) / len(free))
     gravity = math.hypot(*scene.gravity_vector)
-    least = int(area.argmin())
-    check_step(settings, free[least], math.sqrt(area[least]), gravity)
-    steady = STEADY_STEP * math.sqrt(size / gravity) if gravity > 0.0 else math.inf
-    static = settings.mode == "static"
-    coarse = settings.dt > steady and not static
-    numbers = {
-        "displacement_limit": settings.displacement_limit * size,
-        "deflection_limit": math.inf if static else DEFLECTED * size,
-        "sinking_limit": SINKING * size if coarse else math.inf,
-        "first_cut": 1,
-        "block_weight": np.add.reduce(mass) / len(free) * (gravity or 9.81),
+    check_step(settings, area, gravity)
+    return {
+        "block_weight": np.add.reduce(mass) / len(free) * (gravity or EARTH),
         "penetration": settings.penetration or PENETRATION_RATIO * size,
         "slack": SLACK_RATIO * size,
     }
-    if coarse:
-        halvings = round(math.log2(settings.dt / steady))
-        numbers["first_cut"] = min(max(1, halvings), CUTS)
-    return numbers
-
-
-def write_rock_numbers(levels: NDArray[np.void], numbers: dict[str, float]) -> None:
-    """Write what `rock_numbers` gives, for a step and its parts: these are not cut back."""
-    for name, value in numbers.items():
-        levels[name] = value
-    levels["sinking_limit"][1:] = math.inf
 
 
 def pack_parameters(
     scene: Scene, settings: Settings, bodies: Bodies, interfaces: Interfaces
 ) -> NDArray[np.void]:
-    """Return the numbers of the scene and the settings: for the step, halves of it, and parts."""
+    """Return the numbers of the scene and the settings: of a step, and of parts of one."""
     gx, gy = scene.gravity_vector
     static = settings.mode == "static"
     shaken = scene.base_motion is not None
@@ -116,6 +91,7 @@ def pack_parameters(
     if scene.terrain is not None and gx == 0.0 and gy < 0.0:
         floor = scene.terrain.points[:, 1].min() - FALL_BELOW
     numbers = {
+        "dt": settings.dt,
         "blocks": free_bodies(scene),
         "gravity_x": gx,
         "gravity_y": gy,
@@ -137,9 +113,7 @@ def pack_parameters(
         "floor": floor,
         "bonded": (interfaces["cohesion"] + interfaces["tension"]).any(),
     }
-    levels = np.zeros(CUTS + 2, dtype=PARAMETERS)
-    for name, value in numbers.items():
-        levels[name] = value
-    levels["dt"] = settings.dt / 2.0 ** np.arange(CUTS + 2)
-    write_rock_numbers(levels, rock_numbers(scene, settings, bodies))
-    return levels.view(np.recarray)
+    parameters = np.zeros(2, dtype=PARAMETERS)
+    for name, value in (numbers | rock_numbers(scene, settings, bodies)).items():
+        parameters[name] = value
+    return parameters.view(np.recarray)

@@ -57,5 +57,5 @@ CHECKS = (
 
 CASES = (
     Case("thin-wall", CHECKS, measure),
-    Case("thin-wall-80ms", CHECKS, measure, dt=0.08),  # longer ones are refused for such blocks
+    Case("thin-wall-10ms", CHECKS, measure, dt=0.01),
 )

@@ -70,7 +70,7 @@ def test_what_falls_without_barriers_is_told() -> None:
         count = max(2, 16 // largest(CUT, event.name))
         for seed in range(FIRST, FIRST + count):
             scene = CUT.realise((), seed, event.name)
-            run = rigdda.Simulation(scene, CUT.settings(), lines.tolist()).run(8.0)
+            run = rigdda.Simulation(scene, CUT.settings(scene), lines.tolist()).run(8.0)
             for k in range(STATIONS):
                 passed = [e["energy"] for e in run.events if e["target"] == k and e["kind"] == 1]
                 often[group, k] += (len(passed) > 0) * event.rate / count

@@ -35,9 +35,8 @@ def on_benches(height: float, thickness: float = 1.0) -> tuple[Wall, ...]:
 def check_release(job: tuple[tuple[Wall, ...], int]) -> float:
     """Assert what holds in every frame of a release; return its greatest penetration [m]."""
     layout, seed = job
-    sim = Simulation(
-        SITE.realise(layout, seed), SITE.settings(), stations(SITE, layout), watch(SITE)
-    )
+    scene = SITE.realise(layout, seed)
+    sim = Simulation(scene, SITE.settings(scene), stations(SITE, layout), watch(SITE))
     run = sim.run(SITE.motion.duration)
     ground = run.scene.terrain.points
     x, y = run.poses[..., 0], run.poses[..., 1]

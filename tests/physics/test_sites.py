@@ -70,7 +70,8 @@ def test_blocks_start_clear_of_the_ground_and_of_each_other(name, event, seed):
 def test_rock_comes_down_and_is_accounted_for(name, event):
     site = Site.load(name)
     drawn = site.draw(1, event)
-    sim = Simulation(site.scene(drawn), site.settings(), stations(site, ()), watch(site))
+    scene = site.scene(drawn)
+    sim = Simulation(scene, site.settings(scene), stations(site, ()), watch(site))
     run = sim.run(4.0)
     assert sim.diagnostics.penetration < 0.1
     fell = run.poses[0, :, 1] - run.poses[-1, :, 1]
@@ -113,7 +114,8 @@ def test_toppling_site_falls_below_the_limiting_friction(friction_deg, stands):
     site = msgspec.structs.replace(
         Site.load("toppling"), surfaces={"rock": Surface(friction_deg)}, scatter=Scatter()
     )
-    sim = Simulation(site.realise(), site.settings())
+    scene = site.realise()
+    sim = Simulation(scene, site.settings(scene))
     start = sim.poses
     sim.step(1000)
     moved = np.hypot(*(sim.poses - start)[:, :2].T).max()

@@ -12,9 +12,9 @@ from rigdda import Block, Scene, Settings, Simulation, Terrain, Wall
 from rigdda.geometry import polygon_properties
 
 WALL = Wall(x=10.0, height=30.0, thickness=0.2)
-STEPS = (1e-3, 5e-3, 1e-2, 2e-2)
-DEEPEST = {1e-3: 0.02, 5e-3: 0.03, 1e-2: 0.04, 2e-2: 0.1}
-"""Deepest that a corner may be in the wall at the end of a step [m]: half its thickness."""
+STEPS = (1e-3, 5e-3, 1e-2)
+DEEPEST = {1e-3: 0.02, 5e-3: 0.03, 1e-2: 0.05}
+"""Deepest that a corner may be in the wall at the end of a step [m]: a quarter of its thickness."""
 
 
 def any_shape(rng: np.random.Generator, kind: int) -> np.ndarray:
@@ -123,7 +123,7 @@ def lunge(seed: int) -> tuple[Scene, shapely.Polygon]:
     return Scene(terrain, (block,), surfaces), solid(terrain)
 
 
-@pytest.mark.parametrize("dt", [5e-3, 2e-2])
+@pytest.mark.parametrize("dt", [5e-3, 1e-2])
 def test_nothing_passes_jagged_ground(dt):
     for seed in range(60):
         scene, ground = lunge(seed)

@@ -69,7 +69,7 @@ def full(layout: Layout, seed: int, event: str) -> Outcome:
     drawn = SITE.draw(seed, event)
     scene = SITE.scene(drawn, SITE.built(layout, drawn.width))
     lines, duration = stations(SITE, scene.barriers), SITE.motion.duration
-    run = Simulation(scene, SITE.settings(), lines, watch(SITE)).run(duration, duration)
+    run = Simulation(scene, SITE.settings(scene), lines, watch(SITE)).run(duration, duration)
     return measure(SITE, run, drawn.event, drawn.width)
 
 

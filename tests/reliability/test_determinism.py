@@ -19,7 +19,8 @@ def scene(seed: int = 0) -> Scene:
 
 
 def play(seed: int = 0) -> Run:
-    return Simulation(scene(seed), SITE.settings(), (30.0,), (0.0, 1e3)).run(DURATION)
+    one = scene(seed)
+    return Simulation(one, SITE.settings(one), (30.0,), (0.0, 1e3)).run(DURATION)
 
 
 def same(one: Run, other: Run) -> bool:
@@ -47,13 +48,13 @@ def test_seeds_differ(run):
 
 def test_many_at_once(run):
     scenes = [scene(seed) for seed in (0, 1, 2, 0)]
-    runs = simulate_many(scenes, SITE.settings(), DURATION, 0.05, (30.0,), (0.0, 1e3))
+    runs = simulate_many(scenes, SITE.settings(scenes[0]), DURATION, 0.05, (30.0,), (0.0, 1e3))
     for seed, many in zip((0, 1, 2, 0), runs, strict=True):
         assert same(many, run if seed == 0 else play(seed))
 
 
 def test_steps_in_pieces():
-    whole, pieces = (Simulation(scene(), SITE.settings()) for _ in range(2))
+    whole, pieces = (Simulation(scene(), SITE.settings(scene())) for _ in range(2))
     whole.step(400)
     for n in (1, 0, 7, 92, 299, 1):
         pieces.step(n)
@@ -71,7 +72,7 @@ def test_save_and_load(run, tmp_path):
 def test_saved_scene_runs_the_same(run, tmp_path):
     run.save(tmp_path / "run.npz")
     loaded = Run.load(tmp_path / "run.npz").scene
-    again = Simulation(loaded, SITE.settings(), (30.0,), (0.0, 1e3)).run(DURATION)
+    again = Simulation(loaded, SITE.settings(loaded), (30.0,), (0.0, 1e3)).run(DURATION)
     assert same(again, run)
 
 

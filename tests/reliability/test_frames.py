@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from physics.helpers import FLAT, box, rock
 
 from rigdda import Diverged, GravityWall, Scene, Settings, Simulation, Terrain
+from rigdda.constants import SPEED_LIMIT
 from rigdda.frames import PIECE, pieces
 
 DT = 0.01
@@ -50,7 +51,8 @@ def test_pieces_add_up(steps: int, stride: int) -> None:
 @pytest.mark.parametrize("every", [0.01, 0.03, 1.0])
 def test_the_frames_before_a_divergence_are_kept(every: float) -> None:
     """More than a piece of them, and those of the piece in which it diverged."""
-    scene = Scene(None, (box(),), rock(), gravity=2e3)
+    fast = box(velocity=(0.0, 50.0 - SPEED_LIMIT, 0.0))
+    scene = Scene(None, (fast,), rock())
     sim, stepped = Simulation(scene, Settings(dt=DT)), Simulation(scene, Settings(dt=DT))
     with pytest.raises(Diverged) as caught:
         sim.run(100.0, every)

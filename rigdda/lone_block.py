@@ -106,8 +106,9 @@ def begin_part(
     """
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     turning = abs(bodies[islands.block_item[islands.block_start[island]]].omega)
-    end = left if number == MOST_PARTS else min(left, TURN / max(turning, TURN / left))
-    part.dt = left
+    part.dt = end = left
+    if number < MOST_PARTS:
+        end = left / max(math.ceil(turning * left / TURN), 1)
     for item in range(c0, c1):
         c = contacts[islands.contact_item[item]]
         if number > 1:
@@ -119,6 +120,7 @@ def begin_part(
         time = time_of_impact(bodies, c, pull, part)
         if time >= 0.0:
             end = min(end, time + AFTER_IMPACT * left)
-    part.dt = end
+    # no part so short that rounding makes its velocities
+    part.dt = end if end < (1.0 - AFTER_IMPACT) * left else left
     for item in range(c0, c1):
         prepare(bodies, contacts[islands.contact_item[item]], interfaces, False, part)

@@ -45,7 +45,6 @@ from rigdda.constants import (
     OPEN,
     PLAIN,
     PLAIN_CONTACT,
-    PUSHED,
     RECOVERY_SPEED,
     RECOVERY_TIME,
     REST,
@@ -181,11 +180,11 @@ def recovery(surplus: float, dt: float) -> float:
 
 
 @kernel
-def set_rest(c: Contact, weight: float, most: float, p: Parameters) -> None:
+def set_rest(c: Contact, weight: float, p: Parameters) -> None:
     """Make a contact a spring that carries on with the force of the last step.
 
-    Penetration is not pushed out under more than `most` [N], which leaves a wedged block in peace,
-    nor under next to no load, where blocks that collide would gain energy.
+    Penetration is pushed out at no more power than under `weight` [N]: wedged blocks and piles that
+    cannot give way would be driven for ever.
     """
     c.kind = REST
     c.kappa = c.stiffness * max(1.0, RETARDATION_TIME / p.dt)
@@ -195,9 +194,9 @@ def set_rest(c: Contact, weight: float, most: float, p: Parameters) -> None:
         c.bias = -c.gap
     else:
         c.bias = c.memory_normal / c.kappa
-        if PUSHED * weight < c.memory_normal < most:
+        if c.memory_normal > 0.0:
             surplus = max(-c.gap - elastic, 0.0) - max(c.gap, 0.0)
-            c.bias += recovery(surplus, p.dt)
+            c.bias += recovery(surplus, p.dt) * weight / max(weight, c.memory_normal)
 
 
 @kernel
@@ -324,7 +323,7 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
     gap, mean = max(c.gap, 0.0), 0.5 * pull * p.dt - c.un
     set_velocities_at_start(bodies, c, p.dt)
     if c.state != OPEN:
-        set_rest(c, weight, most, p)
+        set_rest(c, weight, p)
         return
     set_new(bodies, c, start, p)
     # what touches starts closed: in a stack no block moves before those below it are held, and

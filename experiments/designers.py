@@ -16,6 +16,7 @@ import statistics
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from agents import extra
@@ -48,6 +49,8 @@ FREE = ("constant", "rule")
 """Designers that search nothing: one budget and one seed tell all."""
 MANY = ("race", "random")
 """Designers that search at every budget with every seed; the others with the default and one."""
+TICKS, APART = (2_000, 5_000, 10_000, 20_000), 1.03
+"""Marks of the axis of the picture, and the factor by which points of designers are drawn apart."""
 SEEDS, QUICK_SEEDS = 3, 1
 BUDGETS, QUICK_BUDGETS = (BUDGET // 10, BUDGET), (600,)
 VERIFY, QUICK_VERIFY = 6_000, 800
@@ -124,13 +127,15 @@ def picture(figure: Figure, rows: list[Any]) -> None:
     names = list(dict.fromkeys(r["site"] for r in rows))
     grid = figure.subplots(2, (len(names) + 1) // 2, squeeze=False, sharey=True).ravel()
     for axes, site in zip(grid, names, strict=False):
-        for name, colour in COLOURS.items():
+        for i, (name, colour) in enumerate(COLOURS.items()):
             own = [r for r in rows if r["site"] == site and r["designer"] == name]
-            x, y = ([float(r[k]) for r in own] for k in ("releases", "distance"))
-            axes.plot(x, y, "o", color=colour, alpha=0.6, label=name)
+            x, y = (np.array([float(r[k]) for r in own]) for k in ("releases", "distance"))
+            axes.plot(APART**i * x, y, "o", color=colour, alpha=0.6, label=name)
         axes.axhline(0.0, color="0.8", zorder=0)
         axes.axhline(1.0, color="0.8", zorder=0, linestyle=":")
         axes.set(xscale="log", title=site, xlabel="releases", ylim=(-0.1, 1.5))
+        axes.set_xticks(TICKS, [f"{tick:,}" for tick in TICKS])
+        axes.set_xticks([], minor=True)
     grid[0].set_ylabel("distance from the reference [-]")
     grid[0].legend(fontsize=8)
     for axes in grid[len(names) :]:

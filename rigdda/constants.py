@@ -216,6 +216,10 @@ SLEEP_SPEED = 0.02
 SLEEP_TIME = 0.5
 """Time for which a whole island must be quiet before it sleeps [s]."""
 
+GROWN = 0.1
+"""Growth of its speed, over the speed below which it counts as quiet, from which on a block is not
+[-]. Without it what is 0.2 deg too steep to stand fell asleep before it slid."""
+
 WAKE_SPEED = 0.05
 """Speed of a block that wakes a sleeping one beside it [m/s]."""
 

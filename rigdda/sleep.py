@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigdda.constants import ASLEEP, AWAKE, SLEEP_SPEED, SLEEP_TIME, WAKE_SPEED
+from rigdda.constants import ASLEEP, AWAKE, GROWN, SLEEP_SPEED, SLEEP_TIME, WAKE_SPEED
 from rigdda.kernel import kernel
 from rigdda.motion import top_speed
 from rigdda.records import Bodies, Ints, Islands, Parameters
@@ -35,12 +35,18 @@ def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int
 
 @kernel
 def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> None:
-    """Count how long blocks have been quiet and put wholly quiet islands to sleep."""
+    """Count how long blocks have been quiet and put wholly quiet islands to sleep.
+
+    A block that is getting faster is not quiet: it has begun to slide or to fall.
+    """
     for s in range(count):
         least = 1e300
         for place in range(islands.block_start[s], islands.block_start[s + 1]):
             body = bodies[islands.block_item[place]]
-            quiet = body.apart == 0.0 and top_speed(body) < SLEEP_SPEED
+            speed = top_speed(body)
+            body.slowest = min(body.slowest, speed) if body.quiet > 0.0 else speed
+            growing = speed > body.slowest + GROWN * SLEEP_SPEED
+            quiet = body.apart == 0.0 and speed < SLEEP_SPEED and not growing
             body.quiet = body.quiet + p.dt if quiet else 0.0
             least = min(least, body.quiet)
         if least < SLEEP_TIME:

@@ -128,7 +128,7 @@ def rocking_error(scene: Scene, times: Floats, poses: Floats) -> float:
     last = slowed[0] + 1
     a, b, c = np.polyfit(times[last - 2 : last + 1] - times[last], angle[last - 2 : last + 1], 2)
     after = 2.0 * c / (-b + math.sqrt(max(b * b - 4.0 * a * c, 0.0)))
-    exact = rocking.time_to_impact(tilt)
+    exact = rocking.time_to_turn(rocking.HALF - tilt, rocking.HALF)
     return abs((times[last] + after) / exact - 1.0)
 
 

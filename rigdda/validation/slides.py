@@ -120,6 +120,7 @@ CASES = (
     slide_case("slide-45-30", 45.0, 30.0, LOW, 2.0, 1e-4),
     slide_case("slide-35-34-2s", 35.0, 34.0, 1.0, 2.0, 2e-3),
     slide_case("slide-35-34-10s", 35.0, 34.0, 1.0, 10.0, 1e-4),
+    slide_case("slide-30.2-30", 30.2, 30.0, 1.0, 5.0, 1e-4),
     Case("hold-30-30.5", HOLDS, lambda lab: measure_hold(lab, 30.5)),
     Case("hold-30-35", HOLDS, lambda lab: measure_hold(lab, 35.0)),
     Case("hold-pressed", HOLDS, measure_pressed),

@@ -1,0 +1,19 @@
+"""docs/theory.md names functions that are there."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pathlib import Path
+
+PAGE = (Path(__file__).parents[1] / "docs" / "theory.md").read_text(encoding="utf-8")
+
+
+def test_every_function_that_is_named_is_there() -> None:
+    named = re.findall(r"`?\b([a-z_/]+):([A-Za-z_.]+)\b", PAGE.replace("module:function", ""))
+    assert len(named) > 30
+    for module, path in named:
+        found = import_module("rigdda." + module.replace("/", "."))
+        for name in path.split("."):
+            found = getattr(found, name)
+        assert callable(found)

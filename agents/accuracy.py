@@ -8,7 +8,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from agents.tables import empty_table, write_rows
+from agents.tables import applies_not, empty_table, write_rows
 from rigdda import BadInput
 from rigdda.validation import CASES, Case, Convergence, Result, converge, evaluate
 from rigdda.validation.convergence import STEPS
@@ -103,7 +103,7 @@ def table(results: Iterable[Result]) -> Table:
     for name, figures in groupby(results, lambda result: result.case):
         for i, r in enumerate(figures):
             if i == 0:
-                out.add_row(name, "", "", "", "", f"{r.cpu:.0f}")
+                out.add_row(name, "", "", "", "", "" if applies_not(r.cpu) else f"{r.cpu:.0f}")
             unit = "" if r.check.unit == "-" else f" [{r.check.unit}]"
             out.add_row(
                 f"  {r.check.quantity}{unit}",

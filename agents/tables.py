@@ -125,7 +125,12 @@ def write_rows(
     with atomic(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, rows[0] if fields is None else fields, restval="")
         table.writeheader()
-        table.writerows(rows)
+        table.writerows({k: "" if applies_not(v) else v for k, v in row.items()} for row in rows)
+
+
+def applies_not(value: Any) -> bool:
+    """Return whether a value is not a number: what does not apply is an empty cell."""
+    return isinstance(value, float) and math.isnan(value)
 
 
 def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:

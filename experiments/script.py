@@ -123,12 +123,22 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows as CSV, a column a key, numbers to six digits; whole or not at all."""
+    """Write rows as CSV, a column a key, numbers to six digits; whole or not at all.
+
+    What is not a number does not apply: its cell is empty.
+    """
     with atomic(path) as part, part.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         for row in rows:
-            writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
+            writer.writerow({k: cell(v) for k, v in row.items()})
+
+
+def cell(value: Any) -> Any:
+    """Return what a cell of a table holds."""
+    if not isinstance(value, float):
+        return value
+    return "" if math.isnan(value) else f"{value:.6g}"
 
 
 def made_by(folder: Path) -> dict[str, str]:

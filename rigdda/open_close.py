@@ -345,10 +345,14 @@ def open_close(
     Newton's restitution with friction can raise the kinetic energy of an eccentric impact; a
     plastic one cannot, since the springs act on the velocity after the step.
 
+    Islands at rest, and those of one or two blocks, are solved as one; the others are relaxed, and
+    for a while what did not settle as one.
+
     Returns
     -------
     bool
-        Whether they settled; a large island that did not is taken as it is.
+        Whether the island was relaxed in substeps, so that its displacements are known; not of a
+        cluster in flight, which keeps its angular momentum: its impulses act at one time.
     """
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     m, motion = system.matrix, system.motion
@@ -357,7 +361,7 @@ def open_close(
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     speed = island_speed(bodies, islands, b0, b1)
     waiting = is_waiting(bodies, islands, b0, b1)
-    small, quiet, settled = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED, True
+    small, quiet = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED
     relaxing = waiting if quiet else not small
     fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
     for halving in range(ENERGY_HALVINGS + 2):
@@ -365,19 +369,16 @@ def open_close(
             relaxing = not solve_states(
                 bodies, contacts, m, system.scratch, islands, island, pairs, p, counters
             )
-            settled = settled and not (relaxing and small)
             if relaxing and not small:
                 let_wait(bodies, islands, b0, b1)
         if relaxing:
             relax(bodies, contacts, m, motion, islands, rows, island, p, counters, speed, fast)
-        # a cluster in flight keeps its angular momentum: its impulses act at one time
-        islands.relaxed[0] = int(fast and grounded)
         if not bouncing or impact_work(contacts, m.d, islands, c0, c1) <= 0.0:
-            return settled
+            break
         for item in range(c0, c1):
             c = contacts[islands.contact_item[item]]
             c.flips = 0
             if c.kind == IMPACT:
                 c.bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0
                 c.state = STICK
-    return settled
+    return fast and grounded

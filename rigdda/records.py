@@ -348,7 +348,6 @@ class Islands(NamedTuple):
     block_item: Ints
     contact_start: Ints  # (M + 1,) contacts of each island
     contact_item: Ints
-    relaxed: Ints  # (1,) 1 if the forces of the island in work are those of relaxation
 
 
 class Rows(NamedTuple):

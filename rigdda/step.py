@@ -43,7 +43,7 @@ from rigdda.islands import find_islands
 from rigdda.kernel import entry_kernel, kernel, stage
 from rigdda.lone_block import begin_part, recall_all, takes_parts
 from rigdda.motion import retire, top_speed
-from rigdda.open_close import let_wait, open_close
+from rigdda.open_close import open_close
 from rigdda.records import (
     BROAD_PHASE,
     CONTACT_TOTAL,
@@ -179,7 +179,7 @@ def detect(
 @stage
 def move_island(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, motion: Motion, islands: Islands,
-    island: int, struck: bool, gauges: Gauges, p: Parameters, ledger: NDArray,
+    island: int, struck: bool, in_substeps: bool, gauges: Gauges, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
@@ -191,7 +191,7 @@ def move_island(
         block.apart += p.dt
     for item in range(c0, c1):
         c = contacts[islands.contact_item[item]]
-        keep_memory(c, struck, islands.relaxed[0] == 1)
+        keep_memory(c, struck, in_substeps)
         if c.state == OPEN:
             continue
         account_contact(c, motion.d, islands, ledger, gauges)
@@ -231,35 +231,31 @@ def step_island(
     now, left, parts, bad = p, p.dt, 0, -1
     since = lap(counters, MOTION, 0, p.timing)
     while left > 0.0 and bad < 0:
-        settled, islands.relaxed[0] = True, 0
+        in_substeps = False
         if parts > 0:
             begin_part(bodies, contacts, interfaces, islands, s, motion, left, parts, part)
             now = part
         if c1 > c0:
             since = lap(counters, MOTION, since, p.timing)
-            settled = open_close(bodies, contacts, system, islands, rows, s, now, counters)
+            in_substeps = open_close(bodies, contacts, system, islands, rows, s, now, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
-        struck = apply_forces(bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, now)
+        struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
         if c1 > c0 and parts == 0 and takes_parts(bodies, contacts, islands, s, gauges, p):
             recall_all(contacts, islands, s, before, work.first, p)
             part.field_x, part.field_y = p.field_x, p.field_y
             parts = 1
             continue
         if c1 > c0:
-            if not settled:
-                let_wait(bodies, islands, islands.block_start[s], islands.block_start[s + 1])
             if charge_fences(
                 bodies, contacts, system, islands, rows, s, gauges, time, now, counters
             ):
-                struck = apply_forces(
-                    bodies, contacts, m, motion, islands, s, islands.relaxed[0] == 1, now
-                )
+                struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
             if len(gauges.target) > 0:
                 counters[EVENTS] = note_hits(
                     bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
                 )
         bad = move_island(
-            bodies, outlines, contacts, motion, islands, s, struck, gauges, now, ledger
+            bodies, outlines, contacts, motion, islands, s, struck, in_substeps, gauges, now, ledger
         )
         left -= now.dt
         parts += 1 if parts > 0 else 0

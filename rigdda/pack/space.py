@@ -95,7 +95,6 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
             block_item=whole(bodies),
             contact_start=whole(bodies + 1),
             contact_item=whole(room),
-            relaxed=whole(1),
         ),
         Rows(
             row=np.zeros((room, COLUMNS)),

@@ -14,7 +14,7 @@ import numpy as np
 from experiments.bench.cases import LONGEST, Case
 from experiments.bench.levels import CORE, Row
 from rigdda import Scene
-from rigdda.errors import Diverged
+from rigdda.errors import BadInput, Diverged
 
 TIE = 1.3
 """A setting is timed again if its first time is at most so many times that of the cheapest at a
@@ -154,7 +154,10 @@ def _refine(
     """Yield ever finer steps until they take too long, sooner if they are accurate enough."""
     for part in case.parts:
         setting = Setting(engine, LONGEST / part, options)
-        first_run(setting, case)
+        try:
+            first_run(setting, case)
+        except BadInput:  # the core refuses steps that are too long for the blocks
+            continue
         yield setting
         enough = setting.error < ENOUGH * min(case.levels)
         if setting.cpu[0] > len(case.scenes) * effort.patience * (ENOUGH if enough else 1.0):

@@ -66,11 +66,13 @@ def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
         Verified layouts: nothing the first, the found one the last.
     """
     chosen = cases[-1][1]
+    order = {None: 0, "met": 0, "undecided": 1, "missed": 2}
     return [
         f"{name} may cost as little a year ({span(other.ci)} against {span(chosen.ci)}), and costs "
         f"{euros(other.cost)} instead of {euros(chosen.cost)} EUR per metre to build"
         for name, other in cases[1:-1]
-        if other.ci[0] <= chosen.ci[1] and other.cost < chosen.cost
+        if other.ci[0] <= chosen.ci[1] and chosen.ci[0] <= other.ci[1]
+        if other.cost < chosen.cost and order[other.targets] <= order[chosen.targets]
     ]
 
 

@@ -37,7 +37,8 @@ MOST_PARTS = 8
 the last one."""
 
 TURN = 0.15
-"""Greatest turn of a lone block in contact in a part of its step [rad]."""
+"""Turn of a lone block in contact, at its first rate, in each part of its step but the last [rad].
+Without it blocks of 0.05 m2 lose 11 % more energy in a bounce in steps of 10 ms than in 0.5 ms."""
 
 SHOCK_SPEED = 0.1
 """Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
@@ -95,7 +96,7 @@ its state. Nearly every step that does not converge has one such contact."""
 FAST_FALL = 1.5
 """Speed of an island above which it is relaxed in several substeps, over what gravity gives in a
 step, g dt [-], where that is more than `QUIET_SPEED`: a pile that all but rests is settled as one
-in the single step. With a third of it 1,000 blocks did not come to rest in steps of 0.05 s."""
+in the single step. Without it 60 layers in a silo did not come to rest in steps of 10 ms."""
 
 SUBSTEP = 2e-3
 """Longest substep in the relaxation of a large island in motion [s]: a blow goes on from contact to
@@ -108,7 +109,7 @@ SPREADING = 128
 SMALL_SHARE = 0.5
 """the number of substeps falls towards this share of it, in proportion [-]. A rockfall of 120
 blocks in steps of 20 ms takes a twentieth less time, and contacts sink alike. Up to 512 blocks it
-would be an eighth less; but 1,000 blocks in a hopper did not come to rest in steps of 0.1 s."""
+would be an eighth less; but 1,000 blocks in a hopper did not come to rest in long steps."""
 
 LEAST_SUBSTEPS = 3
 """Least substeps of a step."""

@@ -20,7 +20,7 @@ from rigdda.constants import (
     NEW,
     OPEN,
     PIN,
-    PLAIN_CONTACT,
+    PLAIN,
     TURN,
 )
 from rigdda.contact.law import prepare, pull_on, strike, time_of_impact
@@ -46,7 +46,8 @@ def takes_parts(
     """Return whether an island is a lone block with an impact, or that turns fast.
 
     Not on a fence, which is charged for a step as a whole, and its impacts are plastic, nor with
-    supports, which are no contacts that could be prepared anew.
+    supports or joints, which could not be prepared anew, nor with plain contacts, whose rebound
+    is what the step makes of it.
     """
     blocks = islands.block_start[island + 1] - islands.block_start[island]
     if blocks > 1 or not p.post_correction:
@@ -56,7 +57,7 @@ def takes_parts(
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
         parts = parts or c.kind == IMPACT
-        if c.kind == BOLT or c.kind == PIN:
+        if c.kind == BOLT or c.kind == PIN or c.kind == PLAIN or c.bond > 0.0:
             return False
         if c.b >= 0 and gauges.barrier[c.b] >= 0:
             if gauges.target[gauges.barrier[c.b]].capacity < math.inf:
@@ -113,7 +114,7 @@ def begin_part(
         c = contacts[islands.contact_item[item]]
         if number > 1:
             follow(bodies, c, motion, part)
-        if number == MOST_PARTS or c.restitution == PLAIN_CONTACT:
+        if number == MOST_PARTS:
             continue
         pull = pull_on(bodies, c, part)
         strike(bodies, c, 0.5 * left, pull, part)

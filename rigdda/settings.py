@@ -22,7 +22,7 @@ mean size of the blocks: 25 ms for blocks of 1 m. Contacts sink in in longer one
 to 100 ms 20 of 141 hard cases did too deep."""
 
 SMALLEST = 0.5
-"""The same for the smallest block [-], which falls by a quarter of its size in it. With 0.56 thin
+"""The same for the smallest block [-], which falls by an eighth of its size in it. With 0.56 thin
 blocks sink into one another, with 0.7 they go through the ground."""
 
 EARTH = 9.81
@@ -40,7 +40,9 @@ class Settings:
     dt : float
         Time step [s], 1e-6 to 0.1. 5 ms keeps a 20 m/s block within 0.1 m a step and the outcome
         of a rockfall within the scatter of its releases. A scene is refused whose blocks are too
-        small for it: on average smaller than sets 0.08 sqrt(size / g), 25 ms for blocks of 1 m.
+        small for it: a step is at most 0.08 sqrt(size / g) of the mean block, 25 ms for 1 m, and
+        0.5 sqrt(size / g) of the smallest. What flies a good part of its size in a step may strike
+        what was not foreseen, and pass what is thin.
     penetration : float or None
         Wanted penetration of a contact under the load it carries [m]; the penalty stiffness
         follows from it. None: 1e-4 of the mean block size (the root of its area), small enough

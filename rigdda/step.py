@@ -92,10 +92,12 @@ def keep_asleep(
     bodies: Bodies, contacts: Contacts, count: int, old: Contacts, first: Ints, a: int,
     gauges: Gauges, time: float,
 ) -> int:  # fmt: skip
-    """Keep the contacts of sleeping block a with what is still; returns the new number."""
+    """Keep the contacts of sleeping block a with what is still; returns the new number, or -1."""
+    if count + first[a + 1] - first[a] > len(contacts):
+        return -1
     for m in range(first[a], first[a + 1]):
         b = old[m].b
-        if count < len(contacts) and (b == TERRAIN or bodies[b].status != AWAKE):
+        if b == TERRAIN or bodies[b].status != AWAKE:
             copy_contact(contacts[count], old[m])
             count += 1
             block, barrier = barrier_contact(gauges, a, b)
@@ -171,6 +173,8 @@ def detect(
                 count += 1
         elif bodies[a].status == ASLEEP:
             count = keep_asleep(bodies, contacts, count, old, work.first, a, gauges, time)
+            if count < 0:
+                return -1
     work.begin[p.blocks] = count
     lap(counters, NARROW_PHASE, since, p.timing)
     return count

@@ -18,7 +18,7 @@ from rigdda.validation.scenes import FLAT, box, incline, polygon, rock
 Floats = NDArray[np.float64]
 
 LONGEST = 0.1
-"""Longest step [s], the longest that rigdda takes; every step is a whole part of it."""
+"""Longest step [s]; every step is a whole part of it. The core refuses what is too long for it."""
 
 FRAME = 0.02
 """Interval of the frames of a rockfall, and its longest step [s]."""

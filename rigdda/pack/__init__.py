@@ -43,7 +43,7 @@ class Arrays(NamedTuple):
     system: System
     work: Work
     gauges: Gauges
-    parameters: NDArray[np.void]  # of PARAMETERS: of the step, then of its halves, quarters, ...
+    parameters: NDArray[np.void]  # of PARAMETERS: of a step, and of the part of one
 
 
 def pack(

@@ -21,3 +21,5 @@ def test_what_costs_as_little_a_year_and_less_to_build_is_named(problem: DesignP
     assert line.endswith("487 instead of 2,575 EUR per metre to build")
     assert not told("constant", replace(alike, ci=(706.0, 730.0)))
     assert not told("constant", replace(alike, cost=3_000.0))
+    assert not told("constant", replace(alike, ci=(640.0, 660.0)))
+    assert not told("constant", replace(alike, targets="missed"))

@@ -15,7 +15,7 @@ from rigdda.supports import FixedPoint
 from rigdda.validation.scenes import polygon
 
 
-def test_a_slide_at_the_longest_step_stays_exact():
+def test_a_slide_at_a_long_step_stays_exact():
     thrown = box(0.0, 0.5, velocity=(12.0, 0.0, 0.0))
     sim = Simulation(Scene(Terrain(FLAT), (thrown,), rock(30.0)), Settings(dt=1.0 / 60.0))
     sim.step(60)

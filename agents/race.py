@@ -50,7 +50,7 @@ ADDED = 3
 """Barriers that are tried beside the best layout in every round."""
 AS_GOOD = 0.02
 """Share of Z of nothing within which of the best a layout with fewer barriers is built instead:
-a final hardly tells less."""
+a final cannot tell less apart."""
 BEST_OF = 8
 """Singles of a kind of which pairs are made."""
 

@@ -1,4 +1,4 @@
-"""A deep pile of polygons between walls: it comes to rest, and its base bears its weight."""
+"""A deep pile of polygons between smooth walls: it comes to rest, and its base bears its weight."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ WIDTH, SIZE = 2.0, 0.3
 COLUMNS, SPACING = 6, 1.25
 """Polygons of a layer, and height of a layer over their size [-]."""
 
-TIME, WATCHED = 20.0, 0.1
-"""Time in which a pile is to rest, and interval in which it is looked at [s]."""
+TIME = 20.0
+"""Time in which a pile is to rest [s]."""
 
 DEPTHS = (20, 40, 60)
 """Layers that are tried."""
@@ -31,8 +31,8 @@ def pebble(rng: np.random.Generator, x: float, y: float) -> Block:
     return Block(np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle)], axis=1))
 
 
-def silo(rng: np.random.Generator, layers: int, friction_deg: float) -> Scene:
-    """Return loose layers of polygons above the base; walls and base have this friction angle."""
+def silo(rng: np.random.Generator, layers: int) -> Scene:
+    """Return loose layers of polygons above the base; walls and base are smooth."""
     height, column = SPACING * SIZE, WIDTH / COLUMNS
     blocks = tuple(
         pebble(rng, (i + 0.5) * column, 0.2 + j * height)
@@ -41,7 +41,7 @@ def silo(rng: np.random.Generator, layers: int, friction_deg: float) -> Scene:
     )
     top = layers * height + 5.0
     chain = [(-1.0, top), (0.0, top), (0.0, 0.0), (WIDTH, 0.0), (WIDTH, top), (WIDTH + 1.0, top)]
-    wall = Surface(friction_deg=friction_deg)
+    wall = Surface(friction_deg=0.0)
     return Scene(
         Terrain(chain, ["wall"] * 5),
         blocks,
@@ -50,14 +50,14 @@ def silo(rng: np.random.Generator, layers: int, friction_deg: float) -> Scene:
     )
 
 
-def fill(lab: Lab, layers: int, friction_deg: float, dt: float) -> tuple[float, float]:
+def fill(lab: Lab, layers: int) -> tuple[float, float]:
     """Let a silo fill; return the greatest speed in the end [m/s] and what its base bears.
 
     The second is the load of the base over the weight [-].
     """
-    scene = silo(lab.random(layers), layers, friction_deg)
-    sim = lab.simulate(scene, dt)
-    sim.step(round(TIME / dt))
+    scene = silo(lab.random(layers), layers)
+    sim = lab.simulate(scene)
+    sim.step(lab.steps(TIME))
     speed = float(np.hypot(*sim.velocities[:, :2].T).max())
     contacts = sim.contacts()
     base = contacts[(contacts["block_b"] == -1) & (contacts["ny"] > 0.7)]
@@ -67,8 +67,8 @@ def fill(lab: Lab, layers: int, friction_deg: float, dt: float) -> tuple[float, 
 
 
 def measure(lab: Lab) -> tuple[Measured, Measured]:
-    """Fill smooth silos of several depths."""
-    speeds, loads = zip(*(fill(lab, layers, 0.0, lab.dt) for layers in DEPTHS), strict=True)
+    """Fill silos of several depths."""
+    speeds, loads = zip(*(fill(lab, layers) for layers in DEPTHS), strict=True)
     return Measured(speeds), Measured(loads, 1.0)
 
 

@@ -24,14 +24,14 @@ from agents.crossings import Ensemble
 from agents.menu import Menu
 from envs import DesignProblem
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Mesh, Site, Wall
-from rigdda.economy import ELEMENT, PANEL
+from rigdda.barriers.base import ELEMENT
+from rigdda.barriers.fence import PANEL
+from rigdda.barriers.gravity_wall import SLID
 
 Floats = NDArray[np.float64]
 
 GRAVITY = 9.81
 """Acceleration of free fall [m/s2]."""
-SLID = 0.1
-"""Displacement at which a gravity wall is mended [m]."""
 BASE = 0.6
 """Friction of its base [-]."""
 BOUNCE = 0.2
@@ -131,9 +131,8 @@ class Effects:
         left = self._volume - taken
         gone = left <= 1e-9 * self._volume
         harm = self._harm(np.where(gone, 0.0, left).astype(np.float64))
-        least = PANEL if isinstance(barrier, Fence) else ELEMENT
         failed = np.bincount(table["release"], broken, minlength=len(self.base)) > 0
-        mended: Floats = np.where(failed, np.maximum(self.ensemble.width, least), 0.0)
+        mended: Floats = np.where(failed, np.maximum(self.ensemble.width, barrier.repaired), 0.0)
         return harm, mended
 
     def _stopped(self, barrier: Barrier, table: NDArray[np.void]) -> tuple[Any, Any]:

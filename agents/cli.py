@@ -148,7 +148,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     """
     import rigdda
     from agents.wording import short, standing
-    from rigdda.replay import Marks, open_viewer
+    from rigdda.results.replay import Marks, open_viewer
 
     file = Path(target)
     if file.suffix in (".npz", ".rrd") and (layout or event or seed or out):

@@ -18,7 +18,7 @@ from agents.pictures import BARRIER, DPI, FONT, GROUND, ROAD, ZONE, colours, sav
 from agents.wording import short, standing
 from rigdda import Barrier, Ditch, Fence, Layout, Site
 from rigdda.barriers import Earthwork, earthworks
-from rigdda.place import BarrierZone
+from rigdda.model.place import BarrierZone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -33,7 +33,7 @@ from envs.building import Room
 from envs.rules import MIN_HEIGHT, TOLERANCE, Span
 from rigdda import BadInput, Barrier, Fence, Layout, Mesh
 from rigdda.barriers import FENCE_CLASSES, Built
-from rigdda.place import BarrierZone
+from rigdda.model.place import BarrierZone
 
 Floats = NDArray[np.float64]
 

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from envs.evaluation import Evaluation, Facts
 from envs.intervals import Estimate, Known, Mean, cost, estimate, pair, total
 from rigdda import BadInput, Layout, Outcome, Site
-from rigdda.economy import PANEL, capitals
+from rigdda.barriers.fence import PANEL
+from rigdda.model.economy import capitals
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

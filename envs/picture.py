@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import Ditch, Run
+from rigdda import Run
 from rigdda.barriers import Earthwork
 
 if TYPE_CHECKING:
@@ -40,9 +40,9 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
         colour = BARRIER if run.times[frame] < run.failure(i) else BROKEN
         axes.fill(
             *run.outline(i, frame).T,
-            facecolor="none" if isinstance(barrier, Ditch) else colour,
+            facecolor="none" if barrier.drawn == "line" else colour,
             edgecolor=colour,
-            linewidth=1.0 if isinstance(barrier, Ditch) else 0.0,
+            linewidth=1.0 if barrier.drawn == "line" else 0.0,
             zorder=3.0 if isinstance(barrier, Earthwork) else 1.0,
         )
     axes.fill_between(x, y, y.min() - 0.05 * np.ptp(y), color=GROUND, linewidth=0)

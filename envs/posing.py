@@ -11,7 +11,7 @@ from envs import fidelity
 from envs.targets import Targets
 from rigdda import BadInput, Site, check
 from rigdda.barriers import KINDS as ALL_KINDS
-from rigdda.place import BarrierZone
+from rigdda.model.place import BarrierZone
 
 MOST_BARRIERS = 100
 """Most slots of a layout; a site has room for a few."""

@@ -18,7 +18,7 @@ from envs.memory import fingerprint
 from envs.samples import Sample
 from envs.targets import Targets
 from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
-from rigdda.place import BarrierZone
+from rigdda.model.place import BarrierZone
 
 Floats = NDArray[np.float64]
 Ask = tuple[Sequence[Barrier], Mapping[str, Sequence[int]]]

@@ -81,7 +81,7 @@ class Recorder:
         rewards : sequence of float
             Of each step.
         """
-        from rigdda.replay import Marks
+        from rigdda.results.replay import Marks
 
         end, site = stages[-1], shown.site
         run, _ = rigdda.release(site, end.layout, shown.seed, shown.event)
@@ -111,7 +111,7 @@ class Recorder:
         stages : sequence of Evaluation
             What stood at the start, nothing, and after each step.
         """
-        from rigdda.episode import Placement, write_episode
+        from rigdda.results.episode import Placement, write_episode
 
         site = shown.site
         placements = [

@@ -146,8 +146,8 @@ def _of_class(fence: Fence, before: Outcome) -> Outcome | None:
     """Return the outcome of a fence where another class held the block, None if it may not."""
     own, took = fence.for_width(before.width), before.barriers[0]
     assert own.capacity is not None
-    if took.absorbed_energy > own.capacity or took.thrust > own.resistance:
+    if took.absorbed_energy > own.capacity or took.thrust > own.bears:
         return None
     left = own.left_height(took.absorbed_energy)
-    mine = replace(took, resistance=own.resistance, left_height=left)
+    mine = replace(took, resistance=own.bears, left_height=left)
     return replace(before, barriers=(mine,))

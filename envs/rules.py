@@ -22,7 +22,7 @@ from rigdda import (
     check,
 )
 from rigdda.barriers import MeshOption, as_layout, earthworks
-from rigdda.place import BarrierZone
+from rigdda.model.place import BarrierZone
 
 Floats = NDArray[np.float64]
 Span = tuple[float, float]

@@ -15,7 +15,6 @@ import numpy as np
 from envs.memory import Memory
 from rigdda import BarrierOutcome, Ditch, Embankment, Fence, GravityWall, Outcome, Site
 from rigdda.barriers import Built, Earthwork, earthworks
-from rigdda.resistance import resistance
 
 MARGIN = 0.1
 """Distance from a barrier beyond which blocks are sure not to touch it [m]."""
@@ -128,7 +127,7 @@ def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[Standi
         scene = site.scene(drawn._replace(blocks=drawn.blocks[:1], friction_deg=0.0), built)
         _, moved = earthworks(site.profile, layout, site.soil)
         known = tuple(
-            _stands(site, barrier, moved.get(barrier), resistance(scene, i))
+            _stands(site, barrier, moved.get(barrier), scene.resistance(i))
             for i, barrier in enumerate(layout)
         )
         memory.remember({(key, layout): known})
@@ -151,7 +150,7 @@ def _idle(built: Built, barrier: Built, there: Standing, holds: bool) -> Barrier
     """Return what happens to a barrier that no block comes near."""
     bears = there.bears
     if isinstance(built, Fence):
-        bears = built.resistance
+        bears = built.bears
     elif isinstance(built, GravityWall | Embankment):
         unit = barrier.for_width(UNIT)
         assert isinstance(unit, GravityWall | Embankment)

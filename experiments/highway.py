@@ -16,7 +16,7 @@ from rigdda import Run, Site, release
 from rigdda.barriers import Layout
 from rigdda.errors import SoftContacts
 from rigdda.geometry import polygon_properties
-from rigdda.outcome import Outcome
+from rigdda.results.outcome import Outcome
 
 SITE = Site.load("shu-hwa-paper")
 

@@ -16,10 +16,10 @@ from msgspec.structs import replace
 
 from experiments.script import BLUE, RED, Number, draw, interval, main, say, write
 from rigdda import Settings, Site, Surface
-from rigdda.joints import JointSet
-from rigdda.place import BarrierZone, Motion, Road, Slope
+from rigdda.model.joints import JointSet
+from rigdda.model.place import BarrierZone, Motion, Road, Slope
+from rigdda.model.source import Source
 from rigdda.release import release_many
-from rigdda.source import Source
 
 RAMP = Site(
     name="ramp",

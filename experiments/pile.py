@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
-from rigdda.assembly.island import assemble_island
+from rigdda.dynamics.assembly.island import assemble_island
+from rigdda.dynamics.islands import find_islands, pair_blocks
+from rigdda.dynamics.kernel import entry_kernel
+from rigdda.dynamics.records import CONTACTS, Bodies, Contacts, Matrix, System, Work
 from rigdda.geometry import polygon_properties
-from rigdda.islands import find_islands, pair_blocks
-from rigdda.kernel import entry_kernel
-from rigdda.records import CONTACTS, Bodies, Contacts, Matrix, System, Work
-from rigdda.scene import Surface
+from rigdda.model.scene import Surface
 from rigdda.validation.scenes import GRAVITY, box
 
 WIDTH, HEIGHT, JOINT = 2.0, 1.0, 0.01

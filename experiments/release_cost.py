@@ -18,7 +18,7 @@ import numpy as np
 from experiments.script import Number, main, say, write
 from rigdda import Embankment, Fence, Layout, Site, sites
 from rigdda.batch import Batch
-from rigdda.outcome import measure
+from rigdda.results.outcome import measure
 
 SITE, TARGET = "bench", 0.5
 EVENTS = {"one block": "block", "group": "group", "slab": "slab"}

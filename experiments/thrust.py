@@ -4,8 +4,8 @@ Embankments and gravity walls of every height of the catalogue, low walls, and f
 at their greatest height, each alone under the mass of
 `shu-hwa` and of `quick`, on a bench or at the toe, in steps of 10 and 2.5 ms. Thrust is the
 greatest mean over a second, resistance is weight times friction or the mean braking force of the
-class, see `rigdda.resistance`. Judged by the barriers that stand although the thrust was beyond
-what they bear. Drawn at 0.01: what failed by energy before anything leaned on it.
+class, see `rigdda.Scene.resistance`. Judged by the barriers that stand although the thrust was
+beyond what they bear. Drawn at 0.01: what failed by energy before anything leaned on it.
 """
 
 from __future__ import annotations

@@ -13,20 +13,20 @@ from rigdda.barriers import (
     Wall,
 )
 from rigdda.barriers.files import load_layout, save_layout
-from rigdda.economy import Bill, Consequences, Prices
+from rigdda.dynamics.simulation import Simulation, simulate_many
 from rigdda.errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
-from rigdda.events import Drawn, Event
-from rigdda.loads import BodyForce, LineLoad, PointLoad
-from rigdda.outcome import BarrierOutcome, Outcome
+from rigdda.model.economy import Bill, Consequences, Prices
+from rigdda.model.events import Drawn, Event
+from rigdda.model.loads import BodyForce, LineLoad, PointLoad
+from rigdda.model.scene import Block, Scene, Surface
+from rigdda.model.settings import Settings
+from rigdda.model.site import Site
+from rigdda.model.source import Source
+from rigdda.model.supports import Bolt, FixedPoint
+from rigdda.model.terrain import Terrain
 from rigdda.release import release, release_many, release_outcome
-from rigdda.run import Run
-from rigdda.scene import Block, Scene, Surface
-from rigdda.settings import Settings
-from rigdda.simulation import Simulation, simulate_many
-from rigdda.site import Site
-from rigdda.source import Source
-from rigdda.supports import Bolt, FixedPoint
-from rigdda.terrain import Terrain
+from rigdda.results.outcome import BarrierOutcome, Outcome
+from rigdda.results.run import Run
 
 __version__ = "0.1.0"
 

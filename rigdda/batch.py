@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rigdda.barriers import Barrier, Mesh, as_layout
+from rigdda.dynamics.pack.again import Template
+from rigdda.dynamics.simulation import Simulation, chainages
 from rigdda.errors import BadInput, Error
-from rigdda.events import Drawn
-from rigdda.outcome import Outcome, leave, measure, stations, watch
-from rigdda.pack.again import Template
-from rigdda.scene import Scene
-from rigdda.simulation import Simulation, chainages
-from rigdda.site import Site
+from rigdda.model.events import Drawn
+from rigdda.model.scene import Scene
+from rigdda.model.site import Site
+from rigdda.results.outcome import Outcome, leave, measure, stations, watch
 
 MOST_BLOCKS = 32
 """Most blocks of a scene whose arrays are kept: packing more takes little beside simulating them.

@@ -16,14 +16,14 @@ import pytest
 import shapely
 from rerun.chunk import RrdReader
 
-from rigdda import replay
 from rigdda.barriers import Built, Embankment, Fence, GravityWall
+from rigdda.dynamics.gauges import FAILED
 from rigdda.errors import BadInput, Error
-from rigdda.gauges import FAILED
-from rigdda.replay import Marks, open_viewer
-from rigdda.run import CROSSING, EVENT, HIT, Run
-from rigdda.scene import Block, Scene, Surface, Terrain, Wall
-from rigdda.states import states
+from rigdda.model.scene import Block, Scene, Surface, Terrain, Wall
+from rigdda.results import replay
+from rigdda.results.replay import Marks, open_viewer
+from rigdda.results.run import CROSSING, EVENT, HIT, Run
+from rigdda.results.states import states
 
 GRAVITY = 9.81
 SIZES = np.array([[1.0, 2.0], [1.5, 1.0], [2.0, 2.0]])
@@ -309,5 +309,5 @@ def test_save_and_load_is_exact(run: Run, tmp_path: Path) -> None:
 
 
 def test_the_core_does_not_import_rerun() -> None:
-    code = "import sys, rigdda.run; sys.exit('rerun' in sys.modules)"
+    code = "import sys, rigdda.results.run; sys.exit('rerun' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -19,10 +19,10 @@ from rigdda import (
     Source,
     Surface,
     Wall,
-    boulders,
     sites,
 )
-from rigdda.place import Interface, Motion, Slope, Stretch
+from rigdda.model import boulders
+from rigdda.model.place import Interface, Motion, Slope, Stretch
 
 QUICK = Site.load("quick")
 VERGE = Site.load("verge")

@@ -13,7 +13,7 @@ def test_every_function_that_is_named_is_there() -> None:
     named = re.findall(r"`?\b([a-z_/]+):([A-Za-z_.]+)\b", PAGE.replace("module:function", ""))
     assert len(named) > 30
     for module, path in named:
-        found = import_module("rigdda." + module.replace("/", "."))
+        found = import_module("rigdda.dynamics." + module.replace("/", "."))
         for name in path.split("."):
             found = getattr(found, name)
         assert callable(found)

@@ -12,9 +12,9 @@ from experiments.deformable.submatrices import (
     row_along,
     set_inertia,
 )
-from rigdda.constants import OPEN, STICK
-from rigdda.kernel import kernel
-from rigdda.records import Bodies, Contact, Contacts, Floats, Matrix, Outlines, Parameters
+from rigdda.dynamics.constants import OPEN, STICK
+from rigdda.dynamics.kernel import kernel
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Floats, Matrix, Outlines, Parameters
 
 
 class Solid(NamedTuple):
@@ -150,7 +150,7 @@ def multiply(s: Solid, m: Matrix, n: int, pairs: int, x: Floats, y: Floats) -> N
 
 @kernel
 def solve_pcg(s: Solid, m: Matrix, n: int, pairs: int, tolerance: float) -> int:
-    """Solve K d = F from the start value in s.d as `rigdda.linear.pcg` does; the iterations."""
+    """Solve K d = F from the start value in s.d; the iterations, see `dynamics.linear.pcg`."""
     multiply(s, m, n, pairs, s.d, s.product)
     scale = rho = 0.0
     for i in range(n):

@@ -11,8 +11,8 @@ from experiments.deformable.equations import Solid
 from experiments.deformable.step import advance
 from experiments.deformable.submatrices import UNKNOWNS
 from rigdda import Scene, Settings, Simulation
+from rigdda.dynamics.records import CONTACTS, COUNTERS, ITERATIONS, SOLVER_ITERATIONS, STEPS
 from rigdda.geometry import is_convex, polygon_properties
-from rigdda.records import CONTACTS, COUNTERS, ITERATIONS, SOLVER_ITERATIONS, STEPS
 
 Floats = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ class Deformable:
 
     @property
     def contacts(self) -> NDArray[np.void]:
-        """The contacts of the last step, see `rigdda.simulation.CONTACT`."""
+        """The contacts of the last step, see `rigdda.dynamics.simulation.CONTACT`."""
         return self._sim.contacts()
 
     def vertices(self, block: int) -> Floats:

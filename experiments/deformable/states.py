@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from rigdda.constants import FLIPS, FRICTION_TOLERANCE, OPEN, OPENING_TOLERANCE, SLIP, STICK
-from rigdda.kernel import kernel
-from rigdda.records import Contact
+from rigdda.dynamics.constants import (
+    FLIPS,
+    FRICTION_TOLERANCE,
+    OPEN,
+    OPENING_TOLERANCE,
+    SLIP,
+    STICK,
+)
+from rigdda.dynamics.kernel import kernel
+from rigdda.dynamics.records import Contact
 
 
 @kernel

@@ -10,10 +10,10 @@ from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
 from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
-from rigdda.correction import keep_memory, place_edges
-from rigdda.islands import find_islands, pair_blocks
-from rigdda.kernel import kernel
-from rigdda.records import (
+from rigdda.dynamics.correction import keep_memory, place_edges
+from rigdda.dynamics.islands import find_islands, pair_blocks
+from rigdda.dynamics.kernel import kernel
+from rigdda.dynamics.records import (
     CONTACT_TOTAL,
     CONTACTS,
     ITERATIONS,
@@ -32,7 +32,7 @@ from rigdda.records import (
     Parameters,
     Work,
 )
-from rigdda.step import copy_index, detect
+from rigdda.dynamics.step import copy_index, detect
 
 
 @kernel

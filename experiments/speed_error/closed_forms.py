@@ -15,7 +15,7 @@ from experiments.bench import timing
 from experiments.bench.engines import core as engine
 from experiments.speed_error.knobs import DEFAULT, STEP, STEPS, Choice, choices
 from rigdda.errors import BadInput, Diverged
-from rigdda.scene import Scene
+from rigdda.model.scene import Scene
 from rigdda.validation import arches, rolling, slides
 from rigdda.validation.case import Case, Lab, Metered
 from rigdda.validation.scenes import block_size

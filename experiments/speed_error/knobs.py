@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigdda import Settings
-from rigdda.constants import PENETRATION_RATIO
+from rigdda.dynamics.constants import PENETRATION_RATIO
 
 DEFAULT = Settings()
 

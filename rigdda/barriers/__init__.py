@@ -4,28 +4,26 @@ Walls, gravity walls and fences stand on the ground; ditches and embankments cha
 the face. The x of each is the chainage where it begins for a block that comes down the slope.
 """
 
-from rigdda.barriers.earthworks import Ditch, Earthwork, Embankment
+from rigdda.barriers.base import section
+from rigdda.barriers.ditch import Ditch
+from rigdda.barriers.embankment import Embankment
+from rigdda.barriers.fence import FENCE_CLASSES, Fence, FenceClass
+from rigdda.barriers.gravity_wall import GravityWall
 from rigdda.barriers.layout import (
     KINDS,
     Barrier,
     Built,
+    Earthwork,
     Layout,
     as_layout,
     describe,
     earthworks,
     from_table,
-    section,
     to_tables,
 )
 from rigdda.barriers.mesh import Mesh, MeshOption
-from rigdda.barriers.standing import (
-    FENCE_CLASSES,
-    Fence,
-    FenceClass,
-    GravityWall,
-    Standing,
-    Wall,
-)
+from rigdda.barriers.standing import Standing
+from rigdda.barriers.wall import Wall
 
 __all__ = [
     "FENCE_CLASSES",

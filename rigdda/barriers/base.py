@@ -3,25 +3,96 @@
 from __future__ import annotations
 
 import math
-from typing import Self
+from collections.abc import Callable
+from itertools import pairwise
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Self
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check
+from rigdda.geometry import polygon_properties
+
+if TYPE_CHECKING:
+    from rigdda.model.scene import Scene
+    from rigdda.model.site import Site
+    from rigdda.model.terrain import Terrain
 
 Floats = NDArray[np.float64]
+Drawn = Literal["solid", "moving", "line"]
+
+ELEMENT = 5.0
+"""Length of an element along the slope, which acts whole, and the least that is mended [m]."""
 
 THINNEST, LARGEST = 1e-3, 1e3
 """Least and greatest length of a barrier [m]: beyond them it is a slip of the pen, and a face that
 thin is lost in rounding."""
 
 
+class Reach(NamedTuple):
+    """Where a barrier holds rock: between two chainages, below a line that rises uphill."""
+
+    start: float
+    end: float
+    top: float
+    """Elevation of the line at `end` [m]."""
+    rise: float
+    """Rise over run of the line: the steepest surface of a deposit [-]."""
+
+    def includes(self, x: float, y: float) -> bool:
+        """Return whether a point is there."""
+        return self.start <= x < self.end and y < self.top + self.rise * (self.end - x)
+
+
 class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fields=True):
-    """What every barrier has; written as a table with its `kind`."""
+    """What every barrier has; written as a table with its `kind`.
+
+    Attributes
+    ----------
+    fails : str
+        Its state when the kernels found that it gave way, by energy or thrust.
+    repaired : float
+        Least length that is built anew of one that failed [m].
+    drawn : str
+        How replays and pictures show it: as a body, as one that moves, or as a line.
+    """
 
     x: float
+    fails: ClassVar[str] = "failed"
+    repaired: ClassVar[float] = ELEMENT
+    drawn: ClassVar[Drawn] = "solid"
+
+    def price(self, site: Site, outline: Floats | None) -> float:
+        """Return what it costs to build at the height of the road [EUR per metre of road].
+
+        `outline`: what an earthwork moves, (n, 2) [m].
+        """
+        raise NotImplementedError
+
+    def resistance(self, scene: Scene, outline: Floats) -> float:
+        """Return the thrust that it bears, standing as `outline` [N/m]; inf: none moves it."""
+        return math.inf
+
+    def changes(self, times: Floats, poses: Floats, failure: float) -> list[tuple[float, str]]:
+        """Return when it came into which state: by its poses at times, or failure, in [s]."""
+        return [(failure, self.fails)] if math.isfinite(failure) else []
+
+    def holds(self, outline: Floats, ground: Terrain | None, rise: float) -> Reach:
+        """Return where it holds rock, standing as `outline`, with a deposit that rises so."""
+        return Reach(-math.inf, float(outline[:, 0].min()), float(outline[:, 1].max()), rise)
+
+    def left_height(self, absorbed: float) -> float:
+        """Return the height that is left after it has absorbed so much [m]."""
+        raise NotImplementedError
+
+    def area_beyond(self, x: float, displacement: float) -> float:
+        """Return its area that came to lie beyond a chainage, so displaced [m2]."""
+        return 0.0
+
+    def sizes(self, metres: Callable[[float], str]) -> str:
+        """Return its sizes in words; `metres` writes a length."""
+        raise NotImplementedError
 
     @property
     def kind(self) -> str:
@@ -46,3 +117,24 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
     def words(self) -> str:
         """Name of the kind in words."""
         return self.kind.replace("_", " ")
+
+
+def section(outline: Floats) -> float:
+    """Return the area of an outline [m2], in whichever direction it is walked."""
+    return abs(polygon_properties(outline)[0])
+
+
+def base_friction(scene: Scene, density: float, own: str, outline: Floats) -> float:
+    """Return weight times friction of what stands on the ground as an outline [N/m].
+
+    The friction is the least of its surface, `own`, on those under it.
+    """
+    assert scene.terrain is not None
+    low, high = outline[:, 0].min(), outline[:, 0].max()
+    extents = (sorted(ends) for ends in pairwise(scene.terrain.points[:, 0]))
+    angle = min(
+        scene.interface(own, name).friction_deg
+        for (start, end), name in zip(extents, scene.terrain.surfaces, strict=True)
+        if start < high and end > low
+    )
+    return -scene.gravity_vector[1] * density * section(outline) * math.tan(math.radians(angle))

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.errors import BadInput
-from rigdda.terrain import Terrain
+from rigdda.model.terrain import Terrain
 
 Floats = NDArray[np.float64]
+
+LEAST_SLOPE, FLATTEST_SLOPE = 0.02, 5.0
+"""Steepest and flattest side of an earthwork, run over rise [-]."""
 
 NEAR = 1e-6
 """Distance within which two corners are one [m]."""

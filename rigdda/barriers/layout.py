@@ -10,12 +10,14 @@ import msgspec
 
 from rigdda import check
 from rigdda.barriers.base import Floats
-from rigdda.barriers.earthworks import Ditch, Earthwork, Embankment
+from rigdda.barriers.ditch import Ditch
+from rigdda.barriers.embankment import Embankment
+from rigdda.barriers.fence import Fence
+from rigdda.barriers.gravity_wall import GravityWall
 from rigdda.barriers.mesh import Mesh
-from rigdda.barriers.standing import Fence, GravityWall, Wall
+from rigdda.barriers.wall import Wall
 from rigdda.errors import BadInput
-from rigdda.geometry import polygon_properties
-from rigdda.terrain import Terrain
+from rigdda.model.terrain import Terrain
 
 Built = Wall | GravityWall | Fence | Ditch | Embankment
 """What a scene has: all but mesh."""
@@ -23,13 +25,11 @@ Built = Wall | GravityWall | Fence | Ditch | Embankment
 Barrier = Built | Mesh
 Layout = tuple[Barrier, ...]
 
+Earthwork = Ditch | Embankment
+
 KINDS: dict[str, type[Barrier]] = {
-    "wall": Wall,
-    "gravity_wall": GravityWall,
-    "fence": Fence,
-    "ditch": Ditch,
-    "embankment": Embankment,
-    "mesh": Mesh,
+    str(kind.__struct_config__.tag): kind
+    for kind in (Wall, GravityWall, Fence, Ditch, Embankment, Mesh)
 }
 """Class of every kind, by its name in layout files."""
 
@@ -90,11 +90,6 @@ def as_layout(layout: Any) -> Layout:
     return check.sequence("layout", layout, Barrier, what)
 
 
-def section(outline: Floats) -> float:
-    """Return the area of an outline [m2], in whichever direction it is walked."""
-    return abs(polygon_properties(outline)[0])
-
-
 def from_table(where: str, table: Any) -> Barrier:
     """Return the barrier of a table of a layout file, by default a wall.
 
@@ -126,16 +121,4 @@ def describe(barrier: Barrier, digits: int = 1) -> str:
     def metres(value: float) -> str:
         return f"{value:.{digits}f} m"
 
-    head = f"{barrier.words} at {metres(barrier.x)}"
-    match barrier:
-        case Mesh():
-            return f"{head}, {barrier.option}"
-        case Ditch():
-            return f"{head}, {metres(barrier.depth)} deep, {metres(barrier.width)} wide"
-        case Embankment():
-            return f"{head}, {metres(barrier.height)} high, crest {metres(barrier.width)} wide"
-        case Fence():
-            capacity, named = barrier.capacity, barrier.energy_class
-            takes = f"{named} kJ" if capacity is None else f"{capacity / 1e3:.0f} kJ/m"
-            return f"{head}, {metres(barrier.height)} high, {takes}"
-    return f"{head}, {metres(barrier.height)} high, {metres(barrier.thickness)} thick"
+    return f"{barrier.words} at {metres(barrier.x)}, {barrier.sizes(metres)}"

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 import msgspec
 
 from rigdda import check
-from rigdda.barriers.base import BarrierBase
+from rigdda.barriers.base import BarrierBase, Floats
 from rigdda.errors import BadInput
+
+if TYPE_CHECKING:
+    from rigdda.model.site import Site
 
 
 class Mesh(BarrierBase, frozen=True, tag="mesh"):
@@ -41,6 +47,19 @@ class Mesh(BarrierBase, frozen=True, tag="mesh"):
     def extent(self) -> float:
         """Length that it takes up among barriers on the slope [m]: none."""
         return 0.0
+
+    def price(self, site: Site, outline: Floats | None) -> float:
+        """Return the price at the height of the road, of its option [EUR/m]."""
+        option = site.mesh(self)
+        return option.area * option.price
+
+    def left_height(self, absorbed: float) -> float:
+        """Return 0: it has none [m]."""
+        return 0.0
+
+    def sizes(self, metres: Callable[[float], str]) -> str:
+        """Return its sizes in words."""
+        return self.option
 
 
 class MeshOption(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -9,7 +9,7 @@ from rigdda import check
 from rigdda.errors import BadInput
 
 if TYPE_CHECKING:
-    from rigdda.site import Site
+    from rigdda.model.site import Site
 
 FAMILIES = ("verge", "bench", "talus", "narrow", "cliff", "shu-hwa")
 """Families of sites to design on, each with a built-in site of its name."""
@@ -50,7 +50,7 @@ def load(name: str) -> Site:
     BadInput
         If there is no site of that name.
     """
-    from rigdda.site import Site  # needs the names above
+    from rigdda.model.site import Site  # needs the names above
     from rigdda.sites.generator import generate
 
     if name in names():

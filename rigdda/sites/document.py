@@ -14,14 +14,14 @@ import msgspec
 
 from rigdda import sites
 from rigdda.barriers import MeshOption
-from rigdda.economy import Consequences, Prices
-from rigdda.events import Event
 from rigdda.files import atomic
-from rigdda.joints import JointSet
-from rigdda.place import BarrierZone, Interface, Motion, Road, Scatter, Slope, Stretch
-from rigdda.scene import Surface
-from rigdda.site import Site
-from rigdda.source import Source
+from rigdda.model.economy import Consequences, Prices
+from rigdda.model.events import Event
+from rigdda.model.joints import JointSet
+from rigdda.model.place import BarrierZone, Interface, Motion, Road, Scatter, Slope, Stretch
+from rigdda.model.scene import Surface
+from rigdda.model.site import Site
+from rigdda.model.source import Source
 
 PATH = Path(__file__).parents[2] / "docs" / "site.md"
 

@@ -17,13 +17,13 @@ import numpy as np
 
 from rigdda import check
 from rigdda.barriers import MeshOption
-from rigdda.economy import Consequences, Prices
-from rigdda.events import Event
-from rigdda.place import BarrierZone, Road, Slope, Stretch
-from rigdda.scene import Surface
-from rigdda.site import Site
+from rigdda.model.economy import Consequences, Prices
+from rigdda.model.events import Event
+from rigdda.model.place import BarrierZone, Road, Slope, Stretch
+from rigdda.model.scene import Surface
+from rigdda.model.site import Site
+from rigdda.model.source import Point, Source
 from rigdda.sites import FAMILIES, load
-from rigdda.source import Point, Source
 
 replace = msgspec.structs.replace
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rigdda.scene import Block, Scene, Terrain
+from rigdda.model.scene import Block, Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, rock
 

@@ -11,10 +11,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigdda.dynamics.simulation import Simulation
 from rigdda.errors import Diverged
-from rigdda.scene import Scene
-from rigdda.settings import Settings
-from rigdda.simulation import Simulation
+from rigdda.model.scene import Scene
+from rigdda.model.settings import Settings
 
 
 class Lab:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigdda.scene import Block, Scene
+from rigdda.model.scene import Block, Scene
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import masses, momentum, polygon, rock, rough
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigdda.site import Site
+from rigdda.model.site import Site
 from rigdda.validation.case import Case, Check, Lab, Measured
 
 STATE = ("kinetic", "potential", "elastic")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.scene import Scene
+from rigdda.model.scene import Scene
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, box, rock
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigdda.barriers import GravityWall
 from rigdda.geometry import polygon_properties
-from rigdda.scene import Block, Scene, Surface, Terrain
+from rigdda.model.scene import Block, Scene, Surface, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, Floats
 

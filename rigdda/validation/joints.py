@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigdda.scene import Block, Scene, Terrain
+from rigdda.model.scene import Block, Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, Floats, box, rock, shifts
 

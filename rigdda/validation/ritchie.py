@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rigdda.barriers import Ditch, Layout
-from rigdda.scene import Block, Scene
-from rigdda.site import Site
+from rigdda.model.scene import Block, Scene
+from rigdda.model.site import Site
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import Floats, polygon, rough
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.integrate import quad
 
-from rigdda.scene import Block, Scene, Terrain
+from rigdda.model.scene import Block, Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, GRAVITY, polygon, rock
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rigdda.geometry import polygon_properties
-from rigdda.scene import Block, Scene
+from rigdda.model.scene import Block, Scene
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import ngon, rock
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigdda.dynamics.simulation import Simulation
 from rigdda.geometry import polygon_properties
-from rigdda.scene import Block, Scene, Surface, Terrain
-from rigdda.simulation import Simulation
+from rigdda.model.scene import Block, Scene, Surface, Terrain
 
 GRAVITY = 9.81
 """Default gravity of a scene [m/s2]."""

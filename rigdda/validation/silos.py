@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigdda.geometry import polygon_properties
-from rigdda.scene import Block, Scene, Surface, Terrain
+from rigdda.model.scene import Block, Scene, Surface, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY
 

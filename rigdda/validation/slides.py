@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from rigdda.loads import PointLoad
-from rigdda.scene import Scene, Terrain
+from rigdda.model.loads import PointLoad
+from rigdda.model.scene import Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured, Metered
 from rigdda.validation.scenes import FLAT, GRAVITY, box, incline, masses, rock, shifts
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rigdda.scene import Block, Scene, Terrain
+from rigdda.model.scene import Block, Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, box, rock
 

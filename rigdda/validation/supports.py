@@ -7,9 +7,9 @@ import math
 import numpy as np
 from scipy.special import ellipk
 
-from rigdda.scene import Block, Scene
-from rigdda.simulation import Simulation
-from rigdda.supports import Bolt, FixedPoint
+from rigdda.dynamics.simulation import Simulation
+from rigdda.model.scene import Block, Scene
+from rigdda.model.supports import Bolt, FixedPoint
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, box, polygon, rock
 

@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from rigdda.limit_equilibrium import Toppling, columns, toppling
-from rigdda.loads import PointLoad
-from rigdda.scene import Block, Scene, Surface, Terrain
+from rigdda.model.loads import PointLoad
+from rigdda.model.scene import Block, Scene, Surface, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured, Metered
 from rigdda.validation.scenes import GRAVITY, Floats, polygon
 

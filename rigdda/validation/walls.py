@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigdda.scene import Block, Scene, Terrain, Wall
+from rigdda.model.scene import Block, Scene, Terrain, Wall
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, polygon, rock, rough
 

@@ -13,7 +13,7 @@ from rigdda import (
     Source,
     Surface,
 )
-from rigdda.place import BarrierZone, Motion, Road, Slope, Stretch
+from rigdda.model.place import BarrierZone, Motion, Road, Slope, Stretch
 
 FREE = Prices(
     fence_base=0.0,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from rigdda import Site, Surface
-from rigdda.joints import JointSet
-from rigdda.place import BarrierZone, Motion, Road, Slope
-from rigdda.source import Source
+from rigdda.model.joints import JointSet
+from rigdda.model.place import BarrierZone, Motion, Road, Slope
+from rigdda.model.source import Source
 
 
 @pytest.fixture(scope="session")

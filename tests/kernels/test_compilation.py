@@ -6,7 +6,7 @@ import pytest
 from physics.helpers import FLAT, box, rock
 
 from rigdda import Fence, PointLoad, Scene, Settings, Simulation, Terrain
-from rigdda.step import advance
+from rigdda.dynamics.step import advance
 
 
 @pytest.mark.parametrize(

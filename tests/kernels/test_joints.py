@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rigdda import Block, Site
 from rigdda.geometry import overlap
-from rigdda.joints import JointSet, cut
+from rigdda.model.joints import JointSet, cut
 
 SQUARE = shapely.Polygon([(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)])
 (ROCK,) = Site.load("shu-hwa-paper").sources

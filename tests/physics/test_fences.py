@@ -20,7 +20,7 @@ from rigdda import (
     Terrain,
 )
 from rigdda.barriers import FENCE_CLASSES
-from rigdda.gauges import FAILED
+from rigdda.dynamics.gauges import FAILED
 from rigdda.validation.fences import CAPACITY, FENCE, volley
 
 GROUND = Terrain(FLAT)

@@ -9,7 +9,7 @@ import pytest
 
 from physics.helpers import FLAT, GRAVITY, box, rock
 from rigdda import Fence, GravityWall, Run, Scene, Simulation, Terrain, Wall
-from rigdda.outcome import state_of
+from rigdda.results.states import states
 from rigdda.validation.case import Lab
 from rigdda.validation.gravity_walls import DURATION, FACE, Push, displacement
 
@@ -90,7 +90,7 @@ def test_runs_with_every_kind_are_stored(tmp_path):
 def test_the_state_at_the_end_is_told(share, at, friction_deg, state):
     push = Push(GravityWall(FACE, 2.0, 1.0), friction_deg, at)
     run = Simulation(push.scene(share * push.limit())).run(5.0)
-    assert state_of(run, 0) == state
+    assert states(run, 0)[-1][1] == state
 
 
 def test_more_walls_than_blocks():

@@ -9,7 +9,7 @@ import numpy as np
 from physics.helpers import FLAT, polygon, rock, rough
 from rigdda import Block, Scene, Settings, Simulation
 from rigdda.geometry import polygon_properties
-from rigdda.scene import Terrain
+from rigdda.model.scene import Terrain
 
 AREA, RESTITUTION, TIME = 0.1, 0.4, 0.2
 """Area [m2] and restitution of the blocks, time in which they bounce once or twice [s]."""

@@ -9,7 +9,7 @@ import pytest
 
 import rigdda
 from rigdda import BadInput, Site, sites
-from rigdda.outcome import Outcome
+from rigdda.results.outcome import Outcome
 from rigdda.sites.generator import fallen
 
 SPLITS = ("train", "validation", "test")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rigdda import Scene, Settings, Simulation, Site
-from rigdda.constants import MOVING, OPEN
-from rigdda.records import CONTACTS
+from rigdda.dynamics.constants import MOVING, OPEN
+from rigdda.dynamics.records import CONTACTS
 from rigdda.validation.scenes import box, incline
 from rigdda.validation.slides import slide
 

@@ -11,7 +11,7 @@ import shapely
 
 from rigdda import Simulation, Site, Wall
 from rigdda.geometry import polygon_properties
-from rigdda.outcome import measure, stations, watch
+from rigdda.results.outcome import measure, stations, watch
 
 SITE = Site.load("shu-hwa-paper")
 

@@ -9,8 +9,8 @@ import shapely
 
 from rigdda import BadInput, Simulation, Site, Surface, sites
 from rigdda.geometry import overlap
-from rigdda.outcome import measure, stations, watch
-from rigdda.place import Scatter
+from rigdda.model.place import Scatter
+from rigdda.results.outcome import measure, stations, watch
 from rigdda.sites.generator import fallen
 from rigdda.validation import toppling
 

@@ -25,7 +25,6 @@ from rigdda import (
     Wall,
     release,
 )
-from rigdda.resistance import resistance
 
 HALF = Terrain([(-40.0, 20.0), (0.0, 0.0), (60.0, 0.0)], ["ice", "rock"])
 SURFACES = {"rock": Surface(35.0), "ice": Surface(0.0)}
@@ -60,9 +59,9 @@ def test_resistances_are_weight_times_friction():
         1900 * 4.0 * GRAVITY * tan,
         math.inf,
     )
-    assert [resistance(scene, i) for i in range(5)] == pytest.approx(expected)
+    assert [scene.resistance(i) for i in range(5)] == pytest.approx(expected)
     soil = Scene(HALF, scene.blocks, SURFACES | {"soil": Surface(20.0)}, barriers=(DAM,))
-    assert resistance(soil, 0) == pytest.approx(1900 * 4.0 * GRAVITY * math.tan(math.radians(20.0)))
+    assert soil.resistance(0) == pytest.approx(1900 * 4.0 * GRAVITY * math.tan(math.radians(20.0)))
 
 
 def test_what_is_wider_is_resisted_by_less():
@@ -78,7 +77,7 @@ def test_what_is_wider_is_resisted_by_less():
 def test_an_embankment_is_pushed_by_more_than_its_friction(dt):
     held = Simulation(row(4), Settings(dt=dt)).run(6.0)
     assert math.isinf(held.failure(0)) and held.thrust[0] > 0.0
-    weak = replace(DAM, density=DAM.density * 0.7 * held.thrust[0] / resistance(held.scene, 0))
+    weak = replace(DAM, density=DAM.density * 0.7 * held.thrust[0] / held.scene.resistance(0))
     pushed = Simulation(row(4, weak), Settings(dt=dt)).run(8.0)
     assert math.isfinite(pushed.failure(0))
     assert held.poses[-1, :, 0].max() < 3.0 < pushed.poses[-1, :, 0].max()

@@ -23,7 +23,7 @@ from rigdda import (
     Terrain,
     sites,
 )
-from rigdda.outcome import Outcome, measure, stations, watch
+from rigdda.results.outcome import Outcome, measure, stations, watch
 
 SITE = sites.load("bench")
 EVENTS = ("block", "small", "group")

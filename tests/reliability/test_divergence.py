@@ -7,7 +7,7 @@ import pytest
 from physics.helpers import FLAT, box, rock
 
 from rigdda import Diverged, Error, Scene, Settings, Simulation, SoftContacts, Terrain
-from rigdda.constants import SPEED_LIMIT
+from rigdda.dynamics.constants import SPEED_LIMIT
 
 FAST = (1e6, 0.0, 0.0)
 

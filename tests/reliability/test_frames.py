@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from physics.helpers import FLAT, box, rock
 
 from rigdda import Diverged, GravityWall, Scene, Settings, Simulation, Terrain
-from rigdda.constants import SPEED_LIMIT
-from rigdda.frames import PIECE, pieces
+from rigdda.dynamics.constants import SPEED_LIMIT
+from rigdda.dynamics.frames import PIECE, pieces
 
 DT = 0.01
 SCENE = Scene(

@@ -1,0 +1,112 @@
+"""A ditch, cut into the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from rigdda.barriers.base import BarrierBase, Drawn, Floats, Reach
+from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
+from rigdda.errors import BadInput
+from rigdda.model.terrain import Terrain
+
+if TYPE_CHECKING:
+    from rigdda.model.site import Site
+
+
+class Ditch(BarrierBase, frozen=True, tag="ditch"):
+    """A ditch with a level floor, cut into the terrain. Its surface is that of the terrain.
+
+    Parameters
+    ----------
+    x : float
+        Chainage of its uphill edge [m].
+    depth : float
+        Depth of the floor below the lower of its edges [m].
+    width : float
+        Distance of its edges along x [m].
+    side_slope : float
+        Run over rise of its sides [-]; 0.25 is usual for a cut in rock.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or outside its range.
+    """
+
+    depth: float
+    width: float
+    side_slope: float = 0.25
+    drawn: ClassVar[Drawn] = "line"
+
+    def __post_init__(self) -> None:
+        self._check("depth", "width")
+        self._check_number("side_slope", LEAST_SLOPE, FLATTEST_SLOPE)
+
+    @property
+    def end(self) -> float:
+        """Chainage of its downhill edge, beyond which a block has passed it [m]."""
+        return self.x + self.width
+
+    @property
+    def extent(self) -> float:
+        """Length that it takes up along the slope [m]."""
+        return self.width
+
+    def build(self, ground: Terrain, surface: str) -> tuple[Floats, Terrain]:
+        """Return the (n, 2) corners of what is dug out of `ground`, and the ground with it.
+
+        `surface`, that of a fill, is not used.
+
+        Raises
+        ------
+        BadInput
+            If the ditch does not fit.
+        """
+        old = span("ditch x", ground, self.x, self.end)
+        (left, high), (right, low) = old[0], old[-1]
+        floor = min(high, low) - self.depth
+        first = left + self.side_slope * (high - floor)
+        last = right - self.side_slope * (low - floor)
+        if last - first < 1e-6:
+            least = first - left + right - last
+            raise BadInput(
+                "ditch width",
+                self.width,
+                f"give more than {least:g}, or less depth: its sides meet above its floor",
+            )
+        line = np.array([[left, high], [first, floor], [last, floor], [right, low]])
+        return regrade("ditch x", ground, line, np.minimum, None)
+
+    def price(self, site: Site, outline: Floats | None) -> float:
+        """Return the price at the height of the road, by the surface of what is dug [EUR/m].
+
+        `outline` has the new ground from left to right, then the old one back, see
+        `rigdda.barriers.grading.regrade`.
+        """
+        assert outline is not None
+        prices = site.prices.ditch
+        dearest = max(prices.values(), default=0.0)
+        count = len(outline) // 2 + 1
+        x, new = outline[:count].T
+        old = np.array([new[0], *outline[: count - 1 : -1, 1], new[-1]])
+        depth = np.abs(old - new)
+        volume = 0.5 * (depth[1:] + depth[:-1]) * np.diff(x)
+        names = [site.slope.surface_at(middle) for middle in 0.5 * (x[1:] + x[:-1])]
+        dug = sum(v * prices.get(n, dearest) for v, n in zip(volume, names, strict=True))
+        return site.prices.ditch_base + float(dug)
+
+    def left_height(self, absorbed: float) -> float:
+        """Return 0: it has none [m]."""
+        return 0.0
+
+    def holds(self, outline: Floats, ground: Terrain | None, rise: float) -> Reach:
+        """Return that it holds what lies between its edges, below a deposit that it stops."""
+        assert ground is not None
+        return Reach(self.x, self.end, ground.height(self.end), rise)
+
+    def sizes(self, metres: Callable[[float], str]) -> str:
+        """Return its sizes in words."""
+        return f"{metres(self.depth)} deep, {metres(self.width)} wide"

@@ -1,0 +1,139 @@
+"""A dam of earth, raised on the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import msgspec
+import numpy as np
+
+from rigdda.barriers.base import BarrierBase, Floats, Reach, base_friction, section
+from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
+from rigdda.errors import BadInput
+from rigdda.model.terrain import Terrain
+
+if TYPE_CHECKING:
+    from rigdda.model.scene import Scene
+    from rigdda.model.site import Site
+
+
+class Embankment(BarrierBase, frozen=True, tag="embankment"):
+    """A dam of earth with a level crest, raised on the terrain.
+
+    Its surface is "soil" where the scene defines it, else that of the other barriers. If the thrust
+    of what lies and strikes on it, as a mean over a second, exceeds its weight times the friction
+    of its base, it is pushed away, and gone.
+
+    Parameters
+    ----------
+    x : float
+        Chainage of its uphill toe [m].
+    height : float
+        Height of the crest above the ground at `x` [m].
+    width : float
+        Width of the crest [m].
+    side_slope : float
+        Run over rise of its sides [-]; 0.5 is usual for reinforced earth. The downhill side goes
+        on until it meets the ground.
+    density : float
+        Density [kg/m3]; 1900 is compacted soil.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or outside its range.
+    """
+
+    height: float
+    width: float = 1.0
+    side_slope: float = 0.5
+    density: float = 1900.0
+    fails: ClassVar[str] = "pushed"
+
+    def __post_init__(self) -> None:
+        self._check("height", "width")
+        self._check_number("side_slope", LEAST_SLOPE, FLATTEST_SLOPE)
+        self._check_number("density", 0.0)
+
+    def for_width(self, width: float) -> Self:
+        """Return the embankment that resists what is so wide [m].
+
+        It resists over the width and its height on either side, into which the load spreads at 45
+        degrees.
+        """
+        factor = (width + 2.0 * self.height) / width
+        return msgspec.structs.replace(self, density=self.density * factor)
+
+    @property
+    def end(self) -> float:
+        """Chainage of the downhill edge of its crest, beyond which a block has passed it [m]."""
+        return self.x + self.side_slope * self.height + self.width
+
+    @property
+    def extent(self) -> float:
+        """Length that it takes up along the slope, on level ground [m]."""
+        return 2.0 * self.side_slope * self.height + self.width
+
+    def build(self, ground: Terrain, surface: str) -> tuple[Floats, Terrain]:
+        """Return the (n, 2) corners of what is filled in on `ground`, and the ground with it.
+
+        `surface` names that of the fill.
+
+        Raises
+        ------
+        BadInput
+            If the embankment does not fit.
+        """
+        base = span("embankment x", ground, self.x, self.end)[0, 1]
+        top, toe = base + self.height, self._toe(ground, base + self.height)
+        line = np.array(
+            [
+                [self.x, base],
+                [self.x + self.side_slope * self.height, top],
+                [self.end, top],
+                [toe, top - (toe - self.end) / self.side_slope],
+            ]
+        )
+        return regrade("embankment x", ground, line, np.maximum, surface)
+
+    def _toe(self, ground: Terrain, top: float) -> float:
+        """Return the chainage where the downhill side meets the ground [m]."""
+        corners = ground.points
+        ahead = corners[corners[:, 0] > self.end, 0]
+        for x in ahead:
+            # ordered along the chain: span refuses what turns back before the side meets it
+            piece = span("embankment x", ground, self.end, float(x))
+            over = top - (piece[:, 0] - self.end) / self.side_slope - piece[:, 1]
+            if over[-1] <= 0.0:
+                before, after = max(over[-2], 0.0), over[-1]
+                share = before / (before - after) if before > 0.0 else 0.0
+                toe = piece[-2, 0] + share * (piece[-1, 0] - piece[-2, 0])
+                return max(float(toe), self.end + 1e-6)
+        raise BadInput(
+            "embankment x",
+            self.x,
+            "put it where the ground is flatter than its side, which does not meet the ground",
+        )
+
+    def price(self, site: Site, outline: Floats | None) -> float:
+        """Return the price at the height of the road, that of its fill [EUR/m]."""
+        assert outline is not None
+        return site.prices.embankment * section(outline)
+
+    def resistance(self, scene: Scene, outline: Floats) -> float:
+        """Return its weight times the friction of its base [N/m]."""
+        return base_friction(scene, self.density, scene.fill, outline)
+
+    def holds(self, outline: Floats, ground: Terrain | None, rise: float) -> Reach:
+        """Return what it holds: its uphill side belongs to it."""
+        usual = super().holds(outline, ground, rise)
+        return usual._replace(end=usual.end + self.side_slope * self.height)
+
+    def left_height(self, absorbed: float) -> float:
+        """Return its height [m]."""
+        return self.height
+
+    def sizes(self, metres: Callable[[float], str]) -> str:
+        """Return its sizes in words."""
+        return f"{metres(self.height)} high, crest {metres(self.width)} wide"

@@ -1,0 +1,110 @@
+"""A wall that stands by its weight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import msgspec
+import numpy as np
+
+from rigdda.barriers.base import ELEMENT, Drawn, Floats, base_friction
+from rigdda.barriers.standing import Standing
+from rigdda.model.terrain import Terrain
+
+if TYPE_CHECKING:
+    from rigdda.model.scene import Scene
+    from rigdda.model.site import Site
+
+SLID = 0.1
+"""Displacement beyond which a gravity wall has slid [m]: what its contacts give under load is a
+hundredth of it."""
+
+
+class GravityWall(Standing, frozen=True, tag="gravity_wall"):
+    """A concrete block that stands on the terrain by its weight, and can slide and overturn.
+
+    Its faces are vertical and its top is level. Its base is straight: the chord of the ground
+    between its faces or, where that would dip into the ground, the edge of the ground's convex
+    hull below its middle.
+
+    Parameters
+    ----------
+    x : float
+        Chainage of its uphill face [m].
+    height : float
+        Height above the higher end of its base [m].
+    thickness : float
+        Extent downhill of `x` [m].
+    density : float
+        Density [kg/m3]; 2400 is plain concrete.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or outside its range.
+    """
+
+    thickness: float = 1.0
+    density: float = 2400.0
+    drawn: ClassVar[Drawn] = "moving"
+
+    def __post_init__(self) -> None:
+        self._check("height", "thickness")
+        self._check_number("density", 0.0)
+
+    def for_width(self, width: float) -> Self:
+        """Return the wall that resists what is so wide [m]: its elements of 5 m act whole."""
+        factor = ELEMENT / min(width, ELEMENT)
+        return msgspec.structs.replace(self, density=self.density * factor)
+
+    def outline(self, ground: Terrain) -> Floats:
+        """Return the (4, 2) corners at the start, on `ground`.
+
+        Raises
+        ------
+        BadInput
+            If it does not stand on the ground.
+        """
+        x, y = self._under(ground)
+        middle = 0.5 * (x[0] + x[-1])
+        ends = [(i, j) for i in range(len(x)) for j in range(i + 1, len(x))]
+
+        def base(pair: tuple[int, int], at: float) -> float:
+            i, j = pair
+            return float(y[i] + (y[j] - y[i]) * (at - x[i]) / (x[j] - x[i]))
+
+        # of all chords across the middle the highest there is the edge of the convex hull
+        over = [pair for pair in ends if x[pair[0]] <= middle <= x[pair[1]]]
+        edge = max(over, key=lambda pair: base(pair, middle))
+        left, right = base(edge, x[0]), base(edge, x[-1])
+        top = max(left, right) + self.height
+        return np.array([[x[0], left], [x[-1], right], [x[-1], top], [x[0], top]])
+
+    def price(self, site: Site, outline: Floats | None) -> float:
+        """Return the price at the height of the road, that of its concrete [EUR/m]."""
+        return site.prices.concrete * self.height * self.thickness
+
+    def resistance(self, scene: Scene, outline: Floats) -> float:
+        """Return its weight times the friction of its base [N/m]."""
+        return base_friction(scene, self.density, scene.barrier_surface, outline)
+
+    def changes(self, times: Floats, poses: Floats, failure: float) -> list[tuple[float, str]]:
+        """Return when it "slid" and when it "overturned", after which it slides no more."""
+        x, y, theta = (poses - poses[0]).T
+        over = abs(theta) > math.atan2(self.thickness, self.height)
+        found = [
+            (float(times[int(there.argmax())]), state)
+            for there, state in ((np.hypot(x, y) > SLID, "slid"), (over, "overturned"))
+            if there.any()
+        ]
+        return found[1:] if len(found) == 2 and found[0][0] >= found[1][0] else found
+
+    def area_beyond(self, x: float, displacement: float) -> float:
+        """Return its area if, so displaced, it stands beyond a chainage [m2]."""
+        return self.height * self.thickness if self.end + displacement > x else 0.0
+
+    def sizes(self, metres: Callable[[float], str]) -> str:
+        """Return its sizes in words."""
+        return f"{metres(self.height)} high, {metres(self.thickness)} thick"

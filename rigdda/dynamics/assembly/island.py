@@ -1,0 +1,132 @@
+"""The system of equations of an island: inertia, damping, weight, loads and closed contacts."""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
+from rigdda.dynamics.assembly.springs import add_block, add_force, normal_row, shear_row
+from rigdda.dynamics.constants import APART, BOLT, OPEN, SLIP, SMALL_ISLAND, STICK
+from rigdda.dynamics.kernel import inlined, kernel
+from rigdda.dynamics.records import Bodies, Body, Contact, Contacts, Islands, Matrix, Parameters
+
+
+@kernel
+def damping_of(body: Body, p: Parameters) -> float:
+    """Return the damping coefficient of a block in this step [1/s]."""
+    if p.damping_in_contact_only and body.apart > APART:
+        return 0.0
+    return p.damping
+
+
+@kernel
+def load_moment(body: Body) -> float:
+    """Return the moment of the dead loads of a block about its centroid [N m]."""
+    if body.moment_cos == 0.0 and body.moment_sin == 0.0:
+        return 0.0
+    theta = body.theta
+    return body.moment_cos * math.cos(theta) + body.moment_sin * math.sin(theta)
+
+
+@inlined
+def assemble_blocks(
+    bodies: Bodies, m: Matrix, islands: Islands, low: int, high: int, p: Parameters
+) -> None:
+    """Set the diagonal blocks and forces of inertia, damping, weight and loads."""
+    for place in range(low, high):
+        body, s = bodies[islands.block_item[place]], place - low
+        alpha = damping_of(body, p)
+        inertia = inertia_stiffness(body.inertia, alpha, p.dt)
+        mass = inertia_stiffness(body.mass, alpha, p.dt)
+        for a in range(3):
+            for b in range(3):
+                m.diagonal[s, a, b] = 0.0
+        m.diagonal[s, 0, 0] = m.diagonal[s, 1, 1] = mass
+        m.diagonal[s, 2, 2] = inertia
+        m.rhs[s, 0] = inertia_force(body.mass, body.vx, p.dt)
+        m.rhs[s, 1] = inertia_force(body.mass, body.vy, p.dt)
+        m.rhs[s, 2] = inertia_force(body.inertia, body.omega, p.dt)
+        m.rhs[s, 0] += body.mass * p.field_x + body.force_x
+        m.rhs[s, 1] += body.mass * p.field_y + body.force_y
+        m.rhs[s, 2] += load_moment(body)
+
+
+@inlined
+def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float, coupled: bool) -> None:
+    """Add the springs of a closed contact between slots i and j (-1: no unknowns).
+
+    On the displacement d of the step the spring N = kappa (b - dt u_1) has stiffness 2 kappa and
+    force kappa (b + dt u_0). The friction of a slipping contact is a force; `coupled` takes it
+    from the unknown normal force, which makes the matrix of one or two blocks unsymmetric.
+    """
+    stiffness = 2.0 * c.kappa
+    normal = c.kappa * (c.bias + dt * c.un)
+    shear = c.memory_shear + c.kappa * dt * c.us
+    en, es = normal_row(c, True), shear_row(c, True)
+    bolt = c.kind == BOLT
+    if bolt and c.state == SLIP:  # it yields
+        stiffness, normal = 0.0, -c.tension
+    add_block(m.diagonal[i], stiffness, en, en)
+    add_force(m.rhs[i], normal, en)
+    stick = c.state == STICK
+    ratio = math.copysign(c.friction, c.lag) if coupled and not (stick or bolt) else 0.0
+    if bolt:
+        pass
+    elif stick:
+        add_block(m.diagonal[i], stiffness, es, es)
+        add_force(m.rhs[i], shear, es)
+    elif coupled:
+        add_block(m.diagonal[i], stiffness * ratio, es, en)
+        add_force(m.rhs[i], normal * ratio, es)
+    else:
+        add_force(m.rhs[i], c.lag, es)
+    if j < 0:
+        return
+    fn, fs = normal_row(c, False), shear_row(c, False)
+    add_block(m.diagonal[j], stiffness, fn, fn)
+    add_block(m.off[c.pair], stiffness, en, fn)
+    add_force(m.rhs[j], normal, fn)
+    if coupled:
+        add_block(m.lower, stiffness, fn, en)
+    if bolt:
+        return
+    if stick:
+        add_block(m.diagonal[j], stiffness, fs, fs)
+        add_block(m.off[c.pair], stiffness, es, fs)
+        add_force(m.rhs[j], shear, fs)
+        if coupled:
+            add_block(m.lower, stiffness, fs, es)
+    elif coupled:
+        add_block(m.diagonal[j], stiffness * ratio, fs, fn)
+        add_block(m.off[c.pair], stiffness * ratio, es, fn)
+        add_block(m.lower, stiffness * ratio, fs, en)
+        add_force(m.rhs[j], normal * ratio, fs)
+    else:
+        add_force(m.rhs[j], c.lag, fs)
+
+
+@inlined
+def assemble_island(
+    bodies: Bodies,
+    contacts: Contacts,
+    m: Matrix,
+    islands: Islands,
+    island: int,
+    pairs: int,
+    p: Parameters,
+) -> None:
+    """Set the system of an island with its contacts in their current states."""
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    assemble_blocks(bodies, m, islands, b0, b1, p)
+    for a in range(3):
+        for b in range(3):
+            m.lower[a, b] = 0.0
+            for q in range(max(pairs, 1)):
+                m.off[q, a, b] = 0.0
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        c = contacts[islands.contact_item[item]]
+        if c.state == OPEN:
+            c.normal = c.shear = 0.0
+        else:
+            j = islands.slot[c.b] if c.pair >= 0 else -1
+            assemble_contact(c, m, islands.slot[c.a], j, p.dt, b1 - b0 <= SMALL_ISLAND)

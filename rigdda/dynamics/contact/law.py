@@ -1,0 +1,332 @@
+r"""The law that a contact follows over one step.
+
+Every closed contact is a penalty spring on the *end* velocity of the step,
+
+.. math:: N = \kappa\,(b - \Delta t\,u_1), \qquad u_1 = 2 d_n / \Delta t - u_0,
+
+with d_n the relative normal displacement of the step and u_0, u_1 the normal relative velocities
+at its ends (positive separates). A spring on d_n itself (plain DDA) turns u_0 into -u_0 when it is
+stiff, which makes resting contacts chatter; on the end velocity it loses energy at any stiffness.
+What differs is the bias b:
+
+=======  ====================================================================================
+at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
+         shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
+         on, the rest viscous (Kelvin and Voigt's solid). Penetration beyond what N_0 explains is
+         pushed out slowly, a small gap closed so. u_0 is that of the points that touch at the
+         start of the step, see `set_velocities_at_start`. An open gap gives b = -g: what would
+         close within the step is slowed down to the speed that closes it in one more.
+impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
+         impulse acts from the time at which the bodies touch.
+new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
+         blocks, and carries on with it as if they had always touched.
+shock    b = 0: a closed contact that the rest of its island drives together, a plastic impact.
+plain    b = -2 g and u_0 taken as 0: a penalty spring on the gap, the paper's contact.
+=======  ====================================================================================
+
+The shear spring is the same on the shear velocity, from the shear force of the last step, limited
+by Coulomb friction: a return mapping.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.dynamics.constants import (
+    AWAKE,
+    BLOW_SPEED,
+    GREATEST_LOAD,
+    IMPACT,
+    IMPACT_SPEED,
+    IMPACT_STEPS,
+    IMPACT_STIFFNESS,
+    MOVING,
+    NEW,
+    OPEN,
+    PLAIN,
+    PLAIN_CONTACT,
+    RECOVERY_SPEED,
+    RECOVERY_TIME,
+    REST,
+    RETARDATION_TIME,
+    SHOCK,
+    START_STIFFNESS,
+    STICK,
+    STIFFNESS_CHANGE,
+    TOUCHING,
+    UNLOADED,
+)
+from rigdda.dynamics.kernel import inlined, kernel
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Parameters
+
+
+@kernel
+def carried_weight(mass_a: float, mass_b: float, p: Parameters) -> float:
+    """Return the weight [N] of the heavier free body of a contact, the least load it may carry."""
+    return max(mass_a, mass_b) * (p.gravity if p.gravity > 0.0 else 9.81)
+
+
+@kernel
+def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
+    """Return k_n [N/m] for the wanted penetration under the load that a contact carries.
+
+    At least for `weight` [N]. It grows with the load unless that comes from pushing out
+    penetration, which in a wedged block would go on for ever. It falls only when most of the load
+    has gone: stiffness that fell with the load would feed the sway of a stack.
+    """
+    least = weight / p.penetration
+    before, load = c.stiffness, c.memory_normal
+    if c.kind == MOVING:
+        load = min(load, STIFFNESS_CHANGE * before * p.penetration)
+    if load < UNLOADED * before * p.penetration:
+        return max(least, before / STIFFNESS_CHANGE)
+    if -c.gap * before > load:
+        return max(least, before)
+    return max(least, before, load / p.penetration)
+
+
+@kernel
+def effective_mass(bodies: Bodies, c: Contact) -> float:
+    """Return the mass [kg] that resists a normal impulse at a contact."""
+    a, b = bodies[c.a], bodies[c.b]  # b is not read where it is the terrain
+    arm = c.ra_x * c.ny - c.ra_y * c.nx
+    inverse = 1.0 / a.mass + arm * arm / a.inertia
+    if c.b >= 0 and b.status == AWAKE:
+        arm = c.rb_x * c.ny - c.rb_y * c.nx
+        inverse += 1.0 / b.mass + arm * arm / b.inertia
+    return 1.0 / inverse
+
+
+@kernel
+def point_velocity(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
+    """Return the velocity [m/s] of the point (x, y) of body i; fixed and sleeping bodies rest."""
+    body = bodies[i]
+    if i < 0 or body.status != AWAKE:
+        return 0.0, 0.0
+    return body.vx - body.omega * (y - body.y), body.vy + body.omega * (x - body.x)
+
+
+@kernel
+def set_arms(bodies: Bodies, c: Contact, time: float) -> None:
+    """Set the arms where the bodies will be after `time` [s]; so angular momentum is kept."""
+    a, b = bodies[c.a], bodies[c.b]
+    vx, vy = point_velocity(bodies, c.a if c.owner == 1 else c.b, c.x, c.y)
+    x, y = c.x + time * vx, c.y + time * vy
+    c.ra_x, c.ra_y = x - a.x - time * a.vx, y - a.y - time * a.vy
+    if c.b >= 0:
+        moving = 1.0 if b.status == AWAKE else 0.0
+        c.rb_x, c.rb_y = x - b.x - time * b.vx * moving, y - b.y - time * b.vy * moving
+
+
+@kernel
+def set_velocities(bodies: Bodies, c: Contact) -> None:
+    """Set the normal and shear relative velocities, at the arms, of bodies as they move now."""
+    a, b = bodies[c.a], bodies[c.b]
+    vx, vy = a.vx - a.omega * c.ra_y, a.vy + a.omega * c.ra_x
+    if c.b >= 0 and b.status == AWAKE:
+        vx -= b.vx - b.omega * c.rb_y
+        vy -= b.vy + b.omega * c.rb_x
+    c.un = c.nx * vx + c.ny * vy
+    c.us = -c.ny * vx + c.nx * vy
+
+
+@kernel
+def set_velocities_at_start(bodies: Bodies, c: Contact, dt: float) -> None:
+    """Set the velocities from the places at the start, after those with the arms of mid-step.
+
+    Points of a turning body do not go straight, and a face that turns comes nearer to what slides
+    along it. With the displacement along the rows of mid-step u_1 then is the velocity at the end,
+    to second order: a block that rocks on a corner neither lifts nor sinks it. But u_0 is at most
+    that along the rows: greater, it would let the contact give energy.
+    """
+    ax, ay = point_velocity(bodies, c.a, c.x, c.y)
+    bx, by = point_velocity(bodies, c.b, c.x, c.y)
+    opening = c.nx * (ax - bx) + c.ny * (ay - by)
+    c.us = -c.ny * (ax - bx) + c.nx * (ay - by)
+    i = c.a if c.owner == 0 else c.b
+    face = bodies[i]
+    if i >= 0 and face.status == AWAKE:
+        opening -= face.omega * c.us * dt
+    c.un = min(c.un, opening)
+
+
+@kernel
+def impact_stiffness(mass: float, dt: float) -> float:
+    """Return the stiffness [N/m] that gives an effective mass its velocity within a step."""
+    return IMPACT_STIFFNESS * mass / (dt * dt)
+
+
+@kernel
+def set_impact(c: Contact, closing: float, mass: float, p: Parameters) -> None:
+    """Make a contact an impact with closing speed `closing` [m/s]."""
+    c.kind = IMPACT
+    c.kappa = impact_stiffness(mass, p.dt)
+    c.bias = p.dt * c.restitution * closing
+    c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+
+
+@kernel
+def set_shock(bodies: Bodies, c: Contact, p: Parameters) -> None:
+    """Make a closed contact a plastic impact within the step."""
+    c.kind = SHOCK
+    c.kappa = max(impact_stiffness(effective_mass(bodies, c), p.dt), c.kappa)
+    c.bias = 0.0
+
+
+@kernel
+def recovery(surplus: float, dt: float) -> float:
+    """Return the part of a surplus penetration that is pushed out in a step [m]."""
+    return max(min(surplus / RECOVERY_TIME, RECOVERY_SPEED), -RECOVERY_SPEED) * dt
+
+
+@kernel
+def set_rest(c: Contact, weight: float, p: Parameters) -> None:
+    """Make a contact a spring that carries on with the force of the last step.
+
+    Penetration is pushed out at no more power than under `weight` [N]: wedged blocks and piles that
+    cannot give way would be driven for ever.
+    """
+    c.kind = REST
+    c.kappa = c.stiffness * max(1.0, RETARDATION_TIME / p.dt)
+    elastic = c.memory_normal / c.stiffness
+    if c.gap > p.penetration and c.bond == 0.0:
+        c.memory_normal = c.start_normal = 0.0
+        c.bias = -c.gap
+    else:
+        c.bias = c.memory_normal / c.kappa
+        if c.memory_normal > 0.0:
+            surplus = max(-c.gap - elastic, 0.0) - max(c.gap, 0.0)
+            c.bias += recovery(surplus, p.dt) * weight / max(weight, c.memory_normal)
+
+
+@kernel
+def set_new(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
+    """Make a contact one that closes now, or may close, without an impact."""
+    c.kind = NEW
+    stiffness = impact_stiffness(effective_mass(bodies, c), p.dt)
+    c.kappa = max(START_STIFFNESS * stiffness if start else stiffness, c.stiffness)
+    # a gap of rounding would be a force in so stiff a spring
+    c.bias = -c.gap if c.gap > TOUCHING * p.penetration else 0.0
+
+
+@kernel
+def set_plain(c: Contact, p: Parameters) -> None:
+    """Make a contact the paper's penalty spring on the displacement of the step.
+
+    N = k_n (-gap - d_n) and S = S_0 - k_n d_s: the law above with u_0 = 0, and one k_n for all
+    contacts. It has no memory of speed, so its rebound is what step and stiffness make of it.
+    """
+    c.kind = PLAIN
+    c.stiffness = p.block_weight / p.penetration
+    c.kappa = 0.5 * c.stiffness
+    c.bias = -2.0 * c.gap
+    c.un = c.us = 0.0
+    if c.gap <= 0.0 and c.state == OPEN:
+        c.state = STICK
+
+
+@inlined
+def strike(bodies: Bodies, c: Contact, time: float, pull: float, p: Parameters) -> float:
+    """Set arms and velocities of a contact at `time` in the step; returns the closing speed."""
+    set_arms(bodies, c, time)
+    set_velocities(bodies, c)
+    c.share = 1.0 - time / p.dt
+    return -c.un + pull * time
+
+
+@inlined
+def strike_at_once(bodies: Bodies, contacts: Contacts, low: int, high: int, p: Parameters) -> None:
+    """Let all contacts of two blocks that collide act at the time of the first impact.
+
+    Impulses at different times would act on arms that the earlier one has changed, and angular
+    momentum would not be kept.
+    """
+    first = low
+    for k in range(low, high):
+        if k + 1 < high and contacts[k + 1].b == contacts[first].b:
+            continue
+        b, share = contacts[first].b, 0.0
+        for j in range(first, k + 1):
+            c = contacts[j]
+            if c.kind == IMPACT:
+                share = max(share, c.share)
+        if share > 0.0 and b >= 0 and bodies[b].status == AWAKE:
+            for j in range(first, k + 1):
+                c = contacts[j]
+                closing = strike(bodies, c, (1.0 - share) * p.dt, 0.0, p)
+                if c.kind == IMPACT:
+                    set_impact(c, max(closing, 0.0), effective_mass(bodies, c), p)
+        first = k + 1
+
+
+@kernel
+def pull_on(bodies: Bodies, c: Contact, p: Parameters) -> float:
+    """Return the free relative acceleration that closes a contact [m/s2]: that of gravity."""
+    if c.b >= 0 and bodies[c.b].status == AWAKE:
+        return 0.0
+    return -(p.field_x * c.nx + p.field_y * c.ny)
+
+
+@inlined
+def time_of_impact(bodies: Bodies, c: Contact, pull: float, p: Parameters) -> float:
+    """Return when in the step a contact begins an impact [s], or -1.0.
+
+    Arms and velocities are those of mid-step before, and after if there is none.
+    """
+    threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
+    gap = max(c.gap, 0.0)
+    mean = -c.un + 0.5 * pull * p.dt
+    # what was foreseen may still come fast when it is closed already; but bodies that are in one
+    # another are held apart by the force of the last step, from which an impact would not start
+    least = threshold if c.state == OPEN else max(threshold, BLOW_SPEED)
+    sunk = c.state != OPEN and c.gap < -p.slack
+    if sunk or mean <= least or gap >= mean * p.dt:
+        return -1.0
+    time = gap / mean
+    if strike(bodies, c, time, pull, p) > threshold:
+        return time
+    strike(bodies, c, 0.5 * p.dt, pull, p)
+    return -1.0
+
+
+@inlined
+def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: Parameters) -> None:
+    """Set the law of a contact from its geometry and memory; `start` is the very first step."""
+    a, b = bodies[c.a], bodies[c.b]
+    pull = pull_on(bodies, c, p)
+    mass_b = b.mass if c.b >= 0 and b.status == AWAKE else 0.0
+    weight = carried_weight(a.mass, mass_b, p)
+    most = GREATEST_LOAD * max(weight, p.block_weight)
+    c.memory_shear *= most / max(c.memory_normal, most)
+    c.memory_normal = min(c.memory_normal, most)
+    c.start_normal = min(c.start_normal, most)
+    c.stiffness = rest_stiffness(weight, c, p)
+    interface = interfaces[a.surface, c.other]
+    c.friction, c.restitution = interface.friction, interface.restitution
+    c.flips = 0
+    c.lag = c.start_shear
+    c.cohesion = c.bond * interface.cohesion
+    c.tension = c.bond * interface.tension
+    if c.cohesion == 0.0 and c.tension == 0.0:
+        c.bond = 0.0
+    strike(bodies, c, 0.5 * p.dt, pull, p)
+    if c.lag == 0.0:
+        c.lag = math.copysign(0.0, -c.us)  # the direction of friction once it slips
+    if c.restitution == PLAIN_CONTACT:
+        set_plain(c, p)
+        return
+    time = time_of_impact(bodies, c, pull, p)
+    if time >= 0.0:
+        set_impact(c, -c.un + pull * time, effective_mass(bodies, c), p)
+        c.state = STICK
+        return
+    gap, mean = max(c.gap, 0.0), 0.5 * pull * p.dt - c.un
+    set_velocities_at_start(bodies, c, p.dt)
+    if c.state != OPEN:
+        set_rest(c, weight, p)
+        return
+    set_new(bodies, c, start, p)
+    # what touches starts closed: in a stack no block moves before those below it are held, and
+    # what hangs on a joint is held by it
+    if c.bond > 0.0 or (gap < p.slack and gap - mean * p.dt < p.penetration):
+        c.state = STICK

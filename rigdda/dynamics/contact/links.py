@@ -1,0 +1,119 @@
+"""Supports as contacts that may pull: bolts act along their line, pins in both directions.
+
+They enter the system of equations, the exchange of forces and the ledger like any closed contact,
+and follow the same law (`contact.law`): a pin with b = 0. The mean tension of a bolt over a step,
+T + k d / 2, is this law with u_0 = 0, kappa = k / 4 and b = -T / kappa: at no step energy is lost.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import NDArray
+
+from rigdda.dynamics.constants import BOLT, START_STIFFNESS, STICK
+from rigdda.dynamics.contact.law import (
+    effective_mass,
+    impact_stiffness,
+    point_velocity,
+)
+from rigdda.dynamics.correction import place_corners
+from rigdda.dynamics.kernel import entry_kernel, kernel
+from rigdda.dynamics.records import Bodies, Body, Contact, Link, Links, Outlines, Parameters
+
+
+@kernel
+def anchor(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
+    """Return the place now of a point given in body coordinates, of the ground if i < 0 [m]."""
+    if i < 0:
+        return x, y
+    body = bodies[i]
+    cos, sin = math.cos(body.theta), math.sin(body.theta)
+    return body.x + cos * x - sin * y, body.y + sin * x + cos * y
+
+
+@kernel
+def arm(body: Body, x: float, y: float, dt: float) -> tuple[float, float]:
+    """Return the mean of the arms before and after a step of a point in body coordinates [m].
+
+    With d = dt (v_0 + v_1) / 2 and t = dt (w_0 + w_1) / 2 a point that had no velocity before and
+    that d + t e x r does not move along this arm r has none afterwards, exactly if w stays.
+    """
+    half = 0.5 * dt * body.omega
+    theta, mean = body.theta + half, math.cos(half)
+    cos, sin = mean * math.cos(theta), mean * math.sin(theta)
+    return cos * x - sin * y, sin * x + cos * y
+
+
+@kernel
+def tension(link: Link, length: float) -> float:
+    """Return the tension of a bolt at a length [N]."""
+    return link.prestress + link.stiffness * (length - link.length)
+
+
+@entry_kernel
+def pull_of_bolts(bodies: Bodies, links: Links, out: NDArray) -> None:
+    """Write the force of each bolt on its first block now, (S, 2) [N], into `out`; 0 for a pin."""
+    for q in range(len(links)):
+        link = links[q]
+        if link.kind == BOLT:
+            ax, ay = anchor(bodies, link.a, link.ax, link.ay)
+            bx, by = anchor(bodies, link.b, link.bx, link.by)
+            length = math.hypot(ax - bx, ay - by)
+            force = tension(link, length) / length
+            out[q, 0], out[q, 1] = force * (bx - ax), force * (by - ay)
+
+
+@kernel
+def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) -> None:
+    """Write support q as a contact."""
+    link = links[q]
+    a, b = link.a, link.b
+    ax, ay = anchor(bodies, a, link.ax, link.ay)
+    bx, by = anchor(bodies, b, link.bx, link.by)
+    c.a, c.b, c.key, c.owner, c.kind = a, b, -1 - q, 1, link.kind
+    c.other, c.gap, c.flips = 0, 0.0, 0
+    c.x, c.y, c.share, c.state = ax, ay, 0.5, STICK
+    c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+    c.friction = c.restitution = c.bond = c.cohesion = 0.0
+    c.ra_x, c.ra_y = arm(bodies[a], link.ax, link.ay, p.dt)
+    if b >= 0:
+        c.rb_x, c.rb_y = arm(bodies[b], link.bx, link.by, p.dt)
+    if link.kind == BOLT:
+        length = math.hypot(ax - bx, ay - by)
+        c.nx, c.ny = (ax - bx) / length, (ay - by) / length
+        c.un = c.us = 0.0
+        c.stiffness, c.kappa = link.stiffness, 0.25 * link.stiffness
+        c.bias = -tension(link, length) / c.kappa
+        c.tension = link.yielding
+    else:
+        c.nx, c.ny = 1.0, 0.0
+        mass = effective_mass(bodies, c)
+        c.kappa = c.stiffness = START_STIFFNESS * impact_stiffness(mass, p.dt)
+        c.tension = math.inf
+        c.un, c.us = point_velocity(bodies, a, ax, ay)
+        c.bias = 0.0  # no velocity at the end
+
+
+@kernel
+def mend_links(bodies: Bodies, outlines: Outlines, links: Links, p: Parameters) -> float:
+    """Yield bolts whose tension is above yield now, perfectly plastic; put pins in their place.
+
+    A turning block goes the arc of its pin only to second order; without post-correction it stays
+    where that brings it. Returns the work of moving it against gravity [J].
+    """
+    work = 0.0
+    for q in range(len(links)):
+        link = links[q]
+        ax, ay = anchor(bodies, link.a, link.ax, link.ay)
+        bx, by = anchor(bodies, link.b, link.bx, link.by)
+        if link.kind == BOLT:
+            excess = tension(link, math.hypot(ax - bx, ay - by)) - link.yielding
+            link.length += max(excess, 0.0) / link.stiffness
+        elif p.post_correction and (ax != bx or ay != by):
+            body = bodies[link.a]
+            body.x += bx - ax
+            body.y += by - ay
+            work -= body.mass * (p.gravity_x * (bx - ax) + p.gravity_y * (by - ay))
+            place_corners(bodies, outlines, link.a)
+    return work

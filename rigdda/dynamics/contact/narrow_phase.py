@@ -1,0 +1,377 @@
+"""Contacts between two polygons over a step, one convex part against another.
+
+Separating axes with time of entry: of the axes that separate the polygons now, the one that they
+stop separating last is the face of contact. An axis along which they are farther apart than their
+paths in this step are long rules the contact out: a fast block cannot pass a thin wall, nor can one
+that a third block deflects within the step be driven into a neighbour.
+
+A face that they touch and do not approach separates them for the whole step: what slides along it
+is not caught by the side of the next body, whose face is flush with it.
+
+Where the last edge to separate two parts, or the one that faces it, is inside its body, the way in
+leads through a neighbouring part, and that one has the contact.
+"""
+
+from __future__ import annotations
+
+from rigdda.dynamics.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
+from rigdda.dynamics.kernel import inlined, kernel
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Corners, Outlines, Parameters
+
+NEVER = 1e3
+"""Time of entry, over the step, of what comes nearer no faster than what is at rest may."""
+
+
+@kernel
+def following(corner: int, corners: int) -> int:
+    """Return the corner after this one, anticlockwise."""
+    return corner + 1 if corner + 1 < corners else 0
+
+
+@kernel
+def axis_gap(
+    nx: float, ny: float, x0: float, y0: float, corners: Corners, j: int, n: int
+) -> tuple[float, int]:
+    """Return the least gap of the n corners of body j above a line, and the corner."""
+    least, corner = 1e300, 0
+    for k in range(n):
+        own = corners[j, k]
+        gap = nx * (own.x - x0) + ny * (own.y - y0)
+        if gap < least:
+            least, corner = gap, k
+    return least, corner
+
+
+@kernel
+def over_edge(outlines: Outlines, i: int, edge: int, j: int) -> float:
+    """Return the gap of the middle of polygon j above an edge of polygon i [m]."""
+    other, own = outlines.polygon[j], outlines.corner[i, edge]
+    dx, dy = other.middle_x - own.x, other.middle_y - own.y
+    return own.normal_x * dx + own.normal_y * dy
+
+
+@kernel
+def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
+    """Return the edge of polygon i that the middle of polygon j is farthest over."""
+    facing, most = 0, -1e300
+    for edge in range(edges):
+        gap = over_edge(outlines, i, edge, j)
+        if gap > most:
+            facing, most = edge, gap
+    return facing
+
+
+@inlined
+def face_of_contact(
+    outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
+    px: float, py: float, turn: float, spread: float, slack: float, sunk: float,
+) -> tuple[bool, float, float, float, int]:  # fmt: skip
+    """Return whether the edges of i leave a contact with j possible, and the best edge.
+
+    (dx, dy) is the displacement of j relative to i over the step if nothing deflects them,
+    (px - turn y, py + turn x) what turning adds to it at (x, y), `spread` how far any of their
+    points may come nearer, whatever does.
+    The best edge comes with its rank, time of entry and gap, after the greatest gap of any. Edges
+    inside the body count as deeper by `sunk`, so that on a tie the real one is best.
+
+    A face is entered when the nearest corner is deeper than the slack: of two that it touches the
+    one that is approached more slowly is the best. By the velocity of that corner then: the middle
+    of a block that rolls comes down, where it rests does not.
+
+    The edge that the middle of j is farthest over comes first: most often it is the best one, or
+    one that separates them. Others are looked at only as far as the circle in j may be over them.
+    """
+    time, depth, best, nearest, apart = -1.0, -1e300, -1, -1, -1e300
+    facing = facing_edge(outlines, i, edges, j)
+    for visit in range(-1, edges):
+        edge = facing if visit < 0 else visit
+        own = outlines.corner[i, edge]
+        nx, ny = own.normal_x, own.normal_y
+        if visit >= 0:
+            most = over_edge(outlines, i, edge, j) - outlines.polygon[j].inside
+            if edge == facing or (most < -slack and (time > 0.0 or most < depth)):
+                continue
+        gap, corner = axis_gap(nx, ny, own.x, own.y, outlines.corner, j, corners)
+        if gap > spread:
+            return False, time, depth, apart, edge
+        if sunk > 0.0 and own.inner:
+            gap -= sunk
+        apart = max(apart, gap)
+        entry = 0.0
+        if gap >= -slack:
+            ux, uy = dx, dy
+            if gap <= slack:
+                ux -= turn * outlines.corner[j, corner].y - px
+                uy += turn * outlines.corner[j, corner].x + py
+            approach = -(nx * ux + ny * uy)
+            late = gap + slack >= NEVER * approach
+            entry = NEVER if late else (gap + slack) / approach
+        later = entry > time or (entry == time and gap > depth)
+        if later or (entry == time and gap == depth and edge < best):
+            time, depth, best, nearest = entry, gap, edge, corner
+    return True, time, depth, apart, edge_over_corner(outlines, i, best, edges, j, nearest)
+
+
+@kernel
+def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, corner: int) -> int:
+    """Return the edge of i, nearly in line with `edge`, that lies over a corner of j.
+
+    Of edges in one line rounding alone decides which is the best face.
+    """
+    face, over = outlines.corner[i, edge], outlines.corner[j, corner]
+    nx, ny, x, y = face.normal_x, face.normal_y, over.x, over.y
+    for _ in range(edges):
+        start, end = outlines.corner[i, edge], outlines.corner[i, following(edge, edges)]
+        beyond_end = ny * (end.x - x) > nx * (end.y - y)
+        before_start = ny * (start.x - x) < nx * (start.y - y)
+        step = (1 if beyond_end else 0) - (1 if before_start else 0)
+        near = (edge + step) % edges
+        other = outlines.corner[i, near]
+        dot = nx * other.normal_x + ny * other.normal_y
+        if step == 0 or dot < SAME_FACE or other.inner:
+            break
+        edge = near
+    return edge
+
+
+@kernel
+def incident_edge(outlines: Outlines, i: int, edge: int, j: int, n: int) -> int:
+    """Return the edge of j at its nearest corner that faces edge `edge` of i most squarely."""
+    face = outlines.corner[i, edge]
+    nx, ny = face.normal_x, face.normal_y
+    _, corner = axis_gap(nx, ny, 0.0, 0.0, outlines.corner, j, n)
+    before = corner - 1 if corner > 0 else n - 1
+    after, ahead = outlines.corner[j, corner], outlines.corner[j, before]
+    dot_after = nx * after.normal_x + ny * after.normal_y
+    dot_ahead = nx * ahead.normal_x + ny * ahead.normal_y
+    return corner if dot_after < dot_ahead else before
+
+
+@kernel
+def add_contact(
+    c: Contact, a: int, b: int, key: int, owner: int, other: int,
+    x: float, y: float, nx: float, ny: float, gap: float,
+) -> None:  # fmt: skip
+    """Write the geometry of a contact."""
+    c.a, c.b, c.key, c.owner, c.other = a, b, key, owner, other
+    c.x, c.y, c.nx, c.ny, c.gap = x, y, nx, ny, gap
+
+
+@inlined
+def clip_contacts(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
+    edge: int, j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float,
+    beside: float,
+) -> int:  # fmt: skip
+    """Add up to two contacts of bodies a and b where the incident edge lies over the face.
+
+    The face of contact is edge `edge` of polygon i, the incident edge is edge `other` of polygon j;
+    (shift_x, shift_y) moves j to where it is at the time of entry, but for its turning: a corner
+    within `beside` of the face may come over it. Returns the new number of contacts.
+    """
+    face = outlines.corner[i, edge]
+    nx, ny, x0, y0 = face.normal_x, face.normal_y, face.x, face.y
+    tx, ty = -ny, nx
+    end = following(edge, outlines.polygon[i].count)
+    next_corner = outlines.corner[i, end]
+    length = tx * (next_corner.x - x0) + ty * (next_corner.y - y0)
+    other_end = following(other, outlines.polygon[j].count)
+    # along the face, the incident edge runs from its end (s1) to its start (s2)
+    one, two = outlines.corner[j, other_end], outlines.corner[j, other]
+    s1 = tx * (one.x + shift_x - x0) + ty * (one.y + shift_y - y0)
+    s2 = tx * (two.x + shift_x - x0) + ty * (two.y + shift_y - y0)
+    g1 = nx * (one.x - x0) + ny * (one.y - y0)
+    g2 = nx * (two.x - x0) + ny * (two.y - y0)
+    # a corner of j that touches the next edge of a notch, too, may be a little beyond the face
+    start = -slack if face.reentrant else -beside
+    stop = length + slack if next_corner.reentrant else length + beside
+    low = s1 if s1 >= start else 0.0
+    high = s2 if s2 <= stop else length
+    if high < low:
+        return k
+    slope = (g2 - g1) / (s2 - s1) if s2 > s1 else 0.0
+    for which in range(2):
+        s = low if which == 0 else high
+        if which == 1 and high - low < 1e-9 * length:
+            break
+        gap = g1 + slope * (s - s1)
+        if gap > reach:
+            continue
+        if which == 0:
+            own_corner = s1 < start
+            corner, other_corner = edge, other_end
+        else:
+            own_corner = s2 > stop
+            corner, other_corner = end, other
+        if own_corner:  # a corner of i on the incident edge
+            k = add_corner(bodies, outlines, contacts, k, a, b, i, corner, i, edge, gap)
+        else:
+            k = add_corner(bodies, outlines, contacts, k, a, b, j, other_corner, i, edge, gap)
+    return k
+
+
+@inlined
+def add_corner(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, owner: int,
+    corner: int, i: int, edge: int, gap: float,
+) -> int:  # fmt: skip
+    """Add the contact of a corner of polygon `owner` with the face `edge` of polygon i.
+
+    Its key is that of the corner of the body, so that parts share the memory of contacts.
+    """
+    sign = 1.0 if outlines.polygon[i].body == b else -1.0  # the normal points to a
+    body = outlines.polygon[owner].body
+    own, face = outlines.corner[owner, corner], outlines.corner[i, edge]
+    key = body * outlines.corner.shape[1] + own.number
+    add_contact(
+        contacts[k], a, b, key, 1 if body == a else 0, bodies[b].surface,
+        own.x, own.y, sign * face.normal_x, sign * face.normal_y, gap,
+    )  # fmt: skip
+    return k + 1
+
+
+@inlined
+def collide_pair(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, p: Parameters
+) -> int:  # fmt: skip
+    """Add the contacts of bodies a and b from entry k on; returns the new number, or -1."""
+    dt = p.dt
+    one, two = bodies[a], bodies[b]
+    dx, dy = -one.vx * dt, -one.vy * dt
+    path, fall = one.path, p.gravity * dt * dt
+    if two.status == AWAKE:
+        dx += two.vx * dt
+        dy += two.vy * dt
+        path += two.path
+        fall = 0.0
+    spread = path + fall + p.slack
+    beside = 0.5 * dt * (abs(one.omega) * one.radius + abs(two.omega) * two.radius)
+    # both turn about their centroids
+    other = two.omega if two.status == AWAKE else 0.0
+    turn = (other - one.omega) * dt
+    px = (other * two.y - one.omega * one.y) * dt
+    py = (one.omega * one.x - other * two.x) * dt
+    if one.parts == 1 and two.parts == 1:
+        return collide_parts(
+            bodies, outlines, contacts, k, a, b, a, b, dx, dy, px, py, turn, spread, p.slack, 0.0,
+            beside,
+        )  # fmt: skip
+    first = k
+    k = collide_all_parts(
+        bodies, outlines, contacts, k, a, b, dx, dy, px, py, turn, spread, p.slack,
+        INNER_EDGE * p.slack, beside,
+    )  # fmt: skip
+    if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
+        k = collide_all_parts(
+            bodies, outlines, contacts, k, a, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0
+        )
+    return k
+
+
+@kernel
+def collide_all_parts(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, dx: float,
+    dy: float, px: float, py: float, turn: float, spread: float, slack: float, sunk: float,
+    beside: float,
+) -> int:  # fmt: skip
+    """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
+    first, one, two = k, bodies[a], bodies[b]
+    for i in range(one.part, one.part + one.parts):
+        for j in range(two.part, two.part + two.parts):
+            if k + 2 > len(contacts):
+                return -1
+            found = collide_parts(
+                bodies, outlines, contacts, k, a, b, i, j, dx, dy, px, py, turn, spread, slack,
+                sunk, beside,
+            )  # fmt: skip
+            for new in range(k, found):
+                k = keep_nearest(contacts, first, k, new)
+    return k
+
+
+@kernel
+def keep_nearest(contacts: Contacts, first: int, k: int, new: int) -> int:
+    """Move contact `new` to entry k, or over one of first:k of the same corner with the same face.
+
+    Parts that share a corner, or a face that a cut ends at, find the same contact. Returns the new
+    number.
+    """
+    place, c = k, contacts[new]
+    for m in range(first, k):
+        other = contacts[m]
+        same = other.key == c.key and other.owner == c.owner
+        if same and other.nx * c.nx + other.ny * c.ny > SAME_FACE:
+            if other.gap <= c.gap:
+                return k
+            place = m
+    add_contact(contacts[place], c.a, c.b, c.key, c.owner, c.other, c.x, c.y, c.nx, c.ny, c.gap)
+    return max(k, place + 1)
+
+
+@inlined
+def collide_parts(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int, j: int,
+    dx: float, dy: float, px: float, py: float, turn: float, spread: float, slack: float,
+    sunk: float, beside: float,
+) -> int:  # fmt: skip
+    """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
+
+    (dx, dy) is the displacement of b relative to a over the step, (px - turn y, py + turn x) what
+    turning adds to it at (x, y), see `face_of_contact`, and `beside` half of how far both may turn.
+    """
+    ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
+    possible, time_i, gap_i, apart_i, edge_i = face_of_contact(
+        outlines, i, ni, j, nj, dx, dy, px, py, turn, spread, slack, sunk
+    )
+    if not possible:
+        return k
+    possible, time_j, gap_j, apart_j, edge_j = face_of_contact(
+        outlines, j, nj, i, ni, -dx, -dy, -px, -py, -turn, spread, slack, sunk
+    )
+    if not possible:
+        return k
+    # near a tie keep the face of a, so that parallel faces do not alternate
+    of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
+    reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
+    touching = max(apart_i, apart_j) <= slack
+    # where they touch, not where they are deeper than the slack
+    time_i *= gap_i / (gap_i + slack) if gap_i > slack else 0.0
+    time_j *= gap_j / (gap_j + slack) if gap_j > slack else 0.0
+    beside = 0.0 if touching else beside
+    # corner beside corner, the better face may miss the other body where the second one does not;
+    # and what is beside it at the time of entry may be driven into it from where it is now
+    for _ in range(2):
+        face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
+        facing = incident_edge(outlines, face, edge, other, outlines.polygon[other].count)
+        if outlines.corner[face, edge].inner or outlines.corner[other, facing].inner:
+            return k
+        shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
+        found = clip_contacts(
+            bodies, outlines, contacts, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
+            reach, slack, beside,
+        )  # fmt: skip
+        if found > k or (shift == 0.0 and not touching):
+            return found
+        if touching:
+            of_j = not of_j
+        else:
+            time_i = time_j = 0.0
+    face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
+    return deepest_corner(bodies, outlines, contacts, k, a, b, face, edge, other)
+
+
+@kernel
+def deepest_corner(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
+    edge: int, j: int,
+) -> int:  # fmt: skip
+    """Add the contact of the nearest corner of polygon j with the line of an edge of polygon i.
+
+    For bodies that touch although the face does not reach over the corner: nearly parallel edges
+    in a row, where rounding decides which of them is the face.
+    """
+    n = outlines.polygon[j].count
+    face = outlines.corner[i, edge]
+    nx, ny, x0, y0 = face.normal_x, face.normal_y, face.x, face.y
+    gap, corner = axis_gap(nx, ny, x0, y0, outlines.corner, j, n)
+    return add_corner(bodies, outlines, contacts, k, a, b, j, corner, i, edge, gap)

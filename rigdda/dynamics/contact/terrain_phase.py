@@ -1,0 +1,290 @@
+"""Contacts of a block with the terrain over a step.
+
+Corners of the block against segments, and convex corners of the terrain against edges of the
+convex parts of the block. Segments are lengthened into the ground at concave corners, or blocks
+fall through there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.dynamics.constants import LEAN, SAME_FACE, TERRAIN
+from rigdda.dynamics.contact.narrow_phase import add_contact, following, keep_nearest
+from rigdda.dynamics.kernel import inlined, kernel
+from rigdda.dynamics.records import Bodies, Box, Contacts, Ground, Outlines, Parameters
+
+NEVER = 2.0
+"""Time of entry, over the step, of what does not come nearer or not soon."""
+
+
+@kernel
+def below_segment(ground: Ground, s: int, x: float, y: float) -> float:
+    """Return the gap of a point above the line of segment s [m]."""
+    one = ground.segment[s]
+    return one.normal_x * (x - one.x) + one.normal_y * (y - one.y)
+
+
+@kernel
+def along_segment(ground: Ground, s: int, x: float, y: float) -> float:
+    """Return how far along segment s a point lies [m]."""
+    one = ground.segment[s]
+    return one.normal_y * (x - one.x) - one.normal_x * (y - one.y)
+
+
+@kernel
+def over_segment(ground: Ground, s: int, x: float, y: float, depth: float) -> bool:
+    """Return whether a point lies over segment s, lengthened by what `depth` needs at its ends."""
+    along, one = along_segment(ground, s, x, y), ground.segment[s]
+    turn_end = ground.segment[s + 1].turn
+    # in a concave corner: what is deeper under this segment than beyond it, or under both
+    if along < 0.0 and one.turn > 0.0:
+        near = -along <= depth * math.tan(0.5 * one.turn)
+        return near or below_segment(ground, s - 1, x, y) <= 0.0
+    if along > one.length and turn_end > 0.0:
+        near = along - one.length <= depth * math.tan(0.5 * turn_end)
+        return near or below_segment(ground, s + 1, x, y) <= 0.0
+    return -1e-9 <= along <= one.length + 1e-9
+
+
+@kernel
+def shadowed(ground: Ground, s: int, x: float, y: float, gap: float) -> bool:
+    """Return whether a point under segment s is less deep under a convex neighbour."""
+    if gap >= 0.0:
+        return False
+    if ground.segment[s].turn < 0.0 and below_segment(ground, s - 1, x, y) > gap:
+        return True
+    return ground.segment[s + 1].turn < 0.0 and below_segment(ground, s + 1, x, y) > gap
+
+
+@kernel
+def crosses_segment(ground: Ground, s: int, x0: float, y0: float, x1: float, y1: float) -> bool:
+    """Return whether the line from (x0, y0) to (x1, y1) crosses segment s."""
+    g0, g1 = below_segment(ground, s, x0, y0), below_segment(ground, s, x1, y1)
+    if g0 * g1 >= 0.0:
+        return False
+    x, y = x0 + g0 / (g0 - g1) * (x1 - x0), y0 + g0 / (g0 - g1) * (y1 - y0)
+    return 0.0 < along_segment(ground, s, x, y) < ground.segment[s].length
+
+
+@kernel
+def beneath_roof(
+    bodies: Bodies, outlines: Outlines, ground: Ground, a: int, vertex: int, s: int, gap: float
+) -> bool:
+    """Return whether a corner of block a under segment s lies in the air beneath an overhang.
+
+    Another segment is between them then. A corner that was pushed right through something thin is
+    no such case: the block still reaches through segment s.
+    """
+    x, y = outlines.corner[a, vertex].x, outlines.corner[a, vertex].y
+    foot_x, foot_y = x - gap * ground.segment[s].normal_x, y - gap * ground.segment[s].normal_y
+    between = False
+    for other in range(len(ground.segment) - 1):
+        if other != s:
+            between = between or crosses_segment(ground, other, x, y, foot_x, foot_y)
+    if not between:
+        return False
+    for part in range(bodies[a].part, bodies[a].part + bodies[a].parts):
+        n, mean_x, mean_y, its = outlines.polygon[part].count, 0.0, 0.0, False
+        for k in range(n):
+            its = its or outlines.corner[part, k].number == vertex
+            mean_x += outlines.corner[part, k].x / n
+            mean_y += outlines.corner[part, k].y / n
+        if its and not crosses_segment(ground, s, mean_x, mean_y, x, y):
+            return True
+    return False
+
+
+@kernel
+def along_neighbour(
+    ground: Ground, s: int, x: float, y: float, dx: float, dy: float
+) -> tuple[float, float]:
+    """Return the displacement of a point less what would take it into segment s, if it is over it.
+
+    It slides along that segment.
+    """
+    one, gap = ground.segment[s], below_segment(ground, s, x, y)
+    sunk = min(gap, 0.0) - gap - (one.normal_x * dx + one.normal_y * dy)
+    if sunk <= 0.0 or not over_segment(ground, s, x, y, max(-gap, 0.0)):
+        return dx, dy
+    return dx + sunk * one.normal_x, dy + sunk * one.normal_y
+
+
+@kernel
+def place_of_hit(
+    bodies: Bodies, ground: Ground, s: int, a: int, x: float, y: float, gap: float, p: Parameters
+) -> tuple[float, float]:
+    """Return where in the step a corner of block a meets the line of segment s.
+
+    Or (x, y) if it never does, or touches already. It may slide there along a neighbour, into a
+    concave corner.
+    """
+    if gap <= p.slack:
+        return x, y
+    one, block = ground.segment[s], bodies[a]
+    dx = (block.vx - block.omega * (y - block.y)) * p.dt
+    dy = (block.vy + block.omega * (x - block.x)) * p.dt
+    if one.turn > 0.0:
+        dx, dy = along_neighbour(ground, s - 1, x, y, dx, dy)
+    if ground.segment[s + 1].turn > 0.0:
+        dx, dy = along_neighbour(ground, s + 1, x, y, dx, dy)
+    approach = -(one.normal_x * dx + one.normal_y * dy)
+    time = min(gap / approach, 1.0) if approach > 0.0 else 0.0
+    return x + time * dx, y + time * dy
+
+
+@inlined
+def corners_on_segment(
+    bodies: Bodies, outlines: Outlines, ground: Ground, contacts: Contacts, k: int, first: int,
+    a: int, s: int, p: Parameters,
+) -> int:  # fmt: skip
+    """Add contacts of the corners of block a with segment s; returns the new number."""
+    one, block = ground.segment[s], bodies[a]
+    nx, ny, surface = one.normal_x, one.normal_y, one.surface
+    reach = block.path + p.gravity * p.dt * p.dt + p.slack
+    concave = block.parts > 1
+    lowest = below_segment(ground, s, block.x, block.y) - block.radius
+    if lowest > reach:
+        return k
+    for vertex in range(block.count):
+        key = a * outlines.corner.shape[1] + vertex
+        corner = outlines.corner[a, vertex]
+        x, y = corner.x, corner.y
+        gap = below_segment(ground, s, x, y)
+        if gap > reach or gap < -block.radius:
+            continue
+        if concave and corner.reentrant:
+            continue
+        hit_x, hit_y = place_of_hit(bodies, ground, s, a, x, y, gap, p)
+        if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0) + reach):
+            continue
+        if shadowed(ground, s, hit_x, hit_y, gap):
+            continue
+        if gap < -p.slack and beneath_roof(bodies, outlines, ground, a, vertex, s, gap):
+            continue
+        again = False
+        for m in range(first, k):  # one face, cut in two segments
+            c = contacts[m]
+            if c.owner == 1 and c.key == key and c.nx * nx + c.ny * ny > SAME_FACE:
+                again = True
+                if gap < c.gap:
+                    add_contact(c, a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
+        if not again:
+            add_contact(contacts[k], a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
+            k += 1
+    return k
+
+
+@kernel
+def bridges(
+    outlines: Outlines, ground: Ground, part: int, edge: int, corner: int, least: float
+) -> bool:
+    """Return whether the ends of an edge are on either side of a ridge, no deeper than `least` [m].
+
+    The start on the left and the end on the right, since outlines run anticlockwise.
+    """
+    start = outlines.corner[part, edge]
+    end = outlines.corner[part, following(edge, outlines.polygon[part].count)]
+    left = below_segment(ground, corner - 1, start.x, start.y)
+    return left >= least and below_segment(ground, corner, end.x, end.y) >= least
+
+
+@inlined
+def edge_on_ridge(
+    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, contacts: Contacts, k: int,
+    a: int, part: int, corner: int, p: Parameters,
+) -> int:  # fmt: skip
+    """Add the contact of a convex terrain corner with an edge of a part of block a, if it has one.
+
+    The edge is the last to separate the corner from the block, or about as deep; its normal must
+    lie about between those of the two segments, or a corner of the block is in contact instead.
+    """
+    left, right, block = ground.segment[corner - 1], ground.segment[corner], bodies[a]
+    x, y = right.x, right.y
+    dt, n = p.dt, outlines.polygon[part].count
+    dx = -(block.vx - block.omega * (y - block.y)) * dt
+    dy = -(block.vy + block.omega * (x - block.x)) * dt
+    if not (box.low_x <= x <= box.high_x and box.low_y <= y <= box.high_y):
+        return k
+    concave = part != a
+    lean = LEAN + abs(block.omega) * dt
+    reach = block.path + p.gravity * dt * dt + p.slack
+    best, best_time, best_gap = -1, -1.0, -1e300
+    last, depth = -1.0, -1e300  # of all edges, fitting or not
+    for edge in range(n):
+        own = outlines.corner[part, edge]
+        nx, ny = own.normal_x, own.normal_y
+        gap = nx * (x - own.x) + ny * (y - own.y)
+        approach = -(nx * dx + ny * dy)
+        if gap > reach:
+            return k
+        inner = concave and own.inner
+        if inner and gap <= 0.0:
+            continue  # a corner inside the part is pushed out of the block, not into the next part
+        time = 0.0
+        if gap > p.slack:
+            time = NEVER if approach <= 0.0 else min(gap / approach, NEVER)
+        # the normal out of the ground is opposite to that of the edge
+        after_left = left.normal_x * -ny - left.normal_y * -nx <= lean
+        before_right = -nx * right.normal_y + ny * right.normal_x <= lean
+        outward = nx * left.normal_x + ny * left.normal_y < 0.0
+        fits = after_left and before_right and outward and not inner
+        if fits and (time > best_time or (time == best_time and gap > best_gap)):
+            best, best_time, best_gap = edge, time, gap
+        if time > last or (time == last and gap > depth):
+            last, depth = time, gap
+    if best < 0 or best_time < last:
+        return k
+    # beside a corner that slides over the ridge another edge is soon the nearest one: what fits
+    # counts as long as the depths are alike, or while it bridges the ridge
+    alike = best_gap >= 2.0 * min(depth, 0.0) - p.slack
+    if not alike and not bridges(outlines, ground, part, best, corner, 0.5 * best_gap):
+        return k
+    start, end = outlines.corner[part, best], outlines.corner[part, following(best, n)]
+    nx, ny = start.normal_x, start.normal_y
+    gap = nx * (x - start.x) + ny * (y - start.y)
+    time = min(best_time, 1.0) if 0.0 < best_time < NEVER else 0.0
+    ex, ey = end.x - start.x, end.y - start.y
+    along = (x + time * dx - start.x) * ex + (y + time * dy - start.y) * ey
+    # a corner inside the block counts even where edges in one line make the choice of edge a tie
+    if gap > 0.0 and (along < 0.0 or along > ex * ex + ey * ey):
+        return k
+    key = len(bodies) * outlines.corner.shape[1] + corner
+    add_contact(contacts[k], a, TERRAIN, key, 0, right.surface, x, y, -nx, -ny, gap)
+    return k + 1
+
+
+@inlined
+def collide_terrain(
+    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, contacts: Contacts, k: int,
+    a: int, p: Parameters,
+) -> int:  # fmt: skip
+    """Add the contacts of block a with the terrain from entry k; returns the new number.
+
+    `box` is the swept box of the block.
+    """
+    bins = len(ground.bin_start) - 1
+    if bins == 0:
+        return k
+    first, block = k, bodies[a]
+    low = int((box.low_x - ground.bin_origin) / ground.bin_width)
+    high = int((box.high_x - ground.bin_origin) / ground.bin_width)
+    low, high = min(max(low, 0), bins - 1), min(max(high, 0), bins - 1)
+    for cell in range(low, high + 1):
+        for item in range(ground.bin_start[cell], ground.bin_start[cell + 1]):
+            s = ground.bin_item[item]
+            one = ground.segment[s]
+            if cell != max(one.bin, low):
+                continue  # seen in an earlier cell
+            if one.left > box.high_x or one.right < box.low_x:
+                continue
+            if one.bottom > box.high_y or one.top < box.low_y:
+                continue
+            if k + outlines.corner.shape[1] + block.parts + 2 > len(contacts):
+                return -1
+            k = corners_on_segment(bodies, outlines, ground, contacts, k, first, a, s, p)
+            if one.turn < 0.0:
+                for part in range(block.part, block.part + block.parts):
+                    found = edge_on_ridge(bodies, outlines, ground, box, contacts, k, a, part, s, p)
+                    k = keep_nearest(contacts, first, k, k) if found > k and part != a else found
+    return k

@@ -1,0 +1,88 @@
+"""Memory of contacts from step to step: normal and shear force, stiffness.
+
+Keyed by the vertex (its owner included) and both bodies; the normals must agree, so that a corner
+in a notch keeps the memories of its two contacts apart.
+"""
+
+from __future__ import annotations
+
+from numpy.typing import NDArray
+
+from rigdda.dynamics.constants import NEW, OPEN, SAME_FACE, SAME_NORMAL, TERRAIN
+from rigdda.dynamics.kernel import inlined, kernel
+from rigdda.dynamics.records import Contact, Contacts
+
+
+@kernel
+def fits_another(contacts: Contacts, k: int, low: int, high: int, was: Contact) -> bool:
+    """Return whether of the new contacts low:high of the corner of k another fits `was` better."""
+    c = contacts[k]
+    cosine = abs(c.nx * was.nx + c.ny * was.ny)
+    for j in range(low, high):
+        other = contacts[j]
+        if j == k or other.key != c.key or other.b != c.b:
+            continue
+        if abs(other.nx * was.nx + other.ny * was.ny) > cosine:
+            return True
+    return False
+
+
+@inlined
+def recall_from(
+    contacts: Contacts, k: int, new_low: int, new_high: int, old: Contacts, low: int, high: int,
+    b: int, sign: float,
+) -> bool:  # fmt: skip
+    """Give contact k the memory of the same closed contact among old[low:high], if there is one."""
+    c = contacts[k]
+    for m in range(low, high):
+        was = old[m]
+        if was.b != b or was.key != c.key or was.state == OPEN:
+            continue
+        cosine = sign * (c.nx * was.nx + c.ny * was.ny)
+        if cosine < SAME_NORMAL:
+            continue
+        # where a corner slides into a concave corner, the face ahead is not the one it comes from
+        if cosine < SAME_FACE and fits_another(contacts, k, new_low, new_high, was):
+            continue
+        c.state, c.kind = was.state, was.kind
+        c.memory_normal, c.memory_shear = was.memory_normal, was.memory_shear
+        c.start_normal, c.start_shear = was.start_normal, was.start_shear
+        c.stiffness, c.bond = was.stiffness, was.bond
+        return True
+    return False
+
+
+@inlined
+def recall(
+    contacts: Contacts, low: int, high: int, old: Contacts, first: NDArray, slack: float
+) -> None:
+    """Give each new contact in low:high its memory; without one it starts OPEN.
+
+    A contact that has come apart by more than `slack` starts OPEN, too: it closes by an impact.
+
+    Bodies change sides (a, b) when one of them falls asleep or wakes, so a pair is looked up both
+    ways; its forces keep their sign, since normal and shear turn round together.
+    """
+    for k in range(low, high):
+        c = contacts[k]
+        c.state, c.kind = OPEN, NEW
+        c.memory_normal = c.memory_shear = c.stiffness = 0.0
+        c.start_normal = c.start_shear = c.bond = 0.0
+        if c.gap > slack:
+            continue
+        a, b = c.a, c.b
+        found = recall_from(contacts, k, low, high, old, first[a], first[a + 1], b, 1.0)
+        if not found and b != TERRAIN:
+            recall_from(contacts, k, low, high, old, first[b], first[b + 1], a, -1.0)
+
+
+@kernel
+def copy_contact(c: Contact, was: Contact) -> None:
+    """Keep a contact of the last step: between sleeping bodies nothing changes."""
+    c.a, c.b, c.key, c.owner, c.other = was.a, was.b, was.key, was.owner, was.other
+    c.x, c.y, c.nx, c.ny, c.gap = was.x, was.y, was.nx, was.ny, was.gap
+    c.state, c.kind = was.state, was.kind
+    c.memory_normal, c.memory_shear = was.memory_normal, was.memory_shear
+    c.start_normal, c.start_shear = was.start_normal, was.start_shear
+    c.stiffness, c.normal, c.shear = was.stiffness, was.normal, was.shear
+    c.bond = was.bond

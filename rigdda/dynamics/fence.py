@@ -1,0 +1,283 @@
+r"""Fences: what a step takes of their capacity, and what comes through if that is not left.
+
+A block that hits a fence is stopped: the fence takes the work of the impact. Blocks that rest
+against it cost it nothing, but pass blows on to it: within a step blow and support act at once,
+nothing moves and no work is done. One after the other, block j strikes block i with the closing
+speed u, both go on together, and the fence takes what of that is directed at it,
+
+.. math:: W = \frac{1}{2} \frac{m_j^2}{m_j + m_i} u^2 (n_q \cdot n)^2 ,
+
+with n_q and n the directions of the blow and of the push on the fence. Through a chain of blocks
+m_i is their mass, and each contact on the way passes on its own share. With the impulse P of the
+blow for m_j u this holds for eccentric blows, too; what more than m_j u passes through a contact in
+a step is thrust, or another blow, which counts for itself. So the charge is a sum over the blows:
+it does not matter how many of them fall into one step.
+
+If it is more than is left, the blocks come through with a share s of the velocities that they would
+have without the fence, which takes W(s) = (1 - s^2) W of impacts in proportion. Friction and
+neighbours bend this law, so s^2 is mended by what W(s) is off, over W.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import NDArray
+
+from rigdda.dynamics.assembly.springs import along, normal_row, shear_row
+from rigdda.dynamics.constants import (
+    ASLEEP,
+    BREAK_SOLVES,
+    BREAK_TOLERANCE,
+    CHAIN,
+    IMPACT,
+    NEW,
+    OPEN,
+    RETIRED,
+    SPEED_LIMIT,
+    STICK,
+)
+from rigdda.dynamics.correction import place_corners
+from rigdda.dynamics.gauges import FAILED, write_event
+from rigdda.dynamics.kernel import kernel, stage
+from rigdda.dynamics.motion import kinetic_energy
+from rigdda.dynamics.open_close import open_close
+from rigdda.dynamics.records import (
+    EVENTS,
+    Bodies,
+    Contact,
+    Contacts,
+    Gauges,
+    Islands,
+    Outlines,
+    Parameters,
+    Rows,
+    System,
+)
+from rigdda.dynamics.sleep import wake_island
+
+
+@kernel
+def strength(way: NDArray) -> float:
+    """Return how well a block passes blows on: the share of their direction over the mass [1/kg].
+
+    `way` is the mass between the blow and the fence, 0 if the block does not lean on it [kg], and
+    the direction in which a push on the block is one on the fence, its length the root of the
+    share that arrives [-].
+    """
+    return (way[1] ** 2 + way[2] ** 2) / way[0] if way[0] > 0.0 else 0.0
+
+
+@kernel
+def share_along(c: Contact, way: NDArray, on_a: bool) -> float:
+    """Return the root of the share that a push through a contact on its body a, or b, passes on."""
+    along_way = c.nx * way[1] + c.ny * way[2]
+    return max(along_way if on_a else -along_way, 0.0)
+
+
+@kernel
+def lean(c: Contact, ways: NDArray, near: int, far: int, mass: float, on_a: bool) -> bool:
+    """Let slot `far`, of such a mass [kg], lean on `near`, if that is better than what it has."""
+    share = share_along(c, ways[near], on_a)
+    through = ways[near, 0] + mass
+    if share * share <= strength(ways[far]) * through * (1.0 + 1e-9):
+        return False
+    sign = share if on_a else -share
+    ways[far, 0], ways[far, 1], ways[far, 2] = through, sign * c.nx, sign * c.ny
+    return True
+
+
+@kernel
+def find_ways(
+    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, fence: int, ways: NDArray
+) -> bool:
+    """Set how each block of an island leans on a fence, (n, 3) see `strength`; whether any does."""
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
+    reached = False
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.b != fence or c.state == OPEN:
+            continue
+        if not reached:
+            for s in range(islands.block_start[island + 1] - islands.block_start[island]):
+                ways[s, 0] = ways[s, 1] = ways[s, 2] = 0.0
+        s, reached = islands.slot[c.a], True
+        ways[s, 0], ways[s, 1], ways[s, 2] = bodies[c.a].mass, -c.nx, -c.ny
+    for _ in range(CHAIN if reached else 0):
+        changed = False
+        for item in range(low, high):
+            c = contacts[islands.contact_item[item]]
+            if c.pair >= 0 and c.state != OPEN:
+                i, j = islands.slot[c.a], islands.slot[c.b]
+                changed = lean(c, ways, i, j, bodies[c.b].mass, True) or changed
+                changed = lean(c, ways, j, i, bodies[c.a].mass, False) or changed
+        if not changed:
+            break
+    return reached
+
+
+@kernel
+def hits(
+    bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int,
+    fence: int, dt: float,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Return the work of the impacts on a fence in this step, the most of one [J], and that one.
+
+    A corner that touches only now counts, too: it may be the second one of a block that hits.
+    """
+    total = most = 0.0
+    k = -1
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.b != fence or c.state == OPEN or c.normal <= 0.0:
+            continue
+        if c.kind != IMPACT and c.kind != NEW:
+            continue
+        own, mass = d[islands.slot[c.a]], bodies[c.a].mass
+        share = min(mass * math.hypot(c.un, c.us) / (c.normal * dt), 1.0)
+        work = c.normal * along(normal_row(c, True), own) + c.shear * along(shear_row(c, True), own)
+        total -= share * work
+        if -share * work > most:
+            most, k = -share * work, islands.contact_item[item]
+    return total, most, k
+
+
+@kernel
+def blows(
+    bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, ways: NDArray,
+    dt: float,
+) -> tuple[float, float, int]:  # fmt: skip
+    """Return what blows pass on to a fence in this step, the most of one [J], and that one."""
+    total = most = 0.0
+    k = -1
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.pair < 0 or c.kind != IMPACT or c.state == OPEN or c.un >= 0.0:
+            continue
+        a, b = islands.slot[c.a], islands.slot[c.b]
+        on_a = strength(ways[a]) >= strength(ways[b])
+        struck, mass = (a, bodies[c.b].mass) if on_a else (b, bodies[c.a].mass)
+        impulse = min(c.normal * dt, -mass * c.un)
+        share = share_along(c, ways[struck], on_a)
+        work = -0.5 * impulse * c.un * share * share * mass / (mass + ways[struck, 0])
+        total += work
+        if work > most:
+            most, k = work, islands.contact_item[item]
+    return total, most, k
+
+
+@kernel
+def aim(
+    contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int, fence: int,
+    first: bool, share: float, dt: float,
+) -> None:  # fmt: skip
+    """Let the contacts with a fence leave a share of the velocities that blocks have without it.
+
+    They begin with no force, whatever comes; so the `first` time it finds these velocities. Those
+    that had not closed in the step stay open.
+    """
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.b != fence:
+            continue
+        if first:
+            c.met, c.free = int(c.state != OPEN), SPEED_LIMIT
+        elif c.met == 1 and c.free == SPEED_LIMIT:
+            c.free = max(c.un - 2.0 * along(normal_row(c, True), d[islands.slot[c.a]]) / dt, 0.0)
+        c.kind, c.flips = IMPACT, 0
+        c.state = STICK if c.free < SPEED_LIMIT else OPEN
+        c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+        c.bias = -dt * (share * c.free if c.free < SPEED_LIMIT else SPEED_LIMIT)
+
+
+@stage
+def break_through(
+    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
+    fence: int, left: float, struck: float, passed: float, p: Parameters, counters: NDArray,
+) -> float:  # fmt: skip
+    """Settle an island whose blocks come through a fence; returns what that takes of them [J].
+
+    It has `left` where it would take the work `struck` of impacts, and what blows pass on.
+    """
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
+    d, total = system.motion.d, struck + passed
+    taken, square = 0.0, 1.0 - left / total
+    for attempt in range(BREAK_SOLVES if left > 0.0 else 1):
+        aim(contacts, d, islands, low, high, fence, attempt == 0, math.sqrt(square), p.dt)
+        open_close(bodies, contacts, system, islands, rows, island, p, counters)
+        if attempt > 0:
+            taken = hits(bodies, contacts, d, islands, low, high, fence, p.dt)[0]
+            taken += (1.0 - square) * passed
+            if abs(taken - left) < BREAK_TOLERANCE * left:
+                break
+            square = min(max(square + (taken - left) / total, 0.0), 1.0)
+    return taken
+
+
+@stage
+def charge_fences(
+    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
+    gauges: Gauges, time: float, p: Parameters, counters: NDArray,
+) -> bool:  # fmt: skip
+    """Charge the fences that an island leans on, which was settled, and break what that exceeds.
+
+    Returns whether a fence broke, so that the island was settled again.
+    """
+    broke, ways, d = False, system.scratch.residual, system.motion.d
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
+    for fence in range(p.blocks, len(bodies) if gauges.fences > 0 else p.blocks):
+        barrier = gauges.barrier[fence]
+        target = gauges.target[barrier]
+        if target.capacity == math.inf:
+            continue
+        if not find_ways(bodies, contacts, islands, island, fence, ways):
+            continue
+        struck, hardest, k = hits(bodies, contacts, d, islands, low, high, fence, p.dt)
+        passed, most, blow = blows(bodies, contacts, islands, low, high, ways, p.dt)
+        left = target.capacity - target.absorbed if bodies[fence].status != RETIRED else 0.0
+        if struck + passed <= left:
+            target.absorbed += max(struck + passed, 0.0)
+            continue
+        if bodies[fence].status != RETIRED:  # not by another island in this step
+            bodies[fence].status = RETIRED
+            c = contacts[k if hardest >= most else blow]
+            i = c.a  # or, in a blow on a block that leans on the fence, what struck that
+            if c.b != fence and kinetic_energy(bodies[c.b]) > kinetic_energy(bodies[i]):
+                i = c.b
+            counters[EVENTS] = write_event(
+                gauges, counters[EVENTS], time, FAILED, bodies[i], i, barrier, c.x, c.y,
+                c.y - target.ground,
+            )  # fmt: skip
+        target.absorbed += min(
+            break_through(
+                bodies, contacts, system, islands, rows, island, fence, left, struck, passed, p,
+                counters,
+            ),
+            left,
+        )  # fmt: skip
+        broke = True
+    return broke
+
+
+@stage
+def lower_fences(bodies: Bodies, outlines: Outlines, gauges: Gauges, p: Parameters) -> None:
+    """Lower the top of each fence by what it has lost of its height since the last step."""
+    for fence in range(p.blocks, len(bodies) if gauges.fences > 0 else p.blocks):
+        target = gauges.target[gauges.barrier[fence]]
+        top = target.top - target.sag * target.absorbed
+        if target.sag > 0.0 and outlines.local[fence, 2].y > top:
+            outlines.local[fence, 2].y = outlines.local[fence, 3].y = top
+            place_corners(bodies, outlines, fence)
+
+
+@kernel
+def wake_behind(
+    bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, p: Parameters
+) -> None:
+    """Wake what sleeps against a fence that failed in this step."""
+    for k in range(count if gauges.fences > 0 else 0):
+        c = contacts[k]
+        if c.b < p.blocks or bodies[c.b].status != RETIRED:
+            continue
+        if bodies[c.a].status == ASLEEP:
+            wake_island(bodies, bodies[c.a].island, p.blocks)

@@ -1,0 +1,186 @@
+"""Free flight of the only body that moves: steps in which it can touch nothing are only flown.
+
+Most steps of a falling block find nothing that it may touch. How many of them are to come follows
+from its distance to the ground and to other bodies, and they need no detection, no corners and no
+islands. What a step computes of the motion is computed here by the same operations, so that the
+numbers are the same to the last bit, wherever a flight is interrupted.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import NDArray
+
+from rigdda.dynamics.constants import ASLEEP, AWAKE, LATELY, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
+from rigdda.dynamics.correction import account_block, apply_forces, move_block, place_corners
+from rigdda.dynamics.gauges import barrier_contact
+from rigdda.dynamics.kernel import kernel, stage
+from rigdda.dynamics.motion import retire, top_speed
+from rigdda.dynamics.records import (
+    Bodies,
+    Body,
+    Contacts,
+    Gauges,
+    Ground,
+    Ints,
+    Islands,
+    Matrix,
+    Motion,
+    Outlines,
+    Parameters,
+    Polygons,
+)
+
+
+@kernel
+def lone_flyer(bodies: Bodies, begin: Ints, p: Parameters) -> int:
+    """Return the only body that is awake, if it touches nothing and bears no load, else -1."""
+    alone = -1
+    for i in range(p.blocks):
+        if bodies[i].status != AWAKE:
+            continue
+        if alone >= 0:
+            return -1
+        alone = i
+    if alone < 0 or begin[alone + 1] > begin[alone]:
+        return -1
+    body = bodies[alone]
+    if body.force_x != 0.0 or body.force_y != 0.0:
+        return -1
+    return alone if body.moment_cos == 0.0 and body.moment_sin == 0.0 else -1
+
+
+@kernel
+def time_to_fall(gap: float, speed: float, gravity: float) -> float:
+    """Return in what time a gap can close, first at `speed`, then as fast as gravity makes it."""
+    if gap <= 0.0:
+        return 0.0
+    root = math.sqrt(speed * speed + 2.0 * gravity * gap)
+    return 2.0 * gap / (speed + root) if speed + root > 0.0 else math.inf
+
+
+@kernel
+def time_to_ground(
+    body: Body, i: int, outlines: Outlines, ground: Ground, speed: float, reach: float, most: float,
+    gravity: float,
+) -> float:  # fmt: skip
+    """Return in what time, at most `most`, the body can come as near to the ground as `reach`.
+
+    For each segment the latest that one of three bounds gives: its corners over the line of the
+    segment, its circle over that line, its circle about the segment.
+    """
+    x, y, r = body.x, body.y, body.radius
+    for s in range(len(ground.segment) - 1):
+        one, around = ground.segment[s], r + reach + speed * most
+        if one.left > x + around or one.right < x - around:
+            continue
+        if one.bottom > y + around or one.top < y - around:
+            continue
+        nx, ny = one.normal_x, one.normal_y
+        closing = max(-(nx * body.vx + ny * body.vy), 0.0)
+        over = nx * (x - one.x) + ny * (y - one.y)
+        time = time_to_fall(over - r - reach, closing, gravity)
+        if time < most:
+            lowest = math.inf
+            for k in range(body.count):
+                corner = outlines.corner[i, k]
+                lowest = min(lowest, nx * (corner.x - one.x) + ny * (corner.y - one.y))
+            spin = closing + abs(body.omega) * r
+            time = max(time, time_to_fall(lowest - reach, spin, gravity))
+        if time < most:
+            along = min(max(ny * (x - one.x) - nx * (y - one.y), 0.0), one.length)
+            away = math.hypot(x - one.x - along * ny, y - one.y + along * nx)
+            time = max(time, (away - r - reach) / speed)
+        most = min(most, time)
+    return most
+
+
+@kernel
+def time_to_bodies(
+    bodies: Bodies, i: int, polygon: Polygons, speed: float, reach: float, most: float
+) -> float:
+    """Return in what time, at most `most`, body i can come as near to another one as `reach`."""
+    x, y = bodies[i].x, bodies[i].y
+    for j in range(len(bodies)):
+        if j == i or bodies[j].status == RETIRED:
+            continue
+        box = polygon[j]
+        dx = max(box.low_x - x, x - box.high_x, 0.0)
+        dy = max(box.low_y - y, y - box.high_y, 0.0)
+        away = math.sqrt(dx * dx + dy * dy) - bodies[i].radius - reach
+        most = min(most, away / speed)
+    return most
+
+
+@kernel
+def steps_of_flight(
+    bodies: Bodies, i: int, outlines: Outlines, ground: Ground, p: Parameters
+) -> int:
+    """Return for how many steps body i can surely touch nothing.
+
+    Contacts are looked for within what a corner can go in a step; twice of it here.
+    """
+    body, most = bodies[i], LONGEST_FLIGHT * p.dt
+    speed = max(top_speed(body) + p.gravity * most, body.lately)
+    reach = 2.0 * (speed * p.dt + p.gravity * p.dt * p.dt + p.slack)
+    time = time_to_bodies(bodies, i, outlines.polygon, speed, reach, most)
+    if time > p.dt:
+        time = time_to_ground(body, i, outlines, ground, speed, reach, time, p.gravity)
+    return int(max(time, 0.0) / p.dt)
+
+
+@kernel
+def take_off(
+    bodies: Bodies, outlines: Outlines, ground: Ground, islands: Islands, begin: Ints, p: Parameters
+) -> tuple[int, int]:  # fmt: skip
+    """Return the body that flies and for how many steps, 0 if none does; it is island 0 then."""
+    i = lone_flyer(bodies, begin, p)
+    steps = steps_of_flight(bodies, i, outlines, ground, p) if i >= 0 else 0
+    if steps > 0:
+        islands.block_start[0], islands.block_start[1], islands.block_item[0] = 0, 1, i
+        islands.contact_start[0] = islands.contact_start[1] = 0
+        islands.slot[i] = 0
+    return i, steps
+
+
+@kernel
+def keep_touch(bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, time: float) -> None:
+    """Note that what sleeps against barriers still touches them."""
+    for k in range(count):
+        if bodies[contacts[k].a].status == ASLEEP:
+            block, barrier = barrier_contact(gauges, contacts[k].a, contacts[k].b)
+            if barrier >= 0:
+                gauges.last_touch[block, barrier] = time
+
+
+@stage
+def fly(
+    bodies: Bodies, i: int, contacts: Contacts, m: Matrix, motion: Motion, islands: Islands,
+    p: Parameters, ledger: NDArray,
+) -> int:  # fmt: skip
+    """Take a step of body i, the only one of island 0 and without contacts; its corners stay.
+
+    Returns i if it went bad, else -1.
+    """
+    body = bodies[i]
+    body.lately = max(top_speed(body), LATELY * body.lately)
+    body.path = body.lately * p.dt
+    apply_forces(bodies, contacts, m, motion, islands, 0, False, p)
+    account_block(body, motion, 0, p, ledger)
+    body.apart += p.dt
+    body.wait = max(body.wait - 1, 0)
+    move_block(body, motion, 0, p.dt)
+    body.quiet = 0.0
+    if not top_speed(body) < SPEED_LIMIT:
+        return i
+    if body.y < p.floor:
+        ledger[1] -= retire(body)
+    return -1
+
+
+@kernel
+def land(bodies: Bodies, outlines: Outlines, i: int, flown: int) -> None:
+    """Set the corners of body i where it has flown for some steps."""
+    if flown > 0:
+        place_corners(bodies, outlines, i)

@@ -1,0 +1,407 @@
+r"""Projected relaxation of contact forces in substeps, for islands in motion.
+
+In an avalanche many contacts open, close, stick and slip in one step, and open-close iteration
+around a global solve does not settle. Relaxation decides the state of each contact as it visits
+it: the normal force is kept from pulling, the shear force within its friction limit. A blow on one
+block reaches the others contact by contact; many short steps of few sweeps find where it takes them
+better than one step of many (Macklin et al. 2019, Small steps in physics simulation). So the step
+is taken in substeps, of length h, along the normals and with the arms of the step:
+
+.. math:: d_s = d_{s-1} + \frac{h^2}{M} \Bigl(F + \sum_c f_c e_c^t\Bigr), \qquad D_s = D_{s-1} + d_s
+
+with d the displacement of a block in a substep and D that since the start of the step, F its weight
+and loads, f_c the force of a contact and e_c its row. A contact whose gap g + e D is open may close
+by that gap, one that is closed not at all; an impact that has closed leaves by what its restitution
+asks for. Forces start from those of the last substep, so that d starts as 2 d_{s-1} - d_{s-2}.
+
+At rest the global solve takes over. What that does not settle is relaxed in a single substep.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rigdda.dynamics.assembly.island import damping_of
+from rigdda.dynamics.assembly.springs import normal_row, shear_row
+from rigdda.dynamics.constants import (
+    BOLT,
+    IMPACT,
+    LARGE_ISLAND,
+    LEAST_RELAXATION,
+    LEAST_SUBSTEPS,
+    MOST_SWEEPS,
+    PIN,
+    PLAIN,
+    REACH,
+    RELAXATION_SHARE,
+    RELAXATION_STIFFNESS,
+    REST,
+    SLOW_SHARE,
+    SLOW_SWEEPS,
+    SMALL_SHARE,
+    SPREADING,
+    SUBSTEP,
+)
+from rigdda.dynamics.kernel import arithmetic_kernel, inlined, kernel
+from rigdda.dynamics.records import (
+    Bodies,
+    Body,
+    Contact,
+    Contacts,
+    Floats,
+    Ints,
+    Islands,
+    Motion,
+    Parameters,
+    Rows,
+)
+
+# columns of rows.row, first what a visit to an open contact needs: the row of the contact for a and
+# b, times h over the roots of their inertia [(m/N)^1/2]; normal and shear force [N]
+NORMAL, FORCE = 0, 6
+# gap at the start of the substep, normal displacement that it aims at once closed [m], infinite
+# where a spring has a gap at which it is free; displacement in the substep in which an impact has
+# closed [m]; its number
+HERE, AIM, REBOUND, HIT = 8, 9, 10, 11
+# share of the normal force that a visit keeps [-], what a displacement takes [N/m]; shear and
+# tension that it bears besides [N]
+KEEP, GAIN, COHESION, TENSION = 12, 13, 14, 15
+# the same of the shear force, and what a normal force takes from it [-]
+SHEAR, KEEP_SHEAR, GAIN_SHEAR, CROSS = 16, 22, 23, 24
+# normal displacement per force [m/N]; friction; shear displacement at which a spring is free, gap
+# at the start of the step [m]
+FLEXIBLE, FRICTION, FREE, GAP = 25, 26, 27, 28
+# substep from which on it has borne its force; sum of the forces of all substeps [N]
+SINCE, SUM = 29, 30
+COLUMNS = 32
+
+# columns of rows.motion, each in three directions, times the roots of inertia over h: displacement
+# in this substep, since the start of the step, and in the substep before
+NOW, SO_FAR, BEFORE = 0, 3, 6
+
+
+@kernel
+def write_row(row: Floats, first: int, e: tuple[float, float, float], scale: Floats) -> None:
+    """Write a row, scaled by the inertia of its body."""
+    row[first], row[first + 1], row[first + 2] = e[0] * scale[0], e[1] * scale[1], e[2] * scale[2]
+
+
+@kernel
+def product(row: Floats, first: int, second: int) -> float:
+    """Return the displacement along one direction of a contact per force along another [m/N]."""
+    total = 0.0
+    for q in range(6):
+        total += row[first + q] * row[second + q]
+    return total
+
+
+@kernel
+def displace(row: Floats, first: int, motion: Floats, i: int, j: int, force: float) -> None:
+    """Move slots i and j by what a force along one direction of a contact displaces them."""
+    for q in range(3):
+        motion[i, NOW + q] += force * row[first + q]
+        motion[j, NOW + q] += force * row[first + 3 + q]
+
+
+@arithmetic_kernel
+def along_six(e: Floats, a: Floats, b: Floats, first: int) -> float:
+    """Return the displacement along a row of two bodies that move by columns of a and b [m]."""
+    own = e[0] * a[first] + e[1] * a[first + 1] + e[2] * a[first + 2]
+    return own + (e[3] * b[first] + e[4] * b[first + 1] + e[5] * b[first + 2])
+
+
+@kernel
+def is_elastic(c: Contact) -> bool:
+    """Return whether a contact is a spring whose stiffness is given."""
+    return c.kind == PLAIN or c.kind == BOLT or c.kind == PIN
+
+
+@kernel
+def set_rigid(row: Floats, c: Contact, flexible: float, rolling: float, substeps: int) -> None:
+    """Write what a visit needs of a contact that gives way to nothing in a substep."""
+    row[KEEP], row[GAIN] = 1.0, 1.0 / flexible
+    row[KEEP_SHEAR], row[GAIN_SHEAR] = 1.0, 1.0 / rolling
+    row[GAP], row[AIM], row[REBOUND], row[HIT] = c.gap, 0.0, -math.inf, -1.0
+    if c.kind == IMPACT and c.bias > 0.0:
+        row[REBOUND] = c.bias / substeps
+    elif c.kind == IMPACT:  # a fence that fails lets blocks pass
+        row[AIM] = c.bias / substeps
+    elif c.kind == REST:  # what pushes penetration out, without the force that is carried over
+        row[AIM] = max(c.bias - c.memory_normal / c.kappa, 0.0) / substeps
+
+
+@inlined
+def set_spring(
+    row: Floats, c: Contact, rows: Rows, i: int, j: int, flexible: float, rolling: float,
+    substeps: int, h: float,
+) -> None:  # fmt: skip
+    """Write what a visit needs of the spring of a contact, see contact.law.
+
+    In a single substep every contact is one: its displacement is dt times the end velocity, but for
+    what its velocity at the start is not that of the bodies along its row. Plain contacts and bolts
+    are springs on the displacement of the step: of 2 and 4 times the stiffness in the law.
+    """
+    normal = shear = c.kappa
+    free, slid = c.bias, 0.0
+    if substeps == 1:
+        a, b = rows.motion[i], rows.motion[j]
+        free += h * c.un - along_six(row[NORMAL : NORMAL + 6], a, b, BEFORE)
+        slid += h * c.us - along_six(row[SHEAR : SHEAR + 6], a, b, BEFORE)
+    if not is_elastic(c):
+        normal, shear = RELAXATION_STIFFNESS / flexible, RELAXATION_STIFFNESS / rolling
+        free += c.memory_normal * (1.0 / normal - 1.0 / c.kappa)
+    elif c.kind != PIN and substeps > 1:
+        factor = 2.0 if c.kind == PLAIN else 4.0
+        normal = shear = factor * c.kappa
+        free = c.bias / factor
+    row[KEEP] = normal * flexible / (1.0 + normal * flexible)
+    row[KEEP_SHEAR] = shear * rolling / (1.0 + shear * rolling)
+    row[GAIN], row[GAIN_SHEAR] = row[KEEP] / flexible, row[KEEP_SHEAR] / rolling
+    row[GAP], row[AIM], row[REBOUND] = -free, math.inf, -math.inf
+    row[FREE] = c.memory_shear / shear + slid
+
+
+@inlined
+def pack_row(
+    c: Contact, islands: Islands, rows: Rows, place: int, n: int, substeps: int, h: float
+) -> None:
+    """Write a contact as row `place` and add its starting force to the displacements.
+
+    Slot n stands for bodies without unknowns.
+    """
+    row = rows.row[place]
+    i = islands.slot[c.a]
+    j = islands.slot[c.b] if c.pair >= 0 else n
+    rows.row_i[place], rows.row_j[place], rows.idle[place] = i, j, 0
+    write_row(row, NORMAL, normal_row(c, True), rows.scale[i])
+    write_row(row, NORMAL + 3, normal_row(c, False), rows.scale[j])
+    write_row(row, SHEAR, shear_row(c, True), rows.scale[i])
+    write_row(row, SHEAR + 3, shear_row(c, False), rows.scale[j])
+    flexible, rolling = product(row, NORMAL, NORMAL), product(row, SHEAR, SHEAR)
+    if substeps == 1 or is_elastic(c):
+        set_spring(row, c, rows, i, j, flexible, rolling, substeps, h)
+    else:
+        set_rigid(row, c, flexible, rolling, substeps)
+    row[FLEXIBLE], row[CROSS] = flexible, row[GAIN_SHEAR] * product(row, NORMAL, SHEAR)
+    row[FRICTION], row[TENSION] = c.friction, c.tension
+    row[COHESION] = math.inf if c.kind == PIN else c.cohesion
+    row[FORCE], row[FORCE + 1] = c.start_normal, c.start_shear
+    row[SUM] = row[SUM + 1] = row[SINCE] = 0.0
+    displace(row, NORMAL, rows.motion, i, j, c.start_normal)
+    displace(row, SHEAR, rows.motion, i, j, c.start_shear)
+
+
+@arithmetic_kernel
+def add_up(row: Floats, number: int) -> None:
+    """Add the forces that a contact has had until the start of substep `number`."""
+    row[SUM] += row[FORCE] * (number - row[SINCE])
+    row[SUM + 1] += row[FORCE + 1] * (number - row[SINCE])
+    row[SINCE] = number
+
+
+@kernel
+def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
+    """Write the contacts that the next sweep is to visit into rows.visit; returns how many.
+
+    Not those that cannot close before substep idle[k]; nor, after the first sweep of a substep,
+    where neither body has moved in the last one: moved_in[s] is the number of the last sweep of the
+    substep in which slot s did. Every contact is written, and the next one over it if it is not to
+    be visited: branches that go either way would cost more than the visits.
+    """
+    visits = 0
+    for place in range(count):
+        k = np.uintp(place)
+        i, j = np.uintp(rows.row_i[k]), np.uintp(rows.row_j[k])
+        moved = (rows.moved_in[i] >= tries - 1) | (rows.moved_in[j] >= tries - 1)
+        rows.visit[np.uintp(visits)] = place
+        visits += int(moved & (rows.idle[k] <= number))
+    return visits
+
+
+@arithmetic_kernel
+def sweep(
+    row: Floats, row_i: Ints, row_j: Ints, motion: Floats, still: int, visit: Ints, visits: int,
+    tries: int, number: int, substeps: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
+) -> float:  # fmt: skip
+    """Visit the contacts listed once, from the lowest up, or down; returns the greatest change [m].
+
+    One that is open waits for as long as it cannot close, at twice the speed at which it closes and
+    `reach` [m] a substep besides. A slot has moved if it did by more than `quiet` [m]; slot `still`
+    never does.
+
+    A visit reads the bodies once: what the normal force changes along the shear direction is added
+    to what was read. Unsigned indices spare numba's test for negative ones.
+    """
+    worst = 0.0
+    for q in range(visits):
+        place = np.uintp(visit[np.uintp(visits - 1 - q if tries % 2 == 1 else q)])
+        i, j = np.uintp(row_i[place]), np.uintp(row_j[place])
+        r, a, b = row[place], motion[i], motion[j]
+        n, s = r[NORMAL : NORMAL + 6], r[SHEAR : SHEAR + 6]
+        u, v, w, u2, v2, w2 = a[0], a[1], a[2], b[0], b[1], b[2]
+        moved = (n[0] * u + n[1] * v + n[2] * w) + (n[3] * u2 + n[4] * v2 + n[5] * w2)
+        if tries == 0:
+            r[HERE] = r[GAP] + along_six(n, a, b, SO_FAR)
+        gap, force, before = r[HERE], r[FORCE], r[FORCE + 1]
+        aim = min(r[AIM], -gap)
+        if gap <= 0.0 and r[REBOUND] > moved and (r[HIT] < 0.0 or r[HIT] == number):
+            aim, r[HIT] = r[REBOUND], number
+        normal = max(r[KEEP] * force + r[GAIN] * (aim - moved), -r[TENSION])
+        if normal == 0.0 and force == 0.0 and before == 0.0 and r[COHESION] == 0.0:
+            if r[AIM] < math.inf:
+                wait = (moved - aim) / (reach + abs(moved))
+                idle[place] = number + int(min(wait, float(substeps)))
+            continue
+        push = normal - force
+        change = abs(push) * r[FLEXIBLE]
+        worst = max(worst, change)
+        slid = (s[0] * u + s[1] * v + s[2] * w) + (s[3] * u2 + s[4] * v2 + s[5] * w2)
+        if r[AIM] == math.inf:
+            slid += along_six(s, a, b, SO_FAR) - r[FREE]
+        shear = r[KEEP_SHEAR] * before - r[GAIN_SHEAR] * slid - r[CROSS] * push
+        limit = r[COHESION] + r[FRICTION] * max(normal, 0.0)
+        shear = min(max(shear, -limit), limit)
+        drag = shear - before
+        if change + abs(drag) * r[FLEXIBLE] > quiet:
+            moved_in[i] = tries
+            if j != np.uintp(still):
+                moved_in[j] = tries
+        a[0], a[1] = (u + push * n[0]) + drag * s[0], (v + push * n[1]) + drag * s[1]
+        b[0], b[1] = (u2 + push * n[3]) + drag * s[3], (v2 + push * n[4]) + drag * s[4]
+        a[2], b[2] = (w + push * n[2]) + drag * s[2], (w2 + push * n[5]) + drag * s[5]
+        add_up(r, number)
+        r[FORCE], r[FORCE + 1] = normal, shear
+    return worst
+
+
+@kernel
+def sort_by_height(contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int) -> None:
+    """Set the rows of the contacts low:high by height, lowest first: a sweep carries loads through.
+
+    A counting sort in as many layers as there is room for: within one the order does not matter.
+    Contacts stay in order: to read them one after the other is what takes long in a large island.
+    """
+    place, height, layer = rows.place, rows.height, rows.layer
+    layers = min(len(layer) - 1, high - low)
+    least, most = math.inf, -math.inf
+    for q in range(low, high):
+        height[q] = contacts[islands.contact_item[q]].y
+        least, most = min(least, height[q]), max(most, height[q])
+    scale = layers / (most - least) * (1.0 - 1e-9) if most > least else 0.0
+    for s in range(layers + 1):
+        layer[s] = 0
+    for q in range(low, high):
+        place[q] = int(scale * (height[q] - least))
+        layer[place[q] + 1] += 1
+    for s in range(layers):
+        layer[s + 1] += layer[s]
+    for q in range(low, high):
+        s = place[q]
+        place[q] = layer[s]
+        layer[s] += 1
+
+
+@kernel
+def velocity(body: Body) -> tuple[float, float, float]:
+    """Return the velocity of a body at the start of the step."""
+    return body.vx, body.vy, body.omega
+
+
+@inlined
+def start(body: Body, rhs: Floats, rows: Rows, s: int, h: float, p: Parameters) -> None:
+    """Set the displacement of a block, slot s, in the first substep without contacts."""
+    v, alpha = velocity(body), damping_of(body, p)
+    for q in range(3):
+        inertia = body.inertia if q == 2 else body.mass
+        scale = h / math.sqrt(inertia)
+        pull = (rhs[s, q] - 2.0 * inertia * v[q] / p.dt) / inertia - alpha * v[q]
+        rows.scale[s, q] = scale
+        rows.motion[s, BEFORE + q] = h * v[q] / scale
+        rows.motion[s, NOW + q] = (h * v[q] + h * h * pull) / scale
+        rows.motion[s, SO_FAR + q] = 0.0
+
+
+@kernel
+def go_on(motion: Floats, n: int, last: bool) -> None:
+    """End a substep: add its displacements, start the next with the accelerations of this one."""
+    for s in range(n):
+        for q in range(3):
+            now = motion[s, NOW + q]
+            motion[s, SO_FAR + q] += now
+            if not last:
+                motion[s, NOW + q] = 2.0 * now - motion[s, BEFORE + q]
+                motion[s, BEFORE + q] = now
+
+
+@kernel
+def substeps_of(n: int, dt: float) -> int:
+    """Return the substeps of a step of an island of n blocks: a blow goes on farther in more."""
+    share = SMALL_SHARE + (1.0 - SMALL_SHARE) * min(n / SPREADING, 1.0)
+    return max(LEAST_SUBSTEPS, math.ceil(share * dt / SUBSTEP - 1e-9))
+
+
+@kernel
+def relax_forces(
+    bodies: Bodies, contacts: Contacts, rhs: Floats, found: Motion, islands: Islands, rows: Rows,
+    low: int, high: int, first: int, n: int, speed: float, fast: bool, p: Parameters,
+) -> tuple[int, int]:  # fmt: skip
+    """Find the forces of an island with contacts low:high, in their rows: see `take_forces`.
+
+    In substeps if it is `fast`, else in one that is settled more closely; `speed` is the greatest
+    of the island [m/s]. `rhs` holds inertia and weight only. found.d is set to the displacements
+    at constant mean force, found.relaxed to what the blocks move besides, since forces act early or
+    late in the step.
+
+    Returns
+    -------
+    sweeps, substeps : int
+        How many it took.
+    """
+    substeps, most = 1, SLOW_SWEEPS
+    usual = p.sweep_tolerance * min(n / LARGE_ISLAND, 1.0)
+    tolerance = max(min(SLOW_SHARE * speed, usual), LEAST_RELAXATION * p.gravity * p.dt)
+    if fast:
+        substeps, most = substeps_of(n, p.dt), MOST_SWEEPS
+        tolerance = min(RELAXATION_SHARE * speed, usual)
+    h, motion = p.dt / substeps, rows.motion
+    for s in range(n):
+        start(bodies[islands.block_item[first + s]], rhs, rows, s, h, p)
+    for q in range(3):
+        rows.scale[n, q] = 0.0
+        motion[n, NOW + q] = motion[n, SO_FAR + q] = motion[n, BEFORE + q] = 0.0
+    count = high - low
+    sort_by_height(contacts, islands, rows, low, high)
+    for q in range(low, high):
+        c = contacts[islands.contact_item[q]]
+        pack_row(c, islands, rows, rows.place[q], n, substeps, h)
+    sweeps = 0
+    for number in range(substeps):
+        for s in range(n + 1):
+            rows.moved_in[s] = -1
+        for tries in range(most):
+            visits = list_visits(rows, count, tries, number)
+            worst = sweep(
+                rows.row, rows.row_i, rows.row_j, motion, n, rows.visit, visits, tries, number,
+                substeps, rows.idle, REACH * speed * h, rows.moved_in, tolerance * h,
+            )  # fmt: skip
+            sweeps += 1
+            if worst <= tolerance * h:
+                break
+        go_on(motion, n, number == substeps - 1)
+    for s in range(n):
+        v = velocity(bodies[islands.block_item[first + s]])
+        for q in range(3):
+            scale = rows.scale[s, q]
+            found.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)
+            found.relaxed[s, q] = motion[s, SO_FAR + q] * scale - found.d[s, q]
+    return sweeps, substeps
+
+
+@inlined
+def take_forces(c: Contact, row: Floats, substeps: int) -> None:
+    """Set the forces of a contact to their means over the step, its starting ones to the last."""
+    add_up(row, substeps)
+    c.normal, c.shear = row[SUM] / substeps, row[SUM + 1] / substeps
+    c.start_normal, c.start_shear = row[FORCE], row[FORCE + 1]

@@ -1,0 +1,127 @@
+"""A lone block that is struck or turns fast takes its step in parts.
+
+A part ends just after an impact, or when the block has turned by `TURN`. An impact turns a block,
+and another corner of it may strike soon after, faster and from elsewhere than it would have
+without. Solved as one, both impacts would act at once, or what closes by the first one would be
+slowed down, and never bounce; how many do depends on the step. In a bounce in steps of 10 ms single
+blocks of 0.1 m2 lost 4.6 % more energy than in 0.5 ms without parts for turns, 0.05 m2 11 %; with
+them they lose 1.3 and 1.0 %. What a block may touch was foreseen for the whole step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rigdda.dynamics.constants import (
+    AFTER_IMPACT,
+    BOLT,
+    IMPACT,
+    MOST_PARTS,
+    NEW,
+    OPEN,
+    PIN,
+    PLAIN,
+    TURN,
+)
+from rigdda.dynamics.contact.law import prepare, pull_on, strike, time_of_impact
+from rigdda.dynamics.contact.transfer import recall
+from rigdda.dynamics.kernel import inlined, kernel
+from rigdda.dynamics.records import (
+    Bodies,
+    Contact,
+    Contacts,
+    Gauges,
+    Interfaces,
+    Ints,
+    Islands,
+    Motion,
+    Parameters,
+)
+
+
+@kernel
+def takes_parts(
+    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, gauges: Gauges, p: Parameters
+) -> bool:
+    """Return whether an island is a lone block with an impact, or that turns fast.
+
+    Not on a fence, which is charged for a step as a whole, and its impacts are plastic, nor with
+    supports or joints, which could not be prepared anew, nor with plain contacts, whose rebound
+    is what the step makes of it.
+    """
+    blocks = islands.block_start[island + 1] - islands.block_start[island]
+    if blocks > 1 or not p.post_correction:
+        return False
+    turn = abs(bodies[islands.block_item[islands.block_start[island]]].omega) * p.dt
+    parts = turn > TURN
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        c = contacts[islands.contact_item[item]]
+        parts = parts or c.kind == IMPACT
+        if c.kind == BOLT or c.kind == PIN or c.kind == PLAIN or c.bond > 0.0:
+            return False
+        if c.b >= 0 and gauges.barrier[c.b] >= 0:
+            if gauges.target[gauges.barrier[c.b]].capacity < math.inf:
+                return False
+    return parts
+
+
+@kernel
+def recall_all(
+    contacts: Contacts, islands: Islands, island: int, before: Contacts, first: Ints, p: Parameters
+) -> None:
+    """Let the contacts of an island be as they were before the step."""
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        k = islands.contact_item[item]
+        recall(contacts, k, k + 1, before, first, p.slack)
+
+
+@inlined
+def follow(bodies: Bodies, c: Contact, motion: Motion, p: Parameters) -> None:
+    """Move a contact with its block, which has moved; apart by more than the slack it is open."""
+    d, besides, a = motion.d[0], motion.besides[0], bodies[c.a]
+    u, v, turn = d[0] + besides[0], d[1] + besides[1], d[2] + besides[2]
+    cos, sin = math.cos(turn), math.sin(turn)
+    side = 0.0 if c.owner == 1 else c.gap  # the corner, or the point of the face that is over it
+    x, y = c.x + side * c.nx - (a.x - u), c.y + side * c.ny - (a.y - v)
+    x, y = a.x + cos * x - sin * y, a.y + sin * x + cos * y
+    if c.owner == 1:
+        c.gap += c.nx * (x - c.x) + c.ny * (y - c.y)
+        c.x, c.y = x, y
+    else:
+        c.nx, c.ny = cos * c.nx - sin * c.ny, sin * c.nx + cos * c.ny
+        c.gap = c.nx * (x - c.x) + c.ny * (y - c.y)
+    if c.gap > p.slack or c.state == OPEN:
+        c.state, c.kind = OPEN, NEW
+        c.memory_normal = c.memory_shear = c.stiffness = 0.0
+        c.start_normal = c.start_shear = c.bond = 0.0
+
+
+@inlined
+def begin_part(
+    bodies: Bodies, contacts: Contacts, interfaces: Interfaces, islands: Islands, island: int,
+    motion: Motion, left: float, number: int, part: Parameters,
+) -> None:  # fmt: skip
+    """Begin part `number` of the step of a lone block: to its next impact, or all that is left [s].
+
+    The first one is 1; `motion` is that of the part before.
+    """
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    turning = abs(bodies[islands.block_item[islands.block_start[island]]].omega)
+    part.dt = end = left
+    if number < MOST_PARTS:
+        end = left / max(math.ceil(turning * left / TURN), 1)
+    for item in range(c0, c1):
+        c = contacts[islands.contact_item[item]]
+        if number > 1:
+            follow(bodies, c, motion, part)
+        if number == MOST_PARTS:
+            continue
+        pull = pull_on(bodies, c, part)
+        strike(bodies, c, 0.5 * left, pull, part)
+        time = time_of_impact(bodies, c, pull, part)
+        if time >= 0.0:
+            end = min(end, time + AFTER_IMPACT * left)
+    # no part so short that rounding makes its velocities
+    part.dt = end if end < (1.0 - AFTER_IMPACT) * left else left
+    for item in range(c0, c1):
+        prepare(bodies, contacts[islands.contact_item[item]], interfaces, False, part)

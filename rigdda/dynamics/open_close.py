@@ -1,0 +1,384 @@
+"""Open-close iteration: find the state of every contact of an island with which the forces agree.
+
+A closed contact must press, an open one must not overlap, a sticking one must stay within its
+friction limit, a slipping one must slip against its friction.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import NDArray
+
+from rigdda.dynamics.assembly.island import assemble_blocks, assemble_island
+from rigdda.dynamics.assembly.springs import relative_displacement
+from rigdda.dynamics.constants import (
+    AUTO,
+    BLOCK_PCG,
+    BOLT,
+    DIRECT,
+    ENERGY_HALVINGS,
+    FAST_FALL,
+    FEW_MOVING,
+    FLIPS,
+    FRICTION_TOLERANCE,
+    IMPACT,
+    MOVING,
+    ONE_BY_ONE,
+    OPEN,
+    OPENING_TOLERANCE,
+    PATIENCE,
+    PIN,
+    PLAIN,
+    QUIET_SPEED,
+    REST,
+    SHOCK_SPEED,
+    SHORT_PROFILE,
+    SLIDING,
+    SLIP,
+    SMALL_ISLAND,
+    SOR,
+    STICK,
+    WAIT_STEPS,
+)
+from rigdda.dynamics.contact.joint import break_joint
+from rigdda.dynamics.contact.law import set_shock
+from rigdda.dynamics.islands import pair_blocks
+from rigdda.dynamics.kernel import inlined, kernel
+from rigdda.dynamics.linear.direct import solve_block, solve_two_blocks
+from rigdda.dynamics.linear.pcg import solve_pcg
+from rigdda.dynamics.linear.relaxation import relax_forces, take_forces
+from rigdda.dynamics.linear.skyline import profile, solve_skyline
+from rigdda.dynamics.linear.sor import solve_sor
+from rigdda.dynamics.motion import top_speed
+from rigdda.dynamics.records import (
+    ITERATIONS,
+    RELAXED,
+    SOLVER_ITERATIONS,
+    SOLVES,
+    SWEEPS,
+    Bodies,
+    Contact,
+    Contacts,
+    Islands,
+    Matrix,
+    Motion,
+    Parameters,
+    Rows,
+    Scratch,
+    System,
+)
+
+NONE, MOVED, LOCKED = 0, 1, 2
+
+
+@inlined
+def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[float, float, float]:
+    """Return normal force, shear force if it stuck [N], and normal velocity after the step."""
+    dn, ds = relative_displacement(c, d, i, j)
+    after = 2.0 * dn / dt - c.un
+    normal = c.kappa * (c.bias - dt * after)
+    shear = c.memory_shear - c.kappa * (2.0 * ds - dt * c.us)
+    return normal, shear, after
+
+
+@kernel
+def next_state_of_link(c: Contact, normal: float, shear: float) -> int:
+    """Let a bolt yield, or no more: SLIP stands for yielding; a pin holds whatever its force."""
+    c.normal, c.shear = max(normal, -c.tension), 0.0 if c.kind == BOLT else shear
+    state = SLIP if normal < -c.tension else STICK
+    if state == c.state:
+        return NONE
+    if c.flips >= FLIPS:
+        return LOCKED
+    c.flips += 1
+    c.state = state
+    return MOVED
+
+
+@kernel
+def close(c: Contact, normal: float, shear: float, coupled: bool) -> int:
+    """Close a contact that would bear these forces if it stuck; returns MOVED or LOCKED.
+
+    Where friction is coupled to the normal force it slips at once if it slides faster than it
+    closes: a contact that stuck would be torn open again.
+    """
+    if c.flips >= FLIPS:
+        return LOCKED
+    c.state = STICK
+    if coupled and abs(shear) > c.friction * normal:
+        c.state, c.lag = SLIP, shear
+    return MOVED
+
+
+@kernel
+def next_friction(c: Contact, shear: float, tension: float, coupled: bool) -> int:
+    """Let a closed contact whose normal force is set stick or slip: a return mapping.
+
+    Where friction is coupled to the normal force a slipping contact is settled if its direction
+    is right.
+    """
+    state, limit = c.state, c.friction * c.normal
+    c.shear = min(max(shear, -limit), limit)
+    if abs(shear) <= limit:
+        if state == STICK:
+            return NONE
+        if c.flips >= FLIPS:
+            return LOCKED
+        c.state = STICK
+        c.flips += 1
+        return MOVED
+    change = abs(c.shear - c.lag) if state == SLIP else math.inf
+    if coupled and state == SLIP and c.shear * math.copysign(1.0, c.lag) >= 0.0:
+        change = 0.0
+    c.state = SLIP
+    c.lag = c.shear
+    return MOVED if change > FRICTION_TOLERANCE * (limit - tension) else NONE
+
+
+@inlined
+def next_state(c: Contact, normal: float, shear: float, weight: float, coupled: bool) -> int:
+    """Move a contact to the state that its forces ask for; returns NONE, MOVED or LOCKED.
+
+    A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
+    """
+    if c.kind == BOLT or c.kind == PIN:
+        return next_state_of_link(c, normal, shear)
+    tension = -OPENING_TOLERANCE * weight
+    if c.state == OPEN:
+        return NONE if normal <= -tension else close(c, normal, shear, coupled)
+    if c.bond > 0.0:
+        strength = c.cohesion + c.friction * max(normal, 0.0)
+        if normal >= -c.tension and abs(shear) <= strength:
+            c.normal, c.shear = normal, shear
+            return NONE
+        break_joint(c)
+        if normal >= tension:
+            return MOVED
+    if normal < tension:
+        c.state = OPEN
+        c.flips += 1
+        return MOVED
+    c.normal = max(normal, 0.0)
+    return next_friction(c, shear, tension, coupled)
+
+
+@inlined
+def update_states(
+    bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int,
+    coupled: bool, one: bool, p: Parameters,
+) -> tuple[int, int]:  # fmt: skip
+    """Move every contact of an island to its next state; returns how many moved and are locked.
+
+    Or only the first that is at odds with its state, as often as it takes.
+    """
+    moved = locked = 0
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        i = islands.slot[c.a]
+        j = islands.slot[c.b] if c.pair >= 0 else -1
+        normal, shear, after = spring_forces(c, d, i, j, p.dt)
+        sinking = -after - max(c.gap, 0.0) / p.dt  # what closes a gap is not driven in
+        if c.state != OPEN and c.kind == REST and sinking > SHOCK_SPEED:
+            set_shock(bodies, c, p)
+            moved += 1
+            continue
+        weight = bodies[c.a].mass * p.gravity
+        if one:
+            c.flips = 0
+        change = next_state(c, normal, shear, weight, coupled)
+        moved += change == MOVED
+        locked += change == LOCKED
+        if one and moved > 0:
+            break
+    return moved, locked
+
+
+@kernel
+def solve_island(m: Matrix, scratch: Scratch, n: int, pairs: int, p: Parameters) -> int:
+    """Solve for the displacements of an island; returns the iterations, 0 of a direct solution."""
+    if p.solver == SOR:
+        return solve_sor(m, scratch, n, pairs, p.tolerance, p.relaxation)
+    if p.solver == DIRECT or p.solver == AUTO:
+        count = profile(m, scratch, n, pairs)
+        longest = len(scratch.factor) if p.solver == DIRECT else SHORT_PROFILE * 3 * n
+        if count <= min(longest, len(scratch.factor)):
+            solve_skyline(m, scratch, n, pairs, count)
+            return 0
+    return solve_pcg(m, scratch, n, pairs, p.tolerance, p.solver == BLOCK_PCG)
+
+
+@kernel
+def solve_states(
+    bodies: Bodies, contacts: Contacts, m: Matrix, scratch: Scratch, islands: Islands, island: int,
+    pairs: int, p: Parameters, counters: NDArray,
+) -> bool:  # fmt: skip
+    """Iterate until no contact of the island changes; returns whether that was reached.
+
+    Afterwards normal and shear of each contact hold its force, zero where it is open.
+    """
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    n = b1 - b0
+    small = n <= SMALL_ISLAND
+    for s in range(n):
+        body = bodies[islands.block_item[b0 + s]]
+        m.d[s, 0], m.d[s, 1], m.d[s, 2] = body.vx * p.dt, body.vy * p.dt, body.omega * p.dt
+    for item in range(c0, c1 if small else c0):
+        c = contacts[islands.contact_item[item]]
+        if c.state == SLIP and c.kind == REST and abs(c.us) < SLIDING * p.gravity * p.dt:
+            c.state = STICK
+    few = 2 + (c1 - c0) // FEW_MOVING
+    for iteration in range(PATIENCE * p.iterations):
+        assemble_island(bodies, contacts, m, islands, island, pairs, p)
+        counters[ITERATIONS] += 1
+        if n == 1:
+            solve_block(m.diagonal[0], m.rhs[0], m.d[0])
+        elif n == 2:
+            solve_two_blocks(m, scratch.dense)
+        else:
+            counters[SOLVES] += 1
+            counters[SOLVER_ITERATIONS] += solve_island(m, scratch, n, pairs, p)
+        one = small and iteration >= ONE_BY_ONE
+        moved, locked = update_states(bodies, contacts, m.d, islands, c0, c1, small, one, p)
+        if moved == 0:
+            return locked == 0
+        if iteration >= p.iterations - 1 and moved > few:
+            return False
+    return False
+
+
+@kernel
+def relax(
+    bodies: Bodies, contacts: Contacts, m: Matrix, motion: Motion, islands: Islands, rows: Rows,
+    island: int, p: Parameters, counters: NDArray, speed: float, fast: bool,
+) -> None:  # fmt: skip
+    """Find the forces of an island by relaxation, from those of the last step."""
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    assemble_blocks(bodies, m, islands, b0, b1, p)
+    counters[RELAXED] += 1
+    sweeps, substeps = relax_forces(
+        bodies, contacts, m.rhs, motion, islands, rows, c0, c1, b0, b1 - b0, speed, fast, p
+    )
+    counters[SWEEPS] += sweeps
+    for item in range(c0, c1):
+        c = contacts[islands.contact_item[item]]
+        take_forces(c, rows.row[rows.place[item]], substeps)
+        limit = c.cohesion + c.friction * max(c.normal, 0.0)
+        within = limit > abs(c.shear)
+        if c.bond > 0.0:
+            if within and c.normal > -c.tension:
+                c.state, c.kind = STICK, MOVING
+                continue
+            break_joint(c)
+        kind = c.kind
+        if kind == BOLT or kind == PIN:
+            c.state = SLIP if c.normal == -c.tension else STICK
+            continue
+        c.state = OPEN if c.normal == 0.0 else (STICK if within else SLIP)
+        if kind != IMPACT and kind != PLAIN:
+            c.kind = MOVING
+
+
+@kernel
+def impact_work(contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int) -> float:
+    """Return the work of the contact forces of an island in this step [J], supports left out.
+
+    Friction that gives energy counts twice: to rebound out of a wedge a block would be pressed
+    against its sides with any force, which friction there would have to yield.
+    """
+    total = 0.0
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.kind == BOLT or c.kind == PIN:
+            continue
+        i = islands.slot[c.a]
+        j = islands.slot[c.b] if c.pair >= 0 else -1
+        dn, ds = relative_displacement(c, d, i, j)
+        total += c.normal * dn + c.shear * ds + max(c.shear * ds, 0.0)
+    return total
+
+
+@kernel
+def island_speed(bodies: Bodies, islands: Islands, low: int, high: int) -> float:
+    """Return the greatest speed of the blocks low:high [m/s]."""
+    speed = 0.0
+    for place in range(low, high):
+        speed = max(speed, top_speed(bodies[islands.block_item[place]]))
+    return speed
+
+
+@kernel
+def is_waiting(bodies: Bodies, islands: Islands, low: int, high: int) -> bool:
+    """Return whether one of the blocks low:high did not settle a moment ago."""
+    waiting = False
+    for place in range(low, high):
+        waiting = waiting or bodies[islands.block_item[place]].wait > 0
+    return waiting
+
+
+@kernel
+def is_bouncing(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
+    """Return whether one of the contacts low:high is an impact that asks for restitution."""
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.kind == IMPACT and c.bias > 0.0:
+            return True
+    return False
+
+
+@kernel
+def let_wait(bodies: Bodies, islands: Islands, low: int, high: int) -> None:
+    """Let the island of the blocks low:high be relaxed for a while before it is solved again."""
+    for place in range(low, high):
+        bodies[islands.block_item[place]].wait = WAIT_STEPS
+
+
+@kernel
+def open_close(
+    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
+    p: Parameters, counters: NDArray,
+) -> bool:  # fmt: skip
+    """Settle the contacts of an island, with less restitution where impacts would gain energy.
+
+    Newton's restitution with friction can raise the kinetic energy of an eccentric impact; a
+    plastic one cannot, since the springs act on the velocity after the step.
+
+    Islands at rest, and those of one or two blocks, are solved as one; the others are relaxed, and
+    for a while what did not settle as one.
+
+    Returns
+    -------
+    bool
+        Whether the island was relaxed in substeps, so that its displacements are known; not of a
+        cluster in flight, which keeps its angular momentum: its impulses act at one time.
+    """
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    m, motion = system.matrix, system.motion
+    pairs, grounded = pair_blocks(bodies, contacts, m, islands, c0, c1)
+    bouncing = is_bouncing(contacts, islands, c0, c1)
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    speed = island_speed(bodies, islands, b0, b1)
+    waiting = is_waiting(bodies, islands, b0, b1)
+    small, quiet = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED
+    relaxing = waiting if quiet else not small
+    fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
+    for halving in range(ENERGY_HALVINGS + 2):
+        if not relaxing:
+            relaxing = not solve_states(
+                bodies, contacts, m, system.scratch, islands, island, pairs, p, counters
+            )
+            if relaxing and not small:
+                let_wait(bodies, islands, b0, b1)
+        if relaxing:
+            relax(bodies, contacts, m, motion, islands, rows, island, p, counters, speed, fast)
+        if not bouncing or impact_work(contacts, m.d, islands, c0, c1) <= 0.0:
+            break
+        for item in range(c0, c1):
+            c = contacts[islands.contact_item[item]]
+            c.flips = 0
+            if c.kind == IMPACT:
+                c.bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0
+                c.state = STICK
+    return fast and grounded

@@ -1,0 +1,141 @@
+"""Arrays of a scene that serve others, of which only the rock differs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.barriers import GravityWall
+from rigdda.dynamics.pack import Arrays, pack
+from rigdda.dynamics.pack.bodies import barrier_trait, block_traits, write_polygons
+from rigdda.dynamics.pack.gauges import start_rock, start_targets
+from rigdda.dynamics.pack.parameters import frictions, rock_numbers
+from rigdda.geometry import is_convex
+from rigdda.model.scene import Scene
+from rigdda.model.settings import Settings
+
+
+class Template:
+    """The arrays of a scene before its first step, and what it takes to set them back.
+
+    Ground, barriers and space are packed once. A scene of `Scene.with_rock` with as many blocks,
+    all convex, is written into the same arrays: they are to the bit what `pack` gives, as far as
+    they are read. One simulation at a time uses them.
+
+    Parameters
+    ----------
+    scene : Scene
+        The first one, without fixed blocks.
+    settings, stations, watch, leave
+        As `pack` takes them.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        stations: NDArray[np.float64],
+        watch: tuple[float, float],
+        leave: float,
+    ):
+        self.scene, self._settings, self._stations = scene, settings, stations
+        self._names = list(scene.surfaces)
+        packed = pack(scene, settings, stations, watch, leave)
+        self._corners = packed.outlines.corner.shape[1]
+        number = packed.outlines.corner["number"]
+        number[: len(scene.blocks)] = np.arange(self._corners)  # where there is no corner, too
+        self._memory, self._arrays = together(packed)
+        self._fresh = self._memory.copy()
+        plain = [
+            array.view(np.ndarray)  # quicker to reach into than a recarray
+            for array in (
+                self._arrays.bodies,
+                self._arrays.outlines.polygon,
+                self._arrays.gauges.rock,
+                self._arrays.parameters,
+            )
+        ]
+        self._bodies, self._polygons, self._rock, self._parameters = plain
+
+    def fits(self, scene: Scene) -> bool:
+        """Return whether a scene of `with_rock` can be written into these arrays."""
+        mine, blocks = self.scene.blocks, scene.blocks
+        return (
+            scene.ground is self.scene.ground
+            and len(blocks) == len(mine)
+            and self._most_corners(scene) == self._corners
+            and not any(b.fixed for b in mine)
+            and not any(b.fixed for b in blocks)
+            and all(is_convex(b.vertices) for b in (*mine, *blocks))
+        )
+
+    def _most_corners(self, scene: Scene) -> int:
+        standing = [len(scene.outline(i)) for i in scene.bodies]
+        return max(*(len(b.vertices) for b in scene.blocks), 0, *standing)
+
+    def write(self, scene: Scene) -> Arrays:
+        """Return the arrays of a scene that fits, as `pack` would.
+
+        Raises
+        ------
+        BadInput
+            If the step is too long for its blocks.
+        """
+        arrays = self._arrays
+        self._memory[:] = self._fresh
+        bodies, outlines = self._bodies, arrays.outlines
+        for i, block in enumerate(scene.blocks):
+            bodies["count"][i] = self._polygons["count"][i] = len(block.vertices)
+        polygons = [b.vertices for b in scene.blocks]
+        traits = block_traits(scene.blocks, self._names)
+        for i in scene.bodies:
+            if isinstance(scene.barriers[i], GravityWall):  # they follow the blocks
+                polygons.append(scene.outline(i))
+                traits.append(barrier_trait(scene, i, self._names))
+        write_polygons(polygons, traits, arrays.bodies, outlines)
+        if scene.barriers != self.scene.barriers:
+            start_targets(arrays.gauges.target, scene)
+        if scene.surfaces is not self.scene.surfaces:
+            arrays.interfaces["friction"] = frictions(scene, len(arrays.interfaces))
+        start_rock(self._rock, bodies, self._stations)
+        for name, value in rock_numbers(scene, self._settings, bodies).items():
+            self._parameters[name] = value
+        return arrays
+
+
+def together(arrays: Arrays) -> tuple[NDArray[np.uint8], Arrays]:
+    """Return a block of memory and copies of all arrays in it, which are set back in one go.
+
+    Arrays that are one and the same stay so.
+    """
+    leaves = {id(array): array for array in _leaves(arrays) if array.size}
+    room = [-(-array.nbytes // LINE) * LINE for array in leaves.values()]
+    memory = np.zeros(sum(room), dtype=np.uint8)
+    moved, low = {}, 0
+    for (key, array), size in zip(leaves.items(), room, strict=True):
+        place = memory[low : low + array.nbytes].view(array.dtype).reshape(array.shape)
+        place[...] = array
+        moved[key] = place.view(type(array))
+        low += size
+    return memory, _replaced(arrays, moved)
+
+
+LINE = 64
+"""Bytes to a multiple of which arrays are aligned: a line of the cache."""
+
+
+def _leaves(arrays: Any) -> list[NDArray[Any]]:
+    """Return the arrays in nested tuples."""
+    if isinstance(arrays, np.ndarray):
+        return [arrays]
+    parts = [_leaves(a) for a in arrays] if isinstance(arrays, tuple) else []
+    return [array for part in parts for array in part]
+
+
+def _replaced(arrays: Any, by: dict[int, Any]) -> Any:
+    """Return nested named tuples with other arrays in the place of these, by their identity."""
+    if isinstance(arrays, tuple):
+        return type(arrays)(*(_replaced(a, by) for a in arrays))
+    return by.get(id(arrays), arrays)

@@ -1,0 +1,58 @@
+"""Blocks at rest sleep, a whole island at a time, until something moving comes near."""
+
+from __future__ import annotations
+
+from rigdda.dynamics.constants import ASLEEP, AWAKE, GROWN, SLEEP_SPEED, SLEEP_TIME, WAKE_SPEED
+from rigdda.dynamics.kernel import kernel
+from rigdda.dynamics.motion import top_speed
+from rigdda.dynamics.records import Bodies, Ints, Islands, Parameters
+
+
+@kernel
+def wake_island(bodies: Bodies, island: int, blocks: int) -> int:
+    """Wake the bodies that fell asleep in an island; returns how many."""
+    woken = 0
+    for k in range(blocks):
+        body = bodies[k]
+        if body.status == ASLEEP and body.island == island:
+            body.status = AWAKE
+            body.quiet = 0.0
+            woken += 1
+    return woken
+
+
+@kernel
+def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int:
+    """Wake the islands of sleeping bodies paired with a moving one; returns how many bodies."""
+    woken = 0
+    for q in range(count):
+        i, j = pairs[2 * q], pairs[2 * q + 1]
+        if bodies[j].status != ASLEEP or top_speed(bodies[i]) < WAKE_SPEED:
+            continue
+        woken += wake_island(bodies, bodies[j].island, blocks)
+    return woken
+
+
+@kernel
+def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> None:
+    """Count how long blocks have been quiet and put wholly quiet islands to sleep.
+
+    A block that is getting faster is not quiet: it has begun to slide or to fall.
+    """
+    for s in range(count):
+        least = 1e300
+        for place in range(islands.block_start[s], islands.block_start[s + 1]):
+            body = bodies[islands.block_item[place]]
+            speed = top_speed(body)
+            body.slowest = min(body.slowest, speed) if body.quiet > 0.0 else speed
+            growing = speed > body.slowest + GROWN * SLEEP_SPEED
+            quiet = body.apart == 0.0 and speed < SLEEP_SPEED and not growing
+            body.quiet = body.quiet + p.dt if quiet else 0.0
+            least = min(least, body.quiet)
+        if least < SLEEP_TIME:
+            continue
+        for place in range(islands.block_start[s], islands.block_start[s + 1]):
+            body = bodies[islands.block_item[place]]
+            body.status = ASLEEP
+            body.island = islands.block_item[islands.block_start[s]]
+            body.vx = body.vy = body.omega = 0.0

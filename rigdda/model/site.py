@@ -1,0 +1,335 @@
+"""What an engineer knows about a site, as a TOML file."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+import tomli_w
+
+from rigdda import sites
+from rigdda.barriers import Barrier, Built, Mesh, MeshOption, as_layout
+from rigdda.errors import BadInput
+from rigdda.files import atomic, read
+from rigdda.geometry import polygon_properties
+from rigdda.model import economy, realisation
+from rigdda.model.economy import Bill, Consequences, Prices
+from rigdda.model.events import Drawn, Event
+from rigdda.model.place import BarrierZone, Interface, Motion, Road, Scatter, Slope, Stretch
+from rigdda.model.scene import Scene, Surface
+from rigdda.model.settings import Settings, longest_step
+from rigdda.model.soundness import check_site
+from rigdda.model.source import Point, Source
+from rigdda.model.terrain import Terrain
+
+if TYPE_CHECKING:
+    from rigdda.results.outcome import Outcome
+
+STEEP_SIDES, FLAT_SIDE = {"rock": 0.25}, 0.67
+"""Side slope of a ditch, run over rise [-], by the surface that it is cut in: 4:1 stands in rock;
+all else is taken for soil."""
+
+
+class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A slope, its loose rock and how often it falls, the road below, and what protection costs.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    description : str
+        What it is, and what of it is assumed.
+    family : str
+        Family of sites that it belongs to; "paper" for scenes of publications.
+    slope : table
+        The ground.
+    sources : tables
+        Where rock starts.
+    events : tables
+        What comes down and how often. By default each source that is no band, once a year.
+    road : table
+        The road.
+    barrier_zone : table
+        Where barriers may stand.
+    surfaces : tables
+        The surfaces, by name: friction_deg, cohesion, tension, restitution. "soil" is that of
+        embankments, "concrete" that of walls and fences, "rock" where they are missing.
+    interfaces : tables
+        How two surfaces meet.
+    prices : table
+        What barriers cost.
+    consequences : table
+        What rock on the road costs.
+    meshes : tables
+        Mesh that may be hung over the face.
+    motion : table
+        How releases are computed.
+    scatter : table
+        What varies at random.
+
+    Raises
+    ------
+    BadInput
+        If a field is unknown, of the wrong type or at odds with another; the message names it.
+    """
+
+    name: str
+    description: str
+    family: str = ""
+    slope: Slope
+    sources: tuple[Source, ...]
+    events: tuple[Event, ...] = ()
+    road: Road
+    barrier_zone: BarrierZone
+    surfaces: dict[str, Surface]
+    interfaces: tuple[Interface, ...] = ()
+    prices: Prices = msgspec.field(default_factory=Prices)
+    consequences: Consequences = Consequences()
+    meshes: tuple[MeshOption, ...] = ()
+    motion: Motion = Motion()
+    scatter: Scatter = Scatter()
+
+    def __post_init__(self) -> None:
+        if not self.events:
+            usual = tuple(Event(s.name, 1.0, s.name) for s in self.sources)
+            msgspec.structs.force_setattr(self, "events", usual)
+        check_site(self)
+
+    @classmethod
+    def load(cls, source: str | os.PathLike[str]) -> Site:
+        """Read a site from a TOML file, or a built-in or generated one by its name.
+
+        Raises
+        ------
+        BadInput
+            If there is no such file or name, or the file is not a sound site.
+        """
+        if not isinstance(source, str | os.PathLike):
+            raise BadInput("site", source, "name a TOML file or a built-in site")
+        path = Path(source)
+        if path.suffix != ".toml" and not path.is_file():
+            return sites.load(str(source))
+        if not path.is_file():
+            raise BadInput("site", str(source), "name an existing TOML file")
+        return cls.parse(read("site file", path), str(source))
+
+    @classmethod
+    def parse(cls, text: str, name: str) -> Site:
+        """Return the site of a TOML text; errors call the file `name`.
+
+        Raises
+        ------
+        BadInput
+            If it is not a sound site.
+        """
+        try:
+            return msgspec.toml.decode(text, type=cls)
+        except msgspec.ValidationError as error:
+            if isinstance(error.__cause__, BadInput):
+                raise error.__cause__ from None
+            raise BadInput("site file", name, str(error)) from None
+        except (msgspec.DecodeError, RecursionError) as error:
+            raise BadInput("site file", name, f"mend its TOML: {error}") from None
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the site as TOML; `load` gives it back."""
+        data = msgspec.to_builtins(self)
+        for table in (*data["sources"], *data["events"]):  # TOML has no null
+            for name in [name for name, value in table.items() if value is None]:
+                del table[name]
+        with atomic(path) as part:
+            part.write_text(tomli_w.dumps(data), encoding="utf-8")
+
+    @property
+    def profile(self) -> Terrain:
+        """The ground as a terrain, with a corner wherever its surface changes."""
+        return _ground(self.slope.points, self.slope.surface, self.slope.surfaces)
+
+    @property
+    def event_names(self) -> tuple[str, ...]:
+        """Names of the events."""
+        return tuple(event.name for event in self.events)
+
+    def event(self, name: str) -> Event:
+        """Return an event by its name.
+
+        Raises
+        ------
+        BadInput
+            If there is none.
+        """
+        return self.events[self.index(name)]
+
+    def index(self, name: str) -> int:
+        """Return the place of an event among the events. Raises as `event` does."""
+        names = self.event_names
+        if not isinstance(name, str) or name not in names:
+            raise BadInput("event", name, "choose one of " + ", ".join(names))
+        return names.index(name)
+
+    def source(self, name: str) -> Source:
+        """Return a source by its name.
+
+        Raises
+        ------
+        BadInput
+            If there is none.
+        """
+        for source in self.sources:
+            if source.name == name:
+                return source
+        raise BadInput("source", name, "choose one of " + ", ".join(s.name for s in self.sources))
+
+    def events_of(self, source: Source) -> list[Event]:
+        """Return the events that come from a source."""
+        return [event for event in self.events if event.source == source.name]
+
+    def pick(self, seed: int) -> str:
+        """Return the name of the event that a seed draws by rate."""
+        return realisation.pick(self, seed)
+
+    @property
+    def rooms(self) -> tuple[tuple[float, float], ...]:
+        """Intervals of the zone in which barriers may stand [m]: those without loose rock.
+
+        Around a band so much is left out as its largest block reaches beyond it.
+        """
+        return realisation.rooms(self)
+
+    def settings(self, scene: Scene) -> Settings:
+        """Return the numerical settings of the scene of a release.
+
+        The step is that of the site, or the longest whole part of it that is not too long for the
+        blocks.
+        """
+        areas = [polygon_properties(b.vertices)[0] for b in scene.blocks if not b.fixed]
+        most = longest_step(np.array(areas), math.hypot(*scene.gravity_vector))
+        return Settings(dt=self.motion.dt / max(1, math.ceil(self.motion.dt / most)))
+
+    def draw(self, seed: int = 0, event: str | None = None) -> Drawn:
+        """Return what a seed draws of an event, or of one that it draws by rate.
+
+        Raises
+        ------
+        BadInput
+            If there is no such event, or the seed is not a whole number >= 0.
+        """
+        return realisation.draw(self, seed, event)
+
+    def built(self, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
+        """Return what stands of a layout, as it resists an event of this width [m].
+
+        Raises
+        ------
+        BadInput
+            If a barrier stands where loose rock lies, or a mesh is not one of the options.
+        """
+        return realisation.built(self, layout, width)
+
+    def scene(self, drawn: Drawn, barriers: Sequence[Built] = ()) -> Scene:
+        """Return the scene of what was drawn, with barriers as `built` gives them."""
+        return realisation.scene(self, drawn, barriers)
+
+    def realise(
+        self, layout: Sequence[Barrier] = (), seed: int = 0, event: str | None = None
+    ) -> Scene:
+        """Return the scene of one release of an event, or of one that the seed draws by rate.
+
+        Blocks and friction are the same for every layout. Mesh is not part of a scene.
+
+        Raises
+        ------
+        BadInput
+            If a barrier does not stand on the slope or stands where loose rock lies, there is no
+            such event, or the seed is not a whole number >= 0.
+        """
+        drawn = self.draw(seed, event)
+        return self.scene(drawn, self.built(layout, drawn.width))
+
+    def strength(self, shift: float) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+        """Return the surfaces and how pairs meet, with all friction angles shifted [deg]."""
+        return realisation.strength(self, shift)
+
+    @property
+    def soil(self) -> str:
+        """Name of the surface of embankments."""
+        usual = "concrete" if "concrete" in self.surfaces else "rock"
+        return "soil" if "soil" in self.surfaces else usual
+
+    def ditch_side(self, x: float, width: float) -> float:
+        """Return the side slope of a ditch [-], the flattest of the ground that it is cut in."""
+        points, names = self.slope.chain()
+        ends = zip(points, points[1:], names, strict=False)
+        spanned = {name for (a, _), (b, _), name in ends if a < x + width and b > x}
+        return max((STEEP_SIDES.get(name, FLAT_SIDE) for name in spanned), default=FLAT_SIDE)
+
+    def access(self, x: float) -> float:
+        """Return the factor on prices at a chainage: dearer the higher above the road [-]."""
+        rise = self.profile.height(x) - self.profile.height(self.road.start)
+        return 1.0 + self.prices.access * max(rise, 0.0) / economy.ACCESS_HEIGHT
+
+    def mesh(self, mesh: Mesh) -> MeshOption:
+        """Return the option that a mesh is.
+
+        Raises
+        ------
+        BadInput
+            If the site has no such option.
+        """
+        for option in self.meshes:
+            if option.name == mesh.option:
+                return option
+        known = ", ".join(option.name for option in self.meshes) or "none: this site has no mesh"
+        raise BadInput("mesh option", mesh.option, f"choose one of {known}")
+
+    def rate(self, event: str, layout: Sequence[Barrier] = ()) -> float:
+        """Return how often an event happens with the mesh of a layout [1/year per metre of slope].
+
+        Raises
+        ------
+        BadInput
+            If there is no such event or mesh option, or an option is there twice.
+        """
+        return economy.rate(self, event, layout)
+
+    def capital(self, layout: Sequence[Barrier]) -> float:
+        """Return what a layout costs to build [EUR per metre of road].
+
+        Raises
+        ------
+        BadInput
+            If an earthwork does not fit, or a barrier has no price.
+        """
+        return float(sum(economy.capitals(self, as_layout(layout))))
+
+    def annual(self, layout: Sequence[Barrier]) -> float:
+        """Return what a layout costs a year, upkeep included [EUR per metre of road and year].
+
+        Raises as `capital` does.
+        """
+        standing = as_layout(layout)
+        each = zip(standing, economy.capitals(self, standing), strict=True)
+        return float(sum(price * self.prices.annual(b.kind) for b, price in each))
+
+    def bill(self, layout: Sequence[Barrier], outcome: Outcome) -> Bill:
+        """Return what a release with a layout costs [EUR per occurrence of its event]."""
+        return economy.bill(self, as_layout(layout), outcome)
+
+    def shed(self) -> float:
+        """Return what a rock shed over the road costs a year [EUR per metre of road and year].
+
+        A reference: nothing reaches the road below it.
+        """
+        return self.prices.shed * self.prices.annual("shed")
+
+
+@lru_cache(maxsize=256)
+def _ground(points: tuple[Point, ...], surface: str, stretches: tuple[Stretch, ...]) -> Terrain:
+    """Return the terrain of a slope; it is asked for several times in every episode."""
+    return Terrain(*Slope(points, 0.0, surface, stretches).chain())

@@ -1,0 +1,191 @@
+"""Whether the tables of a site agree with one another; told before anything is computed."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from rigdda import check
+from rigdda.errors import BadInput, DoubtfulInput
+from rigdda.geometry import overlap
+from rigdda.model import boulders
+from rigdda.model.place import check_surface
+from rigdda.model.settings import Settings
+from rigdda.model.source import NEAR, Point, Source
+
+if TYPE_CHECKING:
+    from rigdda.model.site import Site
+
+BEYOND = 30.0
+"""Least length of the ground beyond the road [m]: blocks that run past it shall not fall off the
+end of the ground before they count as beyond."""
+
+CHEAPEST = 100.0
+"""Closure of a day [EUR] below which thousands of EUR may have been meant."""
+
+
+def check_site(site: Site) -> None:
+    """Check a site.
+
+    Raises
+    ------
+    BadInput
+        If a field is at odds with another; the message names it.
+    """
+    _check_surfaces(site)
+    _check_slope(site)
+    _check_events(site)
+    for source in site.sources:
+        _check_source(site, source)
+    _check_zone(site)
+    _check_meshes(site)
+    motion = site.motion
+    if motion.damping and motion.damping_when == "always" and site.family != "paper":
+        _doubt(
+            "motion.damping_when",
+            "put 'contact': with 'always' energies at a barrier are four to ten times too low",
+        )
+    if 0.0 < site.consequences.closure < CHEAPEST:
+        _doubt("consequences.closure", "give EUR a day, not thousands")
+    Settings(dt=motion.dt)
+
+
+def _doubt(field: str, mend: str) -> None:
+    warnings.warn(f"{field}: {mend}", DoubtfulInput, stacklevel=6)
+
+
+def check_names(field: str, names: Iterable[str]) -> None:
+    """Check that names are texts, each only once.
+
+    Raises
+    ------
+    BadInput
+        If one is empty or comes twice.
+    """
+    seen: set[str] = set()
+    for i, name in enumerate(names):
+        if not isinstance(name, str) or not name:
+            raise BadInput(f"{field}[{i}].name", name, "give it a name")
+        if name in seen:
+            raise BadInput(f"{field}[{i}].name", name, "give each a name of its own")
+        seen.add(name)
+
+
+def _check_surfaces(site: Site) -> None:
+    for name, surface in site.surfaces.items():
+        check_surface(f"surfaces.{name}", surface)
+    check.one_of("slope.surface", site.slope.surface, site.surfaces)
+    for i, stretch in enumerate(site.slope.surfaces):
+        check.one_of(f"slope.surfaces[{i}].surface", stretch.surface, site.surfaces)
+    for i, pair in enumerate(site.interfaces):
+        check.one_of(f"interfaces[{i}].first", pair.first, site.surfaces)
+        check.one_of(f"interfaces[{i}].second", pair.second, site.surfaces)
+        check_surface(f"interfaces[{i}]", pair.surface)
+    for source in site.sources:
+        check.one_of(f"{source.words}.surface", source.surface, site.surfaces)
+
+
+def _check_slope(site: Site) -> None:
+    points, road = np.array(site.slope.points), site.road
+    x, (low, high) = points[:, 0], points[[0, -1], 0]
+    downhill = low < high and (low <= x).all() and (x <= high).all()
+    if not downhill or points[0, 1] <= points[-1, 1]:
+        raise BadInput(
+            "slope.points",
+            f"{len(points)} points",
+            "list them downhill, the one of least x first, the one of greatest x last",
+        )
+    check.number("slope.toe", site.slope.toe, low, high)
+    check.number("road.start", road.start, low, high)
+    check.number("road.end", road.end, low, high)
+    if road.end <= road.start:
+        raise BadInput("road.end", road.end, f"put it beyond road.start {road.start}")
+    for i, stretch in enumerate(site.slope.surfaces):
+        check.number(f"slope.surfaces[{i}].start", stretch.start, low, high)
+        check.number(f"slope.surfaces[{i}].end", stretch.end, low, high)
+    if high < road.end + BEYOND:
+        raise BadInput(
+            f"slope.points[{len(points) - 1}]",
+            points[-1].tolist(),
+            f"let the ground go on to x = {road.end + BEYOND:g} at least, {BEYOND:g} m beyond the "
+            "road, for the rock that runs past it",
+        )
+
+
+def _check_events(site: Site) -> None:
+    check_names("sources", (source.name for source in site.sources))
+    check_names("events", (event.name for event in site.events))
+    if not site.sources:
+        raise BadInput("sources", (), "give at least one")
+    known = {source.name: source for source in site.sources}
+    for event in site.events:
+        check.one_of(f"{event.words}.source", event.source, known)
+        event.check_source(known[event.source])
+    if not any(event.rate > 0.0 for event in site.events):
+        raise BadInput("events", [e.rate for e in site.events], "give a rate above 0 to one")
+
+
+def _check_source(site: Site, source: Source) -> None:
+    chain = site.profile.points
+    deep = chain[:, 1].min() - 1.0
+    ground = shapely.Polygon([*chain, (chain[-1, 0], deep), (chain[0, 0], deep)])
+    if source.band is not None:
+        if (np.diff(chain[:, 0]) < 0.0).any():
+            mend = "give a polygon or blocks: a band needs ground without overhangs"
+            raise BadInput(f"{source.words}.band", source.band, mend)
+        room = max((boulders.reach(source, e) for e in site.events_of(source)), default=0.0)
+        low, high = source.band
+        if low - room < chain[0, 0] or high + room >= site.road.start:
+            first, last = chain[0, 0] + room, site.road.start - room
+            mend = f"put it between {first:g} and {last:g}, where its blocks are clear of the road"
+            raise BadInput(f"{source.words}.band", source.band, mend)
+    for where, piece in source.pieces():
+        _check_piece(site, where, piece, ground)
+
+
+def _check_piece(site: Site, where: str, piece: tuple[Point, ...], ground: shapely.Polygon) -> None:
+    rock = shapely.Polygon(piece)
+    left, _, right, _ = rock.bounds
+    crest = site.slope.points[0][0]
+    if left < crest:
+        raise BadInput(where, piece, f"put it beyond the crest at {crest:g}")
+    if right >= site.road.start:
+        raise BadInput(where, piece, f"put it uphill of the road at {site.road.start:g}")
+    sunk = overlap(rock, ground)
+    if sunk > NEAR * rock.length:
+        corners = shapely.points(piece)
+        depth = shapely.distance(ground.exterior, corners) * ground.contains(corners)
+        corner = int(depth.argmax())
+        mend = f"raise it out of the ground, in which {sunk:g} m2 of the rock are"
+        raise BadInput(f"{where}[{corner}]", piece[corner], mend)
+
+
+def _check_zone(site: Site) -> None:
+    zone, ground = site.barrier_zone, site.profile
+    check.number("barrier_zone.start", zone.start, site.slope.points[0][0])
+    check.number("barrier_zone.end", zone.end, zone.start, site.road.start, open_low=True)
+    corners = {float(x) for x, _ in site.slope.points}
+    x = sorted({zone.start, zone.end} | {at for at in corners if zone.start < at < zone.end})
+    foot = [(at, ground.height(at)) for at in x]
+    over = [(at, y + zone.max_height) for at, y in reversed(foot)]
+    room = shapely.Polygon([*foot, *over])
+    for source in site.sources:
+        for where, piece in source.pieces():
+            taken = shapely.intersection(room, shapely.Polygon(piece))
+            if taken.area > NEAR * taken.length:
+                mend = f"put it beyond {taken.bounds[2]:g}: {where} is where barriers may stand"
+                raise BadInput("barrier_zone.start", zone.start, mend)
+    if not site.rooms:
+        mend = "leave room for barriers: bands of loose rock take all of the zone"
+        raise BadInput("barrier_zone.end", zone.end, mend)
+
+
+def _check_meshes(site: Site) -> None:
+    check_names("meshes", (option.name for option in site.meshes))
+    for option in site.meshes:
+        for name in option.factors:
+            check.one_of(f"meshes.{option.name}.factors", name, site.event_names)

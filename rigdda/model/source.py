@@ -1,0 +1,160 @@
+"""The loose rock of a site: blocks of a band, a mass cut by joint sets, or blocks as they are."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rigdda import check
+from rigdda.errors import BadInput
+from rigdda.geometry import overlap
+from rigdda.model.joints import JointSet, cut
+from rigdda.model.scene import convex_polygon, simple_polygon
+
+Point = tuple[float, float]
+Floats = NDArray[np.float64]
+
+NEAR = 1e-6
+"""Depth to which rock may reach into other rock or the ground at the start [m]: rounding."""
+
+LIGHTEST, DENSEST = 500.0, 1e5
+"""Least and greatest density [kg/m3]: pumice weighs 600, and 2.65 is in t/m3."""
+
+MOST_BLOCKS = 1e5
+"""Most blocks that a mass may be cut into: more would take days to simulate."""
+
+
+class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where rock starts: a band of loose blocks, a jointed mass, or blocks as they are.
+
+    Parameters
+    ----------
+    name : str
+        Its name in `events`.
+    band : (low, high)
+        Chainages between which loose blocks lie on the ground at random places [m]; how many and
+        how large is up to the event.
+    polygon : sequence of (x, y)
+        Instead of a band: corners of a convex mass [m], cut by `joints` into blocks whose mean
+        area is `block_area`.
+    joints : tables
+        At least two joint sets of different dip.
+    blocks : sequence of sequences of (x, y)
+        Instead of both: corners of each block [m], the same in every release.
+    block_area : float
+        Mean area of the blocks of a mass [m2].
+    density : float
+        Density [kg/m3].
+    surface : str
+        Name of its surface, where blocks touch blocks; on the ground the ground's decides.
+    corners : (least, most)
+        Number of corners of a block of a band.
+    aspect : (least, greatest)
+        Length over breadth of a block of a band [-].
+    spin : float
+        Greatest rate of rotation of a block of a band at the start, either way [rad/s].
+    speed : (least, greatest)
+        Speed of a block of a band at the start, horizontally off the face [m/s].
+
+    Raises
+    ------
+    BadInput
+        If a value is outside its range, blocks overlap, or there is not one of the three.
+    """
+
+    name: str = "rock"
+    band: tuple[float, float] | None = None
+    polygon: tuple[Point, ...] = ()
+    joints: tuple[JointSet, ...] = ()
+    blocks: tuple[tuple[Point, ...], ...] = ()
+    block_area: float = 2.0
+    density: float = 2600.0
+    surface: str = "rock"
+    corners: tuple[int, int] = (5, 8)
+    aspect: tuple[float, float] = (1.0, 1.5)
+    spin: float = 0.5
+    speed: tuple[float, float] = (0.2, 1.0)
+
+    def __post_init__(self) -> None:
+        where = self.words
+        check.number(f"{where}.block_area", self.block_area, 0.0, open_low=True)
+        density = check.number(f"{where}.density", self.density, 0.0, DENSEST, open_low=True)
+        if density < LIGHTEST:
+            raise BadInput(f"{where}.density", density, "give kg/m3: about 2600 for rock")
+        check.number(f"{where}.spin", self.spin, 0.0, 20.0)
+        check.interval(f"{where}.speed", self.speed, 0.0, 50.0)
+        check.interval(f"{where}.aspect", self.aspect, 1.0, 4.0)
+        check.interval(f"{where}.corners", self.corners)
+        for count in self.corners:
+            check.integer(f"{where}.corners", count, 4, 12)
+        given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
+        if len(given) > 1 or (self.joints and not self.polygon):
+            what = given[-1] if len(given) > 1 else "joints"
+            mend = "give one of band, polygon with joints, blocks"
+            raise BadInput(f"{where}.{what}", getattr(self, what), mend)
+        if self.band is not None:
+            check.interval(f"{where}.band", self.band, open_low=True)
+        elif self.blocks:
+            self._check_blocks()
+        else:
+            self._check_mass()
+
+    def _check_mass(self) -> None:
+        convex_polygon(f"{self.words}.polygon", self.polygon)
+        rock = self.area
+        least = rock / MOST_BLOCKS
+        if not least <= self.block_area <= rock:
+            mend = f"give {least:g} to {rock:g} m2: the mass has {rock:g} m2"
+            raise BadInput(f"{self.words}.block_area", self.block_area, mend)
+        if len({j.dip_deg for j in self.joints}) < 2:
+            mend = "give at least two sets of different dip"
+            raise BadInput(f"{self.words}.joints", self.joints, mend)
+
+    def _check_blocks(self) -> None:
+        rocks = [shapely.Polygon(simple_polygon(where, b)) for where, b in self.pieces()]
+        for i, j in shapely.STRtree(rocks).query(rocks, predicate="intersects").T:
+            common = overlap(rocks[i], rocks[j]) if i < j else 0.0
+            if common > NEAR * rocks[j].length:
+                raise BadInput(
+                    f"{self.words}.blocks[{j}]",
+                    self.blocks[j],
+                    f"move it: {common:g} m2 of it are in block {i}",
+                )
+
+    @property
+    def words(self) -> str:
+        """What errors call it."""
+        return f"sources.{self.name}"
+
+    def pieces(self) -> list[tuple[str, tuple[Point, ...]]]:
+        """Return what errors call it and the corners [m] of each polygon, none of a band."""
+        if self.blocks:
+            return [(f"{self.words}.blocks[{i}]", block) for i, block in enumerate(self.blocks)]
+        return [(f"{self.words}.polygon", self.polygon)] if self.polygon else []
+
+    @property
+    def outline(self) -> Floats:
+        """Corners of the convex hull of a mass or of given blocks, (n, 2) [m]."""
+        corners = shapely.MultiPoint([point for _, piece in self.pieces() for point in piece])
+        return np.array(corners.convex_hull.exterior.coords)[:-1]
+
+    @property
+    def area(self) -> float:
+        """Area of a mass or of given blocks [m2], 0 of a band."""
+        return float(sum(shapely.Polygon(piece).area for _, piece in self.pieces()))
+
+    @property
+    def mean_block_area(self) -> float:
+        """Mean area of the blocks of a mass or of given blocks [m2]."""
+        return self.area / len(self.blocks) if self.blocks else self.block_area
+
+    def cut(self, rng: np.random.Generator) -> list[Floats]:
+        """Return the corners of the blocks of a mass [m], or those given; `rng` draws the joints.
+
+        Not of a band, whose blocks lie on the ground of a site: see `rigdda.model.boulders`.
+        """
+        if self.blocks:
+            return [np.array(block) for block in self.blocks]
+        return cut(shapely.Polygon(self.polygon), self.joints, self.block_area, rng)

@@ -1,0 +1,253 @@
+"""The recorded history of a simulation."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.barriers import GravityWall, from_table, to_tables
+from rigdda.dynamics.gauges import CROSSING, FAILED, HIT
+from rigdda.errors import BadInput
+from rigdda.files import atomic
+from rigdda.model.loads import BodyForce, LineLoad, PointLoad
+from rigdda.model.scene import Block, Scene, Surface
+from rigdda.model.supports import Bolt, FixedPoint
+from rigdda.model.terrain import Terrain
+
+if TYPE_CHECKING:
+    from rigdda.results.replay import Marks
+
+LOADS = {kind.__name__: kind for kind in (PointLoad, LineLoad, BodyForce)}
+SUPPORTS = {kind.__name__: kind for kind in (FixedPoint, Bolt)}
+
+EVENT = np.dtype(
+    [
+        ("time", "f8"),
+        ("kind", "i4"),
+        ("block", "i4"),
+        ("target", "i4"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("height", "f8"),
+        ("speed", "f8"),
+        ("energy", "f8"),
+    ]
+)
+"""One event. block: N + i for barrier i, a gravity wall that hits or breaks another one. target:
+index of the barrier or station. x, y: contact point of a hit or a failure, centroid at a crossing
+[m]. height: of that point above the highest ground there, above 0 where there is none [m]. speed:
+of the centroid [m/s]. energy: translational and rotational, just before a hit or a failure [J]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """What a simulation recorded: N blocks, T frames, B barriers.
+
+    Parameters
+    ----------
+    scene : Scene
+        What was simulated.
+    times : (T,) array
+        Times of the frames [s].
+    poses, velocities : (T, N, 3) array
+        x, y, theta of the centroids [m, m, rad] and their rates [m/s, m/s, rad/s].
+    events : (E,) structured array
+        Hits and crossings in order of time, see `EVENT`.
+    absorbed : (B,) array
+        Energy that each barrier took from the blocks [J], as `BarrierOutcome` says.
+    thrust : (B,) array
+        Greatest mean over a second of the thrust on each barrier [N], as `BarrierOutcome` says.
+    watch_energy : (N,) array
+        Largest kinetic energy of each block while its centroid was in the watched interval [J].
+    extent : (N, 2) array
+        Least and greatest chainage that the circle about each block came to [m].
+    barrier_poses : (T, B, 3) array
+        x, y, theta of the centroid of each barrier's outline; only gravity walls move.
+    """
+
+    scene: Scene
+    times: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    events: NDArray[np.void]
+    absorbed: NDArray[np.float64]
+    thrust: NDArray[np.float64]
+    watch_energy: NDArray[np.float64]
+    extent: NDArray[np.float64]
+    barrier_poses: NDArray[np.float64]
+
+    def _check(self) -> None:
+        """Check that every array is of its shape and finite, and that times rise."""
+        t, n, b = self.times.size, len(self.scene.blocks), len(self.scene.barriers)
+        shapes = {
+            "times": (t,),
+            "poses": (t, n, 3),
+            "velocities": (t, n, 3),
+            "events": self.events.shape[:1],
+            "absorbed": (b,),
+            "thrust": (b,),
+            "watch_energy": (n,),
+            "extent": (n, 2),
+            "barrier_poses": (t, b, 3),
+        }
+        for name, shape in shapes.items():
+            array = getattr(self, name)
+            if array.shape != shape:
+                raise BadInput(f"run file: {name}", array.shape, f"give an array of shape {shape}")
+            wanted = EVENT if name == "events" else np.dtype(float)
+            if array.dtype != wanted or (name != "events" and not np.isfinite(array).all()):
+                raise BadInput(f"run file: {name}", str(array.dtype), "give finite numbers")
+        if t == 0 or (np.diff(self.times) <= 0.0).any():
+            raise BadInput("run file: times", f"{t} frames", "give times that rise")
+
+    def hits(self, barrier: int) -> NDArray[np.void]:
+        """Return the events in which a block hits `barrier`."""
+        return self._of(HIT, barrier)
+
+    def failure(self, barrier: int) -> float:
+        """Return the time at which `barrier` failed, inf if it did not [s]."""
+        failed = self._of(FAILED, barrier)
+        return float(failed["time"][0]) if len(failed) else np.inf
+
+    def outline(self, barrier: int, frame: int = -1) -> NDArray[np.float64]:
+        """Return the (n, 2) corners of a barrier in a frame, see `Scene.outline` [m]."""
+        corners = self.scene.outline(barrier)
+        if not isinstance(self.scene.barriers[barrier], GravityWall):
+            return corners
+        start, (x, y, theta) = self.barrier_poses[0, barrier], self.barrier_poses[frame, barrier]
+        cos, sin = np.cos(theta), np.sin(theta)
+        return (corners - start[:2]) @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
+
+    @property
+    def ground(self) -> Terrain | None:
+        """The ground at the end: without the embankments that were pushed away."""
+        failed = self.events["target"][self.events["kind"] == FAILED]
+        return self.scene.ground_without(failed)
+
+    def crossings(self, station: int) -> NDArray[np.void]:
+        """Return the events in which a block first passes `station`."""
+        return self._of(CROSSING, station)
+
+    def _of(self, kind: int, target: int) -> NDArray[np.void]:
+        return self.events[(self.events["kind"] == kind) & (self.events["target"] == target)]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the run as .npz; `load` gives back exactly the same numbers."""
+        with atomic(path) as part, part.open("wb") as file:
+            np.savez_compressed(
+                file,
+                scene=np.frombuffer(scene_to_json(self.scene), dtype=np.uint8),
+                times=self.times,
+                poses=self.poses,
+                velocities=self.velocities,
+                events=self.events,
+                absorbed=self.absorbed,
+                thrust=self.thrust,
+                watch_energy=self.watch_energy,
+                extent=self.extent,
+                barrier_poses=self.barrier_poses,
+            )
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Run:
+        """Read a run that `save` wrote.
+
+        Raises
+        ------
+        BadInput
+            If the file is missing or is not a run.
+        """
+        if not Path(path).is_file():
+            raise BadInput("run file", str(path), "name an existing .npz file")
+        try:
+            with np.load(path) as stored:
+                data = {name: stored[name] for name in stored.files}
+            scene = scene_from_json(data.pop("scene").tobytes())
+            run = cls(scene=scene, **data)
+        except (
+            KeyError, ValueError, TypeError, AttributeError, EOFError, OSError,
+            NotImplementedError, RecursionError, zlib.error, zipfile.BadZipFile,
+            msgspec.MsgspecError,
+        ):  # fmt: skip
+            raise BadInput("run file", str(path), "name a .npz file that Run.save wrote") from None
+        run._check()
+        return run
+
+    def to_rerun(self, path: str | os.PathLike[str], marks: Marks | None = None) -> None:
+        """Write the run as a rerun recording (.rrd): geometry once, poses and scalars by column.
+
+        Parameters
+        ----------
+        path : path
+            The .rrd file.
+        marks : Marks, optional
+            What the scene does not know: the road and words about the episode.
+        """
+        from rigdda.results.replay import write_rerun
+
+        write_rerun(self, path, marks)
+
+
+def scene_to_json(scene: Scene) -> bytes:
+    """Return a scene as JSON; numbers survive exactly."""
+    return msgspec.json.encode(
+        {
+            "terrain": scene.terrain
+            and {
+                "points": scene.terrain.points.tolist(),
+                "surfaces": scene.terrain.surfaces,
+            },
+            "blocks": [
+                {
+                    "vertices": b.vertices.tolist(),
+                    "density": b.density,
+                    "surface": b.surface,
+                    "velocity": b.velocity,
+                    "fixed": b.fixed,
+                }
+                for b in scene.blocks
+            ],
+            "surfaces": scene.surfaces,
+            "barriers": to_tables(scene.barriers),
+            "interfaces": [[*pair, surface] for pair, surface in scene.interfaces.items()],
+            "loads": [[type(load).__name__, load] for load in scene.loads],
+            "supports": [[type(support).__name__, support] for support in scene.supports],
+            "base_motion": scene.base_motion is not None and scene.base_motion.tolist(),
+            "gravity": scene.gravity,
+            "damping": scene.damping,
+            "damping_when": scene.damping_when,
+        }
+    )
+
+
+def scene_from_json(text: bytes) -> Scene:
+    """Return the scene that `scene_to_json` wrote.
+
+    Raises
+    ------
+    BadInput
+        If a value in it is not sound.
+    """
+    data = msgspec.json.decode(text)
+    terrain = data.pop("terrain")
+    return Scene(
+        terrain=terrain and Terrain(**terrain),
+        blocks=tuple(Block(**b) for b in data.pop("blocks")),
+        surfaces={name: Surface(**s) for name, s in data.pop("surfaces").items()},
+        barriers=tuple(
+            from_table(f"barriers[{i}]", table) for i, table in enumerate(data.pop("barriers"))
+        ),
+        interfaces={(a, b): Surface(**s) for a, b, s in data.pop("interfaces")},
+        loads=tuple(LOADS[name](**load) for name, load in data.pop("loads")),
+        supports=tuple(SUPPORTS[name](**support) for name, support in data.pop("supports")),
+        base_motion=data.pop("base_motion") or None,
+        **data,
+    )

@@ -21,7 +21,7 @@ import envs
 import rigdda
 from envs import DesignProblem, Evaluation
 from rigdda import Layout, Outcome, __version__
-from rigdda.dynamics.kernel import source_hash
+from rigdda.kernel import source_hash
 
 CONSTANTS = {"Infinity": math.inf, "-Infinity": -math.inf, "NaN": math.nan}
 """Constants of JSON lines: an interval may have no end, an event no release. One NaN for all, so

@@ -25,8 +25,8 @@ from envs.intervals import Known
 from envs.memory import Memory
 from envs.samples import Sample
 from rigdda import Outcome, Site
-from rigdda.dynamics.kernel import cache_directory
 from rigdda.files import atomic
+from rigdda.kernel import cache_directory
 
 SEEDS = 2**33
 """First seed of the releases without barriers that a site is known by. Episodes score releases of

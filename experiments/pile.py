@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
 from rigdda.dynamics.assembly.island import assemble_island
 from rigdda.dynamics.islands import find_islands, pair_blocks
-from rigdda.dynamics.kernel import entry_kernel
 from rigdda.dynamics.records import CONTACTS, Bodies, Contacts, Matrix, System, Work
 from rigdda.geometry import polygon_properties
+from rigdda.kernel import entry_kernel
 from rigdda.model.scene import Surface
 from rigdda.validation.scenes import GRAVITY, box
 

@@ -19,8 +19,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from rigdda.dynamics.kernel import source_hash
 from rigdda.files import atomic
+from rigdda.kernel import source_hash
 
 RESULTS = Path("experiments/results")
 """Where results are recorded; quick ones go into its folder `quick`."""

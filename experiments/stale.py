@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 
 from experiments.script import KERNELS, RESULTS, made_by
-from rigdda.dynamics.kernel import source_hash
+from rigdda.kernel import source_hash
 
 
 def stale(folder: Path) -> list[Path]:

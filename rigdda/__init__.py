@@ -13,6 +13,7 @@ from rigdda.barriers import (
     Wall,
 )
 from rigdda.barriers.files import load_layout, save_layout
+from rigdda.dynamics.run import Run
 from rigdda.dynamics.simulation import Simulation, simulate_many
 from rigdda.errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from rigdda.model.economy import Bill, Consequences, Prices
@@ -26,7 +27,6 @@ from rigdda.model.supports import Bolt, FixedPoint
 from rigdda.model.terrain import Terrain
 from rigdda.release import release, release_many, release_outcome
 from rigdda.results.outcome import BarrierOutcome, Outcome
-from rigdda.results.run import Run
 
 __version__ = "0.1.0"
 

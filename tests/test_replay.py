@@ -18,11 +18,11 @@ from rerun.chunk import RrdReader
 
 from rigdda.barriers import Built, Embankment, Fence, GravityWall
 from rigdda.dynamics.gauges import FAILED
+from rigdda.dynamics.run import CROSSING, EVENT, HIT, Run
 from rigdda.errors import BadInput, Error
 from rigdda.model.scene import Block, Scene, Surface, Terrain, Wall
 from rigdda.results import replay
 from rigdda.results.replay import Marks, open_viewer
-from rigdda.results.run import CROSSING, EVENT, HIT, Run
 from rigdda.results.states import states
 
 GRAVITY = 9.81
@@ -309,5 +309,5 @@ def test_save_and_load_is_exact(run: Run, tmp_path: Path) -> None:
 
 
 def test_the_core_does_not_import_rerun() -> None:
-    code = "import sys, rigdda.results.run; sys.exit('rerun' in sys.modules)"
+    code = "import sys, rigdda.dynamics.run; sys.exit('rerun' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

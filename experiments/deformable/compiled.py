@@ -10,7 +10,7 @@ from typing import Any
 import numba
 from numba.core import config
 
-from rigdda.dynamics.kernel import cache_directory
+from rigdda.kernel import cache_directory
 
 
 def entry(function: Callable[..., Any]) -> Any:

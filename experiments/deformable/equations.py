@@ -13,8 +13,8 @@ from experiments.deformable.submatrices import (
     set_inertia,
 )
 from rigdda.dynamics.constants import OPEN, STICK
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Floats, Matrix, Outlines, Parameters
+from rigdda.kernel import kernel
 
 
 class Solid(NamedTuple):

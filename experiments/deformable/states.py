@@ -10,8 +10,8 @@ from rigdda.dynamics.constants import (
     SLIP,
     STICK,
 )
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Contact
+from rigdda.kernel import kernel
 
 
 @kernel

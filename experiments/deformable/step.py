@@ -12,7 +12,6 @@ from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
 from rigdda.dynamics.correction import keep_memory, place_edges
 from rigdda.dynamics.islands import find_islands, pair_blocks
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,
     CONTACTS,
@@ -33,6 +32,7 @@ from rigdda.dynamics.records import (
     Work,
 )
 from rigdda.dynamics.step import copy_index, detect
+from rigdda.kernel import kernel
 
 
 @kernel

@@ -9,7 +9,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from rigdda.dynamics.kernel import kernel
+from rigdda.kernel import kernel
 
 
 @intrinsic

@@ -22,7 +22,6 @@ from rigdda.dynamics.constants import (
 from rigdda.dynamics.contact.narrow_phase import following, over_edge
 from rigdda.dynamics.gauges import barrier_contact
 from rigdda.dynamics.islands import root
-from rigdda.dynamics.kernel import entry_kernel, inlined, kernel
 from rigdda.dynamics.records import (
     Bodies,
     Body,
@@ -35,6 +34,7 @@ from rigdda.dynamics.records import (
     Outlines,
     Parameters,
 )
+from rigdda.kernel import entry_kernel, inlined, kernel
 
 
 @inlined

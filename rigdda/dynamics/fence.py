@@ -39,7 +39,6 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.gauges import FAILED, write_event
-from rigdda.dynamics.kernel import kernel, stage
 from rigdda.dynamics.motion import kinetic_energy
 from rigdda.dynamics.open_close import open_close
 from rigdda.dynamics.records import (
@@ -55,6 +54,7 @@ from rigdda.dynamics.records import (
     System,
 )
 from rigdda.dynamics.sleep import wake_island
+from rigdda.kernel import kernel, stage
 
 
 @kernel

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rigdda.dynamics.constants import ASLEEP, AWAKE, LATELY, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
 from rigdda.dynamics.correction import account_block, apply_forces, move_block, place_corners
 from rigdda.dynamics.gauges import barrier_contact
-from rigdda.dynamics.kernel import kernel, stage
 from rigdda.dynamics.motion import retire, top_speed
 from rigdda.dynamics.records import (
     Bodies,
@@ -31,6 +30,7 @@ from rigdda.dynamics.records import (
     Parameters,
     Polygons,
 )
+from rigdda.kernel import kernel, stage
 
 
 @kernel

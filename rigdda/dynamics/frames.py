@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Bodies
+from rigdda.kernel import kernel
 
 PIECE = 64
 """Frames that are kept between two calls of the kernels; what a progress bar waits for."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.constants import APART, AWAKE, END_CHECK, OPEN
-from rigdda.dynamics.kernel import inlined, kernel
 from rigdda.dynamics.motion import kinetic_energy
 from rigdda.dynamics.records import (
     STEPS,
@@ -18,6 +17,7 @@ from rigdda.dynamics.records import (
     Islands,
     Parameters,
 )
+from rigdda.kernel import inlined, kernel
 
 HIT, CROSSING, FAILED = 0, 1, 2
 """Kinds of event: a block touches a barrier; a block's centroid first passes a station; a block

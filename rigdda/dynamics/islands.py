@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.constants import AWAKE
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Ints, Islands, Matrix
+from rigdda.kernel import kernel
 
 
 @kernel

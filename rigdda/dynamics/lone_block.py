@@ -25,7 +25,6 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.contact.law import prepare, pull_on, strike, time_of_impact
 from rigdda.dynamics.contact.transfer import recall
-from rigdda.dynamics.kernel import inlined, kernel
 from rigdda.dynamics.records import (
     Bodies,
     Contact,
@@ -37,6 +36,7 @@ from rigdda.dynamics.records import (
     Motion,
     Parameters,
 )
+from rigdda.kernel import inlined, kernel
 
 
 @kernel

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.constants import RETIRED
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Body
+from rigdda.kernel import kernel
 
 
 @kernel

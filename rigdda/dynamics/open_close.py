@@ -44,7 +44,6 @@ from rigdda.dynamics.constants import (
 from rigdda.dynamics.contact.joint import break_joint
 from rigdda.dynamics.contact.law import set_shock
 from rigdda.dynamics.islands import pair_blocks
-from rigdda.dynamics.kernel import inlined, kernel
 from rigdda.dynamics.linear.direct import solve_block, solve_two_blocks
 from rigdda.dynamics.linear.pcg import solve_pcg
 from rigdda.dynamics.linear.relaxation import relax_forces, take_forces
@@ -68,6 +67,7 @@ from rigdda.dynamics.records import (
     Scratch,
     System,
 )
+from rigdda.kernel import inlined, kernel
 
 NONE, MOVED, LOCKED = 0, 1, 2
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Parameters, Shaking
+from rigdda.kernel import kernel
 
 
 @kernel

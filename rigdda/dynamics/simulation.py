@@ -35,7 +35,6 @@ from rigdda.dynamics.constants import (
 from rigdda.dynamics.contact.links import pull_of_bolts
 from rigdda.dynamics.frames import frame_of, no_frames, pieces
 from rigdda.dynamics.gauges import FAILED
-from rigdda.dynamics.kernel import Direct
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.dynamics.pack.again import Template
 from rigdda.dynamics.pack.ground import pack_ground
@@ -54,11 +53,12 @@ from rigdda.dynamics.records import (
     STEPS,
     SWEEPS,
 )
+from rigdda.dynamics.run import EVENT, Run
 from rigdda.dynamics.step import advance
 from rigdda.errors import BadInput, Diverged, SoftContacts
+from rigdda.kernel import Direct
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
-from rigdda.results.run import EVENT, Run
 
 CONTACT = np.dtype(
     [

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from rigdda.dynamics.constants import ASLEEP, AWAKE, GROWN, SLEEP_SPEED, SLEEP_TIME, WAKE_SPEED
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.motion import top_speed
 from rigdda.dynamics.records import Bodies, Ints, Islands, Parameters
+from rigdda.kernel import kernel
 
 
 @kernel

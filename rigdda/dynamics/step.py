@@ -40,7 +40,6 @@ from rigdda.dynamics.flight import fly, keep_touch, land, take_off
 from rigdda.dynamics.frames import keep_frame
 from rigdda.dynamics.gauges import barrier_contact, is_over, note_hits, note_passage
 from rigdda.dynamics.islands import find_islands
-from rigdda.dynamics.kernel import entry_kernel, kernel, stage
 from rigdda.dynamics.lone_block import begin_part, recall_all, takes_parts
 from rigdda.dynamics.motion import retire, top_speed
 from rigdda.dynamics.open_close import open_close
@@ -73,6 +72,7 @@ from rigdda.dynamics.records import (
 from rigdda.dynamics.shaking import set_field
 from rigdda.dynamics.sleep import wake_neighbours, watch_quiet
 from rigdda.dynamics.thrust import press, press_asleep, watch_thrust
+from rigdda.kernel import entry_kernel, kernel, stage
 
 
 @kernel

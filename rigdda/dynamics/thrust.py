@@ -17,8 +17,8 @@ import math
 from rigdda.dynamics.constants import ASLEEP, BOLT, IMPACT, OPEN, PIN, RETIRED, SHOCK, TERRAIN
 from rigdda.dynamics.gauges import FAILED, barrier_contact, write_event
 from rigdda.dynamics.islands import root
-from rigdda.dynamics.kernel import kernel, stage
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Gauges, Islands, Parameters
+from rigdda.kernel import kernel, stage
 
 REST, HITS = 0, 1
 """Contacts of a barrier by which thrust is summed up."""

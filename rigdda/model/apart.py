@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rigdda.dynamics.kernel import Direct, entry_kernel
 from rigdda.errors import BadInput
 from rigdda.geometry import overlap
+from rigdda.kernel import Direct, entry_kernel
 from rigdda.model.terrain import Terrain
 
 FEW = 16

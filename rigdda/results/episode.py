@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import rerun as rr
 import rerun.blueprint as rrb
 
+from rigdda.dynamics.run import Run
 from rigdda.errors import BadInput
 from rigdda.results.replay import PLACEMENT, TIMELINE, Marks, log_run, recording, slope_view
-from rigdda.results.run import Run
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,10 @@ import numpy as np
 
 from rigdda.barriers import Barrier
 from rigdda.dynamics.gauges import CROSSING, FAILED, HIT
+from rigdda.dynamics.run import Run
 from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Scene
 from rigdda.model.site import Site
-from rigdda.results.run import Run
 from rigdda.results.states import STANDS, states
 
 GRAIN = 2.0**40

@@ -26,11 +26,11 @@ from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.barriers import describe
+from rigdda.dynamics.run import CROSSING, Run
 from rigdda.errors import BadInput, Error
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Scene
-from rigdda.results.run import CROSSING, Run
 from rigdda.results.states import STANDS, states
 
 Floats = NDArray[np.float64]

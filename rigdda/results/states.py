@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigdda.results.run import Run
+from rigdda.dynamics.run import Run
 
 STANDS = "stands"
 

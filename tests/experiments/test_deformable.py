@@ -9,8 +9,8 @@ from experiments.deformable import cases
 from experiments.deformable.model import Deformable, Rock
 from experiments.deformable.submatrices import area_moments, set_inertia
 from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
-from rigdda.dynamics.kernel import from_python
 from rigdda.geometry import polygon_properties
+from rigdda.kernel import from_python
 from rigdda.validation.scenes import FLAT, box, ngon
 
 PLAIN = {"rock": Surface(30.0, restitution=None)}

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from rigdda import Block, Scene, Settings
 from rigdda.dynamics.contact.narrow_phase import NEVER, face_of_contact
 from rigdda.dynamics.correction import place_all_corners
-from rigdda.dynamics.kernel import from_python
 from rigdda.dynamics.pack import Arrays, pack
+from rigdda.kernel import from_python
 from rigdda.validation.scenes import rock
 
 SLACK = 0.01

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigdda.dynamics.kernel import kernel
+from rigdda.kernel import kernel
 
 
 @kernel

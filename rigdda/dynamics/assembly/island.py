@@ -7,8 +7,8 @@ import math
 from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.dynamics.assembly.springs import add_block, add_force, normal_row, shear_row
 from rigdda.dynamics.constants import APART, BOLT, OPEN, SLIP, SMALL_ISLAND, STICK
-from rigdda.dynamics.kernel import inlined, kernel
 from rigdda.dynamics.records import Bodies, Body, Contact, Contacts, Islands, Matrix, Parameters
+from rigdda.kernel import inlined, kernel
 
 
 @kernel

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Contact
+from rigdda.kernel import kernel
 
 
 @kernel

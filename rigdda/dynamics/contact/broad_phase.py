@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from rigdda.dynamics.constants import AWAKE, LATELY, RETIRED
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.motion import top_speed
 from rigdda.dynamics.records import Bodies, Boxes, Parameters, Polygons
+from rigdda.kernel import kernel
 
 
 @kernel

@@ -7,8 +7,8 @@ its length; a contact that bears more than its strength loses all of it.
 from __future__ import annotations
 
 from rigdda.dynamics.constants import SAME_FACE
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Contact, Contacts, Parameters
+from rigdda.kernel import kernel
 
 
 @kernel

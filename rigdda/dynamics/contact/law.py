@@ -56,8 +56,8 @@ from rigdda.dynamics.constants import (
     TOUCHING,
     UNLOADED,
 )
-from rigdda.dynamics.kernel import inlined, kernel
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Parameters
+from rigdda.kernel import inlined, kernel
 
 
 @kernel

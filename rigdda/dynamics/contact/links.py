@@ -18,8 +18,8 @@ from rigdda.dynamics.contact.law import (
     point_velocity,
 )
 from rigdda.dynamics.correction import place_corners
-from rigdda.dynamics.kernel import entry_kernel, kernel
 from rigdda.dynamics.records import Bodies, Body, Contact, Link, Links, Outlines, Parameters
+from rigdda.kernel import entry_kernel, kernel
 
 
 @kernel

@@ -15,8 +15,8 @@ leads through a neighbouring part, and that one has the contact.
 from __future__ import annotations
 
 from rigdda.dynamics.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
-from rigdda.dynamics.kernel import inlined, kernel
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Corners, Outlines, Parameters
+from rigdda.kernel import inlined, kernel
 
 NEVER = 1e3
 """Time of entry, over the step, of what comes nearer no faster than what is at rest may."""

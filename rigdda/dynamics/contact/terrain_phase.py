@@ -11,8 +11,8 @@ import math
 
 from rigdda.dynamics.constants import LEAN, SAME_FACE, TERRAIN
 from rigdda.dynamics.contact.narrow_phase import add_contact, following, keep_nearest
-from rigdda.dynamics.kernel import inlined, kernel
 from rigdda.dynamics.records import Bodies, Box, Contacts, Ground, Outlines, Parameters
+from rigdda.kernel import inlined, kernel
 
 NEVER = 2.0
 """Time of entry, over the step, of what does not come nearer or not soon."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 from numpy.typing import NDArray
 
 from rigdda.dynamics.constants import NEW, OPEN, SAME_FACE, SAME_NORMAL, TERRAIN
-from rigdda.dynamics.kernel import inlined, kernel
 from rigdda.dynamics.records import Contact, Contacts
+from rigdda.kernel import inlined, kernel
 
 
 @kernel

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Matrix
+from rigdda.kernel import kernel
 
 
 @kernel

@@ -44,7 +44,6 @@ from rigdda.dynamics.constants import (
     SPREADING,
     SUBSTEP,
 )
-from rigdda.dynamics.kernel import arithmetic_kernel, inlined, kernel
 from rigdda.dynamics.records import (
     Bodies,
     Body,
@@ -57,6 +56,7 @@ from rigdda.dynamics.records import (
     Parameters,
     Rows,
 )
+from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
 # columns of rows.row, first what a visit to an open contact needs: the row of the contact for a and
 # b, times h over the roots of their inertia [(m/N)^1/2]; normal and shear force [N]

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.records import Matrix, Scratch
+from rigdda.kernel import kernel
 
 
 @kernel

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rigdda.dynamics.kernel import kernel
 from rigdda.dynamics.linear.direct import solve_block
 from rigdda.dynamics.records import Matrix, Scratch
+from rigdda.kernel import kernel
 
 
 @kernel

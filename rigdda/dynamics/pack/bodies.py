@@ -18,7 +18,6 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.correction import place_corners, polygon_row
 from rigdda.dynamics.correction import polygons as polygons_of
-from rigdda.dynamics.kernel import Direct, entry_kernel
 from rigdda.dynamics.records import (
     BODY,
     CORNER,
@@ -31,6 +30,7 @@ from rigdda.dynamics.records import (
     Outlines,
 )
 from rigdda.geometry import convex_parts, moments, polygon_properties, turns
+from rigdda.kernel import Direct, entry_kernel
 from rigdda.model.scene import Block, Scene
 from rigdda.model.supports import FixedPoint
 

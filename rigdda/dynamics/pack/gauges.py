@@ -14,8 +14,8 @@ from rigdda.dynamics.records import (
     Bodies,
     Gauges,
 )
+from rigdda.dynamics.run import EVENT
 from rigdda.model.scene import Scene, Terrain
-from rigdda.results.run import EVENT
 
 
 def pack_gauges(

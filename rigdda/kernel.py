@@ -21,9 +21,9 @@ from numba.core import config
 def source_hash() -> str:
     """Return a hash of numba's version and of the sources that hold kernels or their constants."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         source = path.read_bytes()
-        if b"dynamics.kernel import" in source or path.name in ("constants.py", "records.py"):
+        if b"rigdda.kernel import" in source or path.name in ("constants.py", "records.py"):
             digest.update(source)
     return digest.hexdigest()[:16]
 

@@ -221,7 +221,7 @@ def test_thrust_of_what_rests_is_that_of_statics(slope_deg):
 def test_it_fails_under_what_rests_against_it(share):
     resistance = 4 * 2600.0 * 9.81 * math.tan(math.radians(30.0)) / share
     fence = Fence(0.0, 4.0, 4.0 * resistance, elongation=4.0)
-    assert fence.resistance == pytest.approx(resistance)
+    assert fence.bears == pytest.approx(resistance)
     run, _ = leaning(30.0, fence)
     assert math.isfinite(run.failure(0)) == (share > 1.0)
     assert run.absorbed[0] < 0.5 * fence.capacity
@@ -234,7 +234,7 @@ def test_classes():
     assert fence.for_width(2.0) == Fence(5.0, 4.0, 5e5, elongation=4.5)
     assert fence.for_width(25.0).capacity == 1e5
     given = Fence(5.0, 4.0, 2e5)
-    assert given.for_width(3.0) is given and math.isinf(given.resistance)
+    assert given.for_width(3.0) is given and math.isinf(given.bears)
     lowest, heights, elongations = np.array(list(FENCE_CLASSES.values())).T
     assert (np.diff(lowest) >= 0.0).all() and (lowest < heights).all()
     assert (np.diff(heights) >= 0.0).all() and (np.diff(elongations) > 0.0).all()

@@ -17,7 +17,8 @@ class Reuse:
     """Counts what need not be simulated again."""
 
     def __init__(self, site: Site):
-        alone = [event for event in site.events if event.area and event.number == (1, 1)]
+        bands = {source.name for source in site.sources if source.band is not None}
+        alone = [e for e in site.events if e.source in bands and e.number == (1, 1)]
         self._alone = {event.name for event in alone}
         self._known: dict[tuple[object, ...], set[int]] = {}
 

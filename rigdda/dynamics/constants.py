@@ -16,9 +16,6 @@ START_STIFFNESS = 1e3
 """Factor of that in the first step of a simulation [-]: the blocks of a stack give way one after
 the other, and a tall one must start without a jolt."""
 
-IMPACT_SPEED = 0.05
-"""Least closing speed of an impact [m/s], below it a contact closes as a spring at rest."""
-
 IMPACT_STEPS = 3.0
 """Least closing speed of an impact in units of g dt [-]: what gravity alone gives a resting block
 in a few steps is no impact."""
@@ -69,29 +66,8 @@ RETARDATION_TIME = 5e-3
 the force follows the velocity at their end. Without it an arch near its limit vibrates in steps of
 0.1 ms until it falls."""
 
-TOUCHING = 1e-5
-"""Gap over wanted penetration up to which a contact that closes counts as touching [-]."""
-
 FRICTION_TOLERANCE = 2e-2
 """Relative change of a friction limit between open-close iterations that counts as settled [-]."""
-
-OPENING_TOLERANCE = 1e-6
-"""Tension, relative to the weight a contact carries, that does not open it [-]."""
-
-FEW_MOVING = 16
-"""An island of which less than one contact in so many still changes, is iterated on,"""
-
-PATIENCE = 8
-"""up to so many times the open-close iterations: in an arch joints open one after the other."""
-
-ONE_BY_ONE = 3
-"""Open-close iterations after which one contact at a time changes in a small island. Where all
-that are at odds change at once they may go on in a circle; one by one, lowest first, they do not
-(Murty's principal pivoting, for a matrix whose principal minors are positive)."""
-
-FLIPS = 3
-"""A contact that changed between stick and slip, or open and closed, this often in one step keeps
-its state. Nearly every step that does not converge has one such contact."""
 
 FAST_FALL = 1.5
 """Speed of an island above which it is relaxed in several substeps, over what gravity gives in a
@@ -116,7 +92,7 @@ LEAST_SUBSTEPS = 3
 
 MOST_SWEEPS = 100
 """Most sweeps over the contacts of an island in a substep, where they change by more than the
-tolerance: `Settings.sweep_tolerance`."""
+tolerance: `Settings.sweep_tolerance`, or less."""
 
 LARGE_ISLAND = 128
 """Blocks of an island from which on it is used whole; less in proportion in smaller ones. Where a
@@ -127,23 +103,13 @@ a step took half as much time again."""
 RELAXATION_SHARE = 0.2
 """Greatest such tolerance over the speed of the island [-], so that slow ones come to rest."""
 
-SLOW_SWEEPS = 100
-"""Most sweeps over an island that is relaxed since it did not settle as a whole,"""
-
 SLOW_SHARE = 1.0 / 60.0
-"""and the change of a contact's velocity at which they stop, over its speed [-]. In proportion to
-the speed alone an error of one sign would let the speed grow from nothing, so"""
-
-LEAST_RELAXATION = 1e-3
-"""of an island at rest it is this share of what gravity gives in a step, g dt [-]."""
+"""Greatest such tolerance over the speed of an island that did not settle as a whole, and is
+relaxed in one substep [-]."""
 
 RELAXATION_STIFFNESS = 6e3
 """Stiffness of a contact in a single substep times its flexibility there [-]: a blow on the foot of
 a train of blocks leaves them closing at the blow over this."""
-
-REACH = 1.0
-"""Speed at which an open contact may begin to close, over the greatest of its island [-]: one that
-cannot close at that is not visited. With a quarter of it contacts sink up to twice as deep."""
 
 LAYERS = 64
 """Layers in which the contacts of an island are ordered by height for relaxation."""
@@ -163,9 +129,6 @@ blocks to the left of the diagonal. Longer, and conjugate gradients are cheaper.
 SMALL_ISLAND = 2
 """Most blocks of an island that is solved as a whole at any speed."""
 
-ENERGY_HALVINGS = 4
-"""Times restitution is halved when an eccentric impact would gain energy; then it is plastic."""
-
 BREAK_TOLERANCE = 1e-3
 """Share of what it has left by which a failing fence may miss it [-]."""
 
@@ -183,30 +146,9 @@ SAME_NORMAL = 0.7
 SAME_FACE = 0.999
 """Cosine above which two edges, or two contacts of one vertex, count as in one line [-]."""
 
-INNER_EDGE = 0.1
-"""Depth, over the slack, that an edge inside a body counts deeper when the face of contact is
-sought, so that on a tie a real edge is the face [-]."""
-
 OTHER_FACE = 0.02
 """Depth, over the slack, by which a face of the second body must be the better one [-]: parallel
 faces do not alternate."""
-
-WHIP = 3.0
-"""Speed of a corner after another one was hit, over the speed of the hit, up to which contacts are
-foreseen [-]: an eccentric impact makes the far end of a long block more than twice as fast."""
-
-LATELY = 0.7
-"""Share of a body's greatest speed of late that counts on in the next step [-]. In a pile blocks
-are stopped and driven on step by step: the path of one that stands for a moment is not nothing."""
-
-SLIDING = 0.01
-"""Share of what gravity adds to a speed in a step at which a contact that slipped still slides [-].
-One that hardly does may as well stick now; one or two blocks that begin with the wrong friction
-take long. In a pile at rest many are at their limit, and begin as they ended."""
-
-LEAN = 0.05
-"""Angle by which an edge may lean beyond the sides of a ridge that it rests on [rad], besides what
-it turns by in the step: along a side, rounding and the next blow decide which way it leans."""
 
 SLACK_RATIO = 5e-3
 """Distance over block size within which contacts are candidates even at rest [-]."""
@@ -220,9 +162,6 @@ SLEEP_TIME = 0.5
 GROWN = 0.1
 """Growth of its speed, over the speed below which it counts as quiet, from which on a block is not
 [-]. Without it what is 0.2 deg too steep to stand fell asleep before it slid."""
-
-WAKE_SPEED = 0.05
-"""Speed of a block that wakes a sleeping one beside it [m/s]."""
 
 APART = 0.1
 """Time since the last touch after which a block is apart [s]: from a barrier, so that it may hit it

@@ -184,7 +184,7 @@ def aim(
             c.met, c.free = int(c.state != OPEN), SPEED_LIMIT
         elif c.met == 1 and c.free == SPEED_LIMIT:
             c.free = max(c.un - 2.0 * along(normal_row(c, True), d[islands.slot[c.a]]) / dt, 0.0)
-        c.kind, c.flips = IMPACT, 0
+        c.kind = IMPACT
         c.state = STICK if c.free < SPEED_LIMIT else OPEN
         c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
         c.bias = -dt * (share * c.free if c.free < SPEED_LIMIT else SPEED_LIMIT)

@@ -17,24 +17,17 @@ from rigdda.dynamics.constants import (
     BLOCK_PCG,
     BOLT,
     DIRECT,
-    ENERGY_HALVINGS,
     FAST_FALL,
-    FEW_MOVING,
-    FLIPS,
     FRICTION_TOLERANCE,
     IMPACT,
     MOVING,
-    ONE_BY_ONE,
     OPEN,
-    OPENING_TOLERANCE,
-    PATIENCE,
     PIN,
     PLAIN,
     QUIET_SPEED,
     REST,
     SHOCK_SPEED,
     SHORT_PROFILE,
-    SLIDING,
     SLIP,
     SMALL_ISLAND,
     SOR,
@@ -69,8 +62,6 @@ from rigdda.dynamics.records import (
 )
 from rigdda.kernel import inlined, kernel
 
-NONE, MOVED, LOCKED = 0, 1, 2
-
 
 @inlined
 def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[float, float, float]:
@@ -83,36 +74,28 @@ def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[fl
 
 
 @kernel
-def next_state_of_link(c: Contact, normal: float, shear: float) -> int:
+def next_state_of_link(c: Contact, normal: float, shear: float) -> bool:
     """Let a bolt yield, or no more: SLIP stands for yielding; a pin holds whatever its force."""
     c.normal, c.shear = max(normal, -c.tension), 0.0 if c.kind == BOLT else shear
-    state = SLIP if normal < -c.tension else STICK
-    if state == c.state:
-        return NONE
-    if c.flips >= FLIPS:
-        return LOCKED
-    c.flips += 1
-    c.state = state
-    return MOVED
+    before = c.state
+    c.state = SLIP if normal < -c.tension else STICK
+    return c.state != before
 
 
 @kernel
-def close(c: Contact, normal: float, shear: float, coupled: bool) -> int:
-    """Close a contact that would bear these forces if it stuck; returns MOVED or LOCKED.
+def close(c: Contact, normal: float, shear: float, coupled: bool) -> None:
+    """Close a contact that would bear these forces if it stuck.
 
     Where friction is coupled to the normal force it slips at once if it slides faster than it
     closes: a contact that stuck would be torn open again.
     """
-    if c.flips >= FLIPS:
-        return LOCKED
     c.state = STICK
     if coupled and abs(shear) > c.friction * normal:
         c.state, c.lag = SLIP, shear
-    return MOVED
 
 
 @kernel
-def next_friction(c: Contact, shear: float, tension: float, coupled: bool) -> int:
+def next_friction(c: Contact, shear: float, coupled: bool) -> bool:
     """Let a closed contact whose normal force is set stick or slip: a return mapping.
 
     Where friction is coupled to the normal force a slipping contact is settled if its direction
@@ -121,58 +104,47 @@ def next_friction(c: Contact, shear: float, tension: float, coupled: bool) -> in
     state, limit = c.state, c.friction * c.normal
     c.shear = min(max(shear, -limit), limit)
     if abs(shear) <= limit:
-        if state == STICK:
-            return NONE
-        if c.flips >= FLIPS:
-            return LOCKED
         c.state = STICK
-        c.flips += 1
-        return MOVED
+        return state != STICK
     change = abs(c.shear - c.lag) if state == SLIP else math.inf
     if coupled and state == SLIP and c.shear * math.copysign(1.0, c.lag) >= 0.0:
         change = 0.0
     c.state = SLIP
     c.lag = c.shear
-    return MOVED if change > FRICTION_TOLERANCE * (limit - tension) else NONE
+    return change > FRICTION_TOLERANCE * limit
 
 
 @inlined
-def next_state(c: Contact, normal: float, shear: float, weight: float, coupled: bool) -> int:
-    """Move a contact to the state that its forces ask for; returns NONE, MOVED or LOCKED.
-
-    A contact that has flipped too often is LOCKED: it keeps its state and is at odds with it.
-    """
+def next_state(c: Contact, normal: float, shear: float, coupled: bool) -> bool:
+    """Move a contact to the state that its forces ask for; returns whether it changed."""
     if c.kind == BOLT or c.kind == PIN:
         return next_state_of_link(c, normal, shear)
-    tension = -OPENING_TOLERANCE * weight
     if c.state == OPEN:
-        return NONE if normal <= -tension else close(c, normal, shear, coupled)
+        if normal > 0.0:
+            close(c, normal, shear, coupled)
+        return normal > 0.0
     if c.bond > 0.0:
         strength = c.cohesion + c.friction * max(normal, 0.0)
         if normal >= -c.tension and abs(shear) <= strength:
             c.normal, c.shear = normal, shear
-            return NONE
+            return False
         break_joint(c)
-        if normal >= tension:
-            return MOVED
-    if normal < tension:
+        if normal >= 0.0:
+            return True
+    if normal < 0.0:
         c.state = OPEN
-        c.flips += 1
-        return MOVED
-    c.normal = max(normal, 0.0)
-    return next_friction(c, shear, tension, coupled)
+        return True
+    c.normal = normal
+    return next_friction(c, shear, coupled)
 
 
 @inlined
 def update_states(
     bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int,
-    coupled: bool, one: bool, p: Parameters,
-) -> tuple[int, int]:  # fmt: skip
-    """Move every contact of an island to its next state; returns how many moved and are locked.
-
-    Or only the first that is at odds with its state, as often as it takes.
-    """
-    moved = locked = 0
+    coupled: bool, p: Parameters,
+) -> bool:  # fmt: skip
+    """Move every contact of an island to its next state; returns whether one changed."""
+    changed = False
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         i = islands.slot[c.a]
@@ -181,17 +153,10 @@ def update_states(
         sinking = -after - max(c.gap, 0.0) / p.dt  # what closes a gap is not driven in
         if c.state != OPEN and c.kind == REST and sinking > SHOCK_SPEED:
             set_shock(bodies, c, p)
-            moved += 1
-            continue
-        weight = bodies[c.a].mass * p.gravity
-        if one:
-            c.flips = 0
-        change = next_state(c, normal, shear, weight, coupled)
-        moved += change == MOVED
-        locked += change == LOCKED
-        if one and moved > 0:
-            break
-    return moved, locked
+            changed = True
+        elif next_state(c, normal, shear, coupled):
+            changed = True
+    return changed
 
 
 @kernel
@@ -220,16 +185,10 @@ def solve_states(
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     n = b1 - b0
-    small = n <= SMALL_ISLAND
     for s in range(n):
         body = bodies[islands.block_item[b0 + s]]
         m.d[s, 0], m.d[s, 1], m.d[s, 2] = body.vx * p.dt, body.vy * p.dt, body.omega * p.dt
-    for item in range(c0, c1 if small else c0):
-        c = contacts[islands.contact_item[item]]
-        if c.state == SLIP and c.kind == REST and abs(c.us) < SLIDING * p.gravity * p.dt:
-            c.state = STICK
-    few = 2 + (c1 - c0) // FEW_MOVING
-    for iteration in range(PATIENCE * p.iterations):
+    for _ in range(p.iterations):
         assemble_island(bodies, contacts, m, islands, island, pairs, p)
         counters[ITERATIONS] += 1
         if n == 1:
@@ -239,12 +198,8 @@ def solve_states(
         else:
             counters[SOLVES] += 1
             counters[SOLVER_ITERATIONS] += solve_island(m, scratch, n, pairs, p)
-        one = small and iteration >= ONE_BY_ONE
-        moved, locked = update_states(bodies, contacts, m.d, islands, c0, c1, small, one, p)
-        if moved == 0:
-            return locked == 0
-        if iteration >= p.iterations - 1 and moved > few:
-            return False
+        if not update_states(bodies, contacts, m.d, islands, c0, c1, n <= SMALL_ISLAND, p):
+            return True
     return False
 
 
@@ -329,6 +284,16 @@ def is_bouncing(contacts: Contacts, islands: Islands, low: int, high: int) -> bo
 
 
 @kernel
+def set_rebound(contacts: Contacts, islands: Islands, low: int, high: int, share: float) -> None:
+    """Let the impacts among the contacts low:high rebound with a share of what was asked."""
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.kind == IMPACT:
+            c.bias = share * c.rebound
+            c.state = STICK
+
+
+@kernel
 def let_wait(bodies: Bodies, islands: Islands, low: int, high: int) -> None:
     """Let the island of the blocks low:high be relaxed for a while before it is solved again."""
     for place in range(low, high):
@@ -343,7 +308,9 @@ def open_close(
     """Settle the contacts of an island, with less restitution where impacts would gain energy.
 
     Newton's restitution with friction can raise the kinetic energy of an eccentric impact; a
-    plastic one cannot, since the springs act on the velocity after the step.
+    plastic one cannot, since the springs act on the velocity after the step. The gain is convex in
+    the share of restitution, as energy is quadratic in the velocities: it is at most zero at the
+    share at which the chord from plastic to asked is.
 
     Islands at rest, and those of one or two blocks, are solved as one; the others are relaxed, and
     for a while what did not settle as one.
@@ -364,7 +331,8 @@ def open_close(
     small, quiet = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED
     relaxing = waiting if quiet else not small
     fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
-    for halving in range(ENERGY_HALVINGS + 2):
+    asked = 0.0
+    for attempt in range(4):  # as asked, plastic, between them, and plastic if that gains, too
         if not relaxing:
             relaxing = not solve_states(
                 bodies, contacts, m, system.scratch, islands, island, pairs, p, counters
@@ -373,12 +341,16 @@ def open_close(
                 let_wait(bodies, islands, b0, b1)
         if relaxing:
             relax(bodies, contacts, m, motion, islands, rows, island, p, counters, speed, fast)
-        if not bouncing or impact_work(contacts, m.d, islands, c0, c1) <= 0.0:
+        if not bouncing or attempt == 3:
             break
-        for item in range(c0, c1):
-            c = contacts[islands.contact_item[item]]
-            c.flips = 0
-            if c.kind == IMPACT:
-                c.bias *= 0.5 if halving < ENERGY_HALVINGS else 0.0
-                c.state = STICK
+        work = impact_work(contacts, m.d, islands, c0, c1)
+        if attempt == 0:
+            asked, share = work, 0.0
+        elif attempt == 1:
+            share = work / (work - asked)
+        else:
+            share = 0.0
+        if work <= 0.0 if attempt != 1 else work >= 0.0:
+            break
+        set_rebound(contacts, islands, c0, c1, share)
     return fast and grounded

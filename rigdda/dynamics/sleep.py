@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigdda.dynamics.constants import ASLEEP, AWAKE, GROWN, SLEEP_SPEED, SLEEP_TIME, WAKE_SPEED
+from rigdda.dynamics.constants import ASLEEP, AWAKE, GROWN, SLEEP_SPEED, SLEEP_TIME
 from rigdda.dynamics.motion import top_speed
 from rigdda.dynamics.records import Bodies, Ints, Islands, Parameters
 from rigdda.kernel import kernel
@@ -27,7 +27,7 @@ def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int
     woken = 0
     for q in range(count):
         i, j = pairs[2 * q], pairs[2 * q + 1]
-        if bodies[j].status != ASLEEP or top_speed(bodies[i]) < WAKE_SPEED:
+        if bodies[j].status != ASLEEP or top_speed(bodies[i]) < SLEEP_SPEED:
             continue
         woken += wake_island(bodies, bodies[j].island, blocks)
     return woken

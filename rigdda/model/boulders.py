@@ -1,7 +1,9 @@
 """Loose blocks of a band: random convex polygons that rest on the ground and on one another.
 
 Corners lie on an ellipse, so that they are convex, at angles that are spaced at random within
-`JITTER`. Plain numbers throughout: a release of one block is drawn in some tens of microseconds.
+`JITTER`. A block that was measured fills a face of its box: natural blocks of given edges weigh
+half to two thirds of a full box, as such outlines do. Plain numbers throughout: a release of one
+block is drawn in some tens of microseconds.
 """
 
 from __future__ import annotations
@@ -70,6 +72,8 @@ def draw(
 
 def reach(source: Source, event: Event) -> float:
     """Return the greatest distance of a corner of a block from its place [m]."""
+    if source.edges is not None:
+        return max(source.edges)
     if event.area is None:
         return 0.0
     corners = source.corners[0]
@@ -87,25 +91,43 @@ def line(points: tuple[Point, ...]) -> Line:
 
 def _shape(u: Sequence[float], source: Source, event: Event) -> tuple[float, list[Point]]:
     """Return the area [m2] and the corners [m] of a block about its place, anticlockwise."""
-    assert event.area is not None
-    area = _area(u[0], *event.area, 1.5 * event.exponent)  # volume: area times its root
     least, most = source.corners
     count = least + int(u[1] * (most - least + 1))
-    aspect = source.aspect[0] + u[2] * (source.aspect[1] - source.aspect[0])
     gap = 2.0 * math.pi / count
     angles = [gap * (i + JITTER * (2.0 * u[DRAWN + i] - 1.0)) for i in range(count)]
     double = math.sin(angles[0] - angles[-1])
     for i in range(1, count):
         double += math.sin(angles[i] - angles[i - 1])
-    size = math.sqrt(2.0 * area / double)
-    long, short = size * math.sqrt(aspect), size / math.sqrt(aspect)
+    if source.edges is not None:
+        long, short = _face(u, source.edges, angles)
+    else:
+        assert event.area is not None
+        area = _area(u[0], *event.area, 1.5 * event.exponent)  # volume: area times its root
+        aspect = source.aspect[0] + u[2] * (source.aspect[1] - source.aspect[0])
+        size = math.sqrt(2.0 * area / double)
+        long, short = size * math.sqrt(aspect), size / math.sqrt(aspect)
     turn = 2.0 * math.pi * u[3]
     cos, sin = math.cos(turn), math.sin(turn)
     corners = []
     for angle in angles:
         a, b = long * math.cos(angle), short * math.sin(angle)
         corners.append((cos * a - sin * b, sin * a + cos * b))
-    return area, corners
+    return 0.5 * long * short * double, corners
+
+
+def _face(
+    u: Sequence[float], edges: tuple[float, float, float], angles: list[float]
+) -> tuple[float, float]:
+    """Return the half axes of the ellipse whose corners fill a face of a box [m].
+
+    Angles are turned by a random phase first, in place: else a corner is at the end of an axis.
+    """
+    phase = 2.0 * math.pi * u[2]
+    angles[:] = [angle + phase for angle in angles]
+    cosines, sines = [math.cos(a) for a in angles], [math.sin(a) for a in angles]
+    out = int(3.0 * u[0])  # the edge that points along the road
+    long, short = edges[out - 2], edges[out - 1]
+    return long / (max(cosines) - min(cosines)), short / (max(sines) - min(sines))
 
 
 def _area(u: float, least: float, greatest: float, power: float) -> float:

@@ -34,7 +34,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     source : str
         Name of the source that it comes from.
     area : (least, greatest)
-        Area of each block of a band [m2].
+        Area of each block of a band [m2], of one without `edges`.
     exponent : float
         The number of blocks larger than a volume V falls as V to the power of minus this [-],
         within `area`: 0.4 to 0.8 as a rule.
@@ -93,10 +93,14 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 what = "number" if self.area is None else "area"
                 mend = f"leave it out: source {source.name} is no band, its blocks are given"
                 raise BadInput(f"{self.words}.{what}", getattr(self, what), mend)
+        elif source.edges is not None:
+            if self.area is not None:
+                mend = f"leave it out: source {source.name} says it by its edges"
+                raise BadInput(f"{self.words}.area", self.area, mend)
         elif self.area is None:
             mend = f"give the least and the greatest area of a block of band {source.name} [m2]"
             raise BadInput(f"{self.words}.area", None, mend)
-        elif self.number[1] > 1 and self.width is None:
+        if source.band is not None and self.number[1] > 1 and self.width is None:
             mend = "give the width along the road of an event of several blocks [m]"
             raise BadInput(f"{self.words}.width", None, mend)
 
@@ -104,7 +108,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Return the width of a release with blocks of these areas [m]."""
         if self.width is not None:
             return self.width
-        return math.sqrt(areas[0]) if self.area is not None else MASS_WIDTH
+        return math.sqrt(areas[0]) if areas else MASS_WIDTH
 
 
 class Drawn(NamedTuple):

@@ -53,6 +53,9 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Number of corners of a block of a band.
     aspect : (least, greatest)
         Length over breadth of a block of a band [-].
+    edges : (a, b, c)
+        Edges of the box around a block that was measured [m], instead of the `area` of the events
+        and of `aspect`: each release sees one of its three faces at random.
     spin : float
         Greatest rate of rotation of a block of a band at the start, either way [rad/s].
     speed : (least, greatest)
@@ -74,6 +77,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     surface: str = "rock"
     corners: tuple[int, int] = (5, 8)
     aspect: tuple[float, float] = (1.0, 1.5)
+    edges: tuple[float, float, float] | None = None
     spin: float = 0.5
     speed: tuple[float, float] = (0.2, 1.0)
 
@@ -89,6 +93,12 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         check.interval(f"{where}.corners", self.corners)
         for count in self.corners:
             check.integer(f"{where}.corners", count, 4, 12)
+        if self.edges is not None:
+            if self.band is None:
+                mend = "leave it out: only blocks of a band have edges"
+                raise BadInput(f"{where}.edges", self.edges, mend)
+            for edge in self.edges:
+                check.number(f"{where}.edges", edge, 0.01, 30.0)
         given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
         if len(given) > 1 or (self.joints and not self.polygon):
             what = given[-1] if len(given) > 1 else "joints"

@@ -37,7 +37,6 @@ from rigdda.dynamics.constants import (
     BLOW_SPEED,
     GREATEST_LOAD,
     IMPACT,
-    IMPACT_SPEED,
     IMPACT_STEPS,
     IMPACT_STIFFNESS,
     MOVING,
@@ -53,7 +52,6 @@ from rigdda.dynamics.constants import (
     START_STIFFNESS,
     STICK,
     STIFFNESS_CHANGE,
-    TOUCHING,
     UNLOADED,
 )
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Parameters
@@ -161,7 +159,7 @@ def set_impact(c: Contact, closing: float, mass: float, p: Parameters) -> None:
     """Make a contact an impact with closing speed `closing` [m/s]."""
     c.kind = IMPACT
     c.kappa = impact_stiffness(mass, p.dt)
-    c.bias = p.dt * c.restitution * closing
+    c.bias = c.rebound = p.dt * c.restitution * closing
     c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
 
 
@@ -205,8 +203,7 @@ def set_new(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
     c.kind = NEW
     stiffness = impact_stiffness(effective_mass(bodies, c), p.dt)
     c.kappa = max(START_STIFFNESS * stiffness if start else stiffness, c.stiffness)
-    # a gap of rounding would be a force in so stiff a spring
-    c.bias = -c.gap if c.gap > TOUCHING * p.penetration else 0.0
+    c.bias = -max(c.gap, 0.0)
 
 
 @kernel
@@ -273,7 +270,7 @@ def time_of_impact(bodies: Bodies, c: Contact, pull: float, p: Parameters) -> fl
 
     Arms and velocities are those of mid-step before, and after if there is none.
     """
-    threshold = max(IMPACT_SPEED, IMPACT_STEPS * p.gravity * p.dt)
+    threshold = IMPACT_STEPS * p.gravity * p.dt
     gap = max(c.gap, 0.0)
     mean = -c.un + 0.5 * pull * p.dt
     # what was foreseen may still come fast when it is closed already; but bodies that are in one
@@ -303,7 +300,6 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
     c.stiffness = rest_stiffness(weight, c, p)
     interface = interfaces[a.surface, c.other]
     c.friction, c.restitution = interface.friction, interface.restitution
-    c.flips = 0
     c.lag = c.start_shear
     c.cohesion = c.bond * interface.cohesion
     c.tension = c.bond * interface.tension

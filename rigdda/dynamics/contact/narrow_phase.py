@@ -14,7 +14,7 @@ leads through a neighbouring part, and that one has the contact.
 
 from __future__ import annotations
 
-from rigdda.dynamics.constants import AWAKE, INNER_EDGE, OTHER_FACE, SAME_FACE, WHIP
+from rigdda.dynamics.constants import AWAKE, OTHER_FACE, SAME_FACE
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Corners, Outlines, Parameters
 from rigdda.kernel import inlined, kernel
 
@@ -259,7 +259,7 @@ def collide_pair(
     first = k
     k = collide_all_parts(
         bodies, outlines, contacts, k, a, b, dx, dy, px, py, turn, spread, p.slack,
-        INNER_EDGE * p.slack, beside,
+        0.0, beside,
     )  # fmt: skip
     if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
         k = collide_all_parts(
@@ -332,7 +332,7 @@ def collide_parts(
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
-    reach = WHIP * (dx * dx + dy * dy) ** 0.5 + spread
+    reach = (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(apart_i, apart_j) <= slack
     # where they touch, not where they are deeper than the slack
     time_i *= gap_i / (gap_i + slack) if gap_i > slack else 0.0

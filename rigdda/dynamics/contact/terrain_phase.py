@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.constants import LEAN, SAME_FACE, TERRAIN
+from rigdda.dynamics.constants import SAME_FACE, TERRAIN
 from rigdda.dynamics.contact.narrow_phase import add_contact, following, keep_nearest
 from rigdda.dynamics.records import Bodies, Box, Contacts, Ground, Outlines, Parameters
 from rigdda.kernel import inlined, kernel
@@ -207,7 +207,7 @@ def edge_on_ridge(
     if not (box.low_x <= x <= box.high_x and box.low_y <= y <= box.high_y):
         return k
     concave = part != a
-    lean = LEAN + abs(block.omega) * dt
+    lean = abs(block.omega) * dt
     reach = block.path + p.gravity * dt * dt + p.slack
     best, best_time, best_gap = -1, -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not

@@ -29,17 +29,14 @@ from rigdda.dynamics.constants import (
     BOLT,
     IMPACT,
     LARGE_ISLAND,
-    LEAST_RELAXATION,
     LEAST_SUBSTEPS,
     MOST_SWEEPS,
     PIN,
     PLAIN,
-    REACH,
     RELAXATION_SHARE,
     RELAXATION_STIFFNESS,
     REST,
     SLOW_SHARE,
-    SLOW_SWEEPS,
     SMALL_SHARE,
     SPREADING,
     SUBSTEP,
@@ -359,11 +356,11 @@ def relax_forces(
     sweeps, substeps : int
         How many it took.
     """
-    substeps, most = 1, SLOW_SWEEPS
+    substeps = 1
     usual = p.sweep_tolerance * min(n / LARGE_ISLAND, 1.0)
-    tolerance = max(min(SLOW_SHARE * speed, usual), LEAST_RELAXATION * p.gravity * p.dt)
+    tolerance = min(SLOW_SHARE * speed, usual)
     if fast:
-        substeps, most = substeps_of(n, p.dt), MOST_SWEEPS
+        substeps = substeps_of(n, p.dt)
         tolerance = min(RELAXATION_SHARE * speed, usual)
     h, motion = p.dt / substeps, rows.motion
     for s in range(n):
@@ -380,11 +377,11 @@ def relax_forces(
     for number in range(substeps):
         for s in range(n + 1):
             rows.moved_in[s] = -1
-        for tries in range(most):
+        for tries in range(MOST_SWEEPS):
             visits = list_visits(rows, count, tries, number)
             worst = sweep(
                 rows.row, rows.row_i, rows.row_j, motion, n, rows.visit, visits, tries, number,
-                substeps, rows.idle, REACH * speed * h, rows.moved_in, tolerance * h,
+                substeps, rows.idle, speed * h, rows.moved_in, tolerance * h,
             )  # fmt: skip
             sweeps += 1
             if worst <= tolerance * h:

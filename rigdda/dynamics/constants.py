@@ -150,6 +150,11 @@ OTHER_FACE = 0.02
 """Depth, over the slack, by which a face of the second body must be the better one [-]: parallel
 faces do not alternate."""
 
+LATELY = 0.7
+"""Share of a body's greatest speed of late that counts on in the next step [-]. In a pile blocks
+are stopped and driven on step by step: the path of one that stands for a moment is not nothing.
+Without it the thrust of a row on an embankment is 53 kN in steps of 10 ms, 38 in shorter ones."""
+
 SLACK_RATIO = 5e-3
 """Distance over block size within which contacts are candidates even at rest [-]."""
 

@@ -12,7 +12,7 @@ import math
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.constants import ASLEEP, AWAKE, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
+from rigdda.dynamics.constants import ASLEEP, AWAKE, LATELY, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
 from rigdda.dynamics.correction import account_block, apply_forces, move_block, place_corners
 from rigdda.dynamics.gauges import barrier_contact
 from rigdda.dynamics.motion import retire, top_speed
@@ -122,7 +122,7 @@ def steps_of_flight(
     Contacts are looked for within what a corner can go in a step; twice of it here.
     """
     body, most = bodies[i], LONGEST_FLIGHT * p.dt
-    speed = top_speed(body) + p.gravity * most
+    speed = max(top_speed(body) + p.gravity * most, body.lately)
     reach = 2.0 * (speed * p.dt + p.gravity * p.dt * p.dt + p.slack)
     time = time_to_bodies(bodies, i, outlines.polygon, speed, reach, most)
     if time > p.dt:
@@ -164,7 +164,8 @@ def fly(
     Returns i if it went bad, else -1.
     """
     body = bodies[i]
-    body.path = top_speed(body) * p.dt
+    body.lately = max(top_speed(body), LATELY * body.lately)
+    body.path = body.lately * p.dt
     apply_forces(bodies, contacts, m, motion, islands, 0, False, p)
     account_block(body, motion, 0, p, ledger)
     body.apart += p.dt

@@ -33,6 +33,7 @@ BODY = _record(
     radius=float,  # of the circumscribed circle about the centroid [m]
     quiet=float,  # time it has been quiet [s]
     slowest=float,  # its least speed for so long [m/s]
+    lately=float,  # greatest speed of a point of it of late, see broad_phase [m/s]
     path=float,  # longest way of any point of it in this step, undeflected [m]
     count=int,  # corners
     part=int,  # first polygon of its convex parts: itself where it is convex

@@ -69,11 +69,6 @@ the force follows the velocity at their end. Without it an arch near its limit v
 FRICTION_TOLERANCE = 2e-2
 """Relative change of a friction limit between open-close iterations that counts as settled [-]."""
 
-FAST_FALL = 1.5
-"""Speed of an island above which it is relaxed in several substeps, over what gravity gives in a
-step, g dt [-], where that is more than `QUIET_SPEED`: a pile that all but rests is settled as one
-in the single step. Without it 60 layers in a silo did not come to rest in steps of 10 ms."""
-
 SUBSTEP = 2e-3
 """Longest substep in the relaxation of a large island in motion [s]: a blow goes on from contact to
 contact in each. In steps of 20 ms of 480 blocks contacts sink a third less than with 2.5 ms, and a
@@ -121,10 +116,6 @@ may be an impulse."""
 QUIET_SPEED = 0.1
 """Speed below which all blocks of an island are solved together, accurately; faster islands of
 several blocks are relaxed [m/s]."""
-
-SHORT_PROFILE = 40
-"""Mean length of the rows of a matrix, in numbers, up to which it is factorised [-]: about 13
-blocks to the left of the diagonal. Longer, and conjugate gradients are cheaper."""
 
 SMALL_ISLAND = 2
 """Most blocks of an island that is solved as a whole at any speed."""
@@ -195,6 +186,6 @@ REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN = 0, 1, 2, 3, 4, 5, 6, 7
 # why the step loop returned
 DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE, GROUND_MOVED, ENDED = 0, 1, 2, 3, 4, 5
 # solver
-AUTO, PCG, BLOCK_PCG, SOR, DIRECT = 0, 1, 2, 3, 4
+PCG, BLOCK_PCG, SOR, DIRECT = 0, 1, 2, 3
 TERRAIN = -1
 PLAIN_CONTACT = -1.0

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from rigdda.dynamics.assembly.island import assemble_blocks, assemble_island
 from rigdda.dynamics.assembly.springs import relative_displacement
 from rigdda.dynamics.constants import (
-    AUTO,
     BLOCK_PCG,
     BOLT,
     DIRECT,
-    FAST_FALL,
     FRICTION_TOLERANCE,
     IMPACT,
     MOVING,
@@ -27,7 +25,6 @@ from rigdda.dynamics.constants import (
     QUIET_SPEED,
     REST,
     SHOCK_SPEED,
-    SHORT_PROFILE,
     SLIP,
     SMALL_ISLAND,
     SOR,
@@ -164,10 +161,9 @@ def solve_island(m: Matrix, scratch: Scratch, n: int, pairs: int, p: Parameters)
     """Solve for the displacements of an island; returns the iterations, 0 of a direct solution."""
     if p.solver == SOR:
         return solve_sor(m, scratch, n, pairs, p.tolerance, p.relaxation)
-    if p.solver == DIRECT or p.solver == AUTO:
+    if p.solver == DIRECT:
         count = profile(m, scratch, n, pairs)
-        longest = len(scratch.factor) if p.solver == DIRECT else SHORT_PROFILE * 3 * n
-        if count <= min(longest, len(scratch.factor)):
+        if count <= len(scratch.factor):
             solve_skyline(m, scratch, n, pairs, count)
             return 0
     return solve_pcg(m, scratch, n, pairs, p.tolerance, p.solver == BLOCK_PCG)
@@ -330,7 +326,7 @@ def open_close(
     waiting = is_waiting(bodies, islands, b0, b1)
     small, quiet = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED
     relaxing = waiting if quiet else not small
-    fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
+    fast = relaxing and not quiet
     asked = 0.0
     for attempt in range(4):  # as asked, plastic, between them, and plastic if that gains, too
         if not relaxing:

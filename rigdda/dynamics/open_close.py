@@ -16,6 +16,7 @@ from rigdda.dynamics.constants import (
     BLOCK_PCG,
     BOLT,
     DIRECT,
+    FAST_FALL,
     FRICTION_TOLERANCE,
     IMPACT,
     MOVING,
@@ -326,7 +327,7 @@ def open_close(
     waiting = is_waiting(bodies, islands, b0, b1)
     small, quiet = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED
     relaxing = waiting if quiet else not small
-    fast = relaxing and not quiet
+    fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
     asked = 0.0
     for attempt in range(4):  # as asked, plastic, between them, and plastic if that gains, too
         if not relaxing:

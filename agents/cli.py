@@ -12,7 +12,7 @@ from pathlib import Path
 
 import click
 
-from agents.commands import evaluate, study, train, validate
+from agents.commands import evaluate, fit, study, train, validate
 from agents.designing import design
 from agents.options import count_option, layout_option, out_option, read_layout, seed_option
 from agents.terminal import Stopped, fail, folder_for, kept, progress, show
@@ -67,7 +67,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (design, study, train, evaluate, validate):
+for command in (design, fit, study, train, evaluate, validate):
     cli.add_command(command)
 
 
@@ -85,22 +85,38 @@ def sites() -> None:
 @layout_option
 @click.option("--event", metavar="NAME", help="Releases of this event only.  [default: by rate]")
 @count_option("--releases", 1, 100, "Releases to average.")
+@click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
+              show_default=True, help="lumped: each block a point, for a quick look without "
+              "barriers that stand.")  # fmt: skip
 @seed_option("Seed of the first release; the others follow it.")
 @out_option("simulate-SITE")
 def simulate(
-    site: str, layout: str | None, event: str | None, releases: int, seed: int, out: Path | None
+    site: str,
+    layout: str | None,
+    event: str | None,
+    releases: int,
+    model: str,
+    seed: int,
+    out: Path | None,
 ) -> None:
     """Simulate releases of SITE (a name or a TOML file) and say what reaches the road.
 
     Without --event each release is of an event drawn by its rate. Writes outcomes.csv, run.npz
-    (the first release) and section.png. The energy of a hit is that of the block just before it
-    touches; a barrier absorbs what its forces take from all blocks.
+    (the first release) and section.png; with --model lumped points.csv. The energy of a hit is that
+    of the block just before it touches; a barrier absorbs what its forces take from all blocks.
     """
     import rigdda
     from agents import job, section, tables
 
     where, barriers = rigdda.Site.load(site), read_layout(layout)
     seeds = range(seed, seed + releases)
+    if model == "lumped":
+        points = rigdda.lumped(where, barriers, seeds, event)
+        folder = folder_for(out, f"simulate-{where.name}", "points.csv")
+        tables.write_points(folder / "points.csv", seeds, points)
+        show(tables.points(points))
+        click.echo(f"{releases} releases of points; points.csv is in {folder}")
+        return
     where.realise(barriers, seed, event)  # what cannot be built is said before a folder is made
     folder = folder_for(out, f"simulate-{where.name}", "outcomes.csv", "run.npz", "section.png")
     with kept(folder), progress(releases) as tick:
@@ -123,13 +139,13 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
     Compares Z and the processor time of a release, for no barrier and for what the engineering
     rule builds. Writes fidelity.csv.
     """
-    from agents import calibrate as job
+    from agents import fidelity_bias as job
     from envs import DesignProblem
 
     where = DesignProblem(site).site
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
     with kept(folder), progress(4 * releases) as tick:
-        found = job.calibrate(where, releases, seed, tick)
+        found = job.compare(where, releases, seed, tick)
     job.write(folder / "fidelity.csv", where, found)
     show(job.table(found))
     click.echo(f"{releases} releases of each; fidelity.csv is in {folder}")

@@ -1,9 +1,10 @@
-"""Commands that run many simulations: `rigdda study | train | evaluate | validate`."""
+"""Commands that run many simulations: `rigdda fit | study | train | evaluate | validate`."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -34,6 +35,50 @@ def study(file: str, seed: int, out: Path | None) -> None:
     show(studies.table(asked, folder / "study.csv"))
     words = f", {resumed} taken from a former run" if resumed else ""
     click.echo(f"{asked.size:,} releases{words}; study.csv is in {folder}")
+
+
+@click.command()
+@click.argument("site")
+@click.argument("observed", type=click.Path(dir_okay=False, path_type=Path))
+@click.option("--parameters", "names", multiple=True, required=True, metavar="PATH[=LOW:HIGH]",
+              help="A number of the site file to fit, such as surfaces.soil.restitution; repeat "
+              "it, four at most are wise.")  # fmt: skip
+@click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
+              show_default=True, help="What computes run-outs.")  # fmt: skip
+@count_option("--budget", 8, 160, "Sets of values that are computed.")
+@count_option("--releases", 10, 150, "Releases of each event with each set.")
+@seed_option("Seed of the search and of the first release.", SEED)
+@out_option("fit-SITE")
+def fit(
+    site: str,
+    observed: Path,
+    names: tuple[str, ...],
+    model: Literal["blocks", "lumped"],
+    budget: int,
+    releases: int,
+    seed: int,
+    out: Path | None,
+) -> None:
+    """Fit numbers of SITE (a name or a TOML file) to run-outs in OBSERVED, a CSV file.
+
+    Its columns are event and run_out_m, the chainage at which the block stopped. Prints the fitted
+    numbers with 95 % intervals, and what they predict of runs that were left out. Writes
+    site.toml (SITE with them), fit.csv and fit.png.
+    """
+    import rigdda
+    from agents import fit as job
+    from agents import tables
+
+    where = rigdda.Site.load(site)
+    seen, parameters = job.read(observed, where), [job.parse(name) for name in names]
+    folder = folder_for(out, f"fit-{where.name}", "site.toml", "fit.csv", "fit.png")
+    with kept(folder), progress(budget) as tick:
+        found = job.fit(where, seen, parameters, budget, releases, seed, tick, model)
+        found.site.save(folder / "site.toml")
+        job.write(folder / "fit.csv", found, seen)
+        job.draw(folder / "fit.png", found, seen)
+    show(tables.fit(job.rows(found, seen)))
+    click.echo(f"{budget} sets of values; site.toml, fit.csv and fit.png are in {folder}")
 
 
 @click.command()

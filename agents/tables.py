@@ -16,7 +16,7 @@ import numpy as np
 from agents.protocol import Entry
 from agents.wording import short, standing
 from envs.intervals import estimate, student_interval
-from rigdda import Fence, GravityWall, Layout, Outcome, Site
+from rigdda import Fence, GravityWall, Layout, Outcome, Points, Site
 from rigdda.barriers import Earthwork, Embankment, to_tables
 from rigdda.files import atomic
 
@@ -199,3 +199,40 @@ def _span(interval: Iterable[float], form: str) -> str:
     """Return an interval in words; a single value has none."""
     low, high = interval
     return f"{low:{form}} to {high:{form}}" if math.isfinite(high - low) else "-"
+
+
+def fit(rows: Sequence[dict[str, Any]]) -> Table:
+    """Return the table of a fit, at most 80 characters wide."""
+
+    def number(value: Any) -> str:
+        return f"{value:.3g}" if isinstance(value, float) else ""
+
+    out = empty_table(("what", "fitted", "95 %", "left out", "observed"))
+    for row in rows:
+        unit = f" [{row['unit']}]" if row["unit"] not in ("", "-") else ""
+        ends = f"{row['low']:.3g} to {row['high']:.3g}" if row["low"] != "" else ""
+        cells = (number(row[name]) for name in ("left_out", "observed"))
+        out.add_row(row["what"] + unit, number(row["fitted"]), ends, *cells)
+    return out
+
+
+def write_points(path: Path, seeds: Sequence[int], points: Points) -> None:
+    """Write a CSV file with a row a block of the lumped-mass model; where it stops in m."""
+    each = zip(*(column.tolist() for column in (*points, points.energy)), strict=True)
+    names = ("mass_kg", "run_out_m", "speed_m_s", "height_m", "energy_j")
+    rows = [{"seed": seeds[k], **dict(zip(names, row, strict=True))} for k, *row in each]
+    write_rows(path, rows)
+
+
+def points(found: Points) -> Table:
+    """Return what releases of the lumped-mass model do, one figure a row."""
+    out = empty_table(("what", "mean", "95 % of blocks"))
+    reached, weight = found.reached, found.mass / found.mass.sum()
+    out.add_row("debris that reaches the road [-]", f"{float(weight @ reached):.3f}", "")
+    columns = {"run-out [m]": found.run_out, "energy at the road [kJ/m]": 1e-3 * found.energy}
+    columns["height at the road [m]"] = found.height
+    for what, values in columns.items():
+        known = values[~np.isnan(values)]
+        if len(known):
+            out.add_row(what, f"{known.mean():.3g}", f"{np.quantile(known, 0.95):.3g}")
+    return out

@@ -3,7 +3,7 @@
 Each is set to the value at which it does nothing, or where there is none to a half or twice. For
 each of these the closed forms, the hard cases at 5 and 10 ms, the tests of what is confined, held
 or foreseen, and a rockfall of 120 blocks are run. Two at a time it takes an hour; the table grows
-line by line, and lines that it has already are not computed again.
+line by line, and lines that today's kernels made are not computed again.
 
 `python -m experiments.ablated NAME=VALUE ...` runs once with other constants and prints JSON. It is
 a process of its own: kernels take constants in when they are compiled, so that constants are set
@@ -83,7 +83,10 @@ TABLE = "constants.csv"
 
 def change(changes: list[str]) -> None:
     """Put a changed copy of `rigdda.dynamics.constants` where kernels will look for it."""
-    spec = importlib.util.find_spec("rigdda.dynamics.constants")
+    place = importlib.util.find_spec("rigdda")  # of a module in it, this would import kernels
+    assert place is not None and place.submodule_search_locations is not None
+    path = Path(place.submodule_search_locations[0], "dynamics", "constants.py")
+    spec = importlib.util.spec_from_file_location("rigdda.dynamics.constants", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -162,10 +165,12 @@ def attempt(variant: str) -> dict[str, Any]:
 
 def main(out: Path) -> None:
     """Run what the table lacks and write it."""
-    from experiments.script import say, write
+    from experiments.script import made_by, say, write
+    from rigdda.kernel import source_hash
 
     path = out / TABLE
-    rows = list(csv.DictReader(path.open())) if path.is_file() else []
+    ours = made_by(out).get(TABLE) == source_hash()
+    rows = list(csv.DictReader(path.open())) if ours else []
     known = {row["variant"] for row in rows}
     todo = [v for v in ("", *VARIANTS) if (v or "as it is") not in known]
     with ThreadPoolExecutor(2) as pool:

@@ -16,6 +16,7 @@ from rigdda.barriers.files import load_layout, save_layout
 from rigdda.dynamics.run import Run
 from rigdda.dynamics.simulation import Simulation, simulate_many
 from rigdda.errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
+from rigdda.lumped import Points, lumped
 from rigdda.model.economy import Bill, Consequences, Prices
 from rigdda.model.events import Drawn, Event
 from rigdda.model.loads import BodyForce, LineLoad, PointLoad
@@ -55,6 +56,7 @@ __all__ = [
     "MeshOption",
     "Outcome",
     "PointLoad",
+    "Points",
     "Prices",
     "Run",
     "Scene",
@@ -67,6 +69,7 @@ __all__ = [
     "Terrain",
     "Wall",
     "load_layout",
+    "lumped",
     "release",
     "release_many",
     "release_outcome",

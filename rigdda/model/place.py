@@ -218,6 +218,35 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         check.number("motion.dt", self.dt, 0.0, open_low=True)
 
 
+class Rebound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How a point of the lumped-mass model rebounds from a surface, see `rigdda.lumped`.
+
+    Parameters
+    ----------
+    normal : float
+        Normal coefficient of restitution [-].
+    tangential : float
+        Tangential coefficient of restitution [-]: the share of its speed along the ground that a
+        point keeps in an impact.
+    friction_deg : float
+        Friction angle at which it slides on, or rolls, when it no longer bounces [deg].
+
+    Raises
+    ------
+    BadInput
+        If a value is outside its range.
+    """
+
+    normal: float = 0.35
+    tangential: float = 0.85
+    friction_deg: float = 30.0
+
+    def __post_init__(self) -> None:
+        check.number("lumped.normal", self.normal, 0.0, 1.0)
+        check.number("lumped.tangential", self.tangential, 0.0, 1.0)
+        check.number("lumped.friction_deg", self.friction_deg, 0.0, 80.0)
+
+
 class Scatter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What varies at random from release to release, beside the blocks.
 

@@ -21,7 +21,16 @@ from rigdda.geometry import polygon_properties
 from rigdda.model import economy, realisation
 from rigdda.model.economy import Bill, Consequences, Prices
 from rigdda.model.events import Drawn, Event
-from rigdda.model.place import BarrierZone, Interface, Motion, Road, Scatter, Slope, Stretch
+from rigdda.model.place import (
+    BarrierZone,
+    Interface,
+    Motion,
+    Rebound,
+    Road,
+    Scatter,
+    Slope,
+    Stretch,
+)
 from rigdda.model.scene import Scene, Surface
 from rigdda.model.settings import Settings, longest_step
 from rigdda.model.soundness import check_site
@@ -72,6 +81,8 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         How releases are computed.
     scatter : table
         What varies at random.
+    lumped : tables
+        How points of the lumped-mass model rebound, by the name of the surface.
 
     Raises
     ------
@@ -94,6 +105,7 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     meshes: tuple[MeshOption, ...] = ()
     motion: Motion = Motion()
     scatter: Scatter = Scatter()
+    lumped: dict[str, Rebound] = {}
 
     def __post_init__(self) -> None:
         if not self.events:

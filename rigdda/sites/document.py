@@ -18,7 +18,16 @@ from rigdda.files import atomic
 from rigdda.model.economy import Consequences, Prices
 from rigdda.model.events import Event
 from rigdda.model.joints import JointSet
-from rigdda.model.place import BarrierZone, Interface, Motion, Road, Scatter, Slope, Stretch
+from rigdda.model.place import (
+    BarrierZone,
+    Interface,
+    Motion,
+    Rebound,
+    Road,
+    Scatter,
+    Slope,
+    Stretch,
+)
 from rigdda.model.scene import Surface
 from rigdda.model.site import Site
 from rigdda.model.source import Source
@@ -41,6 +50,7 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[[meshes]]`", MeshOption),
     ("`[motion]`", Motion),
     ("`[scatter]`", Scatter),
+    ("`[lumped.NAME]`", Rebound),
 )
 """Every table of a site file and the class that reads it."""
 

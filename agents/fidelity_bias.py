@@ -24,7 +24,7 @@ LOOKED = 512
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class Bias:
     """One layout at both fidelities.
 
     Parameters
@@ -73,9 +73,7 @@ def layouts(site: Site, seed: int) -> dict[str, Layout]:
     }
 
 
-def calibrate(
-    site: Site, releases: int, seed: int, tick: Callable[[int, str], None]
-) -> list[Calibration]:
+def compare(site: Site, releases: int, seed: int, tick: Callable[[int, str], None]) -> list[Bias]:
     """Evaluate every layout at both fidelities, on `releases` releases each.
 
     Raises
@@ -91,11 +89,11 @@ def calibrate(
             tick(done, f"{level}: {name}")
             found[level] = DesignProblem(site, fidelity=level).evaluate(layout, seeds)
             done += releases
-        out.append(Calibration(name, found["full"], found["fast"]))
+        out.append(Bias(name, found["full"], found["fast"]))
     return out
 
 
-def write(path: Path, site: Site, found: Sequence[Calibration]) -> None:
+def write(path: Path, site: Site, found: Sequence[Bias]) -> None:
     """Write a CSV file with one row a layout; money is in EUR per metre of road and year."""
     rows = []
     for c in found:
@@ -110,8 +108,8 @@ def write(path: Path, site: Site, found: Sequence[Calibration]) -> None:
     write_rows(path, rows)
 
 
-def table(found: Sequence[Calibration]) -> Table:
-    """Return the table of a calibration, at most 80 characters wide."""
+def table(found: Sequence[Bias]) -> Table:
+    """Return the table of the comparison, at most 80 characters wide."""
     out = empty_table(("layout", "Z full", "Z fast", "fast - full (95 %)", "CPU [ms]", "gain"))
     for c in found:
         out.add_row(

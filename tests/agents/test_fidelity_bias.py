@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents import calibrate
+from agents import fidelity_bias
 from agents.cli import main
 from agents.seeds import release_seeds
 from envs import DesignProblem, fidelity
@@ -29,7 +29,7 @@ def test_fast_has_fewer_larger_blocks_and_a_longer_step() -> None:
 
 def test_the_bias_is_that_of_the_evaluations() -> None:
     site, ticks = Site.load("quick"), []
-    found = calibrate.calibrate(site, 12, 3, lambda done, _: ticks.append(done))
+    found = fidelity_bias.compare(site, 12, 3, lambda done, _: ticks.append(done))
     assert ticks == [0, 12, 24, 36, 48, 60]
     assert [c.name for c in found] == ["nothing", "constant", "rule"]
     seeds = release_seeds("verification", 3, 12)

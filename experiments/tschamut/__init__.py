@@ -1,0 +1,1 @@
+"""Repeated rockfall tests at Tschamut: a fit on some runs, and what it predicts of others."""

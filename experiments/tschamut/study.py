@@ -1,0 +1,144 @@
+"""Tschamut 2014: run-outs of repeated tests, predicted after a fit on some of them.
+
+Three blocks were released again and again on a slope of grass and soil (Volkwein and Gerber 2018,
+doi 10.16904/envidat.34, ODbL). `site.toml` is the slope with the blocks by their measured edges,
+`observed.csv` 33 of the runs. The block model and the lumped mass are fitted to them, four numbers
+each with the same budget, by what `rigdda fit` does. Each observed run is predicted by what fits
+the others best; then 1,000 releases of each block are the prediction of runs that nobody saw.
+
+Judged by how far the mean run-out that is predicted of left-out runs is from theirs.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from agents import fit
+from agents.fit import Fit, Floats
+from experiments.script import BLUE, GREEN, GREY, RED, Number, draw, say, write
+from rigdda import Site, release
+
+HERE = Path(__file__).parent
+
+MODELS: dict[fit.Model, tuple[str, ...]] = {
+    "blocks": (
+        "surfaces.soil.friction_deg=15:65",
+        "surfaces.soil.restitution=0:0.8",
+        "motion.damping=0:1.5",
+        "scatter.friction_deg=0:10",
+    ),
+    "lumped": (
+        "lumped.soil.normal=0:0.8",
+        "lumped.soil.tangential=0.4:1",
+        "lumped.soil.friction_deg=15:65",
+        "scatter.friction_deg=0:10",
+    ),
+}
+"""What is fitted of each model."""
+
+BUDGET, QUICK_BUDGET = 192, 16
+"""Sets of values that are computed of each model."""
+
+RELEASES, QUICK_RELEASES = 250, 40
+"""Releases of each block with each set."""
+
+PREDICTED, QUICK_PREDICTED = 1000, 100
+"""Releases of each block with the fitted values, on fresh seeds."""
+
+FRESH = 1_000_000
+"""Seed of the first of these."""
+
+DRAWN = 25
+"""Trajectories of each block in the picture."""
+
+BAR = 5.0
+"""Greatest distance of the means [m]."""
+
+
+def table(model: str, fitted: Fit, observed: dict[str, Floats], seconds: float) -> list[dict]:
+    """Return the rows of `agents.fit.rows` with the model and its processor time [s]."""
+    return [{"model": model, "cpu_s": seconds} | row for row in fit.rows(fitted, observed)]
+
+
+def cumulative(axes: Axes, values: Floats, colour: str, words: str, band: int = 0) -> None:
+    """Draw the share of runs that stop up to a chainage; 95 % band of samples of `band` runs."""
+    grid = np.linspace(0.0, 160.0, 400)
+    share = (values[:, None] <= grid).mean(axis=0)
+    axes.plot(grid, share, color=colour, label=words)
+    if band:
+        half = 1.96 * np.sqrt(share * (1.0 - share) / band)
+        low, high = np.clip([share - half, share + half], 0.0, 1.0)
+        axes.fill_between(grid, low, high, color=colour, alpha=0.2, lw=0)
+
+
+def picture(
+    path: Path, observed: dict[str, Floats], predicted: dict[str, dict[str, Floats]], site: Site
+) -> None:
+    """Draw cumulative run-outs of all runs and of each block, and trajectories in section."""
+    figure = Figure(figsize=(12.0, 7.5), layout="constrained")
+    above, below = figure.subfigures(2, 1)
+    names = ("all", *observed)
+    for axes, name in zip(above.subplots(1, len(names), sharey=True), names, strict=True):
+        events = list(observed) if name == "all" else [name]
+        real = np.concatenate([observed[e] for e in events])
+        for model, colour in (("blocks", BLUE), ("lumped", GREEN)):
+            values = np.concatenate([predicted[model][e] for e in events])
+            cumulative(axes, values, colour, model, len(real) if model == "blocks" else 0)
+        order = np.arange(1, len(real) + 1) / len(real)
+        axes.step(np.sort(real), order, where="post", color=RED, label=f"observed, {len(real)}")
+        axes.set(title=name, xlabel="run-out [m]", ylim=(0.0, 1.0))
+        axes.legend(loc="upper left", fontsize=8)
+    axes = below.subplots()
+    x, y = site.profile.points.T
+    axes.plot(x, y, color=GREY)
+    for event, colour in zip(observed, (BLUE, GREEN, RED), strict=True):
+        for seed in range(DRAWN):
+            run, _ = release(site, (), FRESH + seed, event)
+            words = event if seed == 0 else None
+            axes.plot(*run.poses[:, 0, :2].T, color=colour, lw=0.5, alpha=0.6, label=words)
+    axes.set(xlim=(-10.0, 150.0), ylim=(y.min() - 3.0, y.max() + 3.0), aspect="equal")
+    axes.set(xlabel="chainage [m]", ylabel="elevation [m]")
+    axes.legend()
+    draw(figure, path)
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Fit both models, predict, and write tables and the picture."""
+    site = Site.load(HERE / "site.toml")
+    observed = fit.read(HERE / "observed.csv", site)
+    budget, releases, count = (
+        (QUICK_BUDGET, QUICK_RELEASES, QUICK_PREDICTED) if quick else (BUDGET, RELEASES, PREDICTED)
+    )
+    rows: list[dict[str, Any]] = []
+    predicted, found = {}, {}
+    for model, names in MODELS.items():
+        start = time.process_time()
+        parameters = [fit.parse(name) for name in names]
+
+        def tell(done: int, words: str, model: str = model) -> None:
+            if done % 16 == 0:
+                say(f"tschamut: {model}, {done} of {budget}, {words}")
+
+        found[model] = fit.fit(site, observed, parameters, budget, releases, 0, tell, model)
+        rows += table(model, found[model], observed, time.process_time() - start)
+        seeds = range(FRESH, FRESH + count)
+        predicted[model] = fit.run_outs(found[model].site, model, list(observed), seeds)
+    write(out / "tschamut" / "tschamut.csv", rows)
+    blocks = predicted["blocks"]
+    each = [
+        {"block": event.removeprefix("block "), "run_out_m": float(x)}
+        for event, values in blocks.items()
+        for x in values
+    ]
+    write(out / "tschamut" / "prediction.csv", each)
+    picture(out / "tschamut" / "tschamut.png", observed, predicted, found["blocks"].site)
+    real = fit.seen(observed, site.slope.toe)
+    error = {model: abs(found[model].validated.mean - real.mean) for model in MODELS}
+    note = f"lumped mass {error['lumped']:.1f} m"
+    return Number("error of the mean run-out of left-out runs [m]", error["blocks"], 0.0, BAR, note)

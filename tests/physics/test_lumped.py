@@ -1,0 +1,88 @@
+"""The lumped-mass model against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigdda import BadInput, Ditch, GravityWall, Site, lumped
+from rigdda.dynamics.lumped import trajectories
+
+G = 9.81
+
+
+def follow(ground, law, start, line=1e9):
+    """Return run-out, speed and height of one point on ground of one surface."""
+    corners, found = np.array(ground, dtype=float), np.zeros((1, 3))
+    normal, tangential, angle = law
+    laws = np.tile([normal, tangential, math.tan(math.radians(angle))], (1, len(corners) - 1, 1))
+    trajectories(corners, laws, np.array([start], dtype=float), G, line, found)
+    return found[0]
+
+
+@given(st.floats(31.0, 60.0), st.floats(5.0, 30.0), st.floats(1.0, 50.0))
+def test_it_slides_down_and_out(slope, friction, length):
+    """Down a slope from rest, past a corner that takes what is normal, onto level ground."""
+    a, mu = math.radians(slope), math.tan(math.radians(friction))
+    ground = [(0.0, 0.0), (60.0 * math.cos(a), -60.0 * math.sin(a))]
+    ground.append((ground[1][0] + 5000.0, ground[1][1]))
+    begin = 60.0 - length
+    start = (begin * math.cos(a), -begin * math.sin(a), 0.0, 0.0)
+    square = 2.0 * G * length * (math.sin(a) - mu * math.cos(a)) * math.cos(a) ** 2
+    exact = ground[1][0] + square / (2.0 * G * mu)
+    assert follow(ground, (0.0, 1.0, friction), start)[0] == pytest.approx(exact, rel=1e-9)
+
+
+def test_it_bounces_along():
+    """Parabolas whose rise and speed shrink by the coefficients, then a slide."""
+    x, vx, vy = 0.0, 3.0, math.sqrt(2.0 * G * 5.0)
+    x = vx * vy / G
+    while 0.5 * vy >= 0.05:
+        vx, vy = 0.8 * vx, 0.5 * vy
+        x += vx * 2.0 * vy / G
+    x += (0.8 * vx) ** 2 / (2.0 * G * math.tan(math.radians(20.0)))
+    found = follow([(-10.0, 0.0), (500.0, 0.0)], (0.5, 0.8, 20.0), (0.0, 5.0, 3.0, 0.0), 1.0)
+    fall = 1.0 / 3.0
+    assert found[0] == pytest.approx(x, rel=1e-9)
+    assert found[1] == pytest.approx(math.hypot(3.0, G * fall))
+    assert found[2] == pytest.approx(5.0 - 0.5 * G * fall**2)
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.3, 1.0), st.floats(10.0, 50.0), st.integers(0, 2**31))
+def test_it_never_gains_energy_nor_leaves_the_ground(normal, tangential, friction, seed):
+    rng = np.random.default_rng(seed)
+    x = np.cumsum(rng.uniform(0.5, 5.0, 20))
+    ground = np.column_stack([x, np.cumsum(rng.uniform(-4.0, 1.0, 20))])
+    height, speed = rng.uniform(0.0, 3.0), rng.uniform(0.0, 10.0)
+    top = np.interp(x[2] + 0.1, x, ground[:, 1]) + height
+    end, passed, over = follow(ground, (normal, tangential, friction),
+                               (x[2] + 0.1, top, speed, 0.0), x[15])  # fmt: skip
+    assert x[0] <= end <= x[-1]
+    if not math.isnan(passed):
+        level = np.interp(x[15], *ground.T)
+        before = 0.5 * speed**2 + G * top
+        assert 0.5 * passed**2 + G * (level + over) <= before * (1.0 + 1e-9) + 1e-9
+        assert over >= 0.0
+
+
+def test_releases_of_a_site_are_points():
+    site = Site.load("verge")
+    points = lumped(site, (), range(200), "group")
+    assert set(points.release) == set(range(200)) and len(points.mass) > 800
+    assert 0.0 < points.reached.mean() < 1.0
+    assert np.isnan(points.energy).sum() == (~points.reached).sum()
+    again = lumped(site, (), range(200), "group")
+    np.testing.assert_array_equal(points.run_out, again.run_out)
+    ditch = lumped(site, (Ditch(6.0, 1.5, 4.0),), range(200), "group")
+    assert ditch.reached.mean() < points.reached.mean()
+
+
+def test_it_says_what_it_does_not_know():
+    with pytest.raises(BadInput, match=r"gravity_wall.*use the block model"):
+        lumped(Site.load("verge"), (GravityWall(9.0, 2.0),))
+    with pytest.raises(BadInput, match="overhangs"):
+        lumped(Site.load("toppling"))

@@ -78,10 +78,12 @@ def cumulative(axes: Axes, values: Floats, colour: str, words: str, band: int = 
 
 
 def picture(
-    path: Path, observed: dict[str, Floats], predicted: dict[str, dict[str, Floats]], site: Site
+    figure: Figure,
+    observed: dict[str, Floats],
+    predicted: dict[str, dict[str, Floats]],
+    site: Site,
 ) -> None:
     """Draw cumulative run-outs of all runs and of each block, and trajectories in section."""
-    figure = Figure(figsize=(12.0, 7.5), layout="constrained")
     above, below = figure.subfigures(2, 1)
     names = ("all", *observed)
     for axes, name in zip(above.subplots(1, len(names), sharey=True), names, strict=True):
@@ -105,7 +107,6 @@ def picture(
     axes.set(xlim=(-10.0, 150.0), ylim=(y.min() - 3.0, y.max() + 3.0), aspect="equal")
     axes.set(xlabel="chainage [m]", ylabel="elevation [m]")
     axes.legend()
-    draw(figure, path)
 
 
 def run(quick: bool, out: Path) -> Number:
@@ -137,7 +138,9 @@ def run(quick: bool, out: Path) -> Number:
         for x in values
     ]
     write(out / "tschamut" / "prediction.csv", each)
-    picture(out / "tschamut" / "tschamut.png", observed, predicted, found["blocks"].site)
+    slope = found["blocks"].site
+    path = out / "tschamut" / "tschamut.png"
+    draw(path, (12.0, 7.5), lambda figure: picture(figure, observed, predicted, slope))
     real = fit.seen(observed, site.slope.toe)
     error = {model: abs(found[model].validated.mean - real.mean) for model in MODELS}
     note = f"lumped mass {error['lumped']:.1f} m"

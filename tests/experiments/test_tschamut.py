@@ -1,0 +1,36 @@
+"""The study of Tschamut runs, and its record is what the text says."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from experiments.tschamut import study
+
+RECORDED = Path(__file__).parents[2] / "experiments" / "results" / "tschamut"
+
+
+def test_it_fits_predicts_and_draws(tmp_path, monkeypatch):
+    monkeypatch.setattr(study, "QUICK_BUDGET", 8)
+    monkeypatch.setattr(study, "QUICK_RELEASES", 10)
+    monkeypatch.setattr(study, "QUICK_PREDICTED", 10)
+    monkeypatch.setattr(study, "DRAWN", 1)
+    number = study.run(True, tmp_path)
+    assert 0.0 <= number.value < 60.0
+    rows = list(csv.DictReader((tmp_path / "tschamut" / "prediction.csv").read_text().splitlines()))
+    assert len(rows) == 30 and {row["block"] for row in rows} == {"1", "2", "4"}
+    assert (tmp_path / "tschamut" / "tschamut.png").stat().st_size > 20_000
+
+
+def test_blocks_predict_runs_that_were_left_out_and_points_do_not():
+    rows = list(csv.DictReader((RECORDED / "tschamut.csv").read_text().splitlines()))
+    left = {(r["model"], r["what"]): float(r["left_out"]) for r in rows if r["left_out"]}
+    seen = {r["what"]: float(r["observed"]) for r in rows if r["left_out"]}
+    for what, bar in (("mean run-out", 5.0), ("50% of run-outs", 8.0), ("95% of run-outs", 8.0),
+                      ("mean run-out, block 4", 8.0), ("stops on the slope", 0.1)):  # fmt: skip
+        assert left["blocks", what] == pytest.approx(seen[what], abs=bar)
+    assert left["blocks", "score"] < left["lumped", "score"]
+    means = {name: left["blocks", f"mean run-out, block {name}"] for name in (1, 2, 4)}
+    assert min(means, key=means.__getitem__) == 4

@@ -78,7 +78,7 @@ def fit(
         job.write(folder / "fit.csv", found, seen)
         job.draw(folder / "fit.png", found, seen)
     show(tables.fit(job.rows(found, seen)))
-    click.echo(f"{budget} sets of values; site.toml, fit.csv and fit.png are in {folder}")
+    click.echo(f"up to {budget} sets of values; site.toml, fit.csv and fit.png are in {folder}")
 
 
 @click.command()

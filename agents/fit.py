@@ -174,14 +174,12 @@ def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[fl
             mend = "name a number of the site file, such as surfaces.soil.restitution"
             raise BadInput("--parameters", parameter.path, mend)
         table[last] = float(value)
-    return Site.parse(msgspec.toml.encode(_bare(tables)).decode(), site.name)
-
-
-def _bare(table: Any) -> Any:
-    """Return tables without what is None, which TOML does not know."""
-    if isinstance(table, dict):
-        return {key: _bare(value) for key, value in table.items() if value is not None}
-    return [_bare(value) for value in table] if isinstance(table, list | tuple) else table
+    try:
+        return msgspec.convert(tables, Site)
+    except msgspec.ValidationError as error:
+        if isinstance(error.__cause__, BadInput):
+            raise error.__cause__ from None
+        raise BadInput("--parameters", parameters[0].path, str(error)) from None
 
 
 def run_outs(site: Site, model: Model, events: Sequence[str], seeds: range) -> dict[str, Floats]:
@@ -224,7 +222,7 @@ def fit(
     parameters : sequence of Parameter
         What is fitted.
     budget : int
-        Sets of values that are computed.
+        Most sets of values that are computed.
     releases : int
         Releases of each event with each.
     seed : int
@@ -265,7 +263,7 @@ def fit(
     best = places[int(np.argmin([add(place) for place in places]))]
     options = {"bounds": [0, 1], "seed": seed + 1, "verbose": -9, "maxfevals": budget - spread}
     search = cma.CMAEvolutionStrategy(best, 0.15, options)
-    while len(tried) < budget and not search.stop():
+    while budget - len(tried) >= search.popsize and not search.stop():
         asked = search.ask()
         search.tell(asked, [add(np.asarray(place)) for place in asked])
     fresh = range(seed + releases, seed + (1 + MORE) * releases)

@@ -105,7 +105,9 @@ def lumped(
 def law(site: Site, name: str) -> tuple[float, float, float]:
     """Return normal and tangential restitution [-] and friction angle [deg] of a surface."""
     surface = site.surfaces[name]
-    usual = Rebound(surface.restitution or 0.0, friction_deg=min(surface.friction_deg, 80.0))
+    usual = Rebound(
+        surface.restitution or 0.0, friction_deg=min(surface.friction_deg, STEEPEST_DEG)
+    )
     own = site.lumped.get(name, usual)
     found = [math.nan] * 3
     found[NORMAL], found[TANGENTIAL], found[FRICTION] = own.normal, own.tangential, own.friction_deg

@@ -1,0 +1,1 @@
+"""Processor time of a right outcome: this core, other engines and the lumped mass."""

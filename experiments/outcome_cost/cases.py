@@ -1,0 +1,107 @@
+"""What is computed: releases of three sites, as every engine can compute them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from experiments.bench.cases import RUN_OUT
+from rigdda import Site
+from rigdda.model.events import Drawn
+from rigdda.model.place import Surface
+
+TSCHAMUT = Path(__file__).parent.parent / "tschamut" / "site.toml"
+
+GROUND = {"friction_deg": 38.0, "restitution": 0.4}
+"""Of `tschamut` here: with `DAMPING` its blocks come about as far as observed."""
+
+DAMPING = 0.15
+"""Damping of `tschamut` here [1/s]: in flight, too, which is what the other engines know. The fit
+of `experiments.tschamut` damps in contact only."""
+
+ROAD = 80.0
+"""Chainage beyond which blocks of `tschamut` count as debris [m]: about half of them."""
+
+CORNERS = (8, 8)
+"""Of the blocks of `tschamut` here: Box2D takes eight at most."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """Releases of a site.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    site : Site
+        The slope; what passes its `road.start` counts as debris.
+    barrier : float
+        Chainage at which the energy is taken [m].
+    events : tuple of str or None
+        Releases take turns with them; None is the only one.
+    """
+
+    name: str
+    site: Site
+    barrier: float
+    events: tuple[str | None, ...]
+
+    def event(self, seed: int) -> str | None:
+        """Return the event of a seed."""
+        return self.events[seed % len(self.events)]
+
+    def draw(self, seed: int) -> Drawn:
+        """Return what a seed draws."""
+        return self.site.draw(seed, self.event(seed))
+
+
+def everywhere(site: Site) -> Site:
+    """Return a site that damps in flight, too, as all engines do, on a valley floor without end.
+
+    The road goes on to that end, so that a release ends when all of its blocks sleep.
+    """
+    toe, level = site.slope.toe, site.slope.points[-1][1]
+    floor = (*site.slope.points, (RUN_OUT, level))
+    return replace(
+        site,
+        family="paper",  # others may damp in contact only
+        motion=replace(site.motion, damping_when="always"),
+        slope=replace(site.slope, points=floor),
+        road=replace(site.road, end=RUN_OUT - 50.0),
+        barrier_zone=replace(site.barrier_zone, start=toe - 2.0, end=toe - 1.0),  # nothing stands
+    )
+
+
+def highway() -> Case:
+    """Return the paper's highway case: about 120 blocks of 2 m2."""
+    site = everywhere(Site.load("shu-hwa-paper"))
+    return Case("highway", site, site.slope.toe, (None,))
+
+
+def quick() -> Case:
+    """Return the jointed mass of `quick`: about 20 blocks of 2 m2."""
+    site = everywhere(Site.load("quick"))
+    return Case("quick", site, site.slope.toe, ("mass",))
+
+
+def tschamut() -> Case:
+    """Return single blocks of 0.06 to 0.2 m2 that bounce down 50 m; debris is what passes 100 m."""
+    site = everywhere(Site.load(TSCHAMUT))
+    ground = Surface(**GROUND)
+    site = replace(
+        site,
+        sources=tuple(replace(source, corners=CORNERS) for source in site.sources),
+        surfaces={"rock": ground},
+        slope=replace(site.slope, surface="rock"),
+        road=replace(site.road, start=ROAD),
+        motion=replace(site.motion, damping=DAMPING),
+    )
+    events = tuple(event.name for event in site.events)
+    return Case("tschamut", site, site.slope.toe, events)
+
+
+CASES: dict[str, Callable[[], Case]] = {"highway": highway, "quick": quick, "tschamut": tschamut}

@@ -1,0 +1,154 @@
+"""Outcomes of many releases with one engine, and the processor time that they took."""
+
+from __future__ import annotations
+
+import math
+import time
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from experiments.outcome_cost.cases import Case
+from rigdda import Scene, Settings, Simulation
+from rigdda.batch import Batch
+from rigdda.lumped import lumped
+from rigdda.validation.scenes import masses
+
+Floats = NDArray[np.float64]
+
+FRAME = 0.1
+"""Interval of the frames [s]; every step is a whole part of it."""
+
+LOOK = 5
+"""Frames from one look at whether all is at rest to the next."""
+
+STILL = 0.01
+"""Way that no block has made since the last look where it is [m]."""
+
+MASS, PAST, RUN_OUT, ENERGY = range(4)
+"""Columns of what became of a block: mass [kg/m], whether it came past the edge of the road,
+where it stops [m], kinetic energy at the barrier [kJ/m], NaN if it does not come there."""
+
+OUTCOMES = ("debris share [-]", "95 % run-out [m]", "95 % energy at the barrier [kJ/m]")
+
+
+class Release(NamedTuple):
+    """Blocks of a release, (n, 4), and the processor time that it took [s]."""
+
+    blocks: Floats
+    cpu: float
+
+
+def judge(case: Case, scene: Scene, poses: Floats) -> Floats:
+    """Return what became of each block from the frames of a release.
+
+    Parameters
+    ----------
+    poses : (T, N, 3) array
+        x, y of the centroids [m] and rotation [rad], a frame every `FRAME` seconds.
+    """
+    mass, inertia = masses(scene)
+    x = poses[:, :, 0]
+    found = np.full((len(mass), 4), math.nan)
+    found[:, MASS], found[:, RUN_OUT] = mass, x[-1]
+    found[:, PAST] = (x >= case.site.road.start).any(axis=0)
+    crossed = np.flatnonzero((x >= case.barrier).any(axis=0) & (x[0] < case.barrier))
+    first = (x[:, crossed] >= case.barrier).argmax(axis=0)
+    speed = (poses[first, crossed] - poses[first - 1, crossed]) / FRAME
+    weight = np.stack([mass, mass, inertia], axis=1)[crossed]
+    found[crossed, ENERGY] = 0.5e-3 * (weight * speed**2).sum(axis=1)
+    return found
+
+
+class Core:
+    """This core: releases one after the other, as `rigdda.release_many` computes them.
+
+    With settings: those of a simulation, whatever the blocks.
+    """
+
+    NAME = "rigdda"
+
+    def __init__(self, case: Case, dt: float, settings: dict[str, Any]):
+        self._case, self._dt, self._settings = case, dt, settings
+        site = replace(case.site, motion=replace(case.site.motion, dt=dt))
+        self._batch = Batch(site, ())
+
+    def release(self, seed: int) -> Release:
+        """Compute a release until all its blocks sleep."""
+        drawn = self._case.draw(seed)
+        start = time.thread_time()
+        scene = self._batch.scene(drawn)
+        if self._settings:
+            simulation = Simulation(scene, Settings(dt=self._dt, **self._settings))
+        else:
+            simulation = self._batch.simulation(scene)
+        run = simulation.run(self._case.site.motion.duration, FRAME)
+        cpu = time.thread_time() - start
+        return Release(judge(self._case, scene, run.poses), cpu)
+
+
+class Peer:
+    """Another engine, of `experiments.bench.engines`: step by step."""
+
+    def __init__(self, module: ModuleType, case: Case, dt: float, options: dict[str, Any]):
+        self._case, self._engine, self._dt, self._options = case, module.Engine, dt, options
+        self._frames = round(case.site.motion.duration / FRAME)
+
+    def release(self, seed: int) -> Release:
+        """Compute a release until no block has moved since the last look.
+
+        Processor time is that of setting up the engine and of its steps, not of reading poses.
+        """
+        scene = self._case.site.scene(self._case.draw(seed))
+        stride = round(FRAME / self._dt)
+        start = time.thread_time()
+        run = self._engine(scene, self._dt, True, **self._options)
+        cpu = time.thread_time() - start
+        poses = [run.poses()]
+        for frame in range(1, self._frames + 1):
+            start = time.thread_time()
+            run.advance(stride)
+            cpu += time.thread_time() - start
+            poses.append(run.poses())
+            if frame % LOOK == 0 and np.abs(poses[-1] - poses[-1 - LOOK])[:, :2].max() < STILL:
+                break
+        return Release(judge(self._case, scene, np.array(poses)), cpu)
+
+
+class Points:
+    """The lumped mass: computed a second time with the road at the barrier, for the energy there."""
+
+    def __init__(self, case: Case):
+        self._case = case
+        self._at = replace(case.site, road=replace(case.site.road, start=case.barrier))
+
+    def release(self, seed: int) -> Release:
+        """Compute a release."""
+        event, start = self._case.event(seed), time.thread_time()
+        road = lumped(self._case.site, (), (seed,), event)
+        cpu = time.thread_time() - start
+        energy = 1e-3 * lumped(self._at, (), (seed,), event).energy
+        return Release(np.stack([road.mass, road.reached, road.run_out, energy], 1), cpu)
+
+
+def outcomes(releases: list[Release]) -> Floats:
+    """Return debris share, 95 % run-out and 95 % energy of releases taken together, (3,).
+
+    Run-out by mass; energy by the number of blocks that come to the barrier.
+    """
+    blocks = np.concatenate([r.blocks for r in releases])
+    mass = blocks[:, MASS]
+    order = np.argsort(blocks[:, RUN_OUT])
+    share = np.cumsum(mass[order]) / mass.sum()
+    energy = blocks[:, ENERGY]
+    energy = energy[~np.isnan(energy)]
+    return np.array(
+        [
+            mass @ blocks[:, PAST] / mass.sum(),
+            blocks[order, RUN_OUT][np.searchsorted(share, 0.95)],
+            np.quantile(energy, 0.95) if len(energy) else 0.0,
+        ]
+    )

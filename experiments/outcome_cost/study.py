@@ -1,0 +1,310 @@
+"""Processor time to know an outcome: how long each engine takes until its answer is right.
+
+Of three cases (`cases`) each engine (`engines`) computes releases with several settings. What a
+designer asks of them: the share of the debris that passes the edge of the road, the run-out that
+95 % of the rock stays within, and the energy that 95 % of the blocks at a barrier stay below.
+With n releases an outcome is wrong by its bias, against the reference, and by its scatter; an
+answer within `e` of the reference needs the n for which bias^2 + scatter^2 / n is e^2 for the worst
+of the three outcomes. Its cost is n times the processor time of a release. A setting whose bias
+exceeds e never gets there.
+
+All engines compute the same scenes until all blocks are at rest. Settings take turns, some releases
+each, so that all meet the same noise of the machine. A setting that is surely biased by more than
+3 % is not computed any further.
+
+Judged by the cost of this core over that of the cheapest other block engine at 3 %, of the worst
+case.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import lru_cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from agents.store import mechanics
+from experiments.outcome_cost.cases import CASES, Case
+from experiments.outcome_cost.engines import CORE, LUMPED, REFERENCE, Setting, settings
+from experiments.outcome_cost.sample import OUTCOMES, Core, Floats, Peer, Points, Release, outcomes
+from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
+from rigdda.errors import Diverged
+from rigdda.files import atomic
+
+LEVELS = (0.1, 0.03, 0.01)
+"""How far the answer may be off, over the reference [-]."""
+
+JUDGED = 0.03
+
+RELEASES = {"highway": 400, "quick": 2000, "tschamut": 6000}
+QUICK_RELEASES = {"highway": 4, "quick": 20, "tschamut": 60}
+CHUNK = {"highway": 20, "quick": 100, "tschamut": 300}
+"""Releases of a setting at a time."""
+
+FEWEST = 3
+"""Chunks after which a setting may be given up."""
+
+SURE = 2.5
+"""Standard errors by which its bias must then exceed 3 %."""
+
+RESAMPLES = 300
+
+WORKERS = 2
+COLOURS = {CORE: BLUE, "Box2D": RED, "pymunk": GREEN, "MuJoCo": ORANGE, LUMPED: GREY}
+
+
+class Sample(NamedTuple):
+    """What a setting gives: means, their resamples, and processor time of a release [s]."""
+
+    means: Floats
+    resampled: Floats
+    cpu: float
+    releases: int
+
+    @property
+    def error(self) -> Floats:
+        """Standard errors of the means, (3,)."""
+        return self.resampled.std(axis=0)
+
+
+class Verdict(NamedTuple):
+    """Bias over the reference and its standard error, scatter of one release over it; (3,) each."""
+
+    bias: Floats
+    error: Floats
+    scatter: Floats
+
+
+@lru_cache(maxsize=64)
+def loaded(name: str, setting: Setting) -> tuple[Case, Core | Peer | Points]:
+    """Return a case and what computes its releases, once a process."""
+    case = CASES[name]()
+    computer = setting.load(case)
+    computer.release(0)  # compiles, packs
+    return case, computer
+
+
+def compute(name: str, setting: Setting, seeds: range) -> list[Release]:
+    """Return the releases of some seeds; one that diverges has no blocks."""
+    _, computer = loaded(name, setting)
+    found = []
+    for seed in seeds:
+        try:
+            found.append(computer.release(seed))
+        except Diverged:
+            found.append(Release(np.zeros((0, 4)), math.nan))
+    return found
+
+
+def stored(folder: Path, name: str, setting: Setting, seeds: range, made: str) -> Path:
+    """Return the file of some releases."""
+    what = repr((made, name, setting, seeds, CASES[name]()))
+    return folder / f"{name}-{hashlib.sha256(what.encode()).hexdigest()[:16]}.npz"
+
+
+def save(path: Path, releases: list[Release]) -> None:
+    """Write releases."""
+    count = [len(r.blocks) for r in releases]
+    with atomic(path) as part, part.open("wb") as file:
+        blocks = np.concatenate([r.blocks for r in releases])
+        np.savez(file, blocks=blocks, count=count, cpu=[r.cpu for r in releases])
+
+
+def read(path: Path) -> list[Release]:
+    """Return releases that were written."""
+    with np.load(path) as found:
+        blocks = np.split(found["blocks"], np.cumsum(found["count"])[:-1])
+        return [Release(b, float(c)) for b, c in zip(blocks, found["cpu"], strict=True)]
+
+
+def sampled(releases: list[Release]) -> Sample:
+    """Return what releases give, those that diverged left out."""
+    good = [r for r in releases if len(r.blocks)]
+    rng = np.random.default_rng(0)
+    picks = rng.integers(len(good), size=(RESAMPLES, len(good)))
+    resampled = np.array([outcomes([good[i] for i in pick]) for pick in picks])
+    cpu = float(np.mean([r.cpu for r in good]))
+    return Sample(outcomes(good), resampled, cpu, len(good))
+
+
+def judge(sample: Sample, reference: Sample) -> Verdict:
+    """Return bias and scatter of a sample."""
+    error = np.hypot(sample.error, reference.error) / reference.means
+    scatter = sample.error * math.sqrt(sample.releases) / reference.means
+    return Verdict(sample.means / reference.means - 1.0, error, scatter)
+
+
+def needed(bias: Floats, noise: Floats, scatter: Floats, level: float) -> Floats:
+    """Return the releases that each outcome needs to be within a level; inf if it never is.
+
+    Parameters
+    ----------
+    bias, noise, scatter : (..., 3) arrays
+        Bias as it was found, its standard error, scatter of one release.
+    """
+    left = level**2 - np.maximum(bias**2 - noise**2, 0.0)
+    releases = np.divide(scatter**2, left, out=np.full(left.shape, math.inf), where=left > 0.0)
+    return np.maximum(releases, 1.0)
+
+
+def cost(sample: Sample, reference: Sample, level: float) -> tuple[float, float, float]:
+    """Return the processor time of an answer within a level [s], and its 95 % interval.
+
+    Infinite where the bias is greater. NaN where the bias is not known to the level, so that
+    nothing can be told.
+    """
+    bias, error, scatter = judge(sample, reference)
+    half = 1.96 * error
+    if (half > level).any() and not (np.abs(bias) - half > level).any():
+        return math.nan, math.nan, math.nan
+    found = needed(bias, error, scatter, level).max()
+    each = sample.resampled / reference.resampled - 1.0
+    ends = needed(each, math.sqrt(2.0) * error, scatter, level).max(axis=1)
+    low, high = np.quantile(ends, (0.025, 0.975), method="nearest")
+    return sample.cpu * float(found), sample.cpu * float(low), sample.cpu * float(high)
+
+
+def surely_biased(sample: Sample, reference: Sample) -> bool:
+    """Return whether a setting is biased by more than the level that is judged."""
+    verdict = judge(sample, reference)
+    return bool((np.abs(verdict.bias) - SURE * verdict.error > JUDGED).any())
+
+
+def gather(name: str, releases: int, folder: Path) -> dict[Setting, Sample]:
+    """Return the samples of all settings of a case, computed in turns."""
+    folder.mkdir(parents=True, exist_ok=True)
+    made, chunk = mechanics(), min(CHUNK[name], releases)
+    going, found = list(settings(name)), dict[Setting, list[Release]]()
+    with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
+        for first in range(0, releases, chunk):
+            seeds = range(first, min(first + chunk, releases))
+            paths = {s: stored(folder, name, s, seeds, made) for s in going}
+            jobs = {s: pool.submit(compute, name, s, seeds) for s in going if not paths[s].exists()}
+            for setting in going:
+                if setting in jobs:
+                    save(paths[setting], jobs[setting].result())
+                found.setdefault(setting, []).extend(read(paths[setting]))
+            if first >= (FEWEST - 1) * chunk:
+                reference = sampled(found[REFERENCE])
+                for setting in going[1:]:
+                    if surely_biased(sampled(found[setting]), reference):
+                        going.remove(setting)
+            say(f"{name}: {seeds.stop} of {releases} releases, {len(going)} settings")
+    return {setting: sampled(each) for setting, each in found.items()}
+
+
+def rows(name: str, samples: dict[Setting, Sample]) -> Iterator[dict[str, Any]]:
+    """Yield a row for each setting: outcomes, bias, and the cost of each level."""
+    reference = samples[REFERENCE]
+    for setting, sample in samples.items():
+        verdict = judge(sample, reference)
+        row: dict[str, Any] = {
+            "case": name,
+            "engine": setting.engine,
+            "setting": "reference" if setting == REFERENCE else str(setting),
+            "releases": sample.releases,
+            "cpu_ms": 1e3 * sample.cpu,
+        }
+        columns = ("debris", "run_out", "energy")
+        for k, what in enumerate(columns):
+            row[what] = float(sample.means[k])
+            row[f"{what}_bias"] = math.nan if setting == REFERENCE else float(verdict.bias[k])
+            row[f"{what}_bias_95"] = math.nan if setting == REFERENCE else 1.96 * verdict.error[k]
+            row[f"{what}_scatter"] = float(verdict.scatter[k])
+        for level in LEVELS:
+            found = (math.nan,) * 3 if setting == REFERENCE else cost(sample, reference, level)
+            for what, value in zip(("cost", "low", "high"), found, strict=True):
+                row[f"{what}_{level:.0%}_s"] = value
+        yield row
+
+
+def cheapest(samples: dict[Setting, Sample], level: float) -> dict[str, tuple[Setting, float]]:
+    """Return the cheapest setting of each engine that gets within a level, and its cost [s]."""
+    reference, found = samples[REFERENCE], dict[str, tuple[Setting, float]]()
+    for setting, sample in samples.items():
+        if setting == REFERENCE:
+            continue
+        value = cost(sample, reference, level)[0]
+        if math.isfinite(value) and value < found.get(setting.engine, (setting, math.inf))[1]:
+            found[setting.engine] = setting, value
+    return found
+
+
+def ratios(every: dict[str, dict[Setting, Sample]]) -> list[dict[str, Any]]:
+    """Return for each case and level the cost of this core over that of the cheapest peer.
+
+    NaN where none gets there; 0 where this core does and no peer.
+    """
+    found = []
+    for name, samples in every.items():
+        for level in LEVELS:
+            best = cheapest(samples, level)
+            ours = best.get(CORE)
+            peers = {e: b for e, b in best.items() if e not in (CORE, LUMPED)}
+            theirs = min(peers.values(), key=lambda pair: pair[1], default=None)
+            ratio = math.nan
+            if ours is not None:
+                ratio = ours[1] / theirs[1] if theirs else 0.0
+            found.append(
+                {
+                    "case": name,
+                    "level": level,
+                    "rigdda": str(ours[0]) if ours else "",
+                    "rigdda_s": ours[1] if ours else math.nan,
+                    "peer": str(theirs[0]) if theirs else "",
+                    "peer_s": theirs[1] if theirs else math.nan,
+                    "ratio": ratio,
+                }
+            )
+    return found
+
+
+def picture(figure: Figure, every: dict[str, dict[Setting, Sample]]) -> None:
+    """Draw the worst bias of each setting against the processor time of a release."""
+    for axes, (name, samples) in zip(
+        figure.subplots(1, len(every), squeeze=False)[0], every.items(), strict=True
+    ):
+        reference = samples[REFERENCE]
+        for setting, sample in samples.items():
+            if setting == REFERENCE:
+                continue
+            verdict = judge(sample, reference)
+            worst = int(np.abs(verdict.bias).argmax())
+            axes.errorbar(
+                1e3 * sample.cpu,
+                100.0 * abs(verdict.bias[worst]),
+                196.0 * verdict.error[worst],
+                fmt="o",
+                color=COLOURS[setting.engine],
+                lw=0.8,
+            )
+        axes.axhline(100.0 * JUDGED, color=GREY, lw=0.8, ls="--")
+        axes.set(xscale="log", title=name, xlabel="processor time of a release [ms]")
+        axes.set_ylim(0.0, 40.0)
+    for engine, colour in COLOURS.items():
+        figure.axes[0].plot([], [], "o", color=colour, label=engine)
+    figure.axes[0].set_ylabel("greatest bias of the three outcomes [%]")
+    figure.axes[-1].legend(*figure.axes[0].get_legend_handles_labels())
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Compute all cases and write the tables and the picture."""
+    folder = out / "outcome_cost"
+    counts = QUICK_RELEASES if quick else RELEASES
+    every = {name: gather(name, counts[name], folder / "samples") for name in CASES}
+    write(folder / "outcome_cost.csv", [r for name, s in every.items() for r in rows(name, s)])
+    found = ratios(every)
+    write(folder / "ratios.csv", found)
+    draw(folder / "outcome_cost.png", (12.0, 4.2), lambda figure: picture(figure, every))
+    judged = {row["case"]: row["ratio"] for row in found if row["level"] == JUDGED}
+    note = ", ".join(f"{name} {ratio:.2f}" for name, ratio in judged.items())
+    note += f"; outcomes: {', '.join(OUTCOMES)}"
+    what = f"cost over the cheapest peer's at {JUDGED:.0%}, worst case"
+    return Number(what, max(judged.values()), high=1.0, note=note)

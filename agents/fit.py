@@ -241,15 +241,40 @@ def fit(
     """
     low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
     with_values(site, parameters, list(low)), with_values(site, parameters, list(high))
-    events, tried = list(observed), list[Candidate]()
-    table: list[Floats] = []
+    events = list(observed)
+
+    def compute(values: Floats, seeds: range) -> Mapping[str, Floats]:
+        return run_outs(with_values(site, parameters, list(values)), model, events, seeds)
+
+    found = search(site, observed, parameters, compute, budget, releases, seed, tick)
+    return found._replace(site=with_values(site, parameters, list(found.best.values)))
+
+
+def search(
+    site: Site,
+    observed: Mapping[str, Floats],
+    parameters: Sequence[Parameter],
+    compute: Callable[[Floats, range], Mapping[str, Floats]],
+    budget: int,
+    releases: int,
+    seed: int,
+    tick: Tick,
+) -> Fit:
+    """Fit numbers of whatever computes run-outs to observed ones; as `fit`.
+
+    Parameters
+    ----------
+    compute : callable
+        Takes values of the parameters and seeds, gives the run-outs of each event [m].
+    """
+    low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
+    tried, table = list[Candidate](), list[Floats]()
 
     def attempt(place: Floats, seeds: range) -> tuple[Candidate, Floats]:
         values = low + (high - low) * np.clip(place, 0.0, 1.0)
-        found = run_outs(with_values(site, parameters, list(values)), model, events, seeds)
-        return Candidate(values, found), np.concatenate(
-            [scores(found[e], observed[e]) for e in events]
-        )
+        found = compute(values, seeds)
+        each = [scores(found[event], observed[event]) for event in observed]
+        return Candidate(values, found), np.concatenate(each)
 
     def add(place: Floats) -> float:
         candidate, each = attempt(place, range(seed, seed + releases))
@@ -262,10 +287,10 @@ def fit(
     places = qmc.Sobol(len(parameters), rng=np.random.default_rng(seed)).random(spread)
     best = places[int(np.argmin([add(place) for place in places]))]
     options = {"bounds": [0, 1], "seed": seed + 1, "verbose": -9, "maxfevals": budget - spread}
-    search = cma.CMAEvolutionStrategy(best, 0.15, options)
-    while budget - len(tried) >= search.popsize and not search.stop():
-        asked = search.ask()
-        search.tell(asked, [add(np.asarray(place)) for place in asked])
+    evolution = cma.CMAEvolutionStrategy(best, 0.15, options)
+    while budget - len(tried) >= evolution.popsize and not evolution.stop():
+        asked = evolution.ask()
+        evolution.tell(asked, [add(np.asarray(place)) for place in asked])
     fresh = range(seed + releases, seed + (1 + MORE) * releases)
     order = np.argsort([each.mean() for each in table])[:FINALISTS]
     again = [attempt((tried[i].values - low) / (high - low), fresh) for i in order]
@@ -273,9 +298,9 @@ def fit(
     start, end = _intervals(np.array(table), np.array([c.values for c in tried]), seed)
     left_out = _validate(tried, np.array(table), observed, seed)
     toe = site.slope.toe
-    whole = [winner.run_outs[e] for e in events for _ in observed[e]]
+    whole = [winner.run_outs[event] for event in observed for _ in observed[event]]
     return Fit(
-        with_values(site, parameters, list(winner.values)),
+        site,
         tuple(parameters),
         winner,
         np.minimum(start, winner.values),

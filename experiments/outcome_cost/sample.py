@@ -64,7 +64,7 @@ def judge(case: Case, scene: Scene, poses: Floats) -> Floats:
 
 
 class Core:
-    """This core: releases one after the other, as `rigdda.release_many` computes them.
+    """The core of `rigdda`: releases one after the other, as `rigdda.release_many` computes them.
 
     With settings: those of a simulation, whatever the blocks.
     """
@@ -119,7 +119,7 @@ class Peer:
 
 
 class Points:
-    """The lumped mass: computed a second time with the road at the barrier, for the energy there."""
+    """The lumped mass: a second time with the road at the barrier, for the energy there."""
 
     def __init__(self, case: Case):
         self._case = case

@@ -5,13 +5,16 @@ doi 10.16904/envidat.34, ODbL). `site.toml` is the slope with the blocks by thei
 `observed.csv` 33 of the runs. The block model and the lumped mass are fitted to them, four numbers
 each with the same budget, by what `rigdda fit` does. Each observed run is predicted by what fits
 the others best; then 1,000 releases of each block are the prediction of runs that nobody saw.
+PlatRock is fitted likewise if `PLATROCK_PYTHON` names a Python that has it: see `platrock`.
 
 Judged by how far the mean run-out that is predicted of left-out runs is from theirs.
 """
 
 from __future__ import annotations
 
+import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +24,8 @@ from matplotlib.figure import Figure
 
 from agents import fit
 from agents.fit import Fit, Floats
-from experiments.script import BLUE, GREEN, GREY, RED, Number, draw, say, write
+from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
+from experiments.tschamut.platrock import PARAMETERS, PYTHON, PlatRock
 from rigdda import Site, release
 
 HERE = Path(__file__).parent
@@ -41,6 +45,8 @@ MODELS: dict[fit.Model, tuple[str, ...]] = {
     ),
 }
 """What is fitted of each model."""
+
+COLOURS = {"blocks": BLUE, "lumped": GREEN, "PlatRock": ORANGE}
 
 BUDGET, QUICK_BUDGET = 192, 16
 """Sets of values that are computed of each model."""
@@ -89,7 +95,8 @@ def picture(
     for axes, name in zip(above.subplots(1, len(names), sharey=True), names, strict=True):
         events = list(observed) if name == "all" else [name]
         real = np.concatenate([observed[e] for e in events])
-        for model, colour in (("blocks", BLUE), ("lumped", GREEN)):
+        for model in predicted:
+            colour = COLOURS[model]
             values = np.concatenate([predicted[model][e] for e in events])
             cumulative(axes, values, colour, model, len(real) if model == "blocks" else 0)
         order = np.arange(1, len(real) + 1) / len(real)
@@ -117,19 +124,31 @@ def run(quick: bool, out: Path) -> Number:
         (QUICK_BUDGET, QUICK_RELEASES, QUICK_PREDICTED) if quick else (BUDGET, RELEASES, PREDICTED)
     )
     rows: list[dict[str, Any]] = []
-    predicted, found = {}, {}
-    for model, names in MODELS.items():
-        start = time.process_time()
-        parameters = [fit.parse(name) for name in names]
+    predicted, found = dict[str, dict[str, Floats]](), dict[str, Fit]()
+    seeds = range(FRESH, FRESH + count)
 
-        def tell(done: int, words: str, model: str = model) -> None:
+    def tell(model: str) -> Callable[[int, str], None]:
+        def tick(done: int, words: str) -> None:
             if done % 16 == 0:
                 say(f"tschamut: {model}, {done} of {budget}, {words}")
 
-        found[model] = fit.fit(site, observed, parameters, budget, releases, 0, tell, model)
+        return tick
+
+    for model, names in MODELS.items():
+        start = time.process_time()
+        parameters = [fit.parse(name) for name in names]
+        found[model] = fit.fit(site, observed, parameters, budget, releases, 0, tell(model), model)
         rows += table(model, found[model], observed, time.process_time() - start)
-        seeds = range(FRESH, FRESH + count)
         predicted[model] = fit.run_outs(found[model].site, model, list(observed), seeds)
+    if os.environ.get(PYTHON):
+        peer, begin = PlatRock(os.environ[PYTHON], site), time.perf_counter()
+        found["PlatRock"] = fit.search(
+            site, observed, PARAMETERS, peer.run_outs, budget, releases, 0, tell("PlatRock")
+        )
+        took = time.perf_counter() - begin
+        rows += table("PlatRock", found["PlatRock"], observed, took)
+        predicted["PlatRock"] = dict(peer.run_outs(found["PlatRock"].best.values, seeds))
+        peer.close()
     write(out / "tschamut" / "tschamut.csv", rows)
     blocks = predicted["blocks"]
     each = [
@@ -142,6 +161,6 @@ def run(quick: bool, out: Path) -> Number:
     path = out / "tschamut" / "tschamut.png"
     draw(path, (12.0, 7.5), lambda figure: picture(figure, observed, predicted, slope))
     real = fit.seen(observed, site.slope.toe)
-    error = {model: abs(found[model].validated.mean - real.mean) for model in MODELS}
-    note = f"lumped mass {error['lumped']:.1f} m"
+    error = {model: abs(each.validated.mean - real.mean) for model, each in found.items()}
+    note = ", ".join(f"{model} {off:.1f} m" for model, off in error.items() if model != "blocks")
     return Number("error of the mean run-out of left-out runs [m]", error["blocks"], 0.0, BAR, note)

@@ -1,0 +1,1 @@
+"""A catch bench below a mine face: retained share against width."""

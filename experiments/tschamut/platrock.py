@@ -1,0 +1,85 @@
+"""PlatRock beside the models of `rigdda`, in a process of its own: see `platrock_server`."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from agents.fit import Floats, Parameter
+from rigdda import Site
+
+PYTHON = "PLATROCK_PYTHON"
+"""Environment variable that names the Python which has PlatRock; without it, it is left out."""
+
+PARAMETERS = (
+    Parameter("R_n", 0.0, 0.8),
+    Parameter("R_t", 0.4, 0.95),
+    Parameter("roughness", 0.0, 0.5),
+    Parameter("mu_r", 0.1, 1.2),
+)
+"""What is fitted of it: restitutions, roughness [m] and coefficient of rolling."""
+
+MASSES = {"block 1": 69.0, "block 2": 79.0, "block 4": 40.0}
+"""Of the blocks [kg]."""
+
+DENSITY = 2650.0
+
+
+class PlatRock:
+    """PlatRock's 2D model on a site.
+
+    Parameters
+    ----------
+    python : str
+        The Python that has it.
+    site : Site
+        Its ground, and where blocks start.
+    """
+
+    def __init__(self, python: str, site: Site):
+        self._site = site
+        server = Path(__file__).with_name("platrock_server.py").resolve()
+        self._process = subprocess.Popen(
+            [python, "-P", str(server)],  # else it finds this module for its own
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def run_outs(self, values: Floats, seeds: range) -> Mapping[str, Floats]:
+        """Return the run-outs of each block [m], as many as seeds.
+
+        Raises
+        ------
+        RuntimeError
+            If it stops.
+        """
+        source = self._site.sources[0]
+        asked = {p.path: float(v) for p, v in zip(PARAMETERS, values, strict=True)} | {
+            "points": self._site.slope.points,
+            "volumes": [mass / DENSITY for mass in MASSES.values()],
+            "density": DENSITY,
+            "band": source.band,
+            "speed": 0.5 * sum(source.speed),
+            "releases": len(seeds),
+            "seed": seeds.start,
+        }
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None and stdout is not None
+        stdin.write(json.dumps(asked) + "\n")
+        stdin.flush()
+        line = stdout.readline()
+        if not line:
+            errors: IO[str] | None = self._process.stderr
+            raise RuntimeError(f"PlatRock stopped: {errors.read() if errors else ''}")
+        return dict(zip(MASSES, map(np.array, json.loads(line)), strict=True))
+
+    def close(self) -> None:
+        """End it."""
+        self._process.communicate()

@@ -104,4 +104,10 @@ def tschamut() -> Case:
     return Case("tschamut", site, site.slope.toe, events)
 
 
+def cut(angle: int) -> Case:
+    """Return a uniform road cut of 35, 60 or 80 degrees (Ritchie 1963)."""
+    site = everywhere(Site.load(f"ritchie-{angle}"))
+    return Case(site.name, site, site.road.start, (None,))
+
+
 CASES: dict[str, Callable[[], Case]] = {"highway": highway, "quick": quick, "tschamut": tschamut}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from rigdda import BadInput, Simulation, Site, Surface, sites
+from rigdda import BadInput, Simulation, Site, Surface, release_outcome, sites
 from rigdda.geometry import overlap
 from rigdda.model.place import Scatter
 from rigdda.results.outcome import measure, stations, watch
@@ -153,3 +153,46 @@ def test_blocks_of_a_source_are_out_of_the_ground():
     with pytest.raises(BadInput) as caught:
         msgspec.structs.replace(site, sources=(columns(blocks=(sunk,)),))
     assert caught.value.field.startswith("sources.mass.blocks[0]")
+
+
+def surveyed(accuracy):
+    """Return `quick` with three surveyed blocks on its upper face."""
+    site = Site.load("quick")
+    rows = [
+        ((3.0 + 1.2 * i, 42.0 - 1.35 * i), (4.0 + 1.2 * i, 42.0 - 1.35 * i),
+         (4.0 + 1.2 * i, 43.0 - 1.35 * i), (3.0 + 1.2 * i, 43.0 - 1.35 * i))
+        for i in range(3)
+    ]  # fmt: skip
+    mass = msgspec.structs.replace(
+        site.sources[1], polygon=(), joints=(), blocks=tuple(rows), accuracy=accuracy
+    )
+    return msgspec.structs.replace(site, sources=(site.sources[0], mass))
+
+
+def test_a_surveyed_slope_is_an_ensemble_of_copies_within_its_accuracy():
+    site = surveyed(0.004)
+    given = np.array(site.sources[1].blocks)
+    copies = [[b.vertices for b in site.draw(seed, "mass").blocks] for seed in range(8)]
+    shifts = np.array([np.hypot(*(np.array(c) - given).T) for c in copies])
+    assert 0.0 < shifts.min() and 0.003 < shifts.max() <= 0.004 + 1e-12
+    for copy in copies:
+        for (_, own), whole in zip(enumerate(copy), given, strict=True):
+            assert shapely.Polygon(whole).covers(shapely.Polygon(own))
+    outcomes = [release_outcome(site, (), seed, "mass") for seed in range(4)]
+    assert len({outcome.run_out for outcome in outcomes}) == 4
+    again = [block.vertices for block in site.draw(3, "mass").blocks]
+    assert all(np.array_equal(a, b) for a, b in zip(again, copies[3], strict=True))
+
+
+def test_without_accuracy_surveyed_blocks_are_the_same_in_every_release():
+    site = surveyed(0.0)
+    assert all(
+        np.array_equal(b.vertices, np.array(given))
+        for seed in (0, 1)
+        for b, given in zip(site.draw(seed, "mass").blocks, site.sources[1].blocks, strict=True)
+    )
+
+
+def test_an_accuracy_that_blocks_do_not_bear_is_refused():
+    with pytest.raises(BadInput, match=r"sources\.mass\.accuracy = 0\.2: give at most 0\.05"):
+        surveyed(0.2)

@@ -67,7 +67,11 @@ VARIANTS = {
     "lumped": Variant(
         "lumped",
         Parameter("lumped.rock.tangential", 0.2, 0.99),
-        (("lumped.rock.normal", 0.3), ("lumped.rock.friction_deg", 30.0)),
+        (
+            ("lumped.rock.normal", 0.3),
+            ("lumped.rock.friction_deg", 30.0),
+            ("scatter.friction_deg", 10.0),  # else all points come as far
+        ),
     ),
 }
 COLOURS = {"damping": BLUE, "restitution": ORANGE, "lumped": GREEN}
@@ -130,7 +134,9 @@ def row(name: str, face: float, value: float | None, found: Floats) -> dict[str,
 def picture(figure: Figure, every: dict[tuple[str, float], Floats]) -> None:
     """Draw the retained share against the width, a panel a face."""
     grid = np.linspace(0.0, 25.0, 300)
-    for axes, face in zip(figure.subplots(1, len(FACES), sharey=True), FACES, strict=True):
+    for axes, face in zip(
+        figure.subplots(1, len(FACES), sharey=True, squeeze=False)[0], FACES, strict=True
+    ):
         for name, variant in VARIANTS.items():
             found = every[name, face]
             if len(found):

@@ -9,6 +9,7 @@ import msgspec
 from rigdda import check
 from rigdda.errors import BadInput
 from rigdda.model.scene import Surface
+from rigdda.model.settings import USUAL_DT
 from rigdda.model.source import Point
 
 
@@ -209,7 +210,7 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping: float = 0.0
     damping_when: str = "contact"
     duration: float = 25.0
-    dt: float = 5e-3
+    dt: float = USUAL_DT
 
     def __post_init__(self) -> None:
         check.number("motion.damping", self.damping, 0.0, 100.0)

@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 
 from rigdda import check
 
+USUAL_DT = 5e-3
+"""Step of a simulation, and of a site that does not say [s]: the outcome of a rockfall is within
+the scatter of its releases, and a block of 20 m/s moves by 0.1 m."""
+
 LARGEST_DT = 0.1
 """Largest step [s]: in it a block at rest falls by 5 cm; more was hardly meant in seconds."""
 
@@ -82,7 +86,7 @@ class Settings:
         If a value is not finite or outside its range.
     """
 
-    dt: float = 5e-3
+    dt: float = USUAL_DT
     penetration: float | None = None
     tolerance: float = 1e-7
     sweep_tolerance: float = 1.0

@@ -1,0 +1,89 @@
+"""The cost of a right outcome: what is counted, and that every engine computes the same scenes."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.outcome_cost import sample, study
+from experiments.outcome_cost.cases import CASES, cut
+from experiments.outcome_cost.engines import CORE, LUMPED, REFERENCE, settings
+from experiments.outcome_cost.sample import ENERGY, PAST, RUN_OUT, Core, Points, Release
+
+RECORDED = Path(__file__).parents[2] / "experiments" / "results" / "outcome_cost"
+LEVEL = 0.03
+
+
+def releases(share, count, seed=0):
+    """Return releases of ten blocks of which a share is past the road."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(count):
+        past = rng.random(10) < share
+        blocks = np.stack([np.ones(10), past, 50.0 + 10.0 * rng.random(10), np.full(10, 7.0)], 1)
+        found.append(Release(blocks, 0.5))
+    return found
+
+
+def test_outcomes_are_those_of_all_blocks_by_mass():
+    blocks = np.array([[3.0, 1.0, 60.0, 9.0], [1.0, 0.0, 20.0, math.nan], [1.0, 0.0, 30.0, 5.0]])
+    debris, run_out, energy = sample.outcomes([Release(blocks, 0.0), Release(blocks, 0.0)])
+    assert debris == pytest.approx(0.6) and run_out == 60.0
+    assert energy == pytest.approx(np.quantile([9.0, 5.0, 9.0, 5.0], 0.95))
+
+
+def test_the_releases_that_an_answer_needs_are_those_of_scatter_and_bias():
+    scatter, none = np.array([0.3, 0.1, 0.2]), np.zeros(3)
+    assert study.needed(none, none, scatter, 0.03) == pytest.approx([100.0, 0.1 / 0.009, 400 / 9])
+    biased = study.needed(np.array([0.024, 0.0, 0.04]), none, scatter, 0.03)
+    assert biased[0] == pytest.approx(0.09 / (0.03**2 - 0.024**2)) and biased[2] == math.inf
+    noisy = study.needed(np.array([0.024, 0.0, 0.0]), np.full(3, 0.024), scatter, 0.03)
+    assert noisy[0] == pytest.approx(100.0)  # what is within its error counts as none
+
+
+def test_a_cost_is_told_only_where_the_bias_is_known_to_the_level():
+    reference, few = (study.sampled(releases(0.3, n, n)) for n in (1500, 40))
+    assert math.isnan(study.cost(few, reference, 0.03)[0])
+    good, low, high = study.cost(study.sampled(releases(0.3, 1500, 1)), reference, 0.1)
+    assert low <= good <= high and good == pytest.approx(0.5 * 0.7 / 3 / 0.1**2, rel=0.3)
+    off = study.sampled(releases(0.5, 300, 2))
+    assert study.cost(off, reference, 0.1)[0] == math.inf and study.surely_biased(off, reference)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_this_core_and_points_compute_releases(name):
+    case = CASES[name]()
+    core, points = Core(case, 10e-3, {}), Points(case)
+    for computer in (core, points):
+        found = computer.release(1)
+        assert found.cpu > 0.0 and len(found.blocks) == len(case.draw(1).blocks)
+        assert set(found.blocks[:, PAST]) <= {0.0, 1.0}
+        came = ~np.isnan(found.blocks[:, ENERGY])
+        assert (found.blocks[came, ENERGY] >= 0.0).all()
+        assert np.isfinite(found.blocks[:, RUN_OUT]).all()
+
+
+def test_a_study_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr(study, "settings", lambda name: settings(name)[:2])
+    first = study.gather("tschamut", 6, tmp_path)
+    monkeypatch.setattr(study, "compute", None)  # nothing is computed again
+    again = study.gather("tschamut", 6, tmp_path)
+    assert list(first) == list(again) and first[REFERENCE].releases == 6
+    assert all(np.array_equal(first[s].means, again[s].means) for s in first)
+
+
+def test_ritchies_cuts_are_cases():
+    assert {cut(angle).name for angle in (35, 60, 80)} == {f"ritchie-{a}" for a in (35, 60, 80)}
+
+
+def test_the_record_has_every_engine_and_says_who_is_cheapest():
+    rows = list(csv.DictReader((RECORDED / "outcome_cost.csv").read_text().splitlines()))
+    assert {row["case"] for row in rows} == set(CASES)
+    assert {row["engine"] for row in rows} == {CORE, "Box2D", "pymunk", "MuJoCo", LUMPED}
+    ratios = list(csv.DictReader((RECORDED / "ratios.csv").read_text().splitlines()))
+    judged = {r["case"]: float(r["ratio"]) for r in ratios if float(r["level"]) == LEVEL}
+    assert set(judged) == set(CASES) and max(judged.values()) <= 1.0

@@ -27,6 +27,9 @@ SCRIPTS = (
     "outcome_step",
     "fence_step",
     "thrust",
+    "one_slope",
+    "lumped_mass",
+    "catch_bench",
     "hard_cases",
     "speed_error",
 )

@@ -42,10 +42,10 @@ FITTED, PREDICTED = (10.9, 0.9), (9.4, 0.8)
 BAR = 0.05
 """Greatest distance of the prediction [-]."""
 
-RELEASES, QUICK_RELEASES = 1500, 200
+RELEASES, QUICK_RELEASES = 1500, 300
 """Releases of each fit."""
 
-FRESH, QUICK_FRESH = 4000, 200
+FRESH, QUICK_FRESH = 4000, 600
 """Of each prediction."""
 
 

@@ -1,0 +1,91 @@
+"""How certain one slope is: outcomes of perturbed copies of one survey against those of others.
+
+Each survey is a jointed mass of `quick` as one seed cuts it. Its copies differ by at most the
+accuracy of the survey. Two parts of the variance of the debris share follow by an analysis of
+variance: how much of it the survey decides, and how much is left to chance between copies.
+
+Judged by the share of the variance that is left to chance at an accuracy of 1 mm: where it is 1, a
+release of a surveyed slope says as little of its next one as a release of another slope.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from msgspec.structs import replace
+
+from experiments.script import BLUE, GREY, Number, draw, main, say, write
+from rigdda import Site, release_many
+
+SITE, EVENT = "quick", "mass"
+
+ACCURACIES = (1e-12, 1e-6, 1e-3, 1e-2)
+"""Of a survey [m]."""
+
+JUDGED = 1e-3
+SURVEYS, QUICK_SURVEYS = 24, 4
+COPIES, QUICK_COPIES = 40, 5
+
+
+def surveyed(seed: int, accuracy: float) -> Site:
+    """Return the site with the mass that a seed cuts, known to an accuracy [m]."""
+    site = Site.load(SITE)
+    blocks = tuple(tuple(map(tuple, b.vertices.tolist())) for b in site.draw(seed, EVENT).blocks)
+    sources = tuple(
+        replace(s, polygon=(), joints=(), blocks=blocks, accuracy=accuracy) if s.polygon else s
+        for s in site.sources
+    )
+    return replace(site, sources=sources)
+
+
+def shares(accuracy: float, surveys: int, copies: int) -> np.ndarray:
+    """Return the debris shares of copies of surveys, (surveys, copies)."""
+    sites = [surveyed(seed, accuracy) for seed in range(surveys)]
+    jobs = [(site, (), seed, EVENT) for site in sites for seed in range(copies)]
+    found = [outcome.debris_fraction for outcome in release_many(jobs)]
+    return np.array(found).reshape(surveys, copies)
+
+
+def variances(found: np.ndarray) -> tuple[float, float]:
+    """Return the variance between surveys and that between copies of one, by their mean squares."""
+    within = float(found.var(axis=1, ddof=1).mean())
+    return max(float(found.mean(axis=1).var(ddof=1)) - within / found.shape[1], 0.0), within
+
+
+def picture(figure: Figure, every: dict[float, np.ndarray]) -> None:
+    """Draw the debris shares of all copies, a column a survey, a panel an accuracy."""
+    panels = figure.subplots(1, len(every), sharey=True, squeeze=False)[0]
+    for axes, (accuracy, found) in zip(panels, every.items(), strict=True):
+        for k, each in enumerate(found[np.argsort(found.mean(axis=1))]):
+            axes.plot([k] * len(each), each, "o", ms=2.5, color=BLUE, alpha=0.4)
+            axes.plot(k, each.mean(), "_", ms=8, color="black")
+        axes.axhline(found.mean(), color=GREY, lw=0.8)
+        axes.set(title=f"known to {accuracy:g} m", xlabel="survey, by mean", xticks=[])
+    figure.axes[0].set_ylabel("share of the rock past the road's edge")
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Compute the releases and write the table and the picture."""
+    surveys, copies = (QUICK_SURVEYS, QUICK_COPIES) if quick else (SURVEYS, COPIES)
+    rows: list[dict[str, Any]] = []
+    every = {}
+    for accuracy in ACCURACIES:
+        say(f"one slope: known to {accuracy:g} m")
+        found = every[accuracy] = shares(accuracy, surveys, copies)
+        between, within = variances(found)
+        row = {"accuracy_m": accuracy, "surveys": surveys, "copies": copies}
+        row |= {"debris": float(found.mean()), "sd_between_surveys": between**0.5}
+        row |= {"sd_between_copies": within**0.5, "chance": within / (within + between)}
+        rows.append(row)
+    write(out / "one_slope.csv", rows)
+    draw(out / "one_slope.png", (12.0, 3.6), lambda figure: picture(figure, every))
+    chance = next(row["chance"] for row in rows if row["accuracy_m"] == JUDGED)
+    note = ", ".join(f"{row['accuracy_m']:g} m: {row['chance']:.2f}" for row in rows)
+    return Number("share of the variance that is chance, 1 mm [-]", chance, 0.5, 1.0, note)
+
+
+if __name__ == "__main__":
+    main(run)

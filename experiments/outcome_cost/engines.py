@@ -77,6 +77,10 @@ PEERS = (
 )
 
 
+LIMITS = {"Box2D": box2d(2.5e-3, 4, 480.0), "pymunk": pymunk(2.5e-3, 10, 1e-3)}
+"""Finest setting of a peer: what it converges to, by its own law of impact."""
+
+
 def settings(case: str) -> tuple[Setting, ...]:
     """Return the settings that are tried on a case, the reference first."""
     ours = tuple(Setting(CORE, dt) for dt in OURS[case])

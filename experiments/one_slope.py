@@ -1,11 +1,12 @@
 """How certain one slope is: outcomes of perturbed copies of one survey against those of others.
 
-Each survey is a jointed mass of `quick` as one seed cuts it. Its copies differ by at most the
-accuracy of the survey. Two parts of the variance of the debris share follow by an analysis of
-variance: how much of it the survey decides, and how much is left to chance between copies.
+Each survey is a jointed mass of `quick` as one seed cuts it. Its copies differ by the speed of
+their blocks at the start, up to a disturbance. An analysis of variance tells two parts of the
+variance of the debris share: how much of it the survey decides, and how much is left to chance
+between copies.
 
-Judged by the share of the variance that is left to chance at an accuracy of 1 mm: where it is 1, a
-release of a surveyed slope says as little of its next one as a release of another slope.
+Judged by the share that is left to chance at the usual disturbance: where it is 1, a release of a
+surveyed slope says as little of its next one as a release of another slope.
 """
 
 from __future__ import annotations
@@ -22,28 +23,32 @@ from rigdda import Site, release_many
 
 SITE, EVENT = "quick", "mass"
 
-ACCURACIES = (1e-12, 1e-6, 1e-3, 1e-2)
-"""Of a survey [m]."""
+DISTURBANCES = (1e-12, 1e-8, 1e-4, 1e-2)
+"""Greatest speeds at the start [m/s]."""
 
-JUDGED = 1e-3
+JUDGED = 1e-4
+"""What is usual, `sources.disturbance`."""
+
 SURVEYS, QUICK_SURVEYS = 24, 4
 COPIES, QUICK_COPIES = 40, 5
 
 
-def surveyed(seed: int, accuracy: float) -> Site:
-    """Return the site with the mass that a seed cuts, known to an accuracy [m]."""
+def surveyed(seed: int, disturbance: float) -> Site:
+    """Return the site with the mass that a seed cuts, disturbed by so much [m/s]."""
     site = Site.load(SITE)
     blocks = tuple(tuple(map(tuple, b.vertices.tolist())) for b in site.draw(seed, EVENT).blocks)
     sources = tuple(
-        replace(s, polygon=(), joints=(), blocks=blocks, accuracy=accuracy) if s.polygon else s
+        replace(s, polygon=(), joints=(), blocks=blocks, disturbance=disturbance)
+        if s.polygon
+        else s
         for s in site.sources
     )
     return replace(site, sources=sources)
 
 
-def shares(accuracy: float, surveys: int, copies: int) -> np.ndarray:
+def shares(disturbance: float, surveys: int, copies: int) -> np.ndarray:
     """Return the debris shares of copies of surveys, (surveys, copies)."""
-    sites = [surveyed(seed, accuracy) for seed in range(surveys)]
+    sites = [surveyed(seed, disturbance) for seed in range(surveys)]
     jobs = [(site, (), seed, EVENT) for site in sites for seed in range(copies)]
     found = [outcome.debris_fraction for outcome in release_many(jobs)]
     return np.array(found).reshape(surveys, copies)
@@ -56,14 +61,14 @@ def variances(found: np.ndarray) -> tuple[float, float]:
 
 
 def picture(figure: Figure, every: dict[float, np.ndarray]) -> None:
-    """Draw the debris shares of all copies, a column a survey, a panel an accuracy."""
+    """Draw the debris shares of all copies, a column a survey, a panel a disturbance."""
     panels = figure.subplots(1, len(every), sharey=True, squeeze=False)[0]
-    for axes, (accuracy, found) in zip(panels, every.items(), strict=True):
+    for axes, (disturbance, found) in zip(panels, every.items(), strict=True):
         for k, each in enumerate(found[np.argsort(found.mean(axis=1))]):
             axes.plot([k] * len(each), each, "o", ms=2.5, color=BLUE, alpha=0.4)
             axes.plot(k, each.mean(), "_", ms=8, color="black")
         axes.axhline(found.mean(), color=GREY, lw=0.8)
-        axes.set(title=f"known to {accuracy:g} m", xlabel="survey, by mean", xticks=[])
+        axes.set(title=f"up to {disturbance:g} m/s", xlabel="survey, by mean", xticks=[])
     figure.axes[0].set_ylabel("share of the rock past the road's edge")
 
 
@@ -72,19 +77,19 @@ def run(quick: bool, out: Path) -> Number:
     surveys, copies = (QUICK_SURVEYS, QUICK_COPIES) if quick else (SURVEYS, COPIES)
     rows: list[dict[str, Any]] = []
     every = {}
-    for accuracy in ACCURACIES:
-        say(f"one slope: known to {accuracy:g} m")
-        found = every[accuracy] = shares(accuracy, surveys, copies)
+    for disturbance in DISTURBANCES:
+        say(f"one slope: up to {disturbance:g} m/s")
+        found = every[disturbance] = shares(disturbance, surveys, copies)
         between, within = variances(found)
-        row = {"accuracy_m": accuracy, "surveys": surveys, "copies": copies}
+        row = {"disturbance_m_s": disturbance, "surveys": surveys, "copies": copies}
         row |= {"debris": float(found.mean()), "sd_between_surveys": between**0.5}
         row |= {"sd_between_copies": within**0.5, "chance": within / (within + between)}
         rows.append(row)
     write(out / "one_slope.csv", rows)
     draw(out / "one_slope.png", (12.0, 3.6), lambda figure: picture(figure, every))
-    chance = next(row["chance"] for row in rows if row["accuracy_m"] == JUDGED)
-    note = ", ".join(f"{row['accuracy_m']:g} m: {row['chance']:.2f}" for row in rows)
-    return Number("share of the variance that is chance, 1 mm [-]", chance, 0.5, 1.0, note)
+    chance = next(row["chance"] for row in rows if row["disturbance_m_s"] == JUDGED)
+    note = ", ".join(f"{row['disturbance_m_s']:g} m/s: {row['chance']:.2f}" for row in rows)
+    return Number("share of the variance that is chance, at 1e-4 m/s [-]", chance, 0.5, 1.0, note)
 
 
 if __name__ == "__main__":

@@ -129,7 +129,12 @@ def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]
     """
     rng, rock = np.random.default_rng([seed, event]), msgspec.json.decode(source, type=Source)
     normal = rng.standard_normal()
-    return normal, tuple(Block(c, rock.density, rock.surface) for c in rock.cut(rng))
+    outlines = rock.cut(rng)
+    starts = rock.disturbed(rng, len(outlines))
+    return normal, tuple(
+        Block(corners, rock.density, rock.surface, velocity)
+        for corners, velocity in zip(outlines, starts, strict=True)
+    )
 
 
 def _shifted(surface: Surface, shift: float) -> Surface:

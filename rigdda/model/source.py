@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.errors import BadInput
-from rigdda.geometry import overlap, polygon_properties
+from rigdda.geometry import overlap
 from rigdda.model.joints import JointSet, cut
 from rigdda.model.scene import convex_polygon, simple_polygon
 
@@ -23,9 +23,6 @@ NEAR = 1e-6
 
 LIGHTEST, DENSEST = 500.0, 1e5
 """Least and greatest density [kg/m3]: pumice weighs 600, and 2.65 is in t/m3."""
-
-WORST_SURVEY = 0.05
-"""Worst accuracy of a survey over the size of its smallest block [-]: beyond, others would fall."""
 
 MOST_BLOCKS = 1e5
 """Most blocks that a mass may be cut into: more would take days to simulate."""
@@ -48,11 +45,10 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         At least two joint sets of different dip.
     blocks : sequence of sequences of (x, y)
         Instead of both: corners of each block [m], as surveyed.
-    accuracy : float
-        To which these corners are known [m]. Jointed rock is chaotic: each release sees a copy
-        whose blocks are smaller at random, by so much at their farthest corner at most, so that
-        releases are an ensemble. 0: the same blocks in every release, which tells one outcome of
-        many.
+    disturbance : float
+        Greatest speed of such a block at the start, in any direction [m/s]. Jointed rock is
+        chaotic: with so little, releases are an ensemble of what the slope may do. 0: all releases
+        are the same, one outcome of many.
     block_area : float
         Mean area of the blocks of a mass [m2].
     density : float
@@ -82,7 +78,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     polygon: tuple[Point, ...] = ()
     joints: tuple[JointSet, ...] = ()
     blocks: tuple[tuple[Point, ...], ...] = ()
-    accuracy: float = 1e-3
+    disturbance: float = 1e-4
     block_area: float = 2.0
     density: float = 2600.0
     surface: str = "rock"
@@ -98,7 +94,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         density = check.number(f"{where}.density", self.density, 0.0, DENSEST, open_low=True)
         if density < LIGHTEST:
             raise BadInput(f"{where}.density", density, "give kg/m3: about 2600 for rock")
-        check.number(f"{where}.accuracy", self.accuracy, 0.0)
+        check.number(f"{where}.disturbance", self.disturbance, 0.0, 1.0)
         check.number(f"{where}.spin", self.spin, 0.0, 20.0)
         check.interval(f"{where}.speed", self.speed, 0.0, 50.0)
         check.interval(f"{where}.aspect", self.aspect, 1.0, 4.0)
@@ -136,10 +132,6 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def _check_blocks(self) -> None:
         rocks = [shapely.Polygon(simple_polygon(where, b)) for where, b in self.pieces()]
-        most = WORST_SURVEY * math.sqrt(min(rock.area for rock in rocks))
-        if self.accuracy > most:
-            mend = f"give at most {most:.3g} for blocks as small as these"
-            raise BadInput(f"{self.words}.accuracy", self.accuracy, mend)
         for i, j in shapely.STRtree(rocks).query(rocks, predicate="intersects").T:
             common = overlap(rocks[i], rocks[j]) if i < j else 0.0
             if common > NEAR * rocks[j].length:
@@ -148,12 +140,6 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                     self.blocks[j],
                     f"move it: {common:g} m2 of it are in block {i}",
                 )
-
-    def _copy(self, corners: Floats, rng: np.random.Generator) -> Floats:
-        """Return a block that is smaller at random, within `accuracy`: copies never overlap."""
-        _, centroid, _ = polygon_properties(corners)
-        radius = np.hypot(*(corners - centroid).T).max()
-        return centroid + (1.0 - rng.random() * self.accuracy / radius) * (corners - centroid)
 
     @property
     def words(self) -> str:
@@ -183,12 +169,23 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.area / len(self.blocks) if self.blocks else self.block_area
 
     def cut(self, rng: np.random.Generator) -> list[Floats]:
-        """Return the corners of the blocks of a mass [m], or a copy of those given.
-
-        What `rng` draws: the joints, or how much smaller each block of the copy is.
+        """Return the corners of the blocks of a mass [m], or those given; `rng` draws the joints.
 
         Not of a band, whose blocks lie on the ground of a site: see `rigdda.model.boulders`.
         """
         if self.blocks:
-            return [self._copy(np.array(block), rng) for block in self.blocks]
+            return [np.array(block) for block in self.blocks]
         return cut(shapely.Polygon(self.polygon), self.joints, self.block_area, rng)
+
+    def disturbed(self, rng: np.random.Generator, count: int) -> list[tuple[float, float, float]]:
+        """Return the velocities at which so many blocks start [m/s, m/s, rad/s].
+
+        Of blocks that are given: they are disturbed, so that no release is as another.
+        """
+        if not self.blocks or self.disturbance == 0.0:
+            return [(0.0, 0.0, 0.0)] * count
+        speeds = self.disturbance * rng.random(count)
+        angles = 2.0 * math.pi * rng.random(count)
+        return [
+            (v * math.cos(a), v * math.sin(a), 0.0) for v, a in zip(speeds, angles, strict=True)
+        ]

@@ -23,13 +23,13 @@ def test_the_variance_between_surveys_is_told_from_that_between_copies():
 
 
 def test_copies_of_a_survey_come_to_other_ends():
-    found = one_slope.shares(1e-3, 2, 4)
+    found = one_slope.shares(1e-4, 2, 4)
     assert found.shape == (2, 4) and all(len(set(copies)) > 1 for copies in found)
-    assert np.array_equal(one_slope.shares(1e-3, 2, 4), found)
+    assert np.array_equal(one_slope.shares(1e-4, 2, 4), found)
 
 
 def test_the_record_says_that_most_is_chance():
     rows = list(csv.DictReader(RECORDED.read_text().splitlines()))
-    chance = {float(row["accuracy_m"]): float(row["chance"]) for row in rows}
-    assert set(chance) == set(one_slope.ACCURACIES)
+    chance = {float(row["disturbance_m_s"]): float(row["chance"]) for row in rows}
+    assert set(chance) == set(one_slope.DISTURBANCES)
     assert chance[one_slope.JUDGED] > 0.5

@@ -9,10 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.bench import engines
+from experiments.bench.engines import PEERS
 from experiments.outcome_cost import sample, study
 from experiments.outcome_cost.cases import CASES, cut
-from experiments.outcome_cost.engines import CORE, LUMPED, REFERENCE, settings
+from experiments.outcome_cost.engines import CORE, LUMPED, REFERENCE, Setting, settings
 from experiments.outcome_cost.sample import ENERGY, PAST, RUN_OUT, Core, Points, Release
+from rigdda import Block, Scene, Terrain
+from rigdda.validation.scenes import rock
 
 RECORDED = Path(__file__).parents[2] / "experiments" / "results" / "outcome_cost"
 LEVEL = 0.03
@@ -47,11 +51,41 @@ def test_the_releases_that_an_answer_needs_are_those_of_scatter_and_bias():
 
 def test_a_cost_is_told_only_where_the_bias_is_known_to_the_level():
     reference, few = (study.sampled(releases(0.3, n, n)) for n in (1500, 40))
-    assert math.isnan(study.cost(few, reference, 0.03)[0])
-    good, low, high = study.cost(study.sampled(releases(0.3, 1500, 1)), reference, 0.1)
-    assert low <= good <= high and good == pytest.approx(0.5 * 0.7 / 3 / 0.1**2, rel=0.3)
-    off = study.sampled(releases(0.5, 300, 2))
-    assert study.cost(off, reference, 0.1)[0] == math.inf and study.surely_biased(off, reference)
+    unknown = study.cost(few, reference, 0.03)
+    assert not unknown.known and 0.0 < unknown.resampled[0] < math.inf
+    found = study.cost(study.sampled(releases(0.3, 1500, 1), 1), reference, 0.1)
+    low, high = found.ends()
+    assert low <= found.value <= high
+    assert found.value == pytest.approx(0.5 * 0.7 / 3 / 0.1**2, rel=0.3)
+    off = study.sampled(releases(0.5, 300, 2), 1)
+    assert study.cost(off, reference, 0.1).value == math.inf and study.surely_biased(off, reference)
+
+
+def test_a_peer_of_unknown_bias_counts_as_if_it_had_none():
+    ours, peer = Setting(CORE, 1e-2), Setting("MuJoCo", 1e-2)
+    samples = {REFERENCE: study.sampled(releases(0.3, 1500)),
+               ours: study.sampled(releases(0.3, 1500, 1), 1),
+               peer: study.sampled(releases(0.3, 40, 2), 2)}  # fmt: skip
+    row = study.compared(samples, 0.05, own=False)
+    assert row["told"] == "its least cost" and 0.0 < row["ratio"] < math.inf
+    assert row["low"] <= row["ratio"] <= row["high"]
+    samples[peer] = study.sampled(releases(0.5, 300, 2), 2)
+    assert study.compared(samples, 0.05, own=False)["ratio"] == 0.0
+
+
+@pytest.mark.parametrize(("adapter", "package"), PEERS.items())
+def test_peers_start_as_the_scene_does_and_turn_at_its_rate(adapter, package):
+    pytest.importorskip(package)
+    module = engines.adapter(adapter)
+    block = Block(np.array([[0.0, 30.0], [2.0, 30.0], [2.0, 31.0], [0.0, 31.0]]),
+                  velocity=(3.0, 1.0, 40.0))  # fmt: skip
+    scene = Scene(Terrain([(-50.0, 0.0), (50.0, 0.0)]), (block,), rock())
+    run = module.Engine(scene, 1e-3, True, **module.OPTIONS[0])
+    assert run.velocities()[0] == pytest.approx((3.0, 1.0, 40.0))
+    run.advance(200)  # more than a turn
+    vx, vy, omega = run.velocities()[0]
+    assert (vx, omega) == pytest.approx((3.0, 40.0), rel=1e-3)
+    assert vy == pytest.approx(1.0 - 0.2 * 9.81, abs=0.01)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -72,6 +72,7 @@ class Engine:
         body = self._world.create_dynamic_body(
             position=tuple(centre), linear_damping=damping, angular_damping=damping
         )
+        body.linear_velocity, body.angular_velocity = block.velocity[:2], block.velocity[2]
         definition = pyb2d3.shape_def(density=block.density, material=self._material)
         body.create_shape(definition, pyb2d3.polygon(block.vertices - centre, radius=0.0))
         return body
@@ -83,5 +84,9 @@ class Engine:
             step(dt, substeps)
 
     def poses(self) -> np.ndarray:
-        """Return x, y of the centroids [m] and rotation since the start [rad], (N, 3)."""
+        """Return x, y of the centroids [m] and rotation [rad], within half a turn, (N, 3)."""
         return np.array([(*b.position, b.angle) for b in self._bodies])
+
+    def velocities(self) -> np.ndarray:
+        """Return velocities of the centroids [m/s] and rates of rotation [rad/s], (N, 3)."""
+        return np.array([(*b.linear_velocity, b.angular_velocity) for b in self._bodies])

@@ -76,6 +76,7 @@ class Engine:
         area, _, second = polygon_properties(block.vertices)
         body = pymunk.Body(block.density * area, block.density * second)
         body.position = tuple(centre)
+        body.velocity, body.angular_velocity = block.velocity[:2], block.velocity[2]
         shape = pymunk.Poly(body, [tuple(v) for v in block.vertices - centre])
         self._space.add(body, self._with_surface(shape))
         return body
@@ -93,3 +94,7 @@ class Engine:
     def poses(self) -> np.ndarray:
         """Return x, y of the centroids [m] and rotation since the start [rad], (N, 3)."""
         return np.array([(*b.position, b.angle) for b in self._bodies])
+
+    def velocities(self) -> np.ndarray:
+        """Return velocities of the centroids [m/s] and rates of rotation [rad/s], (N, 3)."""
+        return np.array([(*b.velocity, b.angular_velocity) for b in self._bodies])

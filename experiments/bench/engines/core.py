@@ -39,3 +39,7 @@ class Engine:
     def poses(self) -> np.ndarray:
         """Return x, y of the centroids [m] and rotation since the start [rad], (N, 3)."""
         return self._sim.poses
+
+    def velocities(self) -> np.ndarray:
+        """Return velocities of the centroids [m/s] and rates of rotation [rad/s], (N, 3)."""
+        return self._sim.velocities

@@ -81,6 +81,7 @@ class Engine:
             self._add_block(spec, i, block, centre, scene.damping)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
+        self._data.qvel[:] = np.ravel([block.velocity for block in scene.blocks])
         mujoco.mj_forward(self._model, self._data)
         self._start = centroids(scene)
 
@@ -143,6 +144,10 @@ class Engine:
         poses = self._data.qpos.reshape(-1, 3).copy()
         poses[:, :2] += self._start
         return poses
+
+    def velocities(self) -> np.ndarray:
+        """Return velocities of the centroids [m/s] and rates of rotation [rad/s], (N, 3)."""
+        return self._data.qvel.reshape(-1, 3).copy()
 
 
 def _is_rectangle(outline: np.ndarray) -> bool:

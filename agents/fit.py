@@ -260,12 +260,21 @@ def search(
     seed: int,
     tick: Tick,
 ) -> Fit:
-    """Fit numbers of whatever computes run-outs to observed ones; as `fit`.
+    """Fit the numbers of whatever computes run-outs to observed ones.
 
     Parameters
     ----------
+    site : Site
+        Where; the fit keeps it as it is.
+    observed, parameters, budget, releases, seed, tick
+        As those of `fit`.
     compute : callable
-        Takes values of the parameters and seeds, gives the run-outs of each event [m].
+        Takes values of the parameters, (P,), and seeds; returns the run-outs of each event [m].
+
+    Returns
+    -------
+    Fit
+        What was found.
     """
     low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
     tried, table = list[Candidate](), list[Floats]()

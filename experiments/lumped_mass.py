@@ -2,8 +2,8 @@
 
 Both compute the same releases: the block model as jointed rock of rigid corners that touch one
 another, the lumped mass each block as a point of its own, with the restitution and the friction of
-the same site file and the usual tangential restitution. Neither is fitted; what differs is what
-shape, rotation and company do.
+the same site file and the usual tangential restitution. Neither is fitted. Shape, rotation and
+company differ, and damping: the highway case damps blocks in flight, points know none.
 
 Judged by whether on the highway case the difference of the debris share is certain.
 """

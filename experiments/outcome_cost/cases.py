@@ -23,7 +23,7 @@ DAMPING = 0.15
 of `experiments.tschamut` damps in contact only."""
 
 ROAD = 80.0
-"""Chainage beyond which blocks of `tschamut` count as debris [m]: about half of them."""
+"""Chainage beyond which blocks of `tschamut` count as debris [m]: two in three do."""
 
 CORNERS = (8, 8)
 """Of the blocks of `tschamut` here: Box2D takes eight at most."""
@@ -89,7 +89,7 @@ def quick() -> Case:
 
 
 def tschamut() -> Case:
-    """Return single blocks of 0.06 to 0.2 m2 that bounce down 50 m; debris is what passes 100 m."""
+    """Return single blocks of 0.05 to 0.15 m2 that bounce down 50 m."""
     site = everywhere(Site.load(TSCHAMUT))
     ground = Surface(**GROUND)
     site = replace(

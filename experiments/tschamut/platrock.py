@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import subprocess
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO
+from typing import Self
 
 import numpy as np
 
@@ -31,26 +32,37 @@ DENSITY = 2650.0
 
 
 class PlatRock:
-    """PlatRock's 2D model on a site.
+    """PlatRock's 2D model on a site, as a context manager.
 
     Parameters
     ----------
     python : str
-        The Python that has it.
+        The Python that has it, 3.11 or newer.
     site : Site
         Its ground, and where blocks start.
     """
 
     def __init__(self, python: str, site: Site):
         self._site = site
+        self._errors = tempfile.TemporaryFile("w+")
         server = Path(__file__).with_name("platrock_server.py").resolve()
         self._process = subprocess.Popen(
             [python, "-P", str(server)],  # else it finds this module for its own
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=self._errors,
             text=True,
         )
+        self.cpu = 0.0
+        """Its processor time so far [s]."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.communicate()
+        self._errors.close()
 
     def run_outs(self, values: Floats, seeds: range) -> Mapping[str, Floats]:
         """Return the run-outs of each block [m], as many as seeds.
@@ -58,7 +70,7 @@ class PlatRock:
         Raises
         ------
         RuntimeError
-            If it stops.
+            If it stops, with what it said.
         """
         source = self._site.sources[0]
         asked = {p.path: float(v) for p, v in zip(PARAMETERS, values, strict=True)} | {
@@ -72,14 +84,16 @@ class PlatRock:
         }
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None and stdout is not None
-        stdin.write(json.dumps(asked) + "\n")
-        stdin.flush()
-        line = stdout.readline()
+        try:
+            stdin.write(json.dumps(asked) + "\n")
+            stdin.flush()
+            line = stdout.readline()
+        except OSError:
+            line = ""
         if not line:
-            errors: IO[str] | None = self._process.stderr
-            raise RuntimeError(f"PlatRock stopped: {errors.read() if errors else ''}")
-        return dict(zip(MASSES, map(np.array, json.loads(line)), strict=True))
-
-    def close(self) -> None:
-        """End it."""
-        self._process.communicate()
+            self._process.wait()
+            self._errors.seek(0)
+            raise RuntimeError(f"PlatRock stopped: {self._errors.read()}")
+        answer = json.loads(line)
+        self.cpu = answer["cpu"]
+        return dict(zip(MASSES, map(np.array, answer["run_outs"]), strict=True))

@@ -14,6 +14,7 @@ import json
 import os
 import sys
 import tempfile
+import time
 import types
 from pathlib import Path
 
@@ -32,7 +33,8 @@ def main() -> None:
     for line in sys.stdin:
         asked = json.loads(line)
         found = [run(Objects, Simulations, asked, volume) for volume in asked["volumes"]]
-        answers.write(json.dumps(found) + "\n")
+        answer = {"run_outs": found, "cpu": time.process_time()}
+        answers.write(json.dumps(answer) + "\n")
         answers.flush()
 
 

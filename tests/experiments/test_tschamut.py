@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import csv
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from experiments.tschamut import study
+from experiments.tschamut import platrock, study
+from rigdda import Site
 
 RECORDED = Path(__file__).parents[2] / "experiments" / "results" / "tschamut"
 
@@ -22,6 +25,31 @@ def test_it_fits_predicts_and_draws(tmp_path, monkeypatch):
     rows = list(csv.DictReader((tmp_path / "tschamut" / "prediction.csv").read_text().splitlines()))
     assert len(rows) == 30 and {row["block"] for row in rows} == {"1", "2", "4"}
     assert (tmp_path / "tschamut" / "tschamut.png").stat().st_size > 20_000
+
+
+FAKE = """
+import json, sys
+for line in sys.stdin:
+    asked = json.loads(line)
+    if asked["R_n"] > 0.5:
+        sys.exit("no")
+    out = [[100.0 * v] * asked["releases"] for v in asked["volumes"]]
+    print(json.dumps({"run_outs": out, "cpu": 0.25}), flush=True)
+"""
+
+
+def test_platrock_is_asked_in_its_own_process_and_its_end_is_told(tmp_path, monkeypatch):
+    (tmp_path / "platrock_server.py").write_text(FAKE)
+    monkeypatch.setattr(platrock, "__file__", str(tmp_path / "platrock.py"))
+    site = Site.load(study.HERE / "site.toml")
+    with platrock.PlatRock(sys.executable, site) as peer:
+        found = peer.run_outs(np.array([0.2, 0.8, 0.1, 0.4]), range(3, 7))
+        assert list(found) == list(platrock.MASSES) and peer.cpu == 0.25
+        assert found["block 4"] == pytest.approx([100.0 * 40.0 / 2650.0] * 4)
+        with pytest.raises(RuntimeError, match="PlatRock stopped: no"):
+            peer.run_outs(np.array([0.6, 0.8, 0.1, 0.4]), range(3))
+        with pytest.raises(RuntimeError, match="PlatRock stopped"):
+            peer.run_outs(np.array([0.2, 0.8, 0.1, 0.4]), range(3))
 
 
 def test_blocks_predict_runs_that_were_left_out_and_points_do_not():

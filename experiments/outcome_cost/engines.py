@@ -70,9 +70,6 @@ PEERS = (
     Setting("MuJoCo", 20e-3),
 )
 
-LIMITS = {"Box2D": box2d(2.5e-3, 4, 480.0), "pymunk": pymunk(2.5e-3, 10, 1e-3)}
-"""Finest setting of a peer: what it converges to, by its own law of impact."""
-
 
 def settings(case: str) -> tuple[Setting, ...]:
     """Return the settings that are tried on a case, the reference first."""

@@ -8,16 +8,12 @@ answer within `e` of the reference needs the n for which bias^2 + scatter^2 / n 
 of the three outcomes. Its cost is n times the processor time of a release. A setting whose bias
 exceeds e never gets there.
 
-The reference is this core at 1 ms. Box2D and pymunk do not converge to it, but each to a limit of
-its own, as their laws of impact are others: no observation of this study decides between them. So
-costs are told twice: against the reference, and of each engine against its own limit, the finest of
-its settings.
-
-All engines compute the same scenes, MuJoCo without restitution, which it does not know, for the
-duration of the site or until all blocks are at rest. The run-out is where the rock is then.
-Settings take turns, some releases each, so that all meet the same noise of the machine. A peer's
-setting that is surely biased by more than 3 % against both, or against the reference and dear, is
-not computed any further.
+The reference is this core at 1 ms; the finest settings of Box2D and pymunk agree with it within
+what is known. All engines compute the same scenes, MuJoCo without restitution, which it does not
+know, for the duration of the site or until all blocks are at rest. The run-out is where the rock is
+then. Settings take turns, some releases each, so that all meet the same noise of the machine. A
+peer's setting is not computed any further when it is surely biased by more than 3 %, or too dear to
+be the cheapest.
 
 Judged by the cost of this core over that of the cheapest other block engine at 3 %, of the worst
 case.
@@ -41,7 +37,6 @@ from agents.store import mechanics
 from experiments.outcome_cost.cases import CASES, Case
 from experiments.outcome_cost.engines import (
     CORE,
-    LIMITS,
     LUMPED,
     REFERENCE,
     Setting,
@@ -67,9 +62,9 @@ FEWEST = 3
 SURE = 3.5
 """Standard errors by which its bias must then exceed 3 %, at every look."""
 
-DEAR = 1.5
-"""Processor time of a release over that of this core's cheapest setting from which a setting that
-is biased against the reference is not followed to its own limit."""
+DEAR = 2.0
+"""Processor time of a release, over that of this core's cheapest setting, from which a setting of a
+peer is not the cheapest."""
 
 RESAMPLES = 300
 
@@ -222,20 +217,14 @@ def surely_biased(sample: Sample, reference: Sample) -> bool:
 
 
 def followed(samples: dict[Setting, Sample]) -> list[Setting]:
-    """Return the settings that are computed further."""
+    """Return the settings that are computed further: this core's, peers that may be cheapest."""
     reference = samples[REFERENCE]
-    ours = [s.cpu for setting, s in samples.items() if setting.engine == CORE]
-    found = []
-    for setting, sample in samples.items():
-        limit = LIMITS.get(setting.engine)
-        if limit is not None and surely_biased(sample, reference):
-            dear = sample.cpu > DEAR * min(ours) or surely_biased(sample, samples[limit])
-            if dear and setting != limit:
-                continue
-        elif setting.engine != CORE and surely_biased(sample, reference):
-            continue
-        found.append(setting)
-    return found
+    cheap = DEAR * min(s.cpu for setting, s in samples.items() if setting.engine == CORE)
+    return [
+        setting
+        for setting, sample in samples.items()
+        if setting.engine == CORE or (sample.cpu < cheap and not surely_biased(sample, reference))
+    ]
 
 
 def gather(name: str, releases: int, folder: Path) -> dict[Setting, Sample]:
@@ -277,48 +266,30 @@ def rows(name: str, samples: dict[Setting, Sample]) -> Iterator[dict[str, Any]]:
             row[f"{what}_bias_95"] = math.nan if setting == REFERENCE else 1.96 * verdict.error[k]
             row[f"{what}_scatter"] = float(verdict.scatter[k])
         for level in LEVELS:
-            names = [f"{what}_{level:.0%}_s" for what in ("cost", "low", "high", "own_limit")]
+            names = [f"{what}_{level:.0%}_s" for what in ("cost", "low", "high")]
             row |= dict.fromkeys(names, math.nan)
             if setting == REFERENCE:
                 continue
             found = cost(sample, reference, level)
             if found.known:
-                row |= dict(zip(names, (found.value, *found.ends()), strict=False))
-            limit = LIMITS.get(setting.engine, setting)
-            if setting != limit:
-                row[names[-1]] = cost(sample, samples[limit], level).value
+                row |= dict(zip(names, (found.value, *found.ends()), strict=True))
         yield row
 
 
-def costs(
-    samples: dict[Setting, Sample], level: float, own: bool, ours: bool
-) -> dict[Setting, Cost]:
-    """Return the costs of the settings of this core, or of the other block engines.
-
-    Of an answer like the reference's, or like the own limit of engines that have one.
-    """
-    found = {}
-    for setting, sample in samples.items():
-        aim = LIMITS.get(setting.engine, REFERENCE) if own else REFERENCE
-        if setting not in (REFERENCE, aim) and setting.engine != LUMPED:
-            if (setting.engine == CORE) is ours:
-                found[setting] = cost(sample, samples[aim], level)
-    return found
-
-
-def compared(samples: dict[Setting, Sample], level: float, own: bool) -> dict[str, Any]:
+def compared(samples: dict[Setting, Sample], level: float) -> dict[str, Any]:
     """Return the cheapest setting of this core and of the peers, and the ratio of their costs.
 
     A peer whose bias is not known counts as if it had none: the ratio is then the greatest that it
     may be, and `told` says so. The ratio is NaN where this core does not get there; it is 0 where
     no peer does.
     """
-    mine, theirs = (costs(samples, level, own, ours) for ours in (True, False))
+    every = {s: cost(x, samples[REFERENCE], level) for s, x in samples.items() if s != REFERENCE}
+    mine = {s: c for s, c in every.items() if s.engine == CORE}
+    theirs = {s: c for s, c in every.items() if s.engine not in (CORE, LUMPED)}
     ours = min((s for s in mine if mine[s].known), key=lambda s: mine[s].value, default=None)
     least = {s: c.value if c.known else float(c.resampled[0]) for s, c in theirs.items()}
     peer = min(least, key=least.__getitem__)
     row: dict[str, Any] = {
-        "against": "own limit" if own else "reference",
         "level": level,
         "rigdda": str(ours) if ours else "",
         "rigdda_s": mine[ours].value if ours else math.nan,
@@ -340,13 +311,8 @@ def compared(samples: dict[Setting, Sample], level: float, own: bool) -> dict[st
 
 
 def ratios(every: dict[str, dict[Setting, Sample]]) -> list[dict[str, Any]]:
-    """Return `compared` for each case and level, against the reference and own limits."""
-    return [
-        {"case": name} | compared(samples, level, own)
-        for name, samples in every.items()
-        for own in (False, True)
-        for level in LEVELS
-    ]
+    """Return `compared` for each case and level."""
+    return [{"case": n} | compared(s, level) for n, s in every.items() for level in LEVELS]
 
 
 def picture(figure: Figure, every: dict[str, dict[Setting, Sample]]) -> None:
@@ -386,11 +352,7 @@ def run(quick: bool, out: Path) -> Number:
     found = ratios(every)
     write(folder / "ratios.csv", found)
     draw(folder / "outcome_cost.png", (12.0, 4.2), lambda figure: picture(figure, every))
-    judged = {
-        row["case"]: row["ratio"]
-        for row in found
-        if row["level"] == JUDGED and row["against"] == "reference"
-    }
+    judged = {row["case"]: row["ratio"] for row in found if row["level"] == JUDGED}
     note = ", ".join(f"{name} {ratio:.2f}" for name, ratio in judged.items())
     note += f"; outcomes: {', '.join(OUTCOMES)}"
     what = f"cost over the cheapest peer's at {JUDGED:.0%}, worst case"

@@ -66,6 +66,9 @@ DEAR = 2.0
 """Processor time of a release, over that of this core's cheapest setting, from which a setting of a
 peer is not the cheapest."""
 
+CERTAIN = 1.645
+"""Standard errors of its 90 % interval, within which a bias counts as known."""
+
 RESAMPLES = 300
 
 WORKERS = 2
@@ -199,7 +202,7 @@ def cost(sample: Sample, reference: Sample, level: float) -> Cost:
     level; its resamples are then those of a setting without bias, the least that it may cost.
     """
     bias, error, scatter = judge(sample, reference)
-    half = 1.96 * error
+    half = CERTAIN * error
     none = np.zeros(3)
     if (half > level).any() and not (np.abs(bias) - half > level).any():
         least = sample.cpu * float(needed(none, none, scatter, level).max())

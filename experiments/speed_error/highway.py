@@ -107,6 +107,8 @@ def outcome(scene: Scene, poses: Floats) -> tuple[float, float, float]:
     past = (x >= SITE.road.start).any(axis=0)
     order = np.argsort(x[-1])
     reached = np.cumsum(mass[order]) / mass.sum()
+    poses = poses.copy()
+    poses[:, :, 2] = np.unwrap(poses[:, :, 2], axis=0)  # Box2D tells angles within half a turn
     speed = np.diff(poses, axis=0) / FRAME
     energy = 0.5 * (mass * (speed[..., 0] ** 2 + speed[..., 1] ** 2) + inertia * speed[..., 2] ** 2)
     crossed = np.flatnonzero((x >= BARRIER).any(axis=0))

@@ -16,7 +16,7 @@ from rigdda.model.place import Surface
 TSCHAMUT = Path(__file__).parent.parent / "tschamut" / "site.toml"
 
 GROUND = {"friction_deg": 38.0, "restitution": 0.4}
-"""Of `tschamut` here: with `DAMPING` its blocks come about as far as observed."""
+"""Of `tschamut` here: with `DAMPING` its blocks come 80 m far in the mean; 96 were observed."""
 
 DAMPING = 0.15
 """Damping of `tschamut` here [1/s]: in flight, too, which is what the other engines know. The fit

@@ -8,12 +8,13 @@ answer within `e` of the reference needs the n for which bias^2 + scatter^2 / n 
 of the three outcomes. Its cost is n times the processor time of a release. A setting whose bias
 exceeds e never gets there.
 
-The reference is this core at 1 ms. Part of what counts as bias of a peer is another law of impact:
-on `quick` the finest settings of Box2D and pymunk settle at more debris than it. All engines
-compute the same scenes, MuJoCo without restitution, which it does not know, for the duration of the
-site or until all blocks are at rest. The run-out is where the rock is then. Settings take turns,
-some releases each, so that all meet the same noise of the machine. A peer's setting is not computed
-any further when it is surely biased by more than 3 %, or too dear to be the cheapest.
+The reference is this core at 1 ms, and its scatter is common to all ratios of a case. Part of
+what counts as bias of a peer is another law of impact: on `quick` the finest settings of Box2D
+and pymunk settle at more debris than it. All engines compute the same scenes, MuJoCo without
+restitution, which it does not know, for the duration of the site or until all blocks are at rest.
+The run-out is where the rock is then. Settings take turns, some releases each, so that all meet
+the same noise of the machine. A peer's setting is not computed any further when it is surely
+biased by more than 3 %, or too dear to be the cheapest.
 
 Judged by the cost of this core over that of the cheapest other block engine at 3 %, of the worst
 case.
@@ -64,7 +65,7 @@ SURE = 3.5
 
 DEAR = 2.0
 """Processor time of a release, over that of this core's cheapest setting, from which a setting of a
-peer is not the cheapest."""
+peer is not computed further; it then counts with the least that it may cost."""
 
 CERTAIN = 1.645
 """Standard errors of its 90 % interval, within which a bias counts as known."""

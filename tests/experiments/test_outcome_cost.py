@@ -114,7 +114,7 @@ def test_ritchies_cuts_are_cases():
     assert {cut(angle).name for angle in (35, 60, 80)} == {f"ritchie-{a}" for a in (35, 60, 80)}
 
 
-def test_the_record_has_every_engine_and_says_who_is_cheapest():
+def test_the_record_has_every_case_engine_and_ratio():
     rows = list(csv.DictReader((RECORDED / "outcome_cost.csv").read_text().splitlines()))
     assert {row["case"] for row in rows} == set(CASES)
     assert {row["engine"] for row in rows} == {CORE, "Box2D", "pymunk", "MuJoCo", LUMPED}

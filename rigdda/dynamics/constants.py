@@ -53,13 +53,8 @@ GREATEST_LOAD = 300.0
 of the mean block if that is more [-]: the height, in blocks, of the tallest stack. Higher, and
 wedged blocks burst out more violently."""
 
-RECOVERY_TIME = 0.1
-"""Time in which penetration beyond what the load explains is pushed out [s]. Shorter pumps energy
-into piles, longer leaves visible overlap."""
-
-RECOVERY_SPEED = 0.2
-"""Greatest speed of that push [m/s], of a contact that carries the weight of the heavier body; less
-under more load. Were it not, piles of 25 layers and more between smooth walls would never rest."""
+RECOVERY_SWEEPS = 4
+"""Sweeps over the contacts of an island that push out what they are too deep."""
 
 RETARDATION_TIME = 5e-3
 """Retardation time of contacts at rest: viscosity over stiffness [s]. Longer steps damp more, as
@@ -69,23 +64,9 @@ the force follows the velocity at their end. Without it an arch near its limit v
 FRICTION_TOLERANCE = 2e-2
 """Relative change of a friction limit between open-close iterations that counts as settled [-]."""
 
-FAST_FALL = 1.5
-"""Speed of an island above which it is relaxed in several substeps, over what gravity gives in a
-step, g dt [-], where that is more than `QUIET_SPEED`: a pile that all but rests is settled as one
-in the single step. Without it 60 layers in a silo did not come to rest in steps of 10 ms."""
-
-SUBSTEP = 2e-3
-"""Longest substep in the relaxation of a large island in motion [s]: a blow goes on from contact to
-contact in each. In steps of 20 ms of 480 blocks contacts sink a third less than with 2.5 ms, and a
-step takes 3 % more time."""
-
-SPREADING = 128
-"""Blocks of an island from which on this holds; in smaller ones a blow has less far to go, and"""
-
-SMALL_SHARE = 0.5
-"""the number of substeps falls towards this share of it, in proportion [-]. A rockfall of 120
-blocks in steps of 20 ms takes a twentieth less time, and contacts sink alike. Up to 512 blocks it
-would be an eighth less; but 1,000 blocks in a hopper did not come to rest in long steps."""
+SUBSTEP = 4e-3
+"""Longest substep in the relaxation of an island in motion [s]: a blow goes on from contact to
+contact in each."""
 
 LEAST_SUBSTEPS = 3
 """Least substeps of a step."""
@@ -97,19 +78,10 @@ tolerance: `Settings.sweep_tolerance`, or less."""
 LARGE_ISLAND = 128
 """Blocks of an island from which on it is used whole; less in proportion in smaller ones. Where a
 train of ten blocks hits the ground it is the difference between one blow and ten: with 1 m/s
-instead of 0.1 a seventh more of it reached a road. To an avalanche of 120 blocks it made none, but
-a step took half as much time again."""
+instead of 0.1 a seventh more of it reached a road."""
 
-RELAXATION_SHARE = 0.2
+RELAXATION_SHARE = 0.05
 """Greatest such tolerance over the speed of the island [-], so that slow ones come to rest."""
-
-SLOW_SHARE = 1.0 / 60.0
-"""Greatest such tolerance over the speed of an island that did not settle as a whole, and is
-relaxed in one substep [-]."""
-
-RELAXATION_STIFFNESS = 6e3
-"""Stiffness of a contact in a single substep times its flexibility there [-]: a blow on the foot of
-a train of blocks leaves them closing at the blow over this."""
 
 LAYERS = 64
 """Layers in which the contacts of an island are ordered by height for relaxation."""

@@ -16,7 +16,6 @@ from rigdda.dynamics.constants import (
     BLOCK_PCG,
     BOLT,
     DIRECT,
-    FAST_FALL,
     FRICTION_TOLERANCE,
     IMPACT,
     MOVING,
@@ -203,7 +202,7 @@ def solve_states(
 @kernel
 def relax(
     bodies: Bodies, contacts: Contacts, m: Matrix, motion: Motion, islands: Islands, rows: Rows,
-    island: int, p: Parameters, counters: NDArray, speed: float, fast: bool,
+    island: int, p: Parameters, counters: NDArray, speed: float,
 ) -> None:  # fmt: skip
     """Find the forces of an island by relaxation, from those of the last step."""
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
@@ -211,7 +210,7 @@ def relax(
     assemble_blocks(bodies, m, islands, b0, b1, p)
     counters[RELAXED] += 1
     sweeps, substeps = relax_forces(
-        bodies, contacts, m.rhs, motion, islands, rows, c0, c1, b0, b1 - b0, speed, fast, p
+        bodies, contacts, m.rhs, motion, islands, rows, island, speed, p
     )
     counters[SWEEPS] += sweeps
     for item in range(c0, c1):
@@ -327,17 +326,17 @@ def open_close(
     waiting = is_waiting(bodies, islands, b0, b1)
     small, quiet = b1 - b0 <= SMALL_ISLAND, speed <= QUIET_SPEED
     relaxing = waiting if quiet else not small
-    fast = relaxing and speed > max(QUIET_SPEED, FAST_FALL * p.gravity * p.dt)
     asked = 0.0
     for attempt in range(4):  # as asked, plastic, between them, and plastic if that gains, too
         if not relaxing:
-            relaxing = not solve_states(
+            settled = solve_states(
                 bodies, contacts, m, system.scratch, islands, island, pairs, p, counters
             )
+            relaxing = not settled and not p.static
             if relaxing and not small:
                 let_wait(bodies, islands, b0, b1)
         if relaxing:
-            relax(bodies, contacts, m, motion, islands, rows, island, p, counters, speed, fast)
+            relax(bodies, contacts, m, motion, islands, rows, island, p, counters, speed)
         if not bouncing or attempt == 3:
             break
         work = impact_work(contacts, m.d, islands, c0, c1)
@@ -350,4 +349,4 @@ def open_close(
         if work <= 0.0 if attempt != 1 else work >= 0.0:
             break
         set_rebound(contacts, islands, c0, c1, share)
-    return fast and grounded
+    return relaxing and grounded

@@ -69,6 +69,7 @@ from rigdda.dynamics.records import (
     System,
     Work,
 )
+from rigdda.dynamics.recovery import push_out
 from rigdda.dynamics.shaking import set_field
 from rigdda.dynamics.sleep import wake_neighbours, watch_quiet
 from rigdda.dynamics.thrust import press, press_asleep, watch_thrust
@@ -183,7 +184,7 @@ def detect(
 @stage
 def move_island(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, motion: Motion, islands: Islands,
-    island: int, struck: bool, in_substeps: bool, gauges: Gauges, p: Parameters, ledger: NDArray,
+    island: int, gauges: Gauges, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
@@ -195,7 +196,6 @@ def move_island(
         block.apart += p.dt
     for item in range(c0, c1):
         c = contacts[islands.contact_item[item]]
-        keep_memory(c, struck, in_substeps)
         if c.state == OPEN:
             continue
         account_contact(c, motion.d, islands, ledger, gauges)
@@ -258,9 +258,10 @@ def step_island(
                 counters[EVENTS] = note_hits(
                     bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
                 )
-        bad = move_island(
-            bodies, outlines, contacts, motion, islands, s, struck, in_substeps, gauges, now, ledger
-        )
+        for item in range(c0, c1):
+            keep_memory(contacts[islands.contact_item[item]], struck, in_substeps)
+        push_out(bodies, contacts, motion, islands, rows, s)
+        bad = move_island(bodies, outlines, contacts, motion, islands, s, gauges, now, ledger)
         left -= now.dt
         parts += 1 if parts > 0 else 0
     lap(counters, MOTION, since, p.timing)

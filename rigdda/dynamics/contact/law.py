@@ -12,9 +12,8 @@ What differs is the bias b:
 =======  ====================================================================================
 at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
          shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
-         on, the rest viscous (Kelvin and Voigt's solid). Penetration beyond what N_0 explains is
-         pushed out slowly, a small gap closed so. u_0 is that of the points that touch at the
-         start of the step, see `set_velocities_at_start`. An open gap gives b = -g: what would
+         on, the rest viscous (Kelvin and Voigt's solid). u_0 is that of the points that touch at
+         the start of the step, see `set_velocities_at_start`. An open gap gives b = -g: what would
          close within the step is slowed down to the speed that closes it in one more.
 impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
          impulse acts from the time at which the bodies touch.
@@ -44,8 +43,6 @@ from rigdda.dynamics.constants import (
     OPEN,
     PLAIN,
     PLAIN_CONTACT,
-    RECOVERY_SPEED,
-    RECOVERY_TIME,
     REST,
     RETARDATION_TIME,
     SHOCK,
@@ -172,29 +169,15 @@ def set_shock(bodies: Bodies, c: Contact, p: Parameters) -> None:
 
 
 @kernel
-def recovery(surplus: float, dt: float) -> float:
-    """Return the part of a surplus penetration that is pushed out in a step [m]."""
-    return max(min(surplus / RECOVERY_TIME, RECOVERY_SPEED), -RECOVERY_SPEED) * dt
-
-
-@kernel
-def set_rest(c: Contact, weight: float, p: Parameters) -> None:
-    """Make a contact a spring that carries on with the force of the last step.
-
-    Penetration is pushed out at no more power than under `weight` [N]: wedged blocks and piles that
-    cannot give way would be driven for ever.
-    """
+def set_rest(c: Contact, p: Parameters) -> None:
+    """Make a contact a spring that carries on with the force of the last step."""
     c.kind = REST
     c.kappa = c.stiffness * max(1.0, RETARDATION_TIME / p.dt)
-    elastic = c.memory_normal / c.stiffness
     if c.gap > p.penetration and c.bond == 0.0:
         c.memory_normal = c.start_normal = 0.0
         c.bias = -c.gap
     else:
         c.bias = c.memory_normal / c.kappa
-        if c.memory_normal > 0.0:
-            surplus = max(-c.gap - elastic, 0.0) - max(c.gap, 0.0)
-            c.bias += recovery(surplus, p.dt) * weight / max(weight, c.memory_normal)
 
 
 @kernel
@@ -319,7 +302,7 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
     gap, mean = max(c.gap, 0.0), 0.5 * pull * p.dt - c.un
     set_velocities_at_start(bodies, c, p.dt)
     if c.state != OPEN:
-        set_rest(c, weight, p)
+        set_rest(c, p)
         return
     set_new(bodies, c, start, p)
     # what touches starts closed: in a stack no block moves before those below it are held, and

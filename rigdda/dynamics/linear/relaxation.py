@@ -14,7 +14,8 @@ and loads, f_c the force of a contact and e_c its row. A contact whose gap g + e
 by that gap, one that is closed not at all; an impact that has closed leaves by what its restitution
 asks for. Forces start from those of the last substep, so that d starts as 2 d_{s-1} - d_{s-2}.
 
-At rest the global solve takes over. What that does not settle is relaxed in a single substep.
+The sweeps of a substep are few, so that contacts which are closed may close a little more. That is
+pushed out at the end of the step, see `recovery`. At rest the global solve takes over.
 """
 
 from __future__ import annotations
@@ -34,11 +35,6 @@ from rigdda.dynamics.constants import (
     PIN,
     PLAIN,
     RELAXATION_SHARE,
-    RELAXATION_STIFFNESS,
-    REST,
-    SLOW_SHARE,
-    SMALL_SHARE,
-    SPREADING,
     SUBSTEP,
 )
 from rigdda.dynamics.records import (
@@ -125,45 +121,26 @@ def set_rigid(row: Floats, c: Contact, flexible: float, rolling: float, substeps
         row[REBOUND] = c.bias / substeps
     elif c.kind == IMPACT:  # a fence that fails lets blocks pass
         row[AIM] = c.bias / substeps
-    elif c.kind == REST:  # what pushes penetration out, without the force that is carried over
-        row[AIM] = max(c.bias - c.memory_normal / c.kappa, 0.0) / substeps
 
 
 @inlined
-def set_spring(
-    row: Floats, c: Contact, rows: Rows, i: int, j: int, flexible: float, rolling: float,
-    substeps: int, h: float,
-) -> None:  # fmt: skip
-    """Write what a visit needs of the spring of a contact, see contact.law.
+def set_spring(row: Floats, c: Contact, flexible: float, rolling: float) -> None:
+    """Write what a visit needs of a spring whose stiffness is given, see contact.law.
 
-    In a single substep every contact is one: its displacement is dt times the end velocity, but for
-    what its velocity at the start is not that of the bodies along its row. Plain contacts and bolts
-    are springs on the displacement of the step: of 2 and 4 times the stiffness in the law.
+    Plain contacts and bolts are springs on the displacement of the step: of 2 and 4 times the
+    stiffness in the law. A pin is one on the displacement at the end.
     """
-    normal = shear = c.kappa
-    free, slid = c.bias, 0.0
-    if substeps == 1:
-        a, b = rows.motion[i], rows.motion[j]
-        free += h * c.un - along_six(row[NORMAL : NORMAL + 6], a, b, BEFORE)
-        slid += h * c.us - along_six(row[SHEAR : SHEAR + 6], a, b, BEFORE)
-    if not is_elastic(c):
-        normal, shear = RELAXATION_STIFFNESS / flexible, RELAXATION_STIFFNESS / rolling
-        free += c.memory_normal * (1.0 / normal - 1.0 / c.kappa)
-    elif c.kind != PIN and substeps > 1:
-        factor = 2.0 if c.kind == PLAIN else 4.0
-        normal = shear = factor * c.kappa
-        free = c.bias / factor
-    row[KEEP] = normal * flexible / (1.0 + normal * flexible)
-    row[KEEP_SHEAR] = shear * rolling / (1.0 + shear * rolling)
+    factor = 2.0 if c.kind == PLAIN else (4.0 if c.kind == BOLT else 1.0)
+    stiffness = factor * c.kappa
+    row[KEEP] = stiffness * flexible / (1.0 + stiffness * flexible)
+    row[KEEP_SHEAR] = stiffness * rolling / (1.0 + stiffness * rolling)
     row[GAIN], row[GAIN_SHEAR] = row[KEEP] / flexible, row[KEEP_SHEAR] / rolling
-    row[GAP], row[AIM], row[REBOUND] = -free, math.inf, -math.inf
-    row[FREE] = c.memory_shear / shear + slid
+    row[GAP], row[AIM], row[REBOUND] = -c.bias / factor, math.inf, -math.inf
+    row[FREE] = c.memory_shear / stiffness
 
 
 @inlined
-def pack_row(
-    c: Contact, islands: Islands, rows: Rows, place: int, n: int, substeps: int, h: float
-) -> None:
+def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, n: int, substeps: int) -> None:
     """Write a contact as row `place` and add its starting force to the displacements.
 
     Slot n stands for bodies without unknowns.
@@ -177,8 +154,8 @@ def pack_row(
     write_row(row, SHEAR, shear_row(c, True), rows.scale[i])
     write_row(row, SHEAR + 3, shear_row(c, False), rows.scale[j])
     flexible, rolling = product(row, NORMAL, NORMAL), product(row, SHEAR, SHEAR)
-    if substeps == 1 or is_elastic(c):
-        set_spring(row, c, rows, i, j, flexible, rolling, substeps, h)
+    if is_elastic(c):
+        set_spring(row, c, flexible, rolling)
     else:
         set_rigid(row, c, flexible, rolling, substeps)
     row[FLEXIBLE], row[CROSS] = flexible, row[GAIN_SHEAR] * product(row, NORMAL, SHEAR)
@@ -333,52 +310,49 @@ def go_on(motion: Floats, n: int, last: bool) -> None:
 
 
 @kernel
-def substeps_of(n: int, dt: float) -> int:
-    """Return the substeps of a step of an island of n blocks: a blow goes on farther in more."""
-    share = SMALL_SHARE + (1.0 - SMALL_SHARE) * min(n / SPREADING, 1.0)
-    return max(LEAST_SUBSTEPS, math.ceil(share * dt / SUBSTEP - 1e-9))
+def substeps_of(dt: float) -> int:
+    """Return the substeps of a step."""
+    return max(LEAST_SUBSTEPS, math.ceil(dt / SUBSTEP - 1e-9))
 
 
 @kernel
 def relax_forces(
     bodies: Bodies, contacts: Contacts, rhs: Floats, found: Motion, islands: Islands, rows: Rows,
-    low: int, high: int, first: int, n: int, speed: float, fast: bool, p: Parameters,
+    island: int, speed: float, p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
-    """Find the forces of an island with contacts low:high, in their rows: see `take_forces`.
+    """Find the forces of an island in substeps, in the rows of its contacts: see `take_forces`.
 
-    In substeps if it is `fast`, else in one that is settled more closely; `speed` is the greatest
-    of the island [m/s]. `rhs` holds inertia and weight only. found.d is set to the displacements
-    at constant mean force, found.relaxed to what the blocks move besides, since forces act early or
-    late in the step.
+    `speed` is the greatest of the island [m/s]. `rhs` holds inertia and weight only. found.d is set
+    to the displacements at constant mean force, found.relaxed to what the blocks move besides,
+    since forces act early or late in the step.
 
     Returns
     -------
     sweeps, substeps : int
         How many it took.
     """
-    substeps = 1
-    usual = p.sweep_tolerance * min(n / LARGE_ISLAND, 1.0)
-    tolerance = min(SLOW_SHARE * speed, usual)
-    if fast:
-        substeps = substeps_of(n, p.dt)
-        tolerance = min(RELAXATION_SHARE * speed, usual)
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
+    first = islands.block_start[island]
+    n = islands.block_start[island + 1] - first
+    substeps = substeps_of(p.dt)
     h, motion = p.dt / substeps, rows.motion
+    usual = p.sweep_tolerance * min(n / LARGE_ISLAND, 1.0)
+    tolerance = min(RELAXATION_SHARE * speed, usual)
     for s in range(n):
         start(bodies[islands.block_item[first + s]], rhs, rows, s, h, p)
     for q in range(3):
         rows.scale[n, q] = 0.0
         motion[n, NOW + q] = motion[n, SO_FAR + q] = motion[n, BEFORE + q] = 0.0
-    count = high - low
     sort_by_height(contacts, islands, rows, low, high)
     for q in range(low, high):
         c = contacts[islands.contact_item[q]]
-        pack_row(c, islands, rows, rows.place[q], n, substeps, h)
+        pack_row(c, islands, rows, rows.place[q], n, substeps)
     sweeps = 0
     for number in range(substeps):
         for s in range(n + 1):
             rows.moved_in[s] = -1
         for tries in range(MOST_SWEEPS):
-            visits = list_visits(rows, count, tries, number)
+            visits = list_visits(rows, high - low, tries, number)
             worst = sweep(
                 rows.row, rows.row_i, rows.row_j, motion, n, rows.visit, visits, tries, number,
                 substeps, rows.idle, speed * h, rows.moved_in, tolerance * h,

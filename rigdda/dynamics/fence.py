@@ -15,7 +15,7 @@ it does not matter how many of them fall into one step.
 
 If it is more than is left, the blocks come through with a share s of the velocities that they would
 have without the fence, which takes W(s) = (1 - s^2) W of impacts in proportion. Friction and
-neighbours bend this law, so s^2 is mended by what W(s) is off, over W.
+neighbours bend this law, so s^2 is sought by false position between 0 and 1.
 """
 
 from __future__ import annotations
@@ -202,6 +202,7 @@ def break_through(
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     d, total = system.motion.d, struck + passed
     taken, square = 0.0, 1.0 - left / total
+    low_square, high_square, most, least = 0.0, 1.0, total, 0.0  # a bracket, and what its ends take
     for attempt in range(BREAK_SOLVES if left > 0.0 else 1):
         aim(contacts, d, islands, low, high, fence, attempt == 0, math.sqrt(square), p.dt)
         open_close(bodies, contacts, system, islands, rows, island, p, counters)
@@ -210,7 +211,12 @@ def break_through(
             taken += (1.0 - square) * passed
             if abs(taken - left) < BREAK_TOLERANCE * left:
                 break
-            square = min(max(square + (taken - left) / total, 0.0), 1.0)
+            if taken > left:
+                low_square, most = square, taken
+            else:
+                high_square, least = square, taken
+            share = min(max((most - left) / (most - least), 0.05), 0.95)  # no end for ever
+            square = low_square + share * (high_square - low_square)
     return taken
 
 

@@ -133,7 +133,6 @@ def collide_block(
     for k in range(first, count):
         prepare(bodies, contacts[k], interfaces, start, p)
         deepest[0] = max(deepest[0], -contacts[k].gap)
-    strike_at_once(bodies, contacts, first, count, p)
     return count
 
 
@@ -241,6 +240,7 @@ def step_island(
             now = part
         if c1 > c0:
             since = lap(counters, MOTION, since, p.timing)
+            strike_at_once(bodies, contacts, islands, s, now)
             in_substeps = open_close(bodies, contacts, system, islands, rows, s, now, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
         struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)

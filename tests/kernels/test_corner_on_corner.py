@@ -26,7 +26,8 @@ def test_corners_that_meet_do_not_pass(turn, shift):
     for _ in range(100):
         sim.step()
         assert overlap(sim, 0, 1) < 0.05  # the faces slide along each other, turning
-    assert sim.diagnostics.penetration < 0.07
+    # in flight penetration is not pushed out: it would change the angular momentum
+    assert sim.diagnostics.penetration < 0.08
     assert sim.velocities[0, :2] @ way < -0.3  # the first was struck
 
 

@@ -75,10 +75,10 @@ def test_what_is_wider_is_resisted_by_less():
 
 @pytest.mark.parametrize("dt", [1e-2, 2.5e-3])
 def test_an_embankment_is_pushed_by_more_than_its_friction(dt):
-    held = Simulation(row(4), Settings(dt=dt)).run(6.0)
+    held = Simulation(row(3), Settings(dt=dt)).run(6.0)
     assert math.isinf(held.failure(0)) and held.thrust[0] > 0.0
     weak = replace(DAM, density=DAM.density * 0.7 * held.thrust[0] / held.scene.resistance(0))
-    pushed = Simulation(row(4, weak), Settings(dt=dt)).run(8.0)
+    pushed = Simulation(row(3, weak), Settings(dt=dt)).run(8.0)
     assert math.isfinite(pushed.failure(0))
     assert held.poses[-1, :, 0].max() < 3.0 < pushed.poses[-1, :, 0].max()
     assert pushed.ground.height(2.0) == pytest.approx(0.0, abs=1e-9) != held.ground.height(2.0)

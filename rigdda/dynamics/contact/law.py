@@ -51,7 +51,7 @@ from rigdda.dynamics.constants import (
     STIFFNESS_CHANGE,
     UNLOADED,
 )
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Parameters
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Islands, Parameters
 from rigdda.kernel import inlined, kernel
 
 
@@ -215,28 +215,28 @@ def strike(bodies: Bodies, c: Contact, time: float, pull: float, p: Parameters) 
 
 
 @inlined
-def strike_at_once(bodies: Bodies, contacts: Contacts, low: int, high: int, p: Parameters) -> None:
-    """Let all contacts of two blocks that collide act at the time of the first impact.
+def strike_at_once(
+    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, p: Parameters
+) -> None:
+    """Let all contacts of a cluster in flight act at the time of its first impact.
 
-    Impulses at different times would act on arms that the earlier one has changed, and angular
-    momentum would not be kept.
+    Impulses at different times would act on arms that the earlier ones have changed, and angular
+    momentum would not be kept. What touches the ground, or a fixed body, has none to keep.
     """
-    first = low
-    for k in range(low, high):
-        if k + 1 < high and contacts[k + 1].b == contacts[first].b:
-            continue
-        b, share = contacts[first].b, 0.0
-        for j in range(first, k + 1):
-            c = contacts[j]
-            if c.kind == IMPACT:
-                share = max(share, c.share)
-        if share > 0.0 and b >= 0 and bodies[b].status == AWAKE:
-            for j in range(first, k + 1):
-                c = contacts[j]
-                closing = strike(bodies, c, (1.0 - share) * p.dt, 0.0, p)
-                if c.kind == IMPACT:
-                    set_impact(c, max(closing, 0.0), effective_mass(bodies, c), p)
-        first = k + 1
+    share = 0.0
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        c = contacts[islands.contact_item[item]]
+        if c.b < 0 or bodies[c.b].status != AWAKE:
+            return
+        if c.kind == IMPACT:
+            share = max(share, c.share)
+    if share == 0.0:
+        return
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        c = contacts[islands.contact_item[item]]
+        closing = strike(bodies, c, (1.0 - share) * p.dt, 0.0, p)
+        if c.kind == IMPACT:
+            set_impact(c, max(closing, 0.0), effective_mass(bodies, c), p)
 
 
 @kernel

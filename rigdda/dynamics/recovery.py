@@ -32,7 +32,7 @@ def excess_gap(c: Contact, motion: Motion, i: int, j: int) -> float:
     """Return the gap after the step over the one that the load of a contact explains [m]."""
     dn, _ = relative_displacement(c, motion.d, i, j)
     besides, _ = relative_displacement(c, motion.besides, i, j)
-    return c.gap + dn + besides + c.memory_normal / c.stiffness
+    return c.gap + dn + besides + max(c.memory_normal, 0.0) / c.stiffness
 
 
 @kernel

@@ -209,13 +209,12 @@ def relax(
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     assemble_blocks(bodies, m, islands, b0, b1, p)
     counters[RELAXED] += 1
-    sweeps, substeps = relax_forces(
+    counters[SWEEPS] += relax_forces(
         bodies, contacts, m.rhs, motion, islands, rows, island, speed, p
     )
-    counters[SWEEPS] += sweeps
     for item in range(c0, c1):
         c = contacts[islands.contact_item[item]]
-        take_forces(c, rows.row[rows.place[item]], substeps)
+        take_forces(c, rows.row[rows.place[item]])
         limit = c.cohesion + c.friction * max(c.normal, 0.0)
         within = limit > abs(c.shear)
         if c.bond > 0.0:

@@ -55,9 +55,9 @@ class Settings:
         Relative residual at which conjugate gradients stop. 1e-7: looser, and the small forces at
         the top of a tall stack drown in the error of the large ones at its base.
     sweep_tolerance : float
-        Islands of several blocks in motion take a step in three substeps or more, of 4 ms at most.
-        In each their contacts are swept over until no velocity changes by more than this [m/s], up
-        to 100 times. Islands of less than 128 blocks, and slow ones, are settled more closely.
+        Islands of several blocks in motion take a step in five substeps. In each their contacts
+        are swept over until no velocity changes by more than this [m/s], up to 100 times. Islands
+        of less than 128 blocks, and slow ones, are settled more closely.
     open_close_iterations : int
         Most open-close iterations in a step; nearly all steps need 1 to 3. What has not settled
         then is relaxed.

@@ -30,12 +30,11 @@ from rigdda.dynamics.constants import (
     BOLT,
     IMPACT,
     LARGE_ISLAND,
-    LEAST_SUBSTEPS,
     MOST_SWEEPS,
     PIN,
     PLAIN,
     RELAXATION_SHARE,
-    SUBSTEP,
+    SUBSTEPS,
 )
 from rigdda.dynamics.records import (
     Bodies,
@@ -112,15 +111,15 @@ def is_elastic(c: Contact) -> bool:
 
 
 @kernel
-def set_rigid(row: Floats, c: Contact, flexible: float, rolling: float, substeps: int) -> None:
+def set_rigid(row: Floats, c: Contact, flexible: float, rolling: float) -> None:
     """Write what a visit needs of a contact that gives way to nothing in a substep."""
     row[KEEP], row[GAIN] = 1.0, 1.0 / flexible
     row[KEEP_SHEAR], row[GAIN_SHEAR] = 1.0, 1.0 / rolling
     row[GAP], row[AIM], row[REBOUND], row[HIT] = c.gap, 0.0, -math.inf, -1.0
     if c.kind == IMPACT and c.bias > 0.0:
-        row[REBOUND] = c.bias / substeps
+        row[REBOUND] = c.bias / SUBSTEPS
     elif c.kind == IMPACT:  # a fence that fails lets blocks pass
-        row[AIM] = c.bias / substeps
+        row[AIM] = c.bias / SUBSTEPS
 
 
 @inlined
@@ -140,7 +139,7 @@ def set_spring(row: Floats, c: Contact, flexible: float, rolling: float) -> None
 
 
 @inlined
-def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, n: int, substeps: int) -> None:
+def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, n: int) -> None:
     """Write a contact as row `place` and add its starting force to the displacements.
 
     Slot n stands for bodies without unknowns.
@@ -157,7 +156,7 @@ def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, n: int, subst
     if is_elastic(c):
         set_spring(row, c, flexible, rolling)
     else:
-        set_rigid(row, c, flexible, rolling, substeps)
+        set_rigid(row, c, flexible, rolling)
     row[FLEXIBLE], row[CROSS] = flexible, row[GAIN_SHEAR] * product(row, NORMAL, SHEAR)
     row[FRICTION], row[TENSION] = c.friction, c.tension
     row[COHESION] = math.inf if c.kind == PIN else c.cohesion
@@ -197,7 +196,7 @@ def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
 @arithmetic_kernel
 def sweep(
     row: Floats, row_i: Ints, row_j: Ints, motion: Floats, still: int, visit: Ints, visits: int,
-    tries: int, number: int, substeps: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
+    tries: int, number: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
 ) -> float:  # fmt: skip
     """Visit the contacts listed once, from the lowest up, or down; returns the greatest change [m].
 
@@ -226,7 +225,7 @@ def sweep(
         if normal == 0.0 and force == 0.0 and before == 0.0 and r[COHESION] == 0.0:
             if r[AIM] < math.inf:
                 wait = (moved - aim) / (reach + abs(moved))
-                idle[place] = number + int(min(wait, float(substeps)))
+                idle[place] = number + int(min(wait, float(SUBSTEPS)))
             continue
         push = normal - force
         change = abs(push) * r[FLEXIBLE]
@@ -310,32 +309,20 @@ def go_on(motion: Floats, n: int, last: bool) -> None:
 
 
 @kernel
-def substeps_of(dt: float) -> int:
-    """Return the substeps of a step."""
-    return max(LEAST_SUBSTEPS, math.ceil(dt / SUBSTEP - 1e-9))
-
-
-@kernel
 def relax_forces(
     bodies: Bodies, contacts: Contacts, rhs: Floats, found: Motion, islands: Islands, rows: Rows,
     island: int, speed: float, p: Parameters,
-) -> tuple[int, int]:  # fmt: skip
+) -> int:  # fmt: skip
     """Find the forces of an island in substeps, in the rows of its contacts: see `take_forces`.
 
     `speed` is the greatest of the island [m/s]. `rhs` holds inertia and weight only. found.d is set
     to the displacements at constant mean force, found.relaxed to what the blocks move besides,
-    since forces act early or late in the step.
-
-    Returns
-    -------
-    sweeps, substeps : int
-        How many it took.
+    since forces act early or late in the step. Returns the number of sweeps.
     """
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     first = islands.block_start[island]
     n = islands.block_start[island + 1] - first
-    substeps = substeps_of(p.dt)
-    h, motion = p.dt / substeps, rows.motion
+    h, motion = p.dt / SUBSTEPS, rows.motion
     usual = p.sweep_tolerance * min(n / LARGE_ISLAND, 1.0)
     tolerance = min(RELAXATION_SHARE * speed, usual)
     for s in range(n):
@@ -346,33 +333,33 @@ def relax_forces(
     sort_by_height(contacts, islands, rows, low, high)
     for q in range(low, high):
         c = contacts[islands.contact_item[q]]
-        pack_row(c, islands, rows, rows.place[q], n, substeps)
+        pack_row(c, islands, rows, rows.place[q], n)
     sweeps = 0
-    for number in range(substeps):
+    for number in range(SUBSTEPS):
         for s in range(n + 1):
             rows.moved_in[s] = -1
         for tries in range(MOST_SWEEPS):
             visits = list_visits(rows, high - low, tries, number)
             worst = sweep(
                 rows.row, rows.row_i, rows.row_j, motion, n, rows.visit, visits, tries, number,
-                substeps, rows.idle, speed * h, rows.moved_in, tolerance * h,
+                rows.idle, speed * h, rows.moved_in, tolerance * h,
             )  # fmt: skip
             sweeps += 1
             if worst <= tolerance * h:
                 break
-        go_on(motion, n, number == substeps - 1)
+        go_on(motion, n, number == SUBSTEPS - 1)
     for s in range(n):
         v = velocity(bodies[islands.block_item[first + s]])
         for q in range(3):
             scale = rows.scale[s, q]
             found.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)
             found.relaxed[s, q] = motion[s, SO_FAR + q] * scale - found.d[s, q]
-    return sweeps, substeps
+    return sweeps
 
 
 @inlined
-def take_forces(c: Contact, row: Floats, substeps: int) -> None:
+def take_forces(c: Contact, row: Floats) -> None:
     """Set the forces of a contact to their means over the step, its starting ones to the last."""
-    add_up(row, substeps)
-    c.normal, c.shear = row[SUM] / substeps, row[SUM + 1] / substeps
+    add_up(row, SUBSTEPS)
+    c.normal, c.shear = row[SUM] / SUBSTEPS, row[SUM + 1] / SUBSTEPS
     c.start_normal, c.start_shear = row[FORCE], row[FORCE + 1]

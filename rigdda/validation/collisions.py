@@ -1,4 +1,4 @@
-"""Two blocks that spin and collide in free space keep their momentum."""
+"""Blocks that spin and collide in free space keep their momentum, two or several at once."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from rigdda.validation.scenes import masses, momentum, polygon, rock, rough
 PAIRS = 300
 """Random pairs; blocks that part in free space do not meet again."""
 
+RINGS = 60
+"""Random rings of each size."""
+
 
 def pair(rng: np.random.Generator) -> Scene:
     """Return two random blocks that fly at each other."""
@@ -18,6 +21,20 @@ def pair(rng: np.random.Generator) -> Scene:
     for side in (-1.0, 1.0):
         corners = polygon(rough(rng, int(rng.integers(3, 9))), (1.5 * side, rng.uniform(-0.5, 0.5)))
         velocity = (-side * rng.uniform(1.0, 10.0), *rng.uniform(-2.0, 2.0, 2))
+        blocks.append(Block(corners, 10.0 ** rng.uniform(2.0, 4.0), velocity=velocity))
+    surface = rock(rng.uniform(0.0, 60.0), rng.choice([0.0, 0.3, 0.6, 0.9]))
+    return Scene(None, tuple(blocks), surface, gravity=0.0)
+
+
+def ring(rng: np.random.Generator, count: int) -> Scene:
+    """Return random blocks on a ring that fly at one another and meet several at once."""
+    blocks = []
+    for turn in 2.0 * np.pi * np.arange(count) / count:
+        outward = np.array([np.cos(turn), np.sin(turn)])
+        place = 1.3 * count / np.pi * rng.uniform(1.0, 1.3) * outward
+        speed = -5.0 * rng.uniform(0.3, 1.0) * outward + rng.normal(size=2)
+        velocity = (*speed, rng.uniform(-5.0, 5.0))
+        corners = polygon(rough(rng, int(rng.integers(3, 9))), place)
         blocks.append(Block(corners, 10.0 ** rng.uniform(2.0, 4.0), velocity=velocity))
     surface = rock(rng.uniform(0.0, 60.0), rng.choice([0.0, 0.3, 0.6, 0.9]))
     return Scene(None, tuple(blocks), surface, gravity=0.0)
@@ -48,6 +65,13 @@ def measure(lab: Lab) -> list[Measured]:
     return [Measured(column) for column in columns]
 
 
+def measure_rings(lab: Lab) -> list[Measured]:
+    """Let rings of three and of six blocks collide."""
+    rings = [ring(lab.random(count, i), count) for count in (3, 6) for i in range(RINGS)]
+    linear, angular, gain = zip(*(drift(lab, scene) for scene in rings), strict=True)
+    return [Measured(linear), Measured(angular), Measured(gain)]
+
+
 CASES = (
     Case(
         "collisions",
@@ -57,5 +81,14 @@ CASES = (
             Check("gain of energy", "none: passive contact", "-", 1e-9, "bound"),
         ),
         measure,
+    ),
+    Case(
+        "collisions-many",
+        (
+            Check("momentum", "none: Newton III", "-", 1e-10, "bound"),
+            Check("angular momentum", "none: Newton III", "-", 1e-4, "bound"),
+            Check("gain of energy", "none: passive contact", "-", 1e-4, "bound"),
+        ),
+        measure_rings,
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from rigdda.barriers import Barrier, Mesh, as_layout
+from rigdda.barriers import Barrier, GravityWall, Mesh, as_layout
 from rigdda.dynamics.pack.again import Template
 from rigdda.dynamics.simulation import Simulation, chainages
 from rigdda.errors import BadInput, Error
@@ -12,6 +12,9 @@ from rigdda.model.events import Drawn
 from rigdda.model.scene import Scene
 from rigdda.model.site import Site
 from rigdda.results.outcome import Outcome, leave, measure, stations, watch
+
+EVERY = 0.05
+"""Interval of the frames of a run from which states of barriers are judged [s]."""
 
 MOST_BLOCKS = 32
 """Most blocks of a scene whose arrays are kept: packing more takes little beside simulating them.
@@ -59,7 +62,9 @@ class Batch:
         """Return the outcome of one release. Raises as `rigdda.release` does."""
         drawn = self._site.draw(seed, event)
         duration = self._site.motion.duration
-        run = self.simulation(self.scene(drawn)).run(duration, duration)
+        # a wall that slid or overturned on the way may come to stand again
+        moving = any(isinstance(barrier, GravityWall) for barrier in self._standing)
+        run = self.simulation(self.scene(drawn)).run(duration, EVERY if moving else duration)
         return measure(self._site, run, drawn.event, drawn.width)
 
     def scene(self, drawn: Drawn) -> Scene:

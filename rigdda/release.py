@@ -7,14 +7,11 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from rigdda.barriers import Barrier, Layout, as_layout
-from rigdda.batch import Batch, Job, as_site, outcomes, simulation
+from rigdda.batch import EVERY, Batch, Job, as_site, outcomes, simulation
 from rigdda.dynamics.run import Run
 from rigdda.errors import Error
 from rigdda.model.site import Site
 from rigdda.results.outcome import Outcome, measure
-
-EVERY = 0.05
-"""Interval of the frames of a run [s]."""
 
 
 def release(

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from physics.helpers import FLAT, GRAVITY, box, rock
-from rigdda import Fence, GravityWall, Run, Scene, Simulation, Terrain, Wall
+from rigdda import Fence, GravityWall, Run, Scene, Simulation, Site, Terrain, Wall, release
+from rigdda.release import release_many
 from rigdda.results.states import states
 from rigdda.validation.case import Lab
 from rigdda.validation.gravity_walls import DURATION, FACE, Push, displacement
@@ -98,3 +99,13 @@ def test_more_walls_than_blocks():
     sim = Simulation(Scene(Terrain(FLAT), (box(0.0, 0.5),), rock(), barriers=walls))
     sim.step(10)
     assert sim.time == pytest.approx(10 * sim.settings.dt)
+
+
+def test_a_wall_that_overturned_and_stands_again_has_failed_in_many_releases_too():
+    """It is judged by all frames, as one release is: here it is carried on, turning round."""
+    site = Site.load("shu-hwa")
+    wall = GravityWall(83.6, 1.5, 0.6)
+    found = release_many([(site, (wall,), seed, "mass") for seed in range(3)])
+    for seed, outcome in enumerate(found):
+        assert outcome == release(site, (wall,), seed, "mass")[1]
+        assert outcome.barriers[0].failed

@@ -142,12 +142,16 @@ def run(quick: bool, out: Path) -> Number:
         rows += table(model, found[model], observed, time.process_time() - start)
         predicted[model] = fit.run_outs(found[model].site, model, list(observed), seeds)
     if os.environ.get(PYTHON):
-        with PlatRock(os.environ[PYTHON], site) as peer:
-            found["PlatRock"] = fit.search(
-                site, observed, PARAMETERS, peer.run_outs, budget, releases, 0, tell("PlatRock")
-            )
-            rows += table("PlatRock", found["PlatRock"], observed, peer.cpu)
-            predicted["PlatRock"] = dict(peer.run_outs(found["PlatRock"].best.values, seeds))
+        try:
+            with PlatRock(os.environ[PYTHON], site) as peer:
+                fitted = fit.search(
+                    site, observed, PARAMETERS, peer.run_outs, budget, releases, 0, tell("PlatRock")
+                )
+                predicted["PlatRock"] = dict(peer.run_outs(fitted.best.values, seeds))
+                rows += table("PlatRock", fitted, observed, peer.cpu)
+                found["PlatRock"] = fitted
+        except RuntimeError as error:  # what was computed of the others is kept
+            say(f"tschamut: {error}")
     write(out / "tschamut" / "tschamut.csv", rows)
     blocks = predicted["blocks"]
     each = [

@@ -33,7 +33,7 @@ HERE = Path(__file__).parent
 
 MODELS: dict[fit.Model, tuple[str, ...]] = {
     "blocks": (
-        "surfaces.soil.friction_deg=15:70",
+        "surfaces.soil.friction_deg=15:65",
         "surfaces.soil.restitution=0:0.8",
         "motion.damping=0:1.5",
         "scatter.friction_deg=0:10",

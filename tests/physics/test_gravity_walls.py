@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from physics.helpers import FLAT, GRAVITY, box, rock
 from rigdda import Fence, GravityWall, Run, Scene, Simulation, Site, Terrain, Wall, release
@@ -104,8 +105,8 @@ def test_more_walls_than_blocks():
 def test_a_wall_that_overturned_and_stands_again_has_failed_in_many_releases_too():
     """It is judged by all frames, as one release is: here it is carried on, turning round."""
     site = Site.load("shu-hwa")
-    wall = GravityWall(83.6, 1.5, 0.6)
-    found = release_many([(site, (wall,), seed, "mass") for seed in range(3)])
-    for seed, outcome in enumerate(found):
-        assert outcome == release(site, (wall,), seed, "mass")[1]
-        assert outcome.barriers[0].failed
+    site = replace(site, motion=replace(site.motion, dt=2.5e-3))  # by its last frame it stands
+    wall = GravityWall(83.6, 1.5, 0.4 * 1.5)
+    (found,) = release_many([(site, (wall,), 1, "mass")])
+    assert found == release(site, (wall,), 1, "mass")[1]
+    assert found.barriers[0].failed

@@ -23,17 +23,9 @@ def table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-AMISS = {
-    "hard_cases": "a volley at 100 m/s sinks by 0.068 of its size into a thin wall in steps of "
-    "20 ms, bar 0.05; at 5 ms all cases hold",
-}
-"""What is known to miss its target, and why."""
-
-
 def marked(script: str):
     """Return a script with its marks."""
     marks = [pytest.mark.slow] if script in SLOW else []
-    marks += [pytest.mark.xfail(reason=AMISS[script])] if script in AMISS else []
     return pytest.param(script, marks=marks)
 
 

@@ -8,10 +8,12 @@ speed u, both go on together, and the fence takes what of that is directed at it
 .. math:: W = \frac{1}{2} \frac{m_j^2}{m_j + m_i} u^2 (n_q \cdot n)^2 ,
 
 with n_q and n the directions of the blow and of the push on the fence. Through a chain of blocks
-m_i is their mass, and each contact on the way passes on its own share. With the impulse P of the
-blow for m_j u this holds for eccentric blows, too; what more than m_j u passes through a contact in
-a step is thrust, or another blow, which counts for itself. So the charge is a sum over the blows:
-it does not matter how many of them fall into one step.
+m_i is their mass, and each contact on the way passes on its own share. Blocks that strike one
+another in turn within the step, or come on behind one that strikes, are a train and m_j is all of
+it. With the impulse P of the blow for m_j u this holds for eccentric blows, too; what more than
+m_j u passes through a contact in a step is thrust, or another blow, which counts for itself. So the
+charge is a sum over the blows: it does not matter how many of them fall into one step, nor how many
+steps a blow takes to go through a row.
 
 If it is more than is left, the blocks come through with a share s of the velocities that they would
 have without the fence, which takes W(s) = (1 - s^2) W of impacts in proportion. Friction and
@@ -39,11 +41,13 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.gauges import FAILED, write_event
+from rigdda.dynamics.islands import root
 from rigdda.dynamics.motion import kinetic_energy
 from rigdda.dynamics.open_close import open_close
 from rigdda.dynamics.records import (
     EVENTS,
     Bodies,
+    Body,
     Contact,
     Contacts,
     Gauges,
@@ -117,49 +121,137 @@ def find_ways(
 
 
 @kernel
+def momentum_towards(body: Body, way: NDArray) -> float:
+    """Return the momentum with which a block comes towards the fence that it leans on [N s]."""
+    return body.mass * max(body.vx * way[1] + body.vy * way[2], 0.0) if way[0] > 0.0 else 0.0
+
+
+@kernel
+def is_hit(c: Contact, fence: int) -> bool:
+    """Return whether a contact is an impact on a fence.
+
+    A corner that touches only now counts, too: it may be the second one of a block that hits.
+    """
+    hit = c.kind == IMPACT or c.kind == NEW
+    return c.b == fence and c.state != OPEN and c.normal > 0.0 and hit
+
+
+@kernel
 def hits(
     bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int,
-    fence: int, dt: float,
+    fence: int, momentum: float, dt: float,
 ) -> tuple[float, float, int]:  # fmt: skip
     """Return the work of the impacts on a fence in this step, the most of one [J], and that one.
 
-    A corner that touches only now counts, too: it may be the second one of a block that hits.
+    An impulse beyond that of the block alone, and beyond the `momentum` of the trains that hit the
+    fence [N s], is thrust.
     """
     total = most = 0.0
     k = -1
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
-        if c.b != fence or c.state == OPEN or c.normal <= 0.0:
-            continue
-        if c.kind != IMPACT and c.kind != NEW:
-            continue
-        own, mass = d[islands.slot[c.a]], bodies[c.a].mass
-        share = min(mass * math.hypot(c.un, c.us) / (c.normal * dt), 1.0)
-        work = c.normal * along(normal_row(c, True), own) + c.shear * along(shear_row(c, True), own)
-        total -= share * work
-        if -share * work > most:
-            most, k = -share * work, islands.contact_item[item]
+        if is_hit(c, fence):
+            own = d[islands.slot[c.a]]
+            brought = max(bodies[c.a].mass * math.hypot(c.un, c.us), momentum)
+            share = min(brought / (c.normal * dt), 1.0)
+            work = c.normal * along(normal_row(c, True), own)
+            work = -share * (work + c.shear * along(shear_row(c, True), own))
+            total += work
+            if work > most:
+                most, k = work, islands.contact_item[item]
     return total, most, k
 
 
 @kernel
-def blows(
+def strikes(c: Contact, islands: Islands, ways: NDArray) -> tuple[int, int]:
+    """Return the slots of the block that strikes and of the one struck by a blow, or -1, -1."""
+    if c.pair < 0 or c.kind != IMPACT or c.state == OPEN or c.un >= 0.0:
+        return -1, -1
+    a, b = islands.slot[c.a], islands.slot[c.b]
+    return (b, a) if strength(ways[a]) >= strength(ways[b]) else (a, b)
+
+
+@kernel
+def follow(
     bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, ways: NDArray,
+    trains: NDArray,
+) -> bool:  # fmt: skip
+    """Let what comes on behind a block that strikes be of its train; returns whether any is new."""
+    more = False
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.pair < 0 or c.state == OPEN:
+            continue
+        a, b = islands.slot[c.a], islands.slot[c.b]
+        behind, ahead = (b, a) if strength(ways[a]) >= strength(ways[b]) else (a, b)
+        body = bodies[c.b if behind == b else c.a]
+        if trains[ahead, 2] == 1.0 and momentum_towards(body, ways[behind]) > 0.0:
+            i, j = root(islands.parent, a), root(islands.parent, b)
+            more = more or i != j
+            islands.parent[max(i, j)] = min(i, j)
+            trains[behind, 2] = 1.0
+    return more
+
+
+@kernel
+def find_trains(
+    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, fence: int, ways: NDArray,
+    trains: NDArray,
+) -> float:  # fmt: skip
+    """Gather the blocks of an island that come on as one; returns what hits the fence [N s].
+
+    `trains`, (n, 3), gets their mass [kg] and their momentum towards the fence [N s] where their
+    root in islands.parent is, and whether a block strikes another one or the fence.
+    """
+    low, high = islands.contact_start[island], islands.contact_start[island + 1]
+    first = islands.block_start[island]
+    n, parent = islands.block_start[island + 1] - first, islands.parent
+    for s in range(n):
+        parent[s] = s
+        trains[s, 0] = trains[s, 1] = trains[s, 2] = 0.0
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        hit = is_hit(c, fence) and c.kind == IMPACT
+        striker = islands.slot[c.a] if hit else strikes(c, islands, ways)[0]
+        if striker >= 0:
+            trains[striker, 2] = 1.0
+    for _ in range(CHAIN):
+        if not follow(bodies, contacts, islands, low, high, ways, trains):
+            break
+    for s in range(n):
+        body, train = bodies[islands.block_item[first + s]], trains[root(parent, s)]
+        train[0] += body.mass
+        train[1] += momentum_towards(body, ways[s])
+    momentum, last = 0.0, -1
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        train = root(parent, islands.slot[c.a])
+        if is_hit(c, fence) and train != last:
+            momentum += trains[train, 1]
+            last = train
+    return momentum
+
+
+@kernel
+def blows(
+    contacts: Contacts, islands: Islands, low: int, high: int, ways: NDArray, trains: NDArray,
     dt: float,
 ) -> tuple[float, float, int]:  # fmt: skip
-    """Return what blows pass on to a fence in this step, the most of one [J], and that one."""
+    """Return what blows pass on to a fence in this step, the most of one [J], and that one.
+
+    Blocks that strike one another in turn go on as one: the first of them strikes for all.
+    """
     total = most = 0.0
     k = -1
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
-        if c.pair < 0 or c.kind != IMPACT or c.state == OPEN or c.un >= 0.0:
+        striker, struck = strikes(c, islands, ways)
+        if striker < 0 or trains[struck, 2] == 1.0:
             continue
-        a, b = islands.slot[c.a], islands.slot[c.b]
-        on_a = strength(ways[a]) >= strength(ways[b])
-        struck, mass = (a, bodies[c.b].mass) if on_a else (b, bodies[c.a].mass)
-        impulse = min(c.normal * dt, -mass * c.un)
-        share = share_along(c, ways[struck], on_a)
-        work = -0.5 * impulse * c.un * share * share * mass / (mass + ways[struck, 0])
+        train = trains[root(islands.parent, striker)]
+        impulse = min(c.normal * dt, train[1])
+        share = share_along(c, ways[struck], struck == islands.slot[c.a])
+        work = 0.5 * impulse * train[1] * share * share / (train[0] + ways[struck, 0])
         total += work
         if work > most:
             most, k = work, islands.contact_item[item]
@@ -193,7 +285,8 @@ def aim(
 @stage
 def break_through(
     bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
-    fence: int, left: float, struck: float, passed: float, p: Parameters, counters: NDArray,
+    fence: int, left: float, struck: float, passed: float, momentum: float, p: Parameters,
+    counters: NDArray,
 ) -> float:  # fmt: skip
     """Settle an island whose blocks come through a fence; returns what that takes of them [J].
 
@@ -207,7 +300,7 @@ def break_through(
         aim(contacts, d, islands, low, high, fence, attempt == 0, math.sqrt(square), p.dt)
         open_close(bodies, contacts, system, islands, rows, island, p, counters)
         if attempt > 0:
-            taken = hits(bodies, contacts, d, islands, low, high, fence, p.dt)[0]
+            taken = hits(bodies, contacts, d, islands, low, high, fence, momentum, p.dt)[0]
             taken += (1.0 - square) * passed
             if abs(taken - left) < BREAK_TOLERANCE * left:
                 break
@@ -229,7 +322,8 @@ def charge_fences(
 
     Returns whether a fence broke, so that the island was settled again.
     """
-    broke, ways, d = False, system.scratch.residual, system.motion.d
+    broke, d = False, system.motion.d
+    ways, trains = system.scratch.residual, system.scratch.direction
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     for fence in range(p.blocks, len(bodies) if gauges.fences > 0 else p.blocks):
         barrier = gauges.barrier[fence]
@@ -238,8 +332,9 @@ def charge_fences(
             continue
         if not find_ways(bodies, contacts, islands, island, fence, ways):
             continue
-        struck, hardest, k = hits(bodies, contacts, d, islands, low, high, fence, p.dt)
-        passed, most, blow = blows(bodies, contacts, islands, low, high, ways, p.dt)
+        momentum = find_trains(bodies, contacts, islands, island, fence, ways, trains)
+        struck, hardest, k = hits(bodies, contacts, d, islands, low, high, fence, momentum, p.dt)
+        passed, most, blow = blows(contacts, islands, low, high, ways, trains, p.dt)
         left = target.capacity - target.absorbed if bodies[fence].status != RETIRED else 0.0
         if struck + passed <= left:
             target.absorbed += max(struck + passed, 0.0)
@@ -256,8 +351,8 @@ def charge_fences(
             )  # fmt: skip
         target.absorbed += min(
             break_through(
-                bodies, contacts, system, islands, rows, island, fence, left, struck, passed, p,
-                counters,
+                bodies, contacts, system, islands, rows, island, fence, left, struck, passed,
+                momentum, p, counters,
             ),
             left,
         )  # fmt: skip

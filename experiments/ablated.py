@@ -160,11 +160,11 @@ def attempt(variant: str) -> dict[str, Any]:
 
 def main(out: Path) -> None:
     """Run what the table lacks and write it."""
-    from experiments.script import made_by, say, write
-    from rigdda.kernel import source_hash
+    from experiments.made_by import kernels_hash, made_by
+    from experiments.script import say, write
 
     path = out / TABLE
-    ours = made_by(out).get(TABLE) == source_hash()
+    ours = made_by(out).get(TABLE) == kernels_hash()
     rows = list(csv.DictReader(path.open())) if ours else []
     known = {row["variant"] for row in rows}
     todo = [v for v in ("", *VARIANTS) if (v or "as it is") not in known]

@@ -19,14 +19,11 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from experiments.made_by import KERNELS, kernels_hash, made_by
 from rigdda.files import atomic
-from rigdda.kernel import source_hash
 
 RESULTS = Path("experiments/results")
 """Where results are recorded; quick ones go into its folder `quick`."""
-
-KERNELS = "kernels.csv"
-"""Which kernels made each table of a folder."""
 
 BLUE, RED, GREEN, ORANGE, GREY = "#1c5aa0", "#c0392b", "#2e8b57", "#e85d04", "#68584a"
 """Colours of curves."""
@@ -116,9 +113,9 @@ def say(what: str) -> None:
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows as CSV and note beside it which kernels made them, see `made_by`."""
+    """Write rows as CSV and note beside it which kernels made them, see `experiments.made_by`."""
     _write(path, rows)
-    made = made_by(path.parent) | {path.name: source_hash()}
+    made = made_by(path.parent) | {path.name: kernels_hash()}
     _write(path.parent / KERNELS, [{"table": k, "kernels": made[k]} for k in sorted(made)])
 
 
@@ -139,15 +136,6 @@ def cell(value: Any) -> Any:
     if not isinstance(value, float):
         return value
     return "" if math.isnan(value) else f"{value:.6g}"
-
-
-def made_by(folder: Path) -> dict[str, str]:
-    """Return the hash of the kernels that made each table of a folder, of those that are known."""
-    path = folder / KERNELS
-    if not path.is_file():
-        return {}
-    with path.open(newline="") as file:
-        return {row["table"]: row["kernels"] for row in csv.DictReader(file)}
 
 
 def draw(

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import click
 
-from experiments.script import KERNELS, RESULTS, made_by
-from rigdda.kernel import source_hash
+from experiments.made_by import KERNELS, kernels_hash, made_by
+from experiments.script import RESULTS
 
 
 def stale(folder: Path) -> list[Path]:
     """Return the tables below a folder that other kernels made, or that nobody knows of."""
     tables = sorted(path for path in folder.rglob("*.csv") if path.name != KERNELS)
-    return [path for path in tables if made_by(path.parent).get(path.name) != source_hash()]
+    return [path for path in tables if made_by(path.parent).get(path.name) != kernels_hash()]
 
 
 @click.command(help=__doc__)

@@ -18,13 +18,21 @@ import numba
 from numba.core import config
 
 
-def source_hash() -> str:
-    """Return a hash of numba's version and of the sources that hold kernels or their constants."""
-    digest = hashlib.sha256(numba.__version__.encode())
+def sources() -> list[bytes]:
+    """Return the sources that hold kernels or their constants."""
+    found = []
     for path in sorted(Path(__file__).parent.rglob("*.py")):
         source = path.read_bytes()
         if b"rigdda.kernel import" in source or path.name in ("constants.py", "records.py"):
-            digest.update(source)
+            found.append(source)
+    return found
+
+
+def source_hash() -> str:
+    """Return a hash of numba's version and of all that kernels are made of."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sources():
+        digest.update(source)
     return digest.hexdigest()[:16]
 
 

@@ -74,7 +74,29 @@ def case(name: str, *shares: float) -> Case:
     return Case(name, checks, lambda lab: measure(lab, shares))
 
 
+def absorbed(lab: Lab, row: int, shots: Sequence[float]) -> tuple[Measured]:
+    """Return what a fence takes, where a row of unit squares leans on it and others come behind.
+
+    `shots` are the places of what comes with 10 m/s [m]. Of the energy E of one that arrives
+    through n others the fence takes E / (n + 1), of what comes together all.
+    """
+    blocks = [box(-0.5 - i, 0.5) for i in range(row)]
+    blocks += [box(x, 0.5, velocity=(10.0, 0.0, 0.0)) for x in shots]
+    scene = Scene(Terrain(FLAT), tuple(blocks), rock(0.0), barriers=(Fence(0.0, 5.0, 1e9),))
+    one = 50.0 * masses(scene)[0][0]
+    exact = sum(one / (row + i + 1) for i in range(len(shots))) if row else one * len(shots)
+    return (Measured(lab.simulate(scene).run(1.0).absorbed[0], exact),)
+
+
+def train(name: str, row: int, *shots: float) -> Case:
+    """Return the case of blocks that come one behind the other."""
+    check = Check("absorbed energy", "momentum of blows and trains", "J", 0.08, "relative")
+    return Case(name, (check,), lambda lab: absorbed(lab, row, shots))
+
+
 CASES = (
+    train("fence-train", 0, -3.0, -4.0, -5.0),
+    train("fence-row", 3, -6.0, -7.3, -8.6),
     case("fence-0.9", 0.9),
     case("fence-1.1", 1.1),
     case("fence-3x0.45", 0.45, 0.45, 0.45),

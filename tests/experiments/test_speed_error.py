@@ -10,7 +10,7 @@ import pytest
 from experiments.bench.cases import FRAME, single
 from experiments.bench.penetration import centroids
 from experiments.front import front
-from experiments.script import KERNELS
+from experiments.made_by import KERNELS
 from experiments.speed_error import closed_forms, highway, knobs, study
 from experiments.speed_error.highway import Budget, Sample
 from experiments.speed_error.tables import bias, closed_table, total_error

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from click.testing import CliRunner
 
-from experiments import script, stale
+from experiments import made_by, script, stale
 
 
 def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(script, "source_hash", lambda: "0ld")
+        patch.setattr(script, "kernels_hash", lambda: "0ld")
         script.write(tmp_path / "old.csv", [{"a": 1.0}])
     script.write(tmp_path / "new.csv", [{"a": 1.0}])
     (tmp_path / "bench").mkdir()
@@ -24,3 +24,9 @@ def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
         script.write(tmp_path / name, [{"a": 2.0}])
     told = CliRunner().invoke(stale.main, ["--out", str(tmp_path)])
     assert told.exit_code == 0 and not told.output
+
+
+def test_comments_and_the_module_of_a_kernel_do_not_count():
+    one = b'"""Doc."""\nimport math\n\nA = 1  # why\n\n\ndef f(x):\n    """Return x."""\n    return A * x\n'
+    assert made_by.statements(one) == made_by.statements(b"A = 1\ndef f(x):\n    return A * x\n")
+    assert made_by.statements(one) != made_by.statements(b"A = 2\ndef f(x):\n    return A * x\n")

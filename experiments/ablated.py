@@ -129,7 +129,7 @@ def measure() -> dict[str, Any]:
                 amiss.append(f"{hard.name} at {1e3 * dt:g} ms {result.verdict}: {note}")
     failures = Failures()
     paths = [f"tests/physics/{name}.py" for name in TESTS]
-    quiet = ["-q", "-n0", "-p", "no:cacheprovider", "-p", "no:terminal"]
+    quiet = ["-o", "addopts=", "-n0", "-p", "no:cacheprovider", "-p", "no:terminal"]
     pytest.main([*quiet, *paths], plugins=[failures])
     cpu, depth = [], []
     for seed in (1, 2, 3):

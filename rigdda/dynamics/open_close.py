@@ -31,7 +31,7 @@ from rigdda.dynamics.constants import (
     STICK,
     WAIT_STEPS,
 )
-from rigdda.dynamics.contact.joint import break_joint
+from rigdda.dynamics.contact.joint import joint_breaks
 from rigdda.dynamics.contact.law import set_shock
 from rigdda.dynamics.islands import pair_blocks
 from rigdda.dynamics.linear.direct import solve_block, solve_two_blocks
@@ -112,8 +112,11 @@ def next_friction(c: Contact, shear: float, coupled: bool) -> bool:
 
 
 @inlined
-def next_state(c: Contact, normal: float, shear: float, coupled: bool) -> bool:
-    """Move a contact to the state that its forces ask for; returns whether it changed."""
+def next_state(c: Contact, normal: float, shear: float, coupled: bool, breaks: bool) -> bool:
+    """Move a contact to the state that its forces ask for; returns whether it changed.
+
+    `breaks` tells whether these forces have broken the joint that it is on.
+    """
     if c.kind == BOLT or c.kind == PIN:
         return next_state_of_link(c, normal, shear)
     if c.state == OPEN:
@@ -121,13 +124,10 @@ def next_state(c: Contact, normal: float, shear: float, coupled: bool) -> bool:
             close(c, normal, shear, coupled)
         return normal > 0.0
     if c.bond > 0.0:
-        strength = c.cohesion + c.friction * max(normal, 0.0)
-        if normal >= -c.tension and abs(shear) <= strength:
-            c.normal, c.shear = normal, shear
-            return False
-        break_joint(c)
-        if normal >= 0.0:
-            return True
+        c.normal, c.shear = normal, shear
+        return False
+    if breaks and normal >= 0.0:
+        return True
     if normal < 0.0:
         c.state = OPEN
         return True
@@ -142,16 +142,22 @@ def update_states(
 ) -> bool:  # fmt: skip
     """Move every contact of an island to its next state; returns whether one changed."""
     changed = False
+    for item in range(low, high if p.bonded else low):
+        c = contacts[islands.contact_item[item]]
+        if c.bond > 0.0:
+            j = islands.slot[c.b] if c.pair >= 0 else -1
+            c.normal, c.shear, _ = spring_forces(c, d, islands.slot[c.a], j, p.dt)
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         i = islands.slot[c.a]
         j = islands.slot[c.b] if c.pair >= 0 else -1
         normal, shear, after = spring_forces(c, d, i, j, p.dt)
+        breaks = c.bond > 0.0 and joint_breaks(contacts, islands, low, high, item)
         sinking = -after - max(c.gap, 0.0) / p.dt  # what closes a gap is not driven in
         if c.state != OPEN and c.kind == REST and sinking > SHOCK_SPEED:
             set_shock(bodies, c, p)
             changed = True
-        elif next_state(c, normal, shear, coupled):
+        elif next_state(c, normal, shear, coupled, breaks):
             changed = True
     return changed
 
@@ -215,13 +221,14 @@ def relax(
     for item in range(c0, c1):
         c = contacts[islands.contact_item[item]]
         take_forces(c, rows.row[rows.place[item]])
+    for item in range(c0, c1):
+        c = contacts[islands.contact_item[item]]
         limit = c.cohesion + c.friction * max(c.normal, 0.0)
         within = limit > abs(c.shear)
         if c.bond > 0.0:
-            if within and c.normal > -c.tension:
+            if not joint_breaks(contacts, islands, c0, c1, item):
                 c.state, c.kind = STICK, MOVING
                 continue
-            break_joint(c)
         kind = c.kind
         if kind == BOLT or kind == PIN:
             c.state = SLIP if c.normal == -c.tension else STICK

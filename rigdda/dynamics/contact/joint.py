@@ -1,14 +1,21 @@
-"""Joints that hold by cohesion and tensile strength until they break, once and for good.
+r"""Joints that hold by cohesion and tensile strength until they break, once and for good.
 
 A joint is what is closed at the start of a simulation. Each of its contacts stands for a share of
-its length; a contact that bears more than its strength loses all of it.
+its length L, but they are judged together. The forces N_1 and N_2 of a joint's two ends are those
+of a traction that is linear along it, and at its end 1 that is
+
+.. math:: \sigma_1 = \frac{N}{L} + \frac{6 M}{L^2} = \frac{2 (2 N_1 - N_2)}{L} .
+
+Where it exceeds the tensile strength the joint opens, all along if the joint is pulled as a whole:
+the traction grows as the joint becomes shorter. Pressed as a whole, it opens at that end. In shear
+it bears what cohesion and friction give in sum.
 """
 
 from __future__ import annotations
 
 from rigdda.dynamics.constants import SAME_FACE
-from rigdda.dynamics.records import Contact, Contacts, Parameters
-from rigdda.kernel import kernel
+from rigdda.dynamics.records import Contact, Contacts, Islands, Parameters
+from rigdda.kernel import inlined, kernel
 
 
 @kernel
@@ -30,7 +37,48 @@ def bond_joints(contacts: Contacts, low: int, high: int, p: Parameters) -> None:
         c.bond = (most - least) / count
 
 
+@inlined
+def of_one_joint(c: Contact, other: Contact) -> bool:
+    """Return whether two contacts are on one joint and hold still."""
+    same = c.a == other.a and c.b == other.b and c.nx * other.nx + c.ny * other.ny > SAME_FACE
+    return same and other.bond > 0.0
+
+
 @kernel
 def break_joint(c: Contact) -> None:
     """Take the strength from a contact."""
     c.bond = c.cohesion = c.tension = 0.0
+
+
+@kernel
+def joint_breaks(contacts: Contacts, islands: Islands, low: int, high: int, item: int) -> bool:
+    """Break the joint of a contact, one of low:high of an island, if it must; returns whether.
+
+    The forces that the contacts of the joint would bear are in `normal` and `shear`.
+    """
+    c = contacts[islands.contact_item[item]]
+    first = last = item
+    while first > low and of_one_joint(c, contacts[islands.contact_item[first - 1]]):
+        first -= 1
+    while last + 1 < high and of_one_joint(c, contacts[islands.contact_item[last + 1]]):
+        last += 1
+    normal = shear = cohesion = 0.0
+    for q in range(first, last + 1):
+        other = contacts[islands.contact_item[q]]
+        normal += other.normal
+        shear += other.shear
+        cohesion += other.cohesion
+    strength, others = cohesion + c.friction * max(normal, 0.0), last - first
+    here = everywhere = abs(shear) > 0.0 and abs(shear) >= strength
+    for q in range(first, last + 1):
+        other = contacts[islands.contact_item[q]]
+        end = other.normal
+        if others > 0:
+            end += other.normal - (normal - other.normal) / others
+        opens = end < -other.tension
+        here = here or (opens and q == item)
+        everywhere = everywhere or (opens and normal < 0.0)
+    for q in range(first, last + 1):
+        if everywhere or (here and q == item):
+            break_joint(contacts[islands.contact_item[q]])
+    return here or everywhere

@@ -34,7 +34,7 @@ from rigdda.dynamics.records import (
     Outlines,
     Parameters,
 )
-from rigdda.kernel import entry_kernel, inlined, kernel
+from rigdda.kernel import inlined, kernel
 
 
 @inlined
@@ -52,14 +52,27 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
             own, local = outlines.corner[row, k], outlines.local[row, k]
             own.x = body.x + cos * local.x - sin * local.y
             own.y = body.y + sin * local.x + cos * local.y
-        place_edges(outlines, row)
+            own.normal_x = cos * local.normal_x - sin * local.normal_y
+            own.normal_y = sin * local.normal_x + cos * local.normal_y
+        set_extent(outlines, row)
 
 
-@entry_kernel
-def place_all_corners(bodies: Bodies, outlines: Outlines) -> None:
-    """Set the corners and edge normals of all bodies, when a scene is packed."""
-    for i in range(len(bodies)):
-        place_corners(bodies, outlines, i)
+@kernel
+def set_body_coordinates(bodies: Bodies, outlines: Outlines, i: int) -> None:
+    """Set the normals of body i in body coordinates from its corners there, then all that is now.
+
+    And the circle in each of its polygons, which goes with it.
+    """
+    body = bodies[i]
+    for place in range(polygons(body)):
+        row = polygon_row(body, i, place)
+        n = outlines.polygon[row].count
+        for k in range(n):
+            own, end = outlines.local[row, k], outlines.local[row, following(k, n)]
+            own.normal_x, own.normal_y = normal_of(end.x - own.x, end.y - own.y)
+    place_corners(bodies, outlines, i)
+    for place in range(polygons(body)):
+        set_inside(outlines, polygon_row(body, i, place))
 
 
 @kernel
@@ -74,27 +87,47 @@ def polygon_row(body: Body, i: int, place: int) -> int:
     return i if place == 0 else body.part + place - 1
 
 
+@kernel
+def normal_of(ex: float, ey: float) -> tuple[float, float]:
+    """Return the outward unit normal of an edge, of outlines that run anticlockwise."""
+    length = math.sqrt(ex * ex + ey * ey)
+    return ey / length, -ex / length
+
+
 @inlined
-def place_edges(outlines: Outlines, row: int) -> None:
-    """Set edge normals, middle, extent and the circle in a polygon from its corners."""
+def set_extent(outlines: Outlines, row: int) -> None:
+    """Set the middle and the extent of a polygon from its corners."""
     polygon, n, sum_x, sum_y = outlines.polygon[row], outlines.polygon[row].count, 0.0, 0.0
     low_x = low_y = math.inf
     high_x = high_y = -math.inf
     for k in range(n):
-        own, end = outlines.corner[row, k], outlines.corner[row, following(k, n)]
+        own = outlines.corner[row, k]
         sum_x += own.x
         sum_y += own.y
         low_x, high_x = min(low_x, own.x), max(high_x, own.x)
         low_y, high_y = min(low_y, own.y), max(high_y, own.y)
-        ex, ey = end.x - own.x, end.y - own.y
-        length = math.sqrt(ex * ex + ey * ey)
-        own.normal_x, own.normal_y = ey / length, -ex / length
     polygon.middle_x, polygon.middle_y = sum_x / n, sum_y / n
     polygon.low_x, polygon.high_x, polygon.low_y, polygon.high_y = low_x, high_x, low_y, high_y
+
+
+@kernel
+def set_inside(outlines: Outlines, row: int) -> None:
+    """Set the radius of the circle in a polygon."""
     inside = math.inf
-    for k in range(n):
+    for k in range(outlines.polygon[row].count):
         inside = min(inside, -over_edge(outlines, row, k, row))
-    polygon.inside = (1.0 - 1e-9) * inside  # rounding is to leave out no face of contact
+    outlines.polygon[row].inside = (1.0 - 1e-9) * inside  # rounding leaves out no face of contact
+
+
+@kernel
+def place_edges(outlines: Outlines, row: int) -> None:
+    """Set all that depends on the corners of a polygon that has changed its shape."""
+    n = outlines.polygon[row].count
+    for k in range(n):
+        own, end = outlines.corner[row, k], outlines.corner[row, following(k, n)]
+        own.normal_x, own.normal_y = normal_of(end.x - own.x, end.y - own.y)
+    set_extent(outlines, row)
+    set_inside(outlines, row)
 
 
 @kernel

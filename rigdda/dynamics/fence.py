@@ -39,7 +39,7 @@ from rigdda.dynamics.constants import (
     SPEED_LIMIT,
     STICK,
 )
-from rigdda.dynamics.correction import place_corners
+from rigdda.dynamics.correction import set_body_coordinates
 from rigdda.dynamics.gauges import FAILED, write_event
 from rigdda.dynamics.islands import root
 from rigdda.dynamics.motion import kinetic_energy
@@ -368,7 +368,7 @@ def lower_fences(bodies: Bodies, outlines: Outlines, gauges: Gauges, p: Paramete
         top = target.top - target.sag * target.absorbed
         if target.sag > 0.0 and outlines.local[fence, 2].y > top:
             outlines.local[fence, 2].y = outlines.local[fence, 3].y = top
-            place_corners(bodies, outlines, fence)
+            set_body_coordinates(bodies, outlines, fence)
 
 
 @kernel

@@ -255,8 +255,13 @@ CORNER = _record(
 )
 """One corner of a polygon."""
 
-POINT = _record(x=float, y=float)
-"""A point in body coordinates: about the centroid at theta = 0 [m]."""
+LOCAL = _record(
+    x=float,  # [m]
+    y=float,
+    normal_x=float,  # outward unit normal of the edge that starts here
+    normal_y=float,
+)
+"""A corner in body coordinates: about the centroid at theta = 0."""
 
 
 Polygons = NDArray[np.void]
@@ -273,7 +278,7 @@ class Outlines(NamedTuple):
 
     polygon: Polygons
     corner: Corners
-    local: NDArray[np.void]  # (R, P) of POINT: the corners in body coordinates
+    local: NDArray[np.void]  # (R, P) of LOCAL: the corners in body coordinates
 
 
 class Ground(NamedTuple):

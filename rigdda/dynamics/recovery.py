@@ -14,8 +14,8 @@ from rigdda.dynamics.assembly.springs import normal_row, relative_displacement
 from rigdda.dynamics.constants import IMPACT, RECOVERY_SWEEPS
 from rigdda.dynamics.linear.relaxation import (
     AIM,
-    FLEXIBLE,
     FORCE,
+    GAIN,
     NORMAL,
     NOW,
     along_six,
@@ -43,7 +43,7 @@ def part_bodies(rows: Rows, count: int) -> None:
         a, b = rows.motion[i], rows.motion[j]
         parted = along_six(r[NORMAL : NORMAL + 6], a, b, NOW)
         before = r[FORCE]
-        r[FORCE] = max(before + (r[AIM] - parted) / r[FLEXIBLE], 0.0)
+        r[FORCE] = max(before + (r[AIM] - parted) * r[GAIN], 0.0)
         change = r[FORCE] - before
         for q in range(3):
             a[NOW + q] += change * r[NORMAL + q]
@@ -89,7 +89,7 @@ def list_rows(
         j = islands.slot[c.b] if c.pair >= 0 else n
         write_row(r, NORMAL, normal_row(c, True), rows.scale[i])
         write_row(r, NORMAL + 3, normal_row(c, False), rows.scale[j])
-        r[FLEXIBLE], r[FORCE] = product(r, NORMAL, NORMAL), 0.0
+        r[GAIN], r[FORCE] = 1.0 / product(r, NORMAL, NORMAL), 0.0
         r[AIM] = -rows.height[q]
         rows.row_i[count], rows.row_j[count] = i, j
         count += 1

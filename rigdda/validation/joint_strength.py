@@ -1,7 +1,7 @@
 """A joint breaks where a traction that is linear along it exceeds its strength.
 
-In tension, pulled at its middle or beside it, by N = sigma_t L / (1 + 6 e / L), and in shear, pushed
-at its level or above it, by S = c L + N tan phi.
+In tension, pulled at its middle or beside it, by N = sigma_t L / (1 + 6 e / L), and in shear,
+pushed at its level or above it, by S = c L + N tan phi.
 """
 
 from __future__ import annotations

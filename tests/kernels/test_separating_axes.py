@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 
 from rigdda import Block, Scene, Settings
 from rigdda.dynamics.contact.narrow_phase import NEVER, face_of_contact
-from rigdda.dynamics.correction import place_all_corners
+from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.kernel import from_python
 from rigdda.validation.scenes import rock
 
 SLACK = 0.01
 face = from_python(face_of_contact)
+place = from_python(place_corners)
 
 
 def two_polygons(rng: np.random.Generator) -> Arrays:
@@ -32,7 +33,8 @@ def two_polygons(rng: np.random.Generator) -> Arrays:
     bodies = arrays.bodies
     bodies.x[1], bodies.y[1] = bodies.x[0] + way * math.cos(angle), way * math.sin(angle)
     bodies.theta[:] = rng.uniform(-4.0, 4.0, 2)
-    place_all_corners(bodies, arrays.outlines)
+    for i in range(len(bodies)):
+        place(bodies, arrays.outlines, i)
     return arrays
 
 

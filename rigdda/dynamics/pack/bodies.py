@@ -16,13 +16,13 @@ from rigdda.dynamics.constants import (
     PIN,
     TERRAIN,
 )
-from rigdda.dynamics.correction import place_corners, polygon_row
+from rigdda.dynamics.correction import polygon_row, set_body_coordinates
 from rigdda.dynamics.correction import polygons as polygons_of
 from rigdda.dynamics.records import (
     BODY,
     CORNER,
     LINK,
-    POINT,
+    LOCAL,
     POLYGON,
     Bodies,
     Floats,
@@ -121,7 +121,7 @@ def write_bodies(corners: NDArray, traits: NDArray, bodies: Bodies, outlines: Ou
                 local, number = outlines.local[row, k], outlines.corner[row, k].number
                 local.x = corners[low + number, 0] - body.x
                 local.y = corners[low + number, 1] - body.y
-        place_corners(bodies, outlines, i)
+        set_body_coordinates(bodies, outlines, i)
         low = high
 
 
@@ -149,7 +149,7 @@ def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
         bodies["part"][i] = i if len(parts) == 1 else len(rows)
         rows += [(i, part) for part in parts if len(parts) > 1]
     shape = (len(rows), max(len(corner) for _, corner in rows))
-    outlined, points = np.zeros(len(rows), dtype=POLYGON), np.zeros(shape, dtype=POINT)
+    outlined, points = np.zeros(len(rows), dtype=POLYGON), np.zeros(shape, dtype=LOCAL)
     corners = np.zeros(shape, dtype=CORNER)
     for row, (i, number) in enumerate(rows):
         polygon, corner = polygons[i], corners[row, : len(number)]

@@ -10,7 +10,9 @@ from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
 from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
-from rigdda.dynamics.correction import keep_memory, place_edges
+from rigdda.dynamics.correction import place_edges
+from rigdda.dynamics.detection import copy_index, detect
+from rigdda.dynamics.forces import keep_memory
 from rigdda.dynamics.islands import find_islands, pair_blocks
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,
@@ -31,7 +33,6 @@ from rigdda.dynamics.records import (
     Parameters,
     Work,
 )
-from rigdda.dynamics.step import copy_index, detect
 from rigdda.kernel import kernel
 
 

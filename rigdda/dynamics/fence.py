@@ -1,23 +1,9 @@
-r"""Fences: what a step takes of their capacity, and what comes through if that is not left.
+"""Fences: they are charged with what a step takes of their capacity, and fail beyond it.
 
-A block that hits a fence is stopped: the fence takes the work of the impact. Blocks that rest
-against it cost it nothing, but pass blows on to it: within a step blow and support act at once,
-nothing moves and no work is done. One after the other, block j strikes block i with the closing
-speed u, both go on together, and the fence takes what of that is directed at it,
-
-.. math:: W = \frac{1}{2} \frac{m_j^2}{m_j + m_i} u^2 (n_q \cdot n)^2 ,
-
-with n_q and n the directions of the blow and of the push on the fence. Through a chain of blocks
-m_i is their mass, and each contact on the way passes on its own share. Blocks that strike one
-another in turn within the step, or come on behind one that strikes, are a train and m_j is all of
-it. With the impulse P of the blow for m_j u this holds for eccentric blows, too; what more than
-m_j u passes through a contact in a step is thrust, or another blow, which counts for itself. So the
-charge is a sum over the blows: it does not matter how many of them fall into one step, nor how many
-steps a blow takes to go through a row.
-
-If it is more than is left, the blocks come through with a share s of the velocities that they would
-have without the fence, which takes W(s) = (1 - s^2) W of impacts in proportion. Friction and
-neighbours bend this law, so s^2 is sought by false position between 0 and 1.
+What that is `blows` finds. If it is more than is left, the blocks come through with a share s of
+the velocities that they would have without the fence, which takes W(s) = (1 - s^2) W of impacts in
+proportion. Friction and neighbours bend this law, so s^2 is sought by false position between 0 and
+1.
 """
 
 from __future__ import annotations
@@ -26,14 +12,13 @@ import math
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.assembly.springs import along, normal_row, shear_row
+from rigdda.dynamics.assembly.springs import along, normal_row
+from rigdda.dynamics.blows import blows, find_trains, find_ways, hits
 from rigdda.dynamics.constants import (
     ASLEEP,
     BREAK_SOLVES,
     BREAK_TOLERANCE,
-    CHAIN,
     IMPACT,
-    NEW,
     OPEN,
     RETIRED,
     SPEED_LIMIT,
@@ -41,14 +26,11 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.correction import set_body_coordinates
 from rigdda.dynamics.gauges import FAILED, write_event
-from rigdda.dynamics.islands import root
 from rigdda.dynamics.motion import kinetic_energy
 from rigdda.dynamics.open_close import open_close
 from rigdda.dynamics.records import (
     EVENTS,
     Bodies,
-    Body,
-    Contact,
     Contacts,
     Gauges,
     Islands,
@@ -59,203 +41,6 @@ from rigdda.dynamics.records import (
 )
 from rigdda.dynamics.sleep import wake_island
 from rigdda.kernel import kernel, stage
-
-
-@kernel
-def strength(way: NDArray) -> float:
-    """Return how well a block passes blows on: the share of their direction over the mass [1/kg].
-
-    `way` is the mass between the blow and the fence, 0 if the block does not lean on it [kg], and
-    the direction in which a push on the block is one on the fence, its length the root of the
-    share that arrives [-].
-    """
-    return (way[1] ** 2 + way[2] ** 2) / way[0] if way[0] > 0.0 else 0.0
-
-
-@kernel
-def share_along(c: Contact, way: NDArray, on_a: bool) -> float:
-    """Return the root of the share that a push through a contact on its body a, or b, passes on."""
-    along_way = c.nx * way[1] + c.ny * way[2]
-    return max(along_way if on_a else -along_way, 0.0)
-
-
-@kernel
-def lean(c: Contact, ways: NDArray, near: int, far: int, mass: float, on_a: bool) -> bool:
-    """Let slot `far`, of such a mass [kg], lean on `near`, if that is better than what it has."""
-    share = share_along(c, ways[near], on_a)
-    through = ways[near, 0] + mass
-    if share * share <= strength(ways[far]) * through * (1.0 + 1e-9):
-        return False
-    sign = share if on_a else -share
-    ways[far, 0], ways[far, 1], ways[far, 2] = through, sign * c.nx, sign * c.ny
-    return True
-
-
-@kernel
-def find_ways(
-    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, fence: int, ways: NDArray
-) -> bool:
-    """Set how each block of an island leans on a fence, (n, 3) see `strength`; whether any does."""
-    low, high = islands.contact_start[island], islands.contact_start[island + 1]
-    reached = False
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        if c.b != fence or c.state == OPEN:
-            continue
-        if not reached:
-            for s in range(islands.block_start[island + 1] - islands.block_start[island]):
-                ways[s, 0] = ways[s, 1] = ways[s, 2] = 0.0
-        s, reached = islands.slot[c.a], True
-        ways[s, 0], ways[s, 1], ways[s, 2] = bodies[c.a].mass, -c.nx, -c.ny
-    for _ in range(CHAIN if reached else 0):
-        changed = False
-        for item in range(low, high):
-            c = contacts[islands.contact_item[item]]
-            if c.pair >= 0 and c.state != OPEN:
-                i, j = islands.slot[c.a], islands.slot[c.b]
-                changed = lean(c, ways, i, j, bodies[c.b].mass, True) or changed
-                changed = lean(c, ways, j, i, bodies[c.a].mass, False) or changed
-        if not changed:
-            break
-    return reached
-
-
-@kernel
-def momentum_towards(body: Body, way: NDArray) -> float:
-    """Return the momentum with which a block comes towards the fence that it leans on [N s]."""
-    return body.mass * max(body.vx * way[1] + body.vy * way[2], 0.0) if way[0] > 0.0 else 0.0
-
-
-@kernel
-def is_hit(c: Contact, fence: int) -> bool:
-    """Return whether a contact is an impact on a fence.
-
-    A corner that touches only now counts, too: it may be the second one of a block that hits.
-    """
-    hit = c.kind == IMPACT or c.kind == NEW
-    return c.b == fence and c.state != OPEN and c.normal > 0.0 and hit
-
-
-@kernel
-def hits(
-    bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int,
-    fence: int, momentum: float, dt: float,
-) -> tuple[float, float, int]:  # fmt: skip
-    """Return the work of the impacts on a fence in this step, the most of one [J], and that one.
-
-    An impulse beyond that of the block alone, and beyond the `momentum` of the trains that hit the
-    fence [N s], is thrust.
-    """
-    total = most = 0.0
-    k = -1
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        if is_hit(c, fence):
-            own = d[islands.slot[c.a]]
-            brought = max(bodies[c.a].mass * math.hypot(c.un, c.us), momentum)
-            share = min(brought / (c.normal * dt), 1.0)
-            work = c.normal * along(normal_row(c, True), own)
-            work = -share * (work + c.shear * along(shear_row(c, True), own))
-            total += work
-            if work > most:
-                most, k = work, islands.contact_item[item]
-    return total, most, k
-
-
-@kernel
-def strikes(c: Contact, islands: Islands, ways: NDArray) -> tuple[int, int]:
-    """Return the slots of the block that strikes and of the one struck by a blow, or -1, -1."""
-    if c.pair < 0 or c.kind != IMPACT or c.state == OPEN or c.un >= 0.0:
-        return -1, -1
-    a, b = islands.slot[c.a], islands.slot[c.b]
-    return (b, a) if strength(ways[a]) >= strength(ways[b]) else (a, b)
-
-
-@kernel
-def follow(
-    bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, ways: NDArray,
-    trains: NDArray,
-) -> bool:  # fmt: skip
-    """Let what comes on behind a block that strikes be of its train; returns whether any is new."""
-    more = False
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        if c.pair < 0 or c.state == OPEN:
-            continue
-        a, b = islands.slot[c.a], islands.slot[c.b]
-        behind, ahead = (b, a) if strength(ways[a]) >= strength(ways[b]) else (a, b)
-        body = bodies[c.b if behind == b else c.a]
-        if trains[ahead, 2] == 1.0 and momentum_towards(body, ways[behind]) > 0.0:
-            i, j = root(islands.parent, a), root(islands.parent, b)
-            more = more or i != j
-            islands.parent[max(i, j)] = min(i, j)
-            trains[behind, 2] = 1.0
-    return more
-
-
-@kernel
-def find_trains(
-    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, fence: int, ways: NDArray,
-    trains: NDArray,
-) -> float:  # fmt: skip
-    """Gather the blocks of an island that come on as one; returns what hits the fence [N s].
-
-    `trains`, (n, 3), gets their mass [kg] and their momentum towards the fence [N s] where their
-    root in islands.parent is, and whether a block strikes another one or the fence.
-    """
-    low, high = islands.contact_start[island], islands.contact_start[island + 1]
-    first = islands.block_start[island]
-    n, parent = islands.block_start[island + 1] - first, islands.parent
-    for s in range(n):
-        parent[s] = s
-        trains[s, 0] = trains[s, 1] = trains[s, 2] = 0.0
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        hit = is_hit(c, fence) and c.kind == IMPACT
-        striker = islands.slot[c.a] if hit else strikes(c, islands, ways)[0]
-        if striker >= 0:
-            trains[striker, 2] = 1.0
-    for _ in range(CHAIN):
-        if not follow(bodies, contacts, islands, low, high, ways, trains):
-            break
-    for s in range(n):
-        body, train = bodies[islands.block_item[first + s]], trains[root(parent, s)]
-        train[0] += body.mass
-        train[1] += momentum_towards(body, ways[s])
-    momentum, last = 0.0, -1
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        train = root(parent, islands.slot[c.a])
-        if is_hit(c, fence) and train != last:
-            momentum += trains[train, 1]
-            last = train
-    return momentum
-
-
-@kernel
-def blows(
-    contacts: Contacts, islands: Islands, low: int, high: int, ways: NDArray, trains: NDArray,
-    dt: float,
-) -> tuple[float, float, int]:  # fmt: skip
-    """Return what blows pass on to a fence in this step, the most of one [J], and that one.
-
-    Blocks that strike one another in turn go on as one: the first of them strikes for all.
-    """
-    total = most = 0.0
-    k = -1
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        striker, struck = strikes(c, islands, ways)
-        if striker < 0 or trains[struck, 2] == 1.0:
-            continue
-        train = trains[root(islands.parent, striker)]
-        impulse = min(c.normal * dt, train[1])
-        share = share_along(c, ways[struck], struck == islands.slot[c.a])
-        work = 0.5 * impulse * train[1] * share * share / (train[0] + ways[struck, 0])
-        total += work
-        if work > most:
-            most, k = work, islands.contact_item[item]
-    return total, most, k
 
 
 @kernel

@@ -13,7 +13,8 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.dynamics.constants import ASLEEP, AWAKE, LATELY, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
-from rigdda.dynamics.correction import account_block, apply_forces, move_block, place_corners
+from rigdda.dynamics.correction import place_corners
+from rigdda.dynamics.forces import account_block, apply_forces, move_block
 from rigdda.dynamics.gauges import barrier_contact
 from rigdda.dynamics.motion import retire, top_speed
 from rigdda.dynamics.records import (

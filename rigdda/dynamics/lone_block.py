@@ -23,7 +23,8 @@ from rigdda.dynamics.constants import (
     PLAIN,
     TURN,
 )
-from rigdda.dynamics.contact.law import prepare, pull_on, strike, time_of_impact
+from rigdda.dynamics.contact.approach import pull_on, strike
+from rigdda.dynamics.contact.law import prepare, time_of_impact
 from rigdda.dynamics.contact.transfer import recall
 from rigdda.dynamics.records import (
     Bodies,

@@ -12,11 +12,11 @@ import math
 
 from rigdda.dynamics.assembly.springs import normal_row, relative_displacement
 from rigdda.dynamics.constants import IMPACT, RECOVERY_SWEEPS
-from rigdda.dynamics.linear.relaxation import (
+from rigdda.dynamics.linear.relaxation import NORMAL
+from rigdda.dynamics.linear.rows import (
     AIM,
     FORCE,
     GAIN,
-    NORMAL,
     NOW,
     along_six,
     is_elastic,

@@ -17,9 +17,11 @@ from rigdda.barriers import GravityWall, from_table, to_tables
 from rigdda.dynamics.gauges import CROSSING, FAILED, HIT
 from rigdda.errors import BadInput
 from rigdda.files import atomic
+from rigdda.model.block import Block
 from rigdda.model.loads import BodyForce, LineLoad, PointLoad
-from rigdda.model.scene import Block, Scene, Surface
+from rigdda.model.scene import Scene
 from rigdda.model.supports import Bolt, FixedPoint
+from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigdda import Block, Scene, Settings
-from rigdda.dynamics.contact.narrow_phase import NEVER, face_of_contact
+from rigdda.dynamics.contact.separating_axes import NEVER, face_of_contact
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.kernel import from_python

@@ -51,6 +51,12 @@ from rigdda.dynamics.constants import (
     STIFFNESS_CHANGE,
     UNLOADED,
 )
+from rigdda.dynamics.contact.approach import (
+    effective_mass,
+    pull_on,
+    set_velocities_at_start,
+    strike,
+)
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Islands, Parameters
 from rigdda.kernel import inlined, kernel
 
@@ -78,71 +84,6 @@ def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
     if -c.gap * before > load:
         return max(least, before)
     return max(least, before, load / p.penetration)
-
-
-@kernel
-def effective_mass(bodies: Bodies, c: Contact) -> float:
-    """Return the mass [kg] that resists a normal impulse at a contact."""
-    a, b = bodies[c.a], bodies[c.b]  # b is not read where it is the terrain
-    arm = c.ra_x * c.ny - c.ra_y * c.nx
-    inverse = 1.0 / a.mass + arm * arm / a.inertia
-    if c.b >= 0 and b.status == AWAKE:
-        arm = c.rb_x * c.ny - c.rb_y * c.nx
-        inverse += 1.0 / b.mass + arm * arm / b.inertia
-    return 1.0 / inverse
-
-
-@kernel
-def point_velocity(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
-    """Return the velocity [m/s] of the point (x, y) of body i; fixed and sleeping bodies rest."""
-    body = bodies[i]
-    if i < 0 or body.status != AWAKE:
-        return 0.0, 0.0
-    return body.vx - body.omega * (y - body.y), body.vy + body.omega * (x - body.x)
-
-
-@kernel
-def set_arms(bodies: Bodies, c: Contact, time: float) -> None:
-    """Set the arms where the bodies will be after `time` [s]; so angular momentum is kept."""
-    a, b = bodies[c.a], bodies[c.b]
-    vx, vy = point_velocity(bodies, c.a if c.owner == 1 else c.b, c.x, c.y)
-    x, y = c.x + time * vx, c.y + time * vy
-    c.ra_x, c.ra_y = x - a.x - time * a.vx, y - a.y - time * a.vy
-    if c.b >= 0:
-        moving = 1.0 if b.status == AWAKE else 0.0
-        c.rb_x, c.rb_y = x - b.x - time * b.vx * moving, y - b.y - time * b.vy * moving
-
-
-@kernel
-def set_velocities(bodies: Bodies, c: Contact) -> None:
-    """Set the normal and shear relative velocities, at the arms, of bodies as they move now."""
-    a, b = bodies[c.a], bodies[c.b]
-    vx, vy = a.vx - a.omega * c.ra_y, a.vy + a.omega * c.ra_x
-    if c.b >= 0 and b.status == AWAKE:
-        vx -= b.vx - b.omega * c.rb_y
-        vy -= b.vy + b.omega * c.rb_x
-    c.un = c.nx * vx + c.ny * vy
-    c.us = -c.ny * vx + c.nx * vy
-
-
-@kernel
-def set_velocities_at_start(bodies: Bodies, c: Contact, dt: float) -> None:
-    """Set the velocities from the places at the start, after those with the arms of mid-step.
-
-    Points of a turning body do not go straight, and a face that turns comes nearer to what slides
-    along it. With the displacement along the rows of mid-step u_1 then is the velocity at the end,
-    to second order: a block that rocks on a corner neither lifts nor sinks it. But u_0 is at most
-    that along the rows: greater, it would let the contact give energy.
-    """
-    ax, ay = point_velocity(bodies, c.a, c.x, c.y)
-    bx, by = point_velocity(bodies, c.b, c.x, c.y)
-    opening = c.nx * (ax - bx) + c.ny * (ay - by)
-    c.us = -c.ny * (ax - bx) + c.nx * (ay - by)
-    i = c.a if c.owner == 0 else c.b
-    face = bodies[i]
-    if i >= 0 and face.status == AWAKE:
-        opening -= face.omega * c.us * dt
-    c.un = min(c.un, opening)
 
 
 @kernel
@@ -206,15 +147,6 @@ def set_plain(c: Contact, p: Parameters) -> None:
 
 
 @inlined
-def strike(bodies: Bodies, c: Contact, time: float, pull: float, p: Parameters) -> float:
-    """Set arms and velocities of a contact at `time` in the step; returns the closing speed."""
-    set_arms(bodies, c, time)
-    set_velocities(bodies, c)
-    c.share = 1.0 - time / p.dt
-    return -c.un + pull * time
-
-
-@inlined
 def strike_at_once(
     bodies: Bodies, contacts: Contacts, islands: Islands, island: int, p: Parameters
 ) -> None:
@@ -237,14 +169,6 @@ def strike_at_once(
         closing = strike(bodies, c, (1.0 - share) * p.dt, 0.0, p)
         if c.kind == IMPACT:
             set_impact(c, max(closing, 0.0), effective_mass(bodies, c), p)
-
-
-@kernel
-def pull_on(bodies: Bodies, c: Contact, p: Parameters) -> float:
-    """Return the free relative acceleration that closes a contact [m/s2]: that of gravity."""
-    if c.b >= 0 and bodies[c.b].status == AWAKE:
-        return 0.0
-    return -(p.field_x * c.nx + p.field_y * c.ny)
 
 
 @inlined

@@ -1,12 +1,6 @@
 """Contacts between two polygons over a step, one convex part against another.
 
-Separating axes with time of entry: of the axes that separate the polygons now, the one that they
-stop separating last is the face of contact. An axis along which they are farther apart than their
-paths in this step are long rules the contact out: a fast block cannot pass a thin wall, nor can one
-that a third block deflects within the step be driven into a neighbour.
-
-A face that they touch and do not approach separates them for the whole step: what slides along it
-is not caught by the side of the next body, whose face is flush with it.
+The face of contact is found by `separating_axes`; the edge that meets it is clipped to it.
 
 Where the last edge to separate two parts, or the one that faces it, is inside its body, the way in
 leads through a neighbouring part, and that one has the contact.
@@ -15,136 +9,14 @@ leads through a neighbouring part, and that one has the contact.
 from __future__ import annotations
 
 from rigdda.dynamics.constants import AWAKE, OTHER_FACE, SAME_FACE
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Corners, Outlines, Parameters
+from rigdda.dynamics.contact.separating_axes import (
+    axis_gap,
+    face_of_contact,
+    following,
+    incident_edge,
+)
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Outlines, Parameters
 from rigdda.kernel import inlined, kernel
-
-NEVER = 1e3
-"""Time of entry, over the step, of what comes nearer no faster than what is at rest may."""
-
-
-@kernel
-def following(corner: int, corners: int) -> int:
-    """Return the corner after this one, anticlockwise."""
-    return corner + 1 if corner + 1 < corners else 0
-
-
-@kernel
-def axis_gap(
-    nx: float, ny: float, x0: float, y0: float, corners: Corners, j: int, n: int
-) -> tuple[float, int]:
-    """Return the least gap of the n corners of body j above a line, and the corner."""
-    least, corner = 1e300, 0
-    for k in range(n):
-        own = corners[j, k]
-        gap = nx * (own.x - x0) + ny * (own.y - y0)
-        if gap < least:
-            least, corner = gap, k
-    return least, corner
-
-
-@kernel
-def over_edge(outlines: Outlines, i: int, edge: int, j: int) -> float:
-    """Return the gap of the middle of polygon j above an edge of polygon i [m]."""
-    other, own = outlines.polygon[j], outlines.corner[i, edge]
-    dx, dy = other.middle_x - own.x, other.middle_y - own.y
-    return own.normal_x * dx + own.normal_y * dy
-
-
-@kernel
-def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
-    """Return the edge of polygon i that the middle of polygon j is farthest over."""
-    facing, most = 0, -1e300
-    for edge in range(edges):
-        gap = over_edge(outlines, i, edge, j)
-        if gap > most:
-            facing, most = edge, gap
-    return facing
-
-
-@inlined
-def face_of_contact(
-    outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
-    px: float, py: float, turn: float, spread: float, slack: float, sunk: float,
-) -> tuple[bool, float, float, float, int]:  # fmt: skip
-    """Return whether the edges of i leave a contact with j possible, and the best edge.
-
-    (dx, dy) is the displacement of j relative to i over the step if nothing deflects them,
-    (px - turn y, py + turn x) what turning adds to it at (x, y), `spread` how far any of their
-    points may come nearer, whatever does.
-    The best edge comes with its rank, time of entry and gap, after the greatest gap of any. Edges
-    inside the body count as deeper by `sunk`, so that on a tie the real one is best.
-
-    A face is entered when the nearest corner is deeper than the slack: of two that it touches the
-    one that is approached more slowly is the best. By the velocity of that corner then: the middle
-    of a block that rolls comes down, where it rests does not.
-
-    The edge that the middle of j is farthest over comes first: most often it is the best one, or
-    one that separates them. Others are looked at only as far as the circle in j may be over them.
-    """
-    time, depth, best, nearest, apart = -1.0, -1e300, -1, -1, -1e300
-    facing = facing_edge(outlines, i, edges, j)
-    for visit in range(-1, edges):
-        edge = facing if visit < 0 else visit
-        own = outlines.corner[i, edge]
-        nx, ny = own.normal_x, own.normal_y
-        if visit >= 0:
-            most = over_edge(outlines, i, edge, j) - outlines.polygon[j].inside
-            if edge == facing or (most < -slack and (time > 0.0 or most < depth)):
-                continue
-        gap, corner = axis_gap(nx, ny, own.x, own.y, outlines.corner, j, corners)
-        if gap > spread:
-            return False, time, depth, apart, edge
-        if sunk > 0.0 and own.inner:
-            gap -= sunk
-        apart = max(apart, gap)
-        entry = 0.0
-        if gap >= -slack:
-            ux, uy = dx, dy
-            if gap <= slack:
-                ux -= turn * outlines.corner[j, corner].y - px
-                uy += turn * outlines.corner[j, corner].x + py
-            approach = -(nx * ux + ny * uy)
-            late = gap + slack >= NEVER * approach
-            entry = NEVER if late else (gap + slack) / approach
-        later = entry > time or (entry == time and gap > depth)
-        if later or (entry == time and gap == depth and edge < best):
-            time, depth, best, nearest = entry, gap, edge, corner
-    return True, time, depth, apart, edge_over_corner(outlines, i, best, edges, j, nearest)
-
-
-@kernel
-def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, corner: int) -> int:
-    """Return the edge of i, nearly in line with `edge`, that lies over a corner of j.
-
-    Of edges in one line rounding alone decides which is the best face.
-    """
-    face, over = outlines.corner[i, edge], outlines.corner[j, corner]
-    nx, ny, x, y = face.normal_x, face.normal_y, over.x, over.y
-    for _ in range(edges):
-        start, end = outlines.corner[i, edge], outlines.corner[i, following(edge, edges)]
-        beyond_end = ny * (end.x - x) > nx * (end.y - y)
-        before_start = ny * (start.x - x) < nx * (start.y - y)
-        step = (1 if beyond_end else 0) - (1 if before_start else 0)
-        near = (edge + step) % edges
-        other = outlines.corner[i, near]
-        dot = nx * other.normal_x + ny * other.normal_y
-        if step == 0 or dot < SAME_FACE or other.inner:
-            break
-        edge = near
-    return edge
-
-
-@kernel
-def incident_edge(outlines: Outlines, i: int, edge: int, j: int, n: int) -> int:
-    """Return the edge of j at its nearest corner that faces edge `edge` of i most squarely."""
-    face = outlines.corner[i, edge]
-    nx, ny = face.normal_x, face.normal_y
-    _, corner = axis_gap(nx, ny, 0.0, 0.0, outlines.corner, j, n)
-    before = corner - 1 if corner > 0 else n - 1
-    after, ahead = outlines.corner[j, corner], outlines.corner[j, before]
-    dot_after = nx * after.normal_x + ny * after.normal_y
-    dot_ahead = nx * ahead.normal_x + ny * ahead.normal_y
-    return corner if dot_after < dot_ahead else before
 
 
 @kernel

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rigdda.dynamics.constants import (
     LAYERS,
 )
-from rigdda.dynamics.linear.relaxation import COLUMNS
+from rigdda.dynamics.linear.rows import COLUMNS
 from rigdda.dynamics.records import (
     BOX,
     CONTACT,

@@ -1,0 +1,143 @@
+"""Detection: the contacts of a step, body by body."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.dynamics.clock import lap
+from rigdda.dynamics.constants import (
+    ASLEEP,
+    AWAKE,
+    TERRAIN,
+)
+from rigdda.dynamics.contact.broad_phase import partners_of_bodies, sweep_and_prune
+from rigdda.dynamics.contact.joint import bond_joints
+from rigdda.dynamics.contact.law import prepare
+from rigdda.dynamics.contact.links import add_link
+from rigdda.dynamics.contact.narrow_phase import collide_pair
+from rigdda.dynamics.contact.terrain_phase import collide_terrain
+from rigdda.dynamics.contact.transfer import copy_contact, recall
+from rigdda.dynamics.gauges import barrier_contact
+from rigdda.dynamics.records import (
+    BROAD_PHASE,
+    NARROW_PHASE,
+    Bodies,
+    Boxes,
+    Contacts,
+    Gauges,
+    Ground,
+    Interfaces,
+    Ints,
+    Links,
+    Outlines,
+    Parameters,
+    Polygons,
+    Work,
+)
+from rigdda.dynamics.sleep import wake_neighbours
+from rigdda.kernel import kernel, stage
+
+
+@kernel
+def candidate_pairs(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> bool:
+    """List the bodies that each awake one may touch in this step; returns whether they fit."""
+    pairs = sweep_and_prune(bodies, polygon, boxes, p)
+    if pairs > 0 and p.sleeping and wake_neighbours(bodies, boxes.pairs, pairs, p.blocks) > 0:
+        pairs = sweep_and_prune(bodies, polygon, boxes, p)
+    if pairs < 0:
+        return False
+    partners_of_bodies(boxes, pairs)
+    return True
+
+
+@kernel
+def keep_asleep(
+    bodies: Bodies, contacts: Contacts, count: int, old: Contacts, first: Ints, a: int,
+    gauges: Gauges, time: float,
+) -> int:  # fmt: skip
+    """Keep the contacts of sleeping block a with what is still; returns the new number, or -1."""
+    if count + first[a + 1] - first[a] > len(contacts):
+        return -1
+    for m in range(first[a], first[a + 1]):
+        b = old[m].b
+        if b == TERRAIN or bodies[b].status != AWAKE:
+            copy_contact(contacts[count], old[m])
+            count += 1
+            block, barrier = barrier_contact(gauges, a, b)
+            if barrier >= 0:
+                gauges.last_touch[block, barrier] = time
+    return count
+
+
+@stage
+def collide_block(
+    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, contacts: Contacts,
+    count: int, old: Contacts, work: Work, a: int, start: bool, p: Parameters, deepest: NDArray,
+) -> int:  # fmt: skip
+    """Write the contacts of awake block a with the terrain and with its partners.
+
+    Returns
+    -------
+    int
+        The new number of contacts; -1 if they do not fit.
+    """
+    first, room, boxes = count, len(contacts) - outlines.corner.shape[1] - 4, work.boxes
+    count = collide_terrain(bodies, outlines, ground, boxes.swept[a], contacts, count, a, p)
+    for q in range(boxes.partner_start[a], boxes.partner_start[a + 1]):
+        if count < 0 or count > room:
+            return -1
+        count = collide_pair(bodies, outlines, contacts, count, a, boxes.partner[q], p)
+    if count < 0 or count > room:
+        return -1
+    recall(contacts, first, count, old, work.first, p.slack)
+    if p.bonded and start:
+        bond_joints(contacts, first, count, p)
+    for k in range(first, count):
+        prepare(bodies, contacts[k], interfaces, start, p)
+        deepest[0] = max(deepest[0], -contacts[k].gap)
+    return count
+
+
+@kernel
+def copy_index(index: Ints, to: Ints) -> None:
+    """Copy an index of contacts by body."""
+    for a in range(len(index)):
+        to[a] = index[a]
+
+
+@stage
+def detect(
+    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
+    contacts: Contacts, old: Contacts, work: Work, gauges: Gauges, time: float, p: Parameters,
+    counters: NDArray, deepest: NDArray,
+) -> int:  # fmt: skip
+    """Write all contacts of the step in order of their first body; -1 if they do not fit."""
+    since = lap(counters, BROAD_PHASE, 0, p.timing)
+    if not candidate_pairs(bodies, outlines.polygon, work.boxes, p):
+        return -1
+    since = lap(counters, BROAD_PHASE, since, p.timing)
+    start = time <= 1.5 * p.dt
+    count, link = int(np.int64(0)), 0  # with a literal all that it is handed to is compiled twice
+    for a in range(p.blocks):
+        work.begin[a] = count
+        low_link = link
+        while link < len(links) and links[link].a == a:
+            link += 1
+        if bodies[a].status == AWAKE:
+            count = collide_block(
+                bodies, outlines, ground, interfaces, contacts, count, old, work, a, start, p,
+                deepest,
+            )  # fmt: skip
+            if count < 0 or count + link - low_link > len(contacts):
+                return -1
+            for q in range(low_link, link):
+                add_link(bodies, links, q, contacts[count], p)
+                count += 1
+        elif bodies[a].status == ASLEEP:
+            count = keep_asleep(bodies, contacts, count, old, work.first, a, gauges, time)
+            if count < 0:
+                return -1
+    work.begin[p.blocks] = count
+    lap(counters, NARROW_PHASE, since, p.timing)
+    return count

@@ -1,0 +1,131 @@
+"""The step of one island: settle its contacts, note its hits, move its blocks."""
+
+from __future__ import annotations
+
+from numpy.typing import NDArray
+
+from rigdda.dynamics.clock import lap
+from rigdda.dynamics.constants import (
+    OPEN,
+    SPEED_LIMIT,
+)
+from rigdda.dynamics.contact.law import strike_at_once
+from rigdda.dynamics.correction import move_corners, place_corners
+from rigdda.dynamics.fence import charge_fences
+from rigdda.dynamics.forces import (
+    account_block,
+    account_contact,
+    apply_forces,
+    keep_memory,
+    move_block,
+)
+from rigdda.dynamics.gauges import note_hits
+from rigdda.dynamics.lone_block import begin_part, recall_all, takes_parts
+from rigdda.dynamics.motion import retire, top_speed
+from rigdda.dynamics.open_close import open_close
+from rigdda.dynamics.records import (
+    EVENTS,
+    MOTION,
+    OPEN_CLOSE,
+    Bodies,
+    Contacts,
+    Gauges,
+    Interfaces,
+    Islands,
+    Motion,
+    Outlines,
+    Parameters,
+    System,
+    Work,
+)
+from rigdda.dynamics.recovery import push_out
+from rigdda.dynamics.thrust import press
+from rigdda.kernel import stage
+
+
+@stage
+def move_island(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, motion: Motion, islands: Islands,
+    island: int, gauges: Gauges, p: Parameters, ledger: NDArray,
+) -> int:  # fmt: skip
+    """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    bad = -1
+    for s in range(b1 - b0):
+        block = bodies[islands.block_item[b0 + s]]
+        account_block(block, motion, s, p, ledger)
+        block.apart += p.dt
+    for item in range(c0, c1):
+        c = contacts[islands.contact_item[item]]
+        if c.state == OPEN:
+            continue
+        account_contact(c, motion.d, islands, ledger, gauges)
+        if len(gauges.target) > 0:
+            press(c, gauges, p.dt)
+        bodies[c.a].apart = 0.0
+        if c.b >= 0:
+            bodies[c.b].apart = 0.0
+    for s in range(b1 - b0):
+        i = islands.block_item[b0 + s]
+        block = bodies[i]
+        block.wait = max(block.wait - 1, 0)
+        move_block(block, motion, s, p.dt)
+        if not top_speed(block) < SPEED_LIMIT:
+            bad = i
+        elif block.y < p.floor:
+            ledger[1] -= retire(block)
+        if p.post_correction:
+            place_corners(bodies, outlines, i)
+        else:
+            move_corners(bodies, outlines, i, motion, s)
+    return bad
+
+
+@stage
+def step_island(
+    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
+    before: Contacts, system: System, work: Work, gauges: Gauges, time: float, s: int,
+    p: Parameters, part: Parameters, counters: NDArray, ledger: NDArray,
+) -> int:  # fmt: skip
+    """Settle island s, note its hits, and move its blocks, in one or in parts: see `lone_block`.
+
+    Returns a block that went bad, or -1.
+    """
+    islands, rows, m, motion = work.islands, work.rows, system.matrix, system.motion
+    c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
+    now, left, parts, bad = p, p.dt, 0, -1
+    since = lap(counters, MOTION, 0, p.timing)
+    while left > 0.0 and bad < 0:
+        in_substeps = False
+        if parts > 0:
+            begin_part(bodies, contacts, interfaces, islands, s, motion, left, parts, part)
+            now = part
+        if c1 > c0:
+            since = lap(counters, MOTION, since, p.timing)
+            strike_at_once(bodies, contacts, islands, s, now)
+            in_substeps = open_close(bodies, contacts, system, islands, rows, s, now, counters)
+            since = lap(counters, OPEN_CLOSE, since, p.timing)
+        struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
+        if c1 > c0 and parts == 0 and takes_parts(bodies, contacts, islands, s, gauges, p):
+            recall_all(contacts, islands, s, before, work.first, p)
+            part.field_x, part.field_y = p.field_x, p.field_y
+            parts = 1
+            continue
+        if c1 > c0:
+            if charge_fences(
+                bodies, contacts, system, islands, rows, s, gauges, time, now, counters
+            ):
+                struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
+            if len(gauges.target) > 0:
+                counters[EVENTS] = note_hits(
+                    bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
+                )
+        for item in range(c0, c1):
+            keep_memory(contacts[islands.contact_item[item]], struck, in_substeps)
+        push_out(bodies, contacts, motion, islands, rows, s)
+        bad = move_island(bodies, outlines, contacts, motion, islands, s, gauges, now, ledger)
+        left -= now.dt
+        parts += 1 if parts > 0 else 0
+    lap(counters, MOTION, since, p.timing)
+    return bad

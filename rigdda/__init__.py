@@ -17,14 +17,16 @@ from rigdda.dynamics.run import Run
 from rigdda.dynamics.simulation import Simulation, simulate_many
 from rigdda.errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from rigdda.lumped import Points, lumped
+from rigdda.model.block import Block
 from rigdda.model.economy import Bill, Consequences, Prices
 from rigdda.model.events import Drawn, Event
 from rigdda.model.loads import BodyForce, LineLoad, PointLoad
-from rigdda.model.scene import Block, Scene, Surface
+from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
 from rigdda.model.site import Site
 from rigdda.model.source import Source
 from rigdda.model.supports import Bolt, FixedPoint
+from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
 from rigdda.release import release, release_many, release_outcome
 from rigdda.results.outcome import BarrierOutcome, Outcome

@@ -10,7 +10,7 @@ import numpy as np
 from experiments.hard_cases.case import Case, History
 from experiments.hard_cases.stacks import moved
 from rigdda import Bolt, Scene, Terrain
-from rigdda.model.scene import Block
+from rigdda.model.block import Block
 from rigdda.validation.scenes import GRAVITY, box, polygon, rock
 
 WEIGHT = 2600.0 * GRAVITY

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from experiments.bench.cases import RUN_OUT
 from rigdda import Site
 from rigdda.model.events import Drawn
-from rigdda.model.place import Surface
+from rigdda.model.surface import Surface
 
 TSCHAMUT = Path(__file__).parent.parent / "tschamut" / "site.toml"
 

@@ -15,8 +15,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from rigdda.model.block import Block
 from rigdda.model.events import Event
-from rigdda.model.scene import Block
 from rigdda.model.source import Point, Source
 
 JITTER = 0.35

@@ -9,7 +9,7 @@ import msgspec
 
 from rigdda import check
 from rigdda.errors import BadInput
-from rigdda.model.scene import Block
+from rigdda.model.block import Block
 from rigdda.model.source import Source
 
 MASS_WIDTH = 10.0

@@ -8,9 +8,9 @@ import msgspec
 
 from rigdda import check
 from rigdda.errors import BadInput
-from rigdda.model.scene import Surface
 from rigdda.model.settings import USUAL_DT
 from rigdda.model.source import Point
+from rigdda.model.surface import Surface
 
 
 class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -13,9 +13,11 @@ from rigdda import check
 from rigdda.barriers import Barrier, Built, Mesh, as_layout
 from rigdda.errors import BadInput
 from rigdda.model import boulders
+from rigdda.model.block import Block
 from rigdda.model.events import Drawn
-from rigdda.model.scene import Block, Scene, Surface
+from rigdda.model.scene import Scene
 from rigdda.model.source import Source
+from rigdda.model.surface import Surface
 
 if TYPE_CHECKING:
     from rigdda.model.site import Site

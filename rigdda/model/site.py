@@ -31,10 +31,11 @@ from rigdda.model.place import (
     Slope,
     Stretch,
 )
-from rigdda.model.scene import Scene, Surface
+from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
 from rigdda.model.soundness import check_site
 from rigdda.model.source import Point, Source
+from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:

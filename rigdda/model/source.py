@@ -13,7 +13,7 @@ from rigdda import check
 from rigdda.errors import BadInput
 from rigdda.geometry import overlap
 from rigdda.model.joints import JointSet, cut
-from rigdda.model.scene import convex_polygon, simple_polygon
+from rigdda.model.polygon import convex_polygon, simple_polygon
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]

@@ -28,9 +28,9 @@ from rigdda.model.place import (
     Slope,
     Stretch,
 )
-from rigdda.model.scene import Surface
 from rigdda.model.site import Site
 from rigdda.model.source import Source
+from rigdda.model.surface import Surface
 
 PATH = Path(__file__).parents[2] / "docs" / "site.md"
 

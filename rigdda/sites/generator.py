@@ -20,9 +20,9 @@ from rigdda.barriers import MeshOption
 from rigdda.model.economy import Consequences, Prices
 from rigdda.model.events import Event
 from rigdda.model.place import BarrierZone, Road, Slope, Stretch
-from rigdda.model.scene import Surface
 from rigdda.model.site import Site
 from rigdda.model.source import Point, Source
+from rigdda.model.surface import Surface
 from rigdda.sites import FAMILIES, load
 
 replace = msgspec.structs.replace

@@ -1,0 +1,89 @@
+"""Blocks of rock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigdda import check
+from rigdda.errors import BadInput
+from rigdda.model.polygon import simple_polygon
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """A rigid simple polygon, convex or not.
+
+    Parameters
+    ----------
+    vertices : (n, 2) array_like
+        Corners in either winding [m]; kept anticlockwise.
+    density : float
+        Density [kg/m3]; the mass is per metre of slope width.
+    surface : str
+        Name of its surface in the scene.
+    velocity : (vx, vy, omega)
+        Initial velocity of the centroid and rate of rotation [m/s, m/s, rad/s].
+    fixed : bool
+        A fixed block has no unknowns.
+
+    Raises
+    ------
+    BadInput
+        If the polygon crosses itself, repeats a corner or has no area, or a value is not finite.
+    """
+
+    vertices: NDArray[np.float64]
+    density: float = 2600.0
+    surface: str = "rock"
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    fixed: bool = False
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        density: float = 2600.0,
+        surface: str = "rock",
+        velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        fixed: bool = False,
+    ):
+        try:
+            vx, vy, omega = velocity
+        except (TypeError, ValueError):
+            raise BadInput("block velocity", velocity, "give (vx, vy, omega)") from None
+        vx, vy, omega = (check.number("block velocity", v) for v in (vx, vy, omega))
+        if not isinstance(surface, str):
+            raise BadInput("block surface", surface, "name a surface of the scene")
+        object.__setattr__(self, "vertices", simple_polygon("block vertices", vertices))
+        object.__setattr__(
+            self, "density", check.number("block density", density, 0.0, open_low=True)
+        )
+        object.__setattr__(self, "surface", str(surface))
+        object.__setattr__(self, "velocity", (vx, vy, omega))
+        object.__setattr__(self, "fixed", check.boolean("block fixed", fixed))
+
+    @classmethod
+    def sound(
+        cls,
+        corners: Sequence[tuple[float, float]],
+        density: float,
+        surface: str,
+        velocity: tuple[float, float, float],
+    ) -> Block:
+        """Return a block of finite floats that are known to be sound, unchecked.
+
+        Corners anticlockwise, of a simple polygon. Checks take longer than all else in drawing a
+        release of one block.
+        """
+        block = object.__new__(cls)
+        vertices = np.array(corners)
+        vertices.setflags(write=False)
+        object.__setattr__(block, "vertices", vertices)
+        object.__setattr__(block, "density", density)
+        object.__setattr__(block, "surface", surface)
+        object.__setattr__(block, "velocity", velocity)
+        object.__setattr__(block, "fixed", False)
+        return block

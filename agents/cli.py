@@ -164,7 +164,8 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     """
     import rigdda
     from agents.wording import short, standing
-    from rigdda.results.replay import Marks, open_viewer
+    from rigdda.results.marks import Marks
+    from rigdda.results.viewer import open_viewer
 
     file = Path(target)
     if file.suffix in (".npz", ".rrd") and (layout or event or seed or out):

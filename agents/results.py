@@ -12,7 +12,7 @@ from agents.section import Panel, section
 from agents.seeds import release_seeds
 from agents.wording import euros, short, span, standing
 from rigdda import Layout, Site
-from rigdda.results.replay import Marks
+from rigdda.results.marks import Marks
 
 FILES = (
     "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png", "episode.rrd",

@@ -81,7 +81,7 @@ class Recorder:
         rewards : sequence of float
             Of each step.
         """
-        from rigdda.results.replay import Marks
+        from rigdda.results.marks import Marks
 
         end, site = stages[-1], shown.site
         run, _ = rigdda.release(site, end.layout, shown.seed, shown.event)

@@ -16,14 +16,19 @@ import pytest
 import shapely
 from rerun.chunk import RrdReader
 
-from rigdda.barriers import Built, Embankment, Fence, GravityWall
+from rigdda.barriers import Built, Embankment, Fence, GravityWall, Wall
 from rigdda.dynamics.gauges import FAILED
 from rigdda.dynamics.run import CROSSING, EVENT, HIT, Run
 from rigdda.errors import BadInput, Error
-from rigdda.model.scene import Block, Scene, Surface, Terrain, Wall
-from rigdda.results import replay
-from rigdda.results.replay import Marks, open_viewer
+from rigdda.model.block import Block
+from rigdda.model.scene import Scene
+from rigdda.model.surface import Surface
+from rigdda.model.terrain import Terrain
+from rigdda.results import replay, viewer
+from rigdda.results.marks import Marks
+from rigdda.results.plots import PLOTS
 from rigdda.results.states import states
+from rigdda.results.viewer import open_viewer
 
 GRAVITY = 9.81
 SIZES = np.array([[1.0, 2.0], [1.5, 1.0], [2.0, 2.0]])
@@ -123,9 +128,7 @@ def test_scalars_read_back(run: Run, file: Path) -> None:
     mass = DENSITY * SIZES.prod(axis=1)
     inertia = mass * (SIZES**2).sum(axis=1) / 12
     vx, vy, omega = np.moveaxis(run.velocities, -1, 0)
-    read = {
-        name: np.ravel(column(file, f"/plots/{name}", "Scalars:scalars")) for name in replay.PLOTS
-    }
+    read = {name: np.ravel(column(file, f"/plots/{name}", "Scalars:scalars")) for name in PLOTS}
     kinetic = 0.5 * ((vx**2 + vy**2) * mass + omega**2 * inertia).sum(axis=1)
     np.testing.assert_allclose(read["kinetic_energy"], kinetic, rtol=1e-12)
     potential = GRAVITY * (run.poses[:, :, 1] * mass).sum(axis=1)
@@ -252,7 +255,7 @@ def fake_viewer(monkeypatch: pytest.MonkeyPatch, folder: Path, script: str) -> N
     starter = folder / "starter"
     starter.write_text(f"#!/bin/sh\n{script}\n")
     starter.chmod(0o755)
-    monkeypatch.setattr(replay.sys, "executable", str(starter))
+    monkeypatch.setattr(viewer.sys, "executable", str(starter))
 
 
 def test_interrupt_ends_the_viewer_behind_its_starter(

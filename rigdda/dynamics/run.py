@@ -25,7 +25,7 @@ from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:
-    from rigdda.results.replay import Marks
+    from rigdda.results.marks import Marks
 
 LOADS = {kind.__name__: kind for kind in (PointLoad, LineLoad, BodyForce)}
 SUPPORTS = {kind.__name__: kind for kind in (FixedPoint, Bolt)}

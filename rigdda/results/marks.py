@@ -1,0 +1,44 @@
+"""What a replay shows beside the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rigdda import check
+from rigdda.errors import BadInput
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """What a replay shows that the scene does not know.
+
+    Parameters
+    ----------
+    road : (float, float), optional
+        Chainages of the road's uphill and downhill edge [m].
+    notes : mapping of str to str
+        Words about the episode: seed, layout, reward, objective.
+    title : str
+        Name of the recording.
+    labels : sequence of str
+        What each barrier of the scene is called, a fence with its class; without any, the words
+        that the scene has for them.
+
+    Raises
+    ------
+    BadInput
+        If the road is not an interval.
+    """
+
+    road: tuple[float, float] | None = None
+    notes: Mapping[str, str] = field(default_factory=dict)
+    title: str = "rockfall"
+    labels: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if self.road is None:
+            return
+        uphill, downhill = (check.number("road", x) for x in self.road)
+        if uphill >= downhill:
+            raise BadInput("road", self.road, "give its uphill edge, then its downhill edge")

@@ -1,0 +1,52 @@
+"""The rerun viewer on the file of a replay."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from rigdda.errors import BadInput, Error
+
+
+def open_viewer(path: str | os.PathLike[str]) -> None:
+    """Show a replay in the rerun viewer; return when it is closed or on Ctrl-C.
+
+    Raises
+    ------
+    BadInput
+        If the file is missing or is not a rerun recording.
+    Error
+        If the viewer fails, for example without a screen.
+    """
+    file = rrd_path(path)
+    if not file.is_file():
+        raise BadInput("replay file", str(path), "name an existing .rrd file")
+    with file.open("rb") as head:
+        if head.read(3) != b"RRF":
+            raise BadInput("replay file", str(path), "name a .rrd file that Run.to_rerun wrote")
+    command = [sys.executable, "-m", "rerun", str(file.absolute()), "--new", "--bind", "127.0.0.1"]
+    viewer = subprocess.Popen(command, start_new_session=True)
+    try:
+        code = viewer.wait()
+    except KeyboardInterrupt:  # `python -m rerun` only starts the viewer: end the whole group
+        os.killpg(viewer.pid, signal.SIGTERM)
+        viewer.wait()
+        return
+    if code:
+        raise Error(f"the rerun viewer ended with code {code}: see its message above")
+
+
+def rrd_path(path: str | os.PathLike[str]) -> Path:
+    """Return `path`, whose name the viewer must recognise.
+
+    Raises
+    ------
+    BadInput
+        If the name does not end in .rrd.
+    """
+    if Path(path).suffix != ".rrd":
+        raise BadInput("replay file", str(path), "let its name end in .rrd")
+    return Path(path)

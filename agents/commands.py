@@ -67,17 +67,18 @@ def fit(
     """
     import rigdda
     from agents import fit as job
-    from agents import tables
+    from agents import fit_results, run_outs, tables
+    from agents.parameters import parse
 
     where = rigdda.Site.load(site)
-    seen, parameters = job.read(observed, where), [job.parse(name) for name in names]
+    seen, parameters = run_outs.read(observed, where), [parse(name) for name in names]
     folder = folder_for(out, f"fit-{where.name}", "site.toml", "fit.csv", "fit.png")
     with kept(folder), progress(budget) as tick:
         found = job.fit(where, seen, parameters, budget, releases, seed, tick, model)
         found.site.save(folder / "site.toml")
-        job.write(folder / "fit.csv", found, seen)
-        job.draw(folder / "fit.png", found, seen)
-    show(tables.fit(job.rows(found, seen)))
+        fit_results.write(folder / "fit.csv", found, seen)
+        fit_results.draw(folder / "fit.png", found, seen)
+    show(tables.fit(fit_results.rows(found, seen)))
     click.echo(f"up to {budget} sets of values; site.toml, fit.csv and fit.png are in {folder}")
 
 

@@ -21,7 +21,9 @@ from matplotlib.figure import Figure
 from msgspec.structs import replace
 from scipy.optimize import brentq
 
-from agents.fit import Floats, Model, Parameter, run_outs, with_values
+from agents.fit import Floats
+from agents.parameters import Parameter, with_values
+from agents.run_outs import Model, run_outs
 from experiments.script import BLUE, GREEN, ORANGE, RED, Number, draw, say, write
 from rigdda import Site
 

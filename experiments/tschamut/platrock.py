@@ -11,7 +11,8 @@ from typing import Self
 
 import numpy as np
 
-from agents.fit import Floats, Parameter
+from agents.fit import Floats
+from agents.parameters import Parameter
 from rigdda import Site
 
 PYTHON = "PLATROCK_PYTHON"

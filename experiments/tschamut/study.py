@@ -23,15 +23,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from agents import fit
+from agents import fit, fit_results, run_outs
 from agents.fit import Fit, Floats
+from agents.parameters import parse
+from agents.prediction import seen
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
 from experiments.tschamut.platrock import PARAMETERS, PYTHON, PlatRock
 from rigdda import Site, release
 
 HERE = Path(__file__).parent
 
-MODELS: dict[fit.Model, tuple[str, ...]] = {
+MODELS: dict[run_outs.Model, tuple[str, ...]] = {
     "blocks": (
         "surfaces.soil.friction_deg=15:65",
         "surfaces.soil.restitution=0:0.8",
@@ -69,8 +71,8 @@ BAR = 5.0
 
 
 def table(model: str, fitted: Fit, observed: dict[str, Floats], seconds: float) -> list[dict]:
-    """Return the rows of `agents.fit.rows` with the model and its processor time [s]."""
-    return [{"model": model, "cpu_s": seconds} | row for row in fit.rows(fitted, observed)]
+    """Return the rows of `agents.fit_results.rows` with the model and its processor time [s]."""
+    return [{"model": model, "cpu_s": seconds} | row for row in fit_results.rows(fitted, observed)]
 
 
 def cumulative(axes: Axes, values: Floats, colour: str, words: str, band: int = 0) -> None:
@@ -120,7 +122,7 @@ def picture(
 def run(quick: bool, out: Path) -> Number:
     """Fit the models, predict, and write tables and the picture."""
     site = Site.load(HERE / "site.toml")
-    observed = fit.read(HERE / "observed.csv", site)
+    observed = run_outs.read(HERE / "observed.csv", site)
     budget, releases, count = (
         (QUICK_BUDGET, QUICK_RELEASES, QUICK_PREDICTED) if quick else (BUDGET, RELEASES, PREDICTED)
     )
@@ -137,10 +139,10 @@ def run(quick: bool, out: Path) -> Number:
 
     for model, names in MODELS.items():
         start = time.process_time()
-        parameters = [fit.parse(name) for name in names]
+        parameters = [parse(name) for name in names]
         found[model] = fit.fit(site, observed, parameters, budget, releases, 0, tell(model), model)
         rows += table(model, found[model], observed, time.process_time() - start)
-        predicted[model] = fit.run_outs(found[model].site, model, list(observed), seeds)
+        predicted[model] = run_outs.run_outs(found[model].site, model, list(observed), seeds)
     if os.environ.get(PYTHON):
         try:
             with PlatRock(os.environ[PYTHON], site) as peer:
@@ -163,7 +165,7 @@ def run(quick: bool, out: Path) -> Number:
     slope = found["blocks"].site
     path = out / "tschamut" / "tschamut.png"
     draw(path, (12.0, 7.5), lambda figure: picture(figure, observed, predicted, slope))
-    real = fit.seen(observed, site.slope.toe)
+    real = seen(observed, site.slope.toe)
     error = {model: abs(each.validated.mean - real.mean) for model, each in found.items()}
     note = ", ".join(f"{model} {off:.1f} m" for model, off in error.items() if model != "blocks")
     return Number("error of the mean run-out of left-out runs [m]", error["blocks"], 0.0, BAR, note)

@@ -7,8 +7,11 @@ import csv
 import numpy as np
 import pytest
 
-from agents import fit
+from agents import fit, prediction
 from agents.cli import main
+from agents.parameters import Parameter, parse, with_values
+from agents.prediction import scores
+from agents.run_outs import read, run_outs
 from rigdda import BadInput, Site
 from rigdda.model.place import Rebound
 
@@ -16,16 +19,16 @@ SITE = Site.load("verge")
 TRUE = {"lumped.soil.tangential": 0.7, "lumped.soil.friction_deg": 35.0}
 
 
-def truth() -> tuple[tuple[fit.Parameter, ...], Site]:
-    parameters = tuple(fit.parse(name) for name in TRUE)
-    return parameters, fit.with_values(SITE, parameters, list(TRUE.values()))
+def truth() -> tuple[tuple[Parameter, ...], Site]:
+    parameters = tuple(parse(name) for name in TRUE)
+    return parameters, with_values(SITE, parameters, list(TRUE.values()))
 
 
 def test_scores_are_least_for_the_distribution_that_was_drawn_from():
     rng = np.random.default_rng(0)
     seen = rng.normal(10.0, 2.0, 4000)
     mean = {
-        (m, s): fit.scores(rng.normal(m, s, 4000), seen).mean()
+        (m, s): scores(rng.normal(m, s, 4000), seen).mean()
         for m in (9.0, 10.0, 11.0)
         for s in (1.0, 2.0, 4.0)
     }
@@ -36,16 +39,16 @@ def test_scores_are_least_for_the_distribution_that_was_drawn_from():
 def test_values_are_found_again_with_what_they_predict():
     parameters, real = truth()
     events = ["block", "small, face"]
-    observed = fit.run_outs(real, "lumped", events, range(900, 1020))
+    observed = run_outs(real, "lumped", events, range(900, 1020))
     found = fit.fit(SITE, observed, parameters, 96, 60, 0, lambda done, words: None, "lumped")
     exact = np.array(list(TRUE.values()))
     # a point that bounces on a short verge hardly slides: friction is left open, and said to be
     assert found.best.values[0] == pytest.approx(exact[0], abs=0.03)
     assert found.high[0] - found.low[0] < 0.1 and found.high[1] - found.low[1] > 5.0
-    there = fit.seen(observed, SITE.slope.toe)
+    there = prediction.seen(observed, SITE.slope.toe)
     for quality in (found.fitted, found.validated):
         assert quality.mean == pytest.approx(there.mean, abs=1.0)
-        assert quality.score < 1.05 * fit.scores(observed["block"], observed["block"]).mean() + 1.0
+        assert quality.score < 1.05 * scores(observed["block"], observed["block"]).mean() + 1.0
     assert found.site.lumped["soil"] == Rebound(
         Rebound().normal, *(float(v) for v in found.best.values)
     )
@@ -70,13 +73,13 @@ def test_blocks_are_fitted_from_the_command_line(tmp_path):
 @pytest.mark.parametrize("text", ["motion.damping=2:1", "motion.damping=a:b", "motion.duration"])
 def test_limits_are_checked(text):
     with pytest.raises(BadInput, match="parameters"):
-        fit.parse(text)
+        parse(text)
 
 
 @pytest.mark.parametrize("path", ["surfaces.sand.restitution", "name", "road", "motion.friction"])
 def test_only_numbers_of_the_site_are_fitted(path):
     with pytest.raises(BadInput, match="name a number of the site file"):
-        fit.with_values(SITE, [fit.Parameter(path, 0.0, 1.0)], [0.5])
+        with_values(SITE, [Parameter(path, 0.0, 1.0)], [0.5])
 
 
 @pytest.mark.parametrize(
@@ -92,4 +95,4 @@ def test_a_table_of_runs_is_checked(tmp_path, text, what):
     path = tmp_path / "seen.csv"
     path.write_text(text)
     with pytest.raises(BadInput, match=what):
-        fit.read(path, SITE)
+        read(path, SITE)

@@ -1,0 +1,61 @@
+"""Run-outs of a site by event, observed and computed."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import BadInput, Site, check, release_many
+from rigdda.lumped import lumped
+
+Floats = NDArray[np.float64]
+Model = Literal["blocks", "lumped"]
+
+
+def read(path: Path, site: Site) -> dict[str, Floats]:
+    """Return the observed run-outs [m], as chainages of the site, of each event.
+
+    Raises
+    ------
+    BadInput
+        If the file is no table with `run_out_m` and, where the site has several, `event`.
+    """
+    if not path.is_file():
+        raise BadInput("observed", str(path), "name a CSV file with event and run_out_m")
+    found: dict[str, list[float]] = {}
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        table = csv.DictReader(file)
+        names = table.fieldnames or ()
+        if "run_out_m" not in names or ("event" not in names and len(site.events) > 1):
+            mend = "head its columns event and run_out_m"
+            raise BadInput("observed", ", ".join(names), mend)
+        for i, row in enumerate(table):
+            event = row.get("event") or site.events[0].name
+            site.index(event)
+            try:
+                value = float(row["run_out_m"])
+            except (TypeError, ValueError):
+                value = math.nan
+            last = site.slope.points[-1][0]
+            check.number(f"observed row {i + 1} run_out_m", value, site.slope.points[0][0], last)
+            found.setdefault(event, []).append(value)
+    if sum(map(len, found.values())) < 3:
+        raise BadInput("observed", str(path), "give three observed runs or more")
+    return {event: np.array(values) for event, values in found.items()}
+
+
+def run_outs(site: Site, model: Model, events: Sequence[str], seeds: range) -> dict[str, Floats]:
+    """Return the computed run-outs of each event [m]: of a group, of its last block."""
+    if model == "lumped":
+        found = {event: lumped(site, (), seeds, event) for event in events}
+        return {e: np.array([p.run_out[p.release == k].max() for k in range(len(seeds))])
+                for e, p in found.items()}  # fmt: skip
+    outcomes = release_many([(site, (), seed, event) for event in events for seed in seeds])
+    each = np.array([outcome.run_out[2] for outcome in outcomes]).reshape(len(events), len(seeds))
+    return dict(zip(events, each, strict=True))

@@ -41,18 +41,6 @@ SHOCK_SPEED = 0.1
 """Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
 for what hits the block from the other side, and it is treated as a plastic impact."""
 
-STIFFNESS_CHANGE = 1.1
-"""Factor per step by which a contact softens without load, or stiffens in motion, where its load
-may be an impulse [-]."""
-
-UNLOADED = 0.2
-"""Share of the load that its stiffness was chosen for, below which a contact softens [-]."""
-
-GREATEST_LOAD = 300.0
-"""Greatest force that a contact carries to the next step over the weight of its heavier body, or
-of the mean block if that is more [-]: the height, in blocks, of the tallest stack. Higher, and
-wedged blocks burst out more violently."""
-
 RECOVERY_SWEEPS = 4
 """Sweeps over the contacts of an island that push out what they are too deep."""
 
@@ -82,10 +70,6 @@ RELAXATION_SHARE = 0.05
 
 LAYERS = 64
 """Layers in which the contacts of an island are ordered by height for relaxation."""
-
-STEADY_RATE = 0.25
-"""Share of a rise of the force that counts as lasting load after one step of motion [-]; the rest
-may be an impulse."""
 
 QUIET_SPEED = 0.1
 """Speed below which all blocks of an island are solved together, accurately; faster islands of

@@ -17,7 +17,6 @@ from rigdda.dynamics.constants import (
     REST,
     SHOCK,
     SHOCK_SPEED,
-    STEADY_RATE,
 )
 from rigdda.dynamics.gauges import barrier_contact
 from rigdda.dynamics.islands import root
@@ -179,20 +178,15 @@ def move_block(body: Body, motion: Motion, s: int, dt: float) -> None:
 def keep_memory(c: Contact, struck: bool, relaxed: bool) -> None:
     """Carry the forces of a contact to the next step; an impulse does not last.
 
-    In an island that was struck every force may be part of an impulse: what the contact carried
-    before stays. Of a contact that moves only part of a rise counts. Relaxation has set the forces
-    from which the next step is to start.
+    In an island that was struck and solved as one every force may be part of an impulse: what the
+    contact carried before stays. Relaxation has set the forces from which the next step is to
+    start.
     """
     if c.state == OPEN:
         c.memory_normal = c.memory_shear = 0.0
         c.start_normal = c.start_shear = 0.0
         return
-    if c.kind == MOVING:
-        rise = c.normal - c.memory_normal
-        c.memory_normal += rise if rise < 0.0 else STEADY_RATE * rise
-        lasting = c.memory_normal / c.normal if c.normal > 0.0 else 1.0
-        c.memory_shear = lasting * c.shear
-    elif not struck:
+    if c.kind == MOVING or not struck:
         elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
         c.memory_normal += elastic * (c.normal - c.memory_normal)
         c.memory_shear += elastic * (c.shear - c.memory_shear)

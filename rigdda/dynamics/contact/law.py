@@ -34,11 +34,9 @@ import math
 from rigdda.dynamics.constants import (
     AWAKE,
     BLOW_SPEED,
-    GREATEST_LOAD,
     IMPACT,
     IMPACT_STEPS,
     IMPACT_STIFFNESS,
-    MOVING,
     NEW,
     OPEN,
     PLAIN,
@@ -48,8 +46,6 @@ from rigdda.dynamics.constants import (
     SHOCK,
     START_STIFFNESS,
     STICK,
-    STIFFNESS_CHANGE,
-    UNLOADED,
 )
 from rigdda.dynamics.contact.approach import (
     effective_mass,
@@ -71,19 +67,10 @@ def carried_weight(mass_a: float, mass_b: float, p: Parameters) -> float:
 def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
     """Return k_n [N/m] for the wanted penetration under the load that a contact carries.
 
-    At least for `weight` [N]. It grows with the load unless that comes from pushing out
-    penetration, which in a wedged block would go on for ever. It falls only when most of the load
-    has gone: stiffness that fell with the load would feed the sway of a stack.
+    At least for `weight` [N]. It never falls: stiffness that fell with the load would feed the sway
+    of a stack.
     """
-    least = weight / p.penetration
-    before, load = c.stiffness, c.memory_normal
-    if c.kind == MOVING:
-        load = min(load, STIFFNESS_CHANGE * before * p.penetration)
-    if load < UNLOADED * before * p.penetration:
-        return max(least, before / STIFFNESS_CHANGE)
-    if -c.gap * before > load:
-        return max(least, before)
-    return max(least, before, load / p.penetration)
+    return max(weight, c.memory_normal) / p.penetration
 
 
 @kernel
@@ -200,11 +187,7 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
     pull = pull_on(bodies, c, p)
     mass_b = b.mass if c.b >= 0 and b.status == AWAKE else 0.0
     weight = carried_weight(a.mass, mass_b, p)
-    most = GREATEST_LOAD * max(weight, p.block_weight)
-    c.memory_shear *= most / max(c.memory_normal, most)
-    c.memory_normal = min(c.memory_normal, most)
-    c.start_normal = min(c.start_normal, most)
-    c.stiffness = rest_stiffness(weight, c, p)
+    c.stiffness = max(c.stiffness, rest_stiffness(weight, c, p))
     interface = interfaces[a.surface, c.other]
     c.friction, c.restitution = interface.friction, interface.restitution
     c.lag = c.start_shear

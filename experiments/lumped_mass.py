@@ -17,8 +17,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.outcome_cost.cases import Case, cut, highway
+from experiments.outcome_cost.cost import sampled
 from experiments.outcome_cost.sample import MASS, RUN_OUT, Core, Floats, Points, Release
-from experiments.outcome_cost.study import sampled
 from experiments.script import BLUE, GREEN, GREY, Number, draw, main, say, write
 
 DT = 5e-3

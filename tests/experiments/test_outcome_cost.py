@@ -11,10 +11,12 @@ import pytest
 
 from experiments.bench import engines
 from experiments.bench.engines import PEERS
-from experiments.outcome_cost import sample, study
+from experiments.outcome_cost import gathering, sample
 from experiments.outcome_cost.cases import CASES, cut
+from experiments.outcome_cost.cost import cost, needed, sampled
 from experiments.outcome_cost.engines import CORE, LUMPED, REFERENCE, Setting, settings
 from experiments.outcome_cost.sample import ENERGY, PAST, RUN_OUT, Core, Points, Release
+from experiments.outcome_cost.study import compared
 from rigdda import Block, Scene, Terrain
 from rigdda.validation.scenes import rock
 
@@ -42,35 +44,35 @@ def test_outcomes_are_those_of_all_blocks_by_mass():
 
 def test_the_releases_that_an_answer_needs_are_those_of_scatter_and_bias():
     scatter, none = np.array([0.3, 0.1, 0.2]), np.zeros(3)
-    assert study.needed(none, none, scatter, 0.03) == pytest.approx([100.0, 0.1 / 0.009, 400 / 9])
-    biased = study.needed(np.array([0.024, 0.0, 0.04]), none, scatter, 0.03)
+    assert needed(none, none, scatter, 0.03) == pytest.approx([100.0, 0.1 / 0.009, 400 / 9])
+    biased = needed(np.array([0.024, 0.0, 0.04]), none, scatter, 0.03)
     assert biased[0] == pytest.approx(0.09 / (0.03**2 - 0.024**2)) and biased[2] == math.inf
-    noisy = study.needed(np.array([0.024, 0.0, 0.0]), np.full(3, 0.024), scatter, 0.03)
+    noisy = needed(np.array([0.024, 0.0, 0.0]), np.full(3, 0.024), scatter, 0.03)
     assert noisy[0] == pytest.approx(100.0)  # what is within its error counts as none
 
 
 def test_a_cost_is_told_only_where_the_bias_is_known_to_the_level():
-    reference, few = (study.sampled(releases(0.3, n, n)) for n in (1500, 40))
-    unknown = study.cost(few, reference, 0.03)
+    reference, few = (sampled(releases(0.3, n, n)) for n in (1500, 40))
+    unknown = cost(few, reference, 0.03)
     assert not unknown.known and 0.0 < unknown.resampled[0] < math.inf
-    found = study.cost(study.sampled(releases(0.3, 1500, 1), 1), reference, 0.1)
+    found = cost(sampled(releases(0.3, 1500, 1), 1), reference, 0.1)
     low, high = found.ends()
     assert low <= found.value <= high
     assert found.value == pytest.approx(0.5 * 0.7 / 3 / 0.1**2, rel=0.3)
-    off = study.sampled(releases(0.5, 300, 2), 1)
-    assert study.cost(off, reference, 0.1).value == math.inf and study.surely_biased(off, reference)
+    off = sampled(releases(0.5, 300, 2), 1)
+    assert cost(off, reference, 0.1).value == math.inf and gathering.surely_biased(off, reference)
 
 
 def test_a_peer_of_unknown_bias_counts_as_if_it_had_none():
     ours, peer = Setting(CORE, 1e-2), Setting("MuJoCo", 1e-2)
-    samples = {REFERENCE: study.sampled(releases(0.3, 1500)),
-               ours: study.sampled(releases(0.3, 1500, 1), 1),
-               peer: study.sampled(releases(0.3, 40, 2), 2)}  # fmt: skip
-    row = study.compared(samples, 0.05)
+    samples = {REFERENCE: sampled(releases(0.3, 1500)),
+               ours: sampled(releases(0.3, 1500, 1), 1),
+               peer: sampled(releases(0.3, 40, 2), 2)}  # fmt: skip
+    row = compared(samples, 0.05)
     assert row["told"] == "its least cost" and 0.0 < row["ratio"] < math.inf
     assert row["low"] <= row["ratio"] <= row["high"]
-    samples[peer] = study.sampled(releases(0.5, 300, 2), 2)
-    assert study.compared(samples, 0.05)["ratio"] == 0.0
+    samples[peer] = sampled(releases(0.5, 300, 2), 2)
+    assert compared(samples, 0.05)["ratio"] == 0.0
 
 
 @pytest.mark.parametrize(("adapter", "package"), PEERS.items())
@@ -102,10 +104,10 @@ def test_this_core_and_points_compute_releases(name):
 
 
 def test_a_study_goes_on_where_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "settings", lambda name: settings(name)[:2])
-    first = study.gather("tschamut", 6, tmp_path)
-    monkeypatch.setattr(study, "compute", None)  # nothing is computed again
-    again = study.gather("tschamut", 6, tmp_path)
+    monkeypatch.setattr(gathering, "settings", lambda name: settings(name)[:2])
+    first = gathering.gather("tschamut", 6, tmp_path)
+    monkeypatch.setattr(gathering, "compute", None)  # nothing is computed again
+    again = gathering.gather("tschamut", 6, tmp_path)
     assert list(first) == list(again) and first[REFERENCE].releases == 6
     assert all(np.array_equal(first[s].means, again[s].means) for s in first)
 

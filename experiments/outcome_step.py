@@ -17,7 +17,8 @@ from msgspec.structs import replace
 from experiments.script import BLUE, RED, Number, draw, interval, main, say, write
 from rigdda import Settings, Site, Surface
 from rigdda.model.joints import JointSet
-from rigdda.model.place import BarrierZone, Motion, Road, Slope
+from rigdda.model.place import BarrierZone, Motion, Road
+from rigdda.model.slope import Slope
 from rigdda.model.source import Source
 from rigdda.release import release_many
 

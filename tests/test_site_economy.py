@@ -19,7 +19,7 @@ from rigdda import (
     Site,
     Wall,
 )
-from rigdda.model.place import Stretch
+from rigdda.model.slope import Stretch
 
 QUICK = Site.load("quick")
 PRICES = QUICK.prices

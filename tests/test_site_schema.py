@@ -22,7 +22,9 @@ from rigdda import (
     sites,
 )
 from rigdda.model import boulders
-from rigdda.model.place import Interface, Motion, Slope, Stretch
+from rigdda.model.place import Motion
+from rigdda.model.slope import Slope, Stretch
+from rigdda.model.surface import Interface
 
 QUICK = Site.load("quick")
 VERGE = Site.load("verge")

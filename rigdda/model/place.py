@@ -1,92 +1,11 @@
-"""Tables of a site: slope, road, where barriers may stand, how releases move and vary."""
+"""Tables of a site: road, where barriers may stand, how releases move and vary."""
 
 from __future__ import annotations
-
-from itertools import pairwise
 
 import msgspec
 
 from rigdda import check
-from rigdda.errors import BadInput
 from rigdda.model.settings import USUAL_DT
-from rigdda.model.source import Point
-from rigdda.model.surface import Surface
-
-
-class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A stretch of the slope with a surface of its own.
-
-    Parameters
-    ----------
-    start : float
-        Chainage where it begins [m].
-    end : float
-        Chainage where it ends [m].
-    surface : str
-        Name of its surface.
-    """
-
-    start: float
-    end: float
-    surface: str
-
-
-class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The ground.
-
-    Parameters
-    ----------
-    points : sequence of (x, y)
-        Corners from the crest down to at least 30 m beyond the road, x growing downhill [m]. There
-        may be overhangs, as the base of a toppling slope has; earthworks and bands need ground
-        without.
-    toe : float
-        Chainage where the slope ends [m].
-    surface : str
-        Name of the surface of all that `surfaces` leaves out.
-    surfaces : tables
-        Stretches with surfaces of their own.
-
-    Raises
-    ------
-    BadInput
-        If a stretch ends before it starts, or two overlap.
-    """
-
-    points: tuple[Point, ...]
-    toe: float
-    surface: str = "rock"
-    surfaces: tuple[Stretch, ...] = ()
-
-    def __post_init__(self) -> None:
-        points = check.points("slope.points", self.points, 2)
-        msgspec.structs.force_setattr(self, "points", tuple(map(tuple, points.tolist())))
-        last = -check.LARGEST
-        for i, stretch in enumerate(self.surfaces):
-            where = f"slope.surfaces[{i}]"
-            check.number(f"{where}.start", stretch.start, last)
-            last = check.number(f"{where}.end", stretch.end, stretch.start, open_low=True)
-
-    def surface_at(self, x: float) -> str:
-        """Return the name of the surface at a chainage."""
-        found = (s.surface for s in self.surfaces if s.start <= x < s.end)
-        return next(found, self.surface)
-
-    def chain(self) -> tuple[tuple[Point, ...], tuple[str, ...]]:
-        """Return the corners with those where a surface changes, and the surface of each segment.
-
-        A vertical face has the surface of what is just beyond it.
-        """
-        cuts = {x for stretch in self.surfaces for x in (stretch.start, stretch.end)}
-        points, names = [self.points[0]], []
-        for (ax, ay), (bx, by) in pairwise(self.points):
-            inner = sorted((x for x in cuts if min(ax, bx) < x < max(ax, bx)), reverse=bx < ax)
-            for x in inner:
-                points.append((x, ay + (by - ay) * (x - ax) / (bx - ax)))
-            points.append((bx, by))
-            ends = [ax, *inner, bx]
-            names += [self.surface_at(0.5 * (a + b)) for a, b in pairwise(ends)]
-        return tuple(points), tuple(names)
 
 
 class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -151,39 +70,6 @@ class BarrierZone(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             check.number(f"barrier_zone.{name}", getattr(self, name), low, 100.0, open_low=True)
         for name, low in (("max_thickness", self.min_thickness), ("max_width", self.min_width)):
             check.number(f"barrier_zone.{name}", getattr(self, name), low, 100.0)
-
-
-class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How two surfaces meet, instead of what follows from each.
-
-    Without one, rock on the ground meets the ground's surface, and otherwise the smaller of each
-    property counts.
-
-    Parameters
-    ----------
-    first : str
-        Name of the one surface.
-    second : str
-        Name of the other.
-    friction_deg : float
-        Coulomb friction angle [deg].
-    cohesion, tension : float
-        Strength of a joint that is closed at the start [Pa].
-    restitution : float
-        Coefficient of restitution [-].
-    """
-
-    first: str
-    second: str
-    friction_deg: float = 30.0
-    cohesion: float = 0.0
-    tension: float = 0.0
-    restitution: float | None = 0.0
-
-    @property
-    def surface(self) -> Surface:
-        """Its properties."""
-        return Surface(self.friction_deg, self.cohesion, self.tension, self.restitution)
 
 
 class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -266,17 +152,3 @@ class Scatter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         check.number("scatter.friction_deg", self.friction_deg, 0.0, 10.0)
-
-
-def check_surface(where: str, surface: Surface) -> None:
-    """Check that the friction of a surface can be meant.
-
-    Raises
-    ------
-    BadInput
-        If it looks like a tangent or an angle in radians.
-    """
-    angle = surface.friction_deg
-    if 0.0 < angle < 1.0:
-        mend = f"give degrees, such as 30: {angle:g} looks like a tangent or radians"
-        raise BadInput(f"{where}.friction_deg", angle, mend)

@@ -21,21 +21,13 @@ from rigdda.geometry import polygon_properties
 from rigdda.model import economy, realisation
 from rigdda.model.economy import Bill, Consequences, Prices
 from rigdda.model.events import Drawn, Event
-from rigdda.model.place import (
-    BarrierZone,
-    Interface,
-    Motion,
-    Rebound,
-    Road,
-    Scatter,
-    Slope,
-    Stretch,
-)
+from rigdda.model.place import BarrierZone, Motion, Rebound, Road, Scatter
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
+from rigdda.model.slope import Slope, Stretch
 from rigdda.model.soundness import check_site
 from rigdda.model.source import Point, Source
-from rigdda.model.surface import Surface
+from rigdda.model.surface import Interface, Surface
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from rigdda import check
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
 from rigdda.model import boulders
-from rigdda.model.place import check_surface
 from rigdda.model.settings import Settings
 from rigdda.model.source import NEAR, Point, Source
+from rigdda.model.surface import check_surface
 
 if TYPE_CHECKING:
     from rigdda.model.site import Site

@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from rigdda import check
+from rigdda.errors import BadInput
 
 
 class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -50,3 +51,50 @@ def smaller(a: Surface, b: Surface) -> Surface:
         if a.restitution is None or b.restitution is None
         else min(a.restitution, b.restitution),
     )
+
+
+class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How two surfaces meet, instead of what follows from each.
+
+    Without one, rock on the ground meets the ground's surface, and otherwise the smaller of each
+    property counts.
+
+    Parameters
+    ----------
+    first : str
+        Name of the one surface.
+    second : str
+        Name of the other.
+    friction_deg : float
+        Coulomb friction angle [deg].
+    cohesion, tension : float
+        Strength of a joint that is closed at the start [Pa].
+    restitution : float
+        Coefficient of restitution [-].
+    """
+
+    first: str
+    second: str
+    friction_deg: float = 30.0
+    cohesion: float = 0.0
+    tension: float = 0.0
+    restitution: float | None = 0.0
+
+    @property
+    def surface(self) -> Surface:
+        """Its properties."""
+        return Surface(self.friction_deg, self.cohesion, self.tension, self.restitution)
+
+
+def check_surface(where: str, surface: Surface) -> None:
+    """Check that the friction of a surface can be meant.
+
+    Raises
+    ------
+    BadInput
+        If it looks like a tangent or an angle in radians.
+    """
+    angle = surface.friction_deg
+    if 0.0 < angle < 1.0:
+        mend = f"give degrees, such as 30: {angle:g} looks like a tangent or radians"
+        raise BadInput(f"{where}.friction_deg", angle, mend)

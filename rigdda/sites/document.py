@@ -18,19 +18,11 @@ from rigdda.files import atomic
 from rigdda.model.economy import Consequences, Prices
 from rigdda.model.events import Event
 from rigdda.model.joints import JointSet
-from rigdda.model.place import (
-    BarrierZone,
-    Interface,
-    Motion,
-    Rebound,
-    Road,
-    Scatter,
-    Slope,
-    Stretch,
-)
+from rigdda.model.place import BarrierZone, Motion, Rebound, Road, Scatter
 from rigdda.model.site import Site
+from rigdda.model.slope import Slope, Stretch
 from rigdda.model.source import Source
-from rigdda.model.surface import Surface
+from rigdda.model.surface import Interface, Surface
 
 PATH = Path(__file__).parents[2] / "docs" / "site.md"
 

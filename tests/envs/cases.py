@@ -13,7 +13,8 @@ from rigdda import (
     Source,
     Surface,
 )
-from rigdda.model.place import BarrierZone, Motion, Road, Slope, Stretch
+from rigdda.model.place import BarrierZone, Motion, Road
+from rigdda.model.slope import Slope, Stretch
 
 FREE = Prices(
     fence_base=0.0,

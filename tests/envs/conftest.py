@@ -6,7 +6,8 @@ import pytest
 
 from rigdda import Site, Surface
 from rigdda.model.joints import JointSet
-from rigdda.model.place import BarrierZone, Motion, Road, Slope
+from rigdda.model.place import BarrierZone, Motion, Road
+from rigdda.model.slope import Slope
 from rigdda.model.source import Source
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,91 +13,33 @@ import numpy as np
 import tomli_w
 
 from rigdda import sites
-from rigdda.barriers import Barrier, Built, Mesh, MeshOption, as_layout
+from rigdda.barriers import Barrier, Built, as_layout
 from rigdda.errors import BadInput
 from rigdda.files import atomic, read
 from rigdda.geometry import polygon_properties
 from rigdda.model import economy, realisation
-from rigdda.model.economy import Bill, Consequences, Prices
+from rigdda.model.economy import Bill
 from rigdda.model.events import Drawn, Event
-from rigdda.model.place import BarrierZone, Motion, Rebound, Road, Scatter
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
-from rigdda.model.slope import Slope, Stretch
+from rigdda.model.site_tables import SiteTables
 from rigdda.model.soundness import check_site
-from rigdda.model.source import Point, Source
-from rigdda.model.surface import Interface, Surface
-from rigdda.model.terrain import Terrain
+from rigdda.model.surface import Surface
 
 if TYPE_CHECKING:
     from rigdda.results.outcome import Outcome
 
-STEEP_SIDES, FLAT_SIDE = {"rock": 0.25}, 0.67
-"""Side slope of a ditch, run over rise [-], by the surface that it is cut in: 4:1 stands in rock;
-all else is taken for soil."""
 
+class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What an engineer knows about a site: the tables of its file, sound together.
 
-class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A slope, its loose rock and how often it falls, the road below, and what protection costs.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    description : str
-        What it is, and what of it is assumed.
-    family : str
-        Family of sites that it belongs to; "paper" for scenes of publications.
-    slope : table
-        The ground.
-    sources : tables
-        Where rock starts.
-    events : tables
-        What comes down and how often. By default each source that is no band, once a year.
-    road : table
-        The road.
-    barrier_zone : table
-        Where barriers may stand.
-    surfaces : tables
-        The surfaces, by name: friction_deg, cohesion, tension, restitution. "soil" is that of
-        embankments, "concrete" that of walls and fences, "rock" where they are missing.
-    interfaces : tables
-        How two surfaces meet.
-    prices : table
-        What barriers cost.
-    consequences : table
-        What rock on the road costs.
-    meshes : tables
-        Mesh that may be hung over the face.
-    motion : table
-        How releases are computed.
-    scatter : table
-        What varies at random.
-    lumped : tables
-        How points of the lumped-mass model rebound, by the name of the surface.
+    Its parameters are those of `SiteTables`.
 
     Raises
     ------
     BadInput
         If a field is unknown, of the wrong type or at odds with another; the message names it.
     """
-
-    name: str
-    description: str
-    family: str = ""
-    slope: Slope
-    sources: tuple[Source, ...]
-    events: tuple[Event, ...] = ()
-    road: Road
-    barrier_zone: BarrierZone
-    surfaces: dict[str, Surface]
-    interfaces: tuple[Interface, ...] = ()
-    prices: Prices = msgspec.field(default_factory=Prices)
-    consequences: Consequences = Consequences()
-    meshes: tuple[MeshOption, ...] = ()
-    motion: Motion = Motion()
-    scatter: Scatter = Scatter()
-    lumped: dict[str, Rebound] = {}
 
     def __post_init__(self) -> None:
         if not self.events:
@@ -150,50 +91,6 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
                 del table[name]
         with atomic(path) as part:
             part.write_text(tomli_w.dumps(data), encoding="utf-8")
-
-    @property
-    def profile(self) -> Terrain:
-        """The ground as a terrain, with a corner wherever its surface changes."""
-        return _ground(self.slope.points, self.slope.surface, self.slope.surfaces)
-
-    @property
-    def event_names(self) -> tuple[str, ...]:
-        """Names of the events."""
-        return tuple(event.name for event in self.events)
-
-    def event(self, name: str) -> Event:
-        """Return an event by its name.
-
-        Raises
-        ------
-        BadInput
-            If there is none.
-        """
-        return self.events[self.index(name)]
-
-    def index(self, name: str) -> int:
-        """Return the place of an event among the events. Raises as `event` does."""
-        names = self.event_names
-        if not isinstance(name, str) or name not in names:
-            raise BadInput("event", name, "choose one of " + ", ".join(names))
-        return names.index(name)
-
-    def source(self, name: str) -> Source:
-        """Return a source by its name.
-
-        Raises
-        ------
-        BadInput
-            If there is none.
-        """
-        for source in self.sources:
-            if source.name == name:
-                return source
-        raise BadInput("source", name, "choose one of " + ", ".join(s.name for s in self.sources))
-
-    def events_of(self, source: Source) -> list[Event]:
-        """Return the events that come from a source."""
-        return [event for event in self.events if event.source == source.name]
 
     def pick(self, seed: int) -> str:
         """Return the name of the event that a seed draws by rate."""
@@ -261,37 +158,10 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         """Return the surfaces and how pairs meet, with all friction angles shifted [deg]."""
         return realisation.strength(self, shift)
 
-    @property
-    def soil(self) -> str:
-        """Name of the surface of embankments."""
-        usual = "concrete" if "concrete" in self.surfaces else "rock"
-        return "soil" if "soil" in self.surfaces else usual
-
-    def ditch_side(self, x: float, width: float) -> float:
-        """Return the side slope of a ditch [-], the flattest of the ground that it is cut in."""
-        points, names = self.slope.chain()
-        ends = zip(points, points[1:], names, strict=False)
-        spanned = {name for (a, _), (b, _), name in ends if a < x + width and b > x}
-        return max((STEEP_SIDES.get(name, FLAT_SIDE) for name in spanned), default=FLAT_SIDE)
-
     def access(self, x: float) -> float:
         """Return the factor on prices at a chainage: dearer the higher above the road [-]."""
         rise = self.profile.height(x) - self.profile.height(self.road.start)
         return 1.0 + self.prices.access * max(rise, 0.0) / economy.ACCESS_HEIGHT
-
-    def mesh(self, mesh: Mesh) -> MeshOption:
-        """Return the option that a mesh is.
-
-        Raises
-        ------
-        BadInput
-            If the site has no such option.
-        """
-        for option in self.meshes:
-            if option.name == mesh.option:
-                return option
-        known = ", ".join(option.name for option in self.meshes) or "none: this site has no mesh"
-        raise BadInput("mesh option", mesh.option, f"choose one of {known}")
 
     def rate(self, event: str, layout: Sequence[Barrier] = ()) -> float:
         """Return how often an event happens with the mesh of a layout [1/year per metre of slope].
@@ -332,9 +202,3 @@ class Site(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         A reference: nothing reaches the road below it.
         """
         return self.prices.shed * self.prices.annual("shed")
-
-
-@lru_cache(maxsize=256)
-def _ground(points: tuple[Point, ...], surface: str, stretches: tuple[Stretch, ...]) -> Terrain:
-    """Return the terrain of a slope; it is asked for several times in every episode."""
-    return Terrain(*Slope(points, 0.0, surface, stretches).chain())

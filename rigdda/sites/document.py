@@ -19,7 +19,7 @@ from rigdda.model.economy import Consequences, Prices
 from rigdda.model.events import Event
 from rigdda.model.joints import JointSet
 from rigdda.model.place import BarrierZone, Motion, Rebound, Road, Scatter
-from rigdda.model.site import Site
+from rigdda.model.site_tables import SiteTables
 from rigdda.model.slope import Slope, Stretch
 from rigdda.model.source import Source
 from rigdda.model.surface import Interface, Surface
@@ -27,7 +27,7 @@ from rigdda.model.surface import Interface, Surface
 PATH = Path(__file__).parents[2] / "docs" / "site.md"
 
 TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
-    ("Top of the file", Site),
+    ("Top of the file", SiteTables),
     ("`[slope]`", Slope),
     ("`[[slope.surfaces]]`", Stretch),
     ("`[[sources]]`", Source),

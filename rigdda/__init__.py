@@ -29,7 +29,8 @@ from rigdda.model.supports import Bolt, FixedPoint
 from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
 from rigdda.release import release, release_many, release_outcome
-from rigdda.results.outcome import BarrierOutcome, Outcome
+from rigdda.results.barrier_outcome import BarrierOutcome
+from rigdda.results.outcome import Outcome
 
 __version__ = "0.1.0"
 

@@ -17,8 +17,8 @@ import shapely
 from rerun.chunk import RrdReader
 
 from rigdda.barriers import Built, Embankment, Fence, GravityWall, Wall
-from rigdda.dynamics.gauges import FAILED
-from rigdda.dynamics.run import CROSSING, EVENT, HIT, Run
+from rigdda.dynamics.gauges import CROSSING, FAILED, HIT
+from rigdda.dynamics.run import EVENT, Run
 from rigdda.errors import BadInput, Error
 from rigdda.model.block import Block
 from rigdda.model.scene import Scene

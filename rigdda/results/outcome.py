@@ -8,86 +8,23 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from operator import and_
-from typing import NamedTuple
 
 import numpy as np
 
 from rigdda.barriers import Barrier
-from rigdda.dynamics.gauges import CROSSING, FAILED, HIT
 from rigdda.dynamics.run import Run
 from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Scene
 from rigdda.model.site import Site
-from rigdda.results.states import STANDS, states
+from rigdda.results.barrier_outcome import BarrierOutcome, holding, measure_barrier
+from rigdda.results.log import log_of
+from rigdda.results.states import states
 
 GRAIN = 2.0**40
 """Fractions are whole multiples of 1/GRAIN, so that they add up to 1 exactly in any order."""
 
-
-GONE = ("failed", "overturned", "pushed")
-"""States in which a barrier holds nothing."""
-
 AT_REST = 0.1
 """Speed below which a caught block is at rest [m/s], as in replays."""
-
-
-@dataclass(frozen=True, slots=True)
-class BarrierOutcome:
-    """What one barrier took in a release.
-
-    Ditches and embankments are ground: what happens on them counts as no hit, and they absorb
-    nothing here.
-
-    Parameters
-    ----------
-    hits : int
-        Hits, counted anew after 0.1 s apart.
-    max_energy, total_energy : float
-        Largest and summed energy of the hits, of translation and rotation just before the first
-        touch [J].
-    absorbed_energy : float
-        Work that contact forces of the barrier took from the blocks [J]; of a fence that of
-        impacts, and what blocks that rest against it passed on of blows on them. One that failed
-        by energy took its capacity.
-    impact_heights : tuple of float
-        Height of each hit above the ground at the barrier's uphill face at the start [m].
-    overtopped : int
-        Blocks that started uphill of the barrier and first passed it while it stood: beyond its
-        downhill face, the downhill edge of a ditch or of an embankment's crest. A gravity wall
-        counts as where it stood at the start.
-    failed : bool
-        Whether it no longer stands as it was built.
-    caught : float
-        Share of the released mass at rest at the end that it holds, or that is in the ditch.
-    state : {"stands", "failed", "slid", "overturned", "pushed"}
-        At the end. A fence failed, a gravity wall has slid if it is more than 0.1 m away from its
-        place, and is overturned if it is turned beyond the angle of its diagonal; an embankment was
-        pushed away.
-    displacement : float
-        Distance of its centroid at the end from where it was at the start [m].
-    thrust : float
-        Greatest mean over a second of the horizontal force on it, downhill [N/m]: of a fence that
-        of contacts at rest, of a ditch none.
-    resistance : float
-        Thrust that it bears [N/m], inf where none can move it, see `rigdda.Scene.resistance`.
-    left_height : float
-        Height that is left of it [m]: none of what failed, was overturned or pushed away, nor of a
-        ditch.
-    """
-
-    hits: int
-    max_energy: float
-    total_energy: float
-    absorbed_energy: float
-    impact_heights: tuple[float, ...]
-    overtopped: int
-    failed: bool
-    caught: float
-    state: str
-    displacement: float
-    thrust: float
-    resistance: float
-    left_height: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,13 +114,13 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
     """
     scene, road = run.scene, site.road
     area, weight, mass = _masses(scene)
-    log = _log(run, stations(site, scene.barriers))
+    log = log_of(run, stations(site, scene.barriers))
     at = list(zip(*run.poses[-1, :, :2].T.tolist(), strict=True))
     place = [2 if x > road.end else int(x >= road.start) for x, _ in at]
     came = [time < math.inf for time in log.passed[road.start]]
     resting = [math.hypot(vx, vy) < AT_REST for vx, vy, _ in run.velocities[-1].tolist()]
     ends = [states(run, i)[-1][1] for i in range(len(scene.barriers))]
-    reach = [_reach(run, i, state, at) for i, state in enumerate(ends)]
+    reach = [holding(run, i, state, at) for i, state in enumerate(ends)]
     held = [on == 0 and any(r[k] for r in reach) for k, on in enumerate(place)]
 
     def share(where: Iterable[bool]) -> float:
@@ -209,7 +146,7 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
         road_fraction=share(on == 1 for on in place),
         beyond_fraction=share(on == 2 for on in place),
         barriers=tuple(
-            _barrier(run, i, ends[i], log, share(map(and_, reach[i], resting)))
+            measure_barrier(run, i, ends[i], log, share(map(and_, reach[i], resting)))
             for i in range(len(scene.barriers))
         ),
     )
@@ -230,58 +167,3 @@ def _run_out(x: list[float], weight: list[float]) -> tuple[float, float, float]:
     reached = list(accumulate(weight[k] / GRAIN for k in order))
     half, most, every = (x[order[bisect_left(reached, q)]] for q in (0.5, 0.95, 1.0))
     return half, most, every
-
-
-class _Log(NamedTuple):
-    """The events of a run: what happened to each barrier, and when blocks first passed stations."""
-
-    hits: list[list[tuple[float, float]]]  # energy [J] and height [m] of each hit of a barrier
-    failure: list[float]  # when it failed, inf if it did not [s]
-    passed: dict[float, list[float]]  # by station: when each block passed it, inf if it did not [s]
-
-
-def _log(run: Run, lines: Sequence[float]) -> _Log:
-    barriers, blocks = len(run.scene.barriers), len(run.scene.blocks)
-    log = _Log(
-        [[] for _ in range(barriers)],
-        [math.inf] * barriers,
-        {line: [math.inf] * blocks for line in lines},
-    )
-    for time, kind, block, target, _, _, height, _, energy in run.events.tolist():
-        if kind == HIT:
-            log.hits[target].append((energy, height))
-        elif kind == CROSSING:
-            log.passed[lines[target]][block] = time
-        elif kind == FAILED:
-            log.failure[target] = min(time, log.failure[target])
-    return log
-
-
-def _reach(run: Run, index: int, state: str, at: Sequence[tuple[float, float]]) -> list[bool]:
-    """Return which centroids (x, y) a barrier holds at the end, as `Outcome` says."""
-    scene, barrier = run.scene, run.scene.barriers[index]
-    if state in GONE:
-        return [False] * len(at)
-    rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
-    reach = barrier.holds(run.outline(index), scene.ground, rise)
-    return [reach.includes(x, y) for x, y in at]
-
-
-def _barrier(run: Run, index: int, state: str, log: _Log, caught: float) -> BarrierOutcome:
-    barrier, hits, failure = run.scene.barriers[index], log.hits[index], log.failure[index]
-    passed = zip(run.poses[0, :, 0].tolist(), log.passed[barrier.end], strict=True)
-    return BarrierOutcome(
-        hits=len(hits),
-        max_energy=max((energy for energy, _ in hits), default=0.0),
-        total_energy=math.fsum(energy for energy, _ in hits),
-        absorbed_energy=float(run.absorbed[index]),
-        impact_heights=tuple(height for _, height in hits),
-        overtopped=sum(x < barrier.x and time < failure for x, time in passed),
-        failed=state != STANDS,
-        caught=caught,
-        state=state,
-        displacement=math.dist(*run.barrier_poses[[0, -1], index, :2].tolist()),
-        thrust=float(run.thrust[index]),
-        resistance=run.scene.resistance(index),
-        left_height=0.0 if state in GONE else barrier.left_height(float(run.absorbed[index])),
-    )

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.run import CROSSING, Run
+from rigdda.dynamics.gauges import CROSSING
+from rigdda.dynamics.run import Run
 from rigdda.geometry import polygon_properties
 from rigdda.results.frame import frame
 from rigdda.results.marks import Marks

@@ -1,0 +1,104 @@
+"""What one barrier took in a release, and what it holds in the end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigdda.dynamics.run import Run
+from rigdda.results.log import Log
+from rigdda.results.states import STANDS
+
+GONE = ("failed", "overturned", "pushed")
+"""States in which a barrier holds nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class BarrierOutcome:
+    """What one barrier took in a release.
+
+    Ditches and embankments are ground: what happens on them counts as no hit, and they absorb
+    nothing here.
+
+    Parameters
+    ----------
+    hits : int
+        Hits, counted anew after 0.1 s apart.
+    max_energy, total_energy : float
+        Largest and summed energy of the hits, of translation and rotation just before the first
+        touch [J].
+    absorbed_energy : float
+        Work that contact forces of the barrier took from the blocks [J]; of a fence that of
+        impacts, and what blocks that rest against it passed on of blows on them. One that failed
+        by energy took its capacity.
+    impact_heights : tuple of float
+        Height of each hit above the ground at the barrier's uphill face at the start [m].
+    overtopped : int
+        Blocks that started uphill of the barrier and first passed it while it stood: beyond its
+        downhill face, the downhill edge of a ditch or of an embankment's crest. A gravity wall
+        counts as where it stood at the start.
+    failed : bool
+        Whether it no longer stands as it was built.
+    caught : float
+        Share of the released mass at rest at the end that it holds, or that is in the ditch.
+    state : {"stands", "failed", "slid", "overturned", "pushed"}
+        At the end. A fence failed, a gravity wall has slid if it is more than 0.1 m away from its
+        place, and is overturned if it is turned beyond the angle of its diagonal; an embankment was
+        pushed away.
+    displacement : float
+        Distance of its centroid at the end from where it was at the start [m].
+    thrust : float
+        Greatest mean over a second of the horizontal force on it, downhill [N/m]: of a fence that
+        of contacts at rest, of a ditch none.
+    resistance : float
+        Thrust that it bears [N/m], inf where none can move it, see `rigdda.Scene.resistance`.
+    left_height : float
+        Height that is left of it [m]: none of what failed, was overturned or pushed away, nor of a
+        ditch.
+    """
+
+    hits: int
+    max_energy: float
+    total_energy: float
+    absorbed_energy: float
+    impact_heights: tuple[float, ...]
+    overtopped: int
+    failed: bool
+    caught: float
+    state: str
+    displacement: float
+    thrust: float
+    resistance: float
+    left_height: float
+
+
+def measure_barrier(run: Run, index: int, state: str, log: Log, caught: float) -> BarrierOutcome:
+    """Return the outcome of a barrier that ends in a state and caught a share of the mass."""
+    barrier, hits, failure = run.scene.barriers[index], log.hits[index], log.failure[index]
+    passed = zip(run.poses[0, :, 0].tolist(), log.passed[barrier.end], strict=True)
+    return BarrierOutcome(
+        hits=len(hits),
+        max_energy=max((energy for energy, _ in hits), default=0.0),
+        total_energy=math.fsum(energy for energy, _ in hits),
+        absorbed_energy=float(run.absorbed[index]),
+        impact_heights=tuple(height for _, height in hits),
+        overtopped=sum(x < barrier.x and time < failure for x, time in passed),
+        failed=state != STANDS,
+        caught=caught,
+        state=state,
+        displacement=math.dist(*run.barrier_poses[[0, -1], index, :2].tolist()),
+        thrust=float(run.thrust[index]),
+        resistance=run.scene.resistance(index),
+        left_height=0.0 if state in GONE else barrier.left_height(float(run.absorbed[index])),
+    )
+
+
+def holding(run: Run, index: int, state: str, at: Sequence[tuple[float, float]]) -> list[bool]:
+    """Return which centroids (x, y) a barrier holds at the end, see `rigdda.Outcome`."""
+    scene, barrier = run.scene, run.scene.barriers[index]
+    if state in GONE:
+        return [False] * len(at)
+    rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
+    reach = barrier.holds(run.outline(index), scene.ground, rise)
+    return [reach.includes(x, y) for x, y in at]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from agents.menu import Menu
 from envs import DesignProblem
 from envs.encoding import CLASSES
-from envs.rules import MIN_HEIGHT
+from envs.sizes import MIN_HEIGHT
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
 
 NEAR = 0.05

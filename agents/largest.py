@@ -8,7 +8,7 @@ import numpy as np
 
 from agents.seeds import release_seeds
 from envs import DesignProblem
-from envs.rules import SLENDER
+from envs.sizes import SLENDER
 from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, GravityWall, Layout
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.geometry import polygon_properties

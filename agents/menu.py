@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from envs import DesignProblem
 from envs.encoding import CLASSES
-from envs.rules import MIN_HEIGHT, SLENDER
+from envs.sizes import MIN_HEIGHT, SLENDER
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
 from rigdda.barriers import FENCE_CLASSES
 

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from envs.rules import MIN_GAP, MIN_HEIGHT, SLENDER, STEEPEST, TOLERANCE, Rules, Span, meet, room
+from envs.gaps import MIN_GAP, Span, meet, room
+from envs.rules import STEEPEST, Rules
+from envs.sizes import MIN_HEIGHT, SLENDER, TOLERANCE
 from rigdda import BadInput, Barrier, Ditch, Fence, GravityWall, Mesh
 
 MIN_FLOOR = 1.0

@@ -30,7 +30,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from envs.building import Room
-from envs.rules import MIN_HEIGHT, TOLERANCE, Span
+from envs.gaps import Span
+from envs.sizes import MIN_HEIGHT, TOLERANCE
 from rigdda import BadInput, Barrier, Fence, Layout, Mesh
 from rigdda.barriers import FENCE_CLASSES, Built
 from rigdda.model.place import BarrierZone

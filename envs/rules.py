@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from envs.gaps import Span, check_gaps, room
+from envs.sizes import SLENDER, TOLERANCE, limits
 from rigdda import (
     BadInput,
     Barrier,
@@ -25,7 +26,6 @@ from rigdda.barriers import MeshOption, as_layout, earthworks
 from rigdda.model.place import BarrierZone
 
 Floats = NDArray[np.float64]
-Span = tuple[float, float]
 
 STEEPEST = {"ditch": 30.0, "embankment": 25.0, "gravity_wall": 30.0, "wall": 30.0}
 """Greatest mean inclination of the ground under a barrier [deg]. On steeper ground fill slides,
@@ -34,19 +34,6 @@ and what is dug or founded there starts a fall itself. Fences stand on posts, an
 MACHINE = 3.0
 """Width of a machine that builds, empties and mends what is dug, filled or cast [m]: so much ground
 that it can stand on lies beside the works, above and below together."""
-
-MIN_HEIGHT = 0.5
-"""Least height of a barrier that is designed, and depth of a ditch [m]."""
-
-SLENDER = 0.4
-"""Least thickness over height of a gravity wall [-]: it stands by its weight, also in the wind and
-on ground that gives."""
-
-MIN_GAP = 0.5
-"""Least distance between the works of two barriers [m]."""
-
-TOLERANCE = 1e-9
-"""Rounding that is forgiven at limits: share of the limit, and of 1 [m]."""
 
 
 class Rules:
@@ -153,7 +140,7 @@ class Rules:
                 rooms.append((where, barrier, room(barrier, self.check(where, barrier))))
         if len(barriers) - len(rooms) > 1:
             raise BadInput("layout", "several meshes", "give at most one: choose another option")
-        _check_gaps(rooms)
+        check_gaps(rooms)
         return barriers
 
     def check_mesh(self, where: str, mesh: Mesh) -> None:
@@ -237,47 +224,3 @@ class Rules:
         """Return the mean inclination of the ground between two chainages [deg]."""
         high, low = self.level(np.array([start, end])).tolist()
         return math.degrees(math.atan2(abs(high - low), end - start))
-
-
-def room(barrier: Barrier, works: Span) -> Span:
-    """Return the chainages that a barrier needs: its works, and where a fence gives way to [m]."""
-    start, end = works
-    gives = barrier.elongation if isinstance(barrier, Fence) else None
-    return start, end + (gives or 0.0)
-
-
-def meet(one: Span, two: Span) -> bool:
-    """Tell whether two barriers are nearer than `MIN_GAP`."""
-    return one[0] < two[1] + MIN_GAP - TOLERANCE and two[0] < one[1] + MIN_GAP - TOLERANCE
-
-
-def _check_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> None:
-    """Check that no two barriers meet.
-
-    Parameters
-    ----------
-    rooms : sequence of (str, Barrier, (start, end))
-        What messages call each, each, and the room that it needs [m].
-
-    Raises
-    ------
-    BadInput
-        If two do.
-    """
-    ordered = sorted(rooms, key=lambda item: item[2])
-    for (_, before, one), (where, barrier, two) in pairwise(ordered):
-        if meet(one, two):
-            mend = f"put it {MIN_GAP:g} m beyond {one[1]:g}, up to where the {before.words} needs"
-            raise BadInput(f"{where}.x", barrier.x, mend)
-
-
-def limits(zone: BarrierZone, barrier: Barrier) -> dict[str, tuple[float, float]]:
-    """Return the fields of a barrier that the zone limits, with least and greatest value [m]."""
-    if isinstance(barrier, Ditch):
-        return {"depth": (0.0, zone.max_depth), "width": (zone.min_width, zone.max_width)}
-    own: dict[str, tuple[float, float]] = {"height": (0.0, zone.max_height)}
-    if isinstance(barrier, Embankment):
-        return own | {"width": (zone.min_thickness, zone.max_thickness)}
-    if isinstance(barrier, Fence):
-        return own
-    return own | {"thickness": (zone.min_thickness, zone.max_thickness)}

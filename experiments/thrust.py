@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from msgspec.structs import replace
 
 from agents.menu import HEIGHTS
-from envs.rules import SLENDER
+from envs.sizes import SLENDER
 from experiments.script import BLUE, GREEN, RED, Number, draw, main, say, write
 from rigdda import Barrier, Embankment, Fence, GravityWall, Site
 from rigdda.barriers import FENCE_CLASSES, describe

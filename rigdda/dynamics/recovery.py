@@ -23,16 +23,20 @@ from rigdda.dynamics.linear.rows import (
     product,
     write_row,
 )
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Islands, Motion, Rows
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Islands, Motion, Parameters, Rows
 from rigdda.kernel import inlined, kernel
 
 
 @inlined
-def excess_gap(c: Contact, motion: Motion, i: int, j: int) -> float:
-    """Return the gap after the step over the one that the load of a contact explains [m]."""
+def excess_gap(c: Contact, motion: Motion, i: int, j: int, p: Parameters) -> float:
+    """Return the gap after the step over the one that the load of a contact explains [m].
+
+    The stiffness follows the load in the next step, so that it explains the wanted penetration at
+    most.
+    """
     dn, _ = relative_displacement(c, motion.d, i, j)
     besides, _ = relative_displacement(c, motion.besides, i, j)
-    return c.gap + dn + besides + max(c.memory_normal, 0.0) / c.stiffness
+    return c.gap + dn + besides + min(max(c.memory_normal, 0.0) / c.stiffness, p.penetration)
 
 
 @kernel
@@ -52,8 +56,9 @@ def part_bodies(rows: Rows, count: int) -> None:
 
 @inlined
 def find_deepest(
-    contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, low: int, high: int
-) -> float:
+    contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, low: int, high: int,
+    p: Parameters,
+) -> float:  # fmt: skip
     """Set rows.height to the excess gaps of the contacts low:high; returns the deepest [m].
 
     Springs whose stiffness is given are as deep as they are to be, and what comes through a fence
@@ -67,7 +72,7 @@ def find_deepest(
         j = islands.slot[c.b] if c.pair >= 0 else -1
         rows.height[q] = math.inf
         if not is_elastic(c) and not (c.kind == IMPACT and c.bias < 0.0):
-            rows.height[q] = excess_gap(c, motion, islands.slot[c.a], j)
+            rows.height[q] = excess_gap(c, motion, islands.slot[c.a], j, p)
         deepest = max(deepest, -rows.height[q])
     return deepest if grounded else 0.0
 
@@ -98,13 +103,14 @@ def list_rows(
 
 @inlined
 def push_out(
-    bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, island: int
-) -> None:
+    bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, island: int,
+    p: Parameters,
+) -> None:  # fmt: skip
     """Add to `motion.besides` what pushes out the penetration of an island in this step."""
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     first = islands.block_start[island]
     n = islands.block_start[island + 1] - first
-    deepest = find_deepest(contacts, motion, islands, rows, low, high)
+    deepest = find_deepest(contacts, motion, islands, rows, low, high, p)
     if deepest <= 0.0:
         return
     for s in range(n + 1):

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -55,31 +54,6 @@ def number(
     return out
 
 
-def set_number(
-    record: object,
-    name: str,
-    low: float = -math.inf,
-    high: float = math.inf,
-    *,
-    open_low: bool = False,
-    field: str = "",
-) -> None:
-    """Set a field of a frozen dataclass or struct to its value as a float, see `number`.
-
-    `field` is what an error calls it, `name` by default. A whole number or one of numpy's in its
-    place would be another type to the kernels, which would be compiled again, and to files.
-    """
-    value = number(field or name, getattr(record, name), low, high, open_low=open_low)
-    _set(record, name, value)
-
-
-def _set(record: object, name: str, value: Any) -> None:
-    if isinstance(record, msgspec.Struct):
-        msgspec.structs.force_setattr(record, name, value)
-    else:
-        object.__setattr__(record, name, value)
-
-
 def boolean(field: str, value: Any) -> bool:
     """Return `value` as a bool.
 
@@ -91,30 +65,6 @@ def boolean(field: str, value: Any) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise BadInput(field, value, "give True or False")
     return bool(value)
-
-
-def set_booleans(record: object, *names: str) -> None:
-    """Set fields of a frozen dataclass, each to its value as a bool.
-
-    Raises
-    ------
-    BadInput
-        If one is neither True nor False.
-    """
-    for name in names:
-        _set(record, name, boolean(name, getattr(record, name)))
-
-
-def set_integers(what: str, record: object, *names: str) -> None:
-    """Set fields of a frozen dataclass, each to its value as a whole number of at least 0.
-
-    Raises
-    ------
-    BadInput
-        If one is not such a number.
-    """
-    for name in names:
-        _set(record, name, integer(f"{what}: {name}", getattr(record, name), 0))
 
 
 def sequence(field: str, value: Any, kind: Any, what: str) -> tuple[Any, ...]:
@@ -207,18 +157,6 @@ def vector(field: str, value: Sequence[float]) -> tuple[float, float]:
     except (TypeError, ValueError):
         raise BadInput(field, value, "give two numbers (x, y)") from None
     return number(field, x), number(field, y)
-
-
-def set_vectors(what: str, record: object, *names: str) -> None:
-    """Set fields of a frozen dataclass, each to its value as two finite numbers.
-
-    Raises
-    ------
-    BadInput
-        If one is not two finite numbers.
-    """
-    for name in names:
-        object.__setattr__(record, name, vector(f"{what}: {name}", getattr(record, name)))
 
 
 def points(field: str, value: ArrayLike, least: int) -> NDArray[np.float64]:

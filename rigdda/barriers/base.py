@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check
+from rigdda import fields
 from rigdda.geometry import polygon_properties
 
 if TYPE_CHECKING:
@@ -105,13 +105,13 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
 
     def _check(self, *lengths: str) -> None:
         """Check and set where it is and its lengths."""
-        check.set_number(self, "x", field=f"{self.words} x")
+        fields.set_number(self, "x", field=f"{self.words} x")
         for name in lengths:
             self._check_number(name, THINNEST, LARGEST)
 
     def _check_number(self, name: str, low: float, high: float = math.inf) -> None:
         """Check and set a field."""
-        check.set_number(self, name, low, high, open_low=low == 0.0, field=f"{self.words} {name}")
+        fields.set_number(self, name, low, high, open_low=low == 0.0, field=f"{self.words} {name}")
 
     @property
     def words(self) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check
+from rigdda import fields
 
 Floats = NDArray[np.float64]
 
@@ -36,8 +36,8 @@ class PointLoad:
     force: tuple[float, float]
 
     def __post_init__(self) -> None:
-        check.set_integers("point load", self, "block")
-        check.set_vectors("point load", self, "point", "force")
+        fields.set_integers("point load", self, "block")
+        fields.set_vectors("point load", self, "point", "force")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
@@ -69,8 +69,8 @@ class LineLoad:
     force_per_length: tuple[float, float]
 
     def __post_init__(self) -> None:
-        check.set_integers("line load", self, "block")
-        check.set_vectors("line load", self, "start", "end", "force_per_length")
+        fields.set_integers("line load", self, "block")
+        fields.set_vectors("line load", self, "start", "end", "force_per_length")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
@@ -100,8 +100,8 @@ class BodyForce:
     force_per_area: tuple[float, float]
 
     def __post_init__(self) -> None:
-        check.set_integers("body force", self, "block")
-        check.set_vectors("body force", self, "force_per_area")
+        fields.set_integers("body force", self, "block")
+        fields.set_vectors("body force", self, "force_per_area")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""

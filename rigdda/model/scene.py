@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check
+from rigdda import check, fields
 from rigdda.barriers import Barrier, Built, Earthwork, GravityWall, Mesh, Wall, earthworks
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
@@ -96,8 +96,8 @@ class Scene:
         if isinstance(self.gravity, Sequence | np.ndarray):
             object.__setattr__(self, "gravity", check.vector("gravity", self.gravity))
         else:
-            check.set_number(self, "gravity", 0.0)
-        check.set_number(self, "damping", 0.0)
+            fields.set_number(self, "gravity", 0.0)
+        fields.set_number(self, "damping", 0.0)
         check.one_of("damping_when", self.damping_when, ("always", "contact"))
         check_blocks(self.blocks)
         check_indices(self)

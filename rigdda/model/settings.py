@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check
+from rigdda import check, fields
 
 USUAL_DT = 5e-3
 """Step of a simulation, and of a site that does not say [s]: the outcome of a rockfall is within
@@ -100,17 +100,17 @@ class Settings:
     timing: bool = False
 
     def __post_init__(self) -> None:
-        check.set_number(self, "dt", SHORTEST_DT, LARGEST_DT)
+        fields.set_number(self, "dt", SHORTEST_DT, LARGEST_DT)
         if self.penetration is not None:
-            check.set_number(self, "penetration", 0.0, open_low=True)
-        check.set_number(self, "tolerance", 0.0, 1e-2, open_low=True)
-        check.set_number(self, "sweep_tolerance", 0.0, open_low=True)
+            fields.set_number(self, "penetration", 0.0, open_low=True)
+        fields.set_number(self, "tolerance", 0.0, 1e-2, open_low=True)
+        fields.set_number(self, "sweep_tolerance", 0.0, open_low=True)
         iterations = check.integer("open_close_iterations", self.open_close_iterations, 1)
         object.__setattr__(self, "open_close_iterations", iterations)
         check.one_of("mode", self.mode, ("dynamic", "static"))
         check.one_of("solver", self.solver, SOLVERS)
-        check.set_number(self, "relaxation", 0.0, 1.99, open_low=True)
-        check.set_booleans(self, "post_correction", "islands", "sleeping", "timing")
+        fields.set_number(self, "relaxation", 0.0, 1.99, open_low=True)
+        fields.set_booleans(self, "post_correction", "islands", "sleeping", "timing")
 
 
 def longest_step(areas: NDArray[np.float64], gravity: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rigdda import check
+from rigdda import fields
 from rigdda.errors import BadInput
 
 
@@ -30,8 +30,8 @@ class FixedPoint:
     point: tuple[float, float]
 
     def __post_init__(self) -> None:
-        check.set_integers("fixed point", self, "block")
-        check.set_vectors("fixed point", self, "point")
+        fields.set_integers("fixed point", self, "block")
+        fields.set_vectors("fixed point", self, "point")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +66,18 @@ class Bolt:
     yield_force: float | None = None
 
     def __post_init__(self) -> None:
-        check.set_integers("bolt", self, "block_a")
+        fields.set_integers("bolt", self, "block_a")
         if self.block_b is not None:
-            check.set_integers("bolt", self, "block_b")
+            fields.set_integers("bolt", self, "block_b")
             if self.block_b == self.block_a:
                 raise BadInput("bolt: block_b", self.block_b, "give another block than block_a")
-        check.set_vectors("bolt", self, "point_a", "point_b")
+        fields.set_vectors("bolt", self, "point_a", "point_b")
         if math.dist(self.point_a, self.point_b) < 1e-6:
             raise BadInput("bolt: point_b", self.point_b, "put it apart from point_a")
-        check.set_number(self, "stiffness", 0.0, open_low=True, field="bolt: stiffness")
-        check.set_number(self, "prestress", 0.0, field="bolt: prestress")
+        fields.set_number(self, "stiffness", 0.0, open_low=True, field="bolt: stiffness")
+        fields.set_number(self, "prestress", 0.0, field="bolt: prestress")
         if self.yield_force is not None:
-            check.set_number(self, "yield_force", self.prestress, field="bolt: yield_force")
+            fields.set_number(self, "yield_force", self.prestress, field="bolt: yield_force")
 
 
 Support = FixedPoint | Bolt

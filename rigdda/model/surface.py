@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from rigdda import check
+from rigdda import fields
 from rigdda.errors import BadInput
 
 
@@ -34,11 +34,11 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     restitution: float | None = 0.0
 
     def __post_init__(self) -> None:
-        check.set_number(self, "friction_deg", 0.0, 89.9)
-        check.set_number(self, "cohesion", 0.0)
-        check.set_number(self, "tension", 0.0)
+        fields.set_number(self, "friction_deg", 0.0, 89.9)
+        fields.set_number(self, "cohesion", 0.0)
+        fields.set_number(self, "tension", 0.0)
         if self.restitution is not None:
-            check.set_number(self, "restitution", 0.0, 1.0)
+            fields.set_number(self, "restitution", 0.0, 1.0)
 
 
 def smaller(a: Surface, b: Surface) -> Surface:

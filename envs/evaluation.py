@@ -91,6 +91,14 @@ class Evaluation:
         volume = np.array([self.outcomes[i].road_volume for i in own])
         return self.seeds[own[int(np.argmin(np.abs(volume - volume.mean())))]], event
 
+    def gain(self, nothing: Evaluation) -> float:
+        """Return the fall of Z over Z of nothing, see `DesignProblem.reward`."""
+        if nothing.objective > 0.0:
+            return (nothing.objective - self.objective) / nothing.objective
+        if self.objective > 0.0:
+            return -1.0
+        return 1.0 - self.debris_share if nothing.debris else 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class Facts:

@@ -233,12 +233,7 @@ class DesignProblem:
 
         Of a slope from which nothing comes onto the road it is 0, and -1 of whatever is built.
         """
-        nothing = self._known.nothing
-        if nothing.objective > 0.0:
-            return (nothing.objective - evaluation.objective) / nothing.objective
-        if evaluation.objective > 0.0:
-            return -1.0
-        return 1.0 - evaluation.debris_share if nothing.debris else 0.0
+        return evaluation.gain(self._known.nothing)
 
     def _state(self, found: Evaluation) -> str | None:
         design = [event.name for event in self.site.events if event.design]

@@ -15,38 +15,27 @@ from __future__ import annotations
 import csv
 import json
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 from msgspec.structs import replace
 
 from agents.constant import CONSTANTS, constant, place
 from agents.menu import Menu
-from agents.seeds import release_seeds
 from agents.store import Store, mechanics
 from agents.verify import verify
 from envs import DesignProblem, Evaluation
+from experiments.contenders import contenders, kinds_of
 from experiments.script import BLUE, GREY, RED, Number, draw, main, say, write
-from rigdda import Barrier, Layout, Site, sites
+from rigdda import Layout, Site, sites
 from rigdda.barriers import describe, from_table, to_tables
 
 STATIONS, QUICK_STATIONS = 24, 6
 """Chainages across the zone at which singles are tried."""
 FIRST, QUICK_FIRST = 40, 8
 """Releases of a candidate, over all events, in the first round; twice as many in each later one."""
-KEPT = 0.3
-"""Share of the candidates that goes on to the next round."""
-LEFT = 16
-"""Candidates that end a race."""
-PAIR_STATIONS = 8
-"""Parts of the zone in each of which the best single of a kind is paired with others."""
-PAIRS = 240
-"""Pairs that are raced, the most promising."""
-CHUNK = 20_000
-"""Releases that are simulated together: their outcomes are kept until they are summed up."""
 WANTED, QUICK_WANTED = 0.01, 0.2
 """Half of the interval of a reference over Z of nothing that ends its verification [-]."""
 LEAST, MOST, QUICK_MOST = 1_500, 48_000, 1_000
@@ -55,118 +44,6 @@ BEST = "best"
 SINGLE = "for single blocks"
 
 Row = Mapping[str, Any]
-
-
-def kinds_of(layout: Layout) -> str:
-    """Return the kinds of a layout in words, each once."""
-    return " + ".join(sorted({barrier.words for barrier in layout})) or "nothing"
-
-
-def catalogue(menu: Menu, stations: int) -> list[Layout]:
-    """Return all singles of a problem over so many of its stations, kind by kind."""
-    own = menu.stations[:: max(1, len(menu.stations) // stations)].tolist()
-    singles: list[Barrier] = []
-    for kind in menu.problem.kinds:
-        found = menu.lone(kind)
-        ends = {b.x for b in found} - set(menu.stations.tolist())
-        singles += [b for b in found if kind == "mesh" or b.x in ends or b.x in own]
-    return [(barrier,) for barrier in singles]
-
-
-class Candidate:
-    """A layout and its mean bill by event so far."""
-
-    def __init__(self, problem: DesignProblem, layout: Layout):
-        site = problem.site
-        self.problem, self.layout, self.annual = problem, layout, site.annual(layout)
-        self.rates = {name: site.rate(name, layout) for name in site.event_names}
-        self.bills: dict[str, list[float]] = {name: [] for name in self.rates}
-
-    @property
-    def z(self) -> float:
-        """Z so far [EUR per metre of road and year]."""
-        means = ((r, self.bills[name]) for name, r in self.rates.items())
-        return self.annual + sum(r * float(np.mean(b)) for r, b in means if b)
-
-
-def look(problem: DesignProblem, field: Sequence[Candidate], n: int) -> None:
-    """Give each candidate `n` releases in all, the same for all; more than it has.
-
-    None of an event that would have no more than two: a mass takes as long as hundreds of blocks.
-    """
-    counts = {name: count for name, count in problem.allocation(n).items() if count > 2}
-    seeds = {name: release_seeds("search", 0, count) for name, count in counts.items()}
-    for low in range(0, len(field), max(1, CHUNK // n)):
-        part = field[low : low + max(1, CHUNK // n)]
-        asks = [(c.layout, {k: own[len(c.bills[k]) :] for k, own in seeds.items()}) for c in part]
-        for candidate, sample in zip(part, problem.sample_many(asks), strict=True):
-            for outcome in sample:
-                bill = problem.site.bill(candidate.layout, outcome)
-                candidate.bills[outcome.event].append(sum(bill))
-
-
-def race(problem: DesignProblem, layouts: Iterable[Layout], first: int) -> list[Candidate]:
-    """Return all candidates of a race by sequential halving, the best of the last round first."""
-    field = [Candidate(problem, layout) for layout in dict.fromkeys(layouts)]
-    alive, n = field, first
-    out: list[Candidate] = []
-    while True:
-        look(problem, alive, n)
-        alive = sorted(alive, key=lambda c: c.z)
-        if len(alive) <= LEFT:
-            return alive + out[::-1]
-        kept = max(LEFT, int(KEPT * len(alive)))
-        out += alive[kept:][::-1]
-        alive, n = alive[:kept], 2 * n
-
-
-def pairs(problem: DesignProblem, singles: Sequence[Candidate]) -> list[Layout]:
-    """Return the most promising pairs: of what one lets past, the other lets past its share."""
-    nothing = Candidate(problem, ())
-    look(problem, [nothing], max(sum(map(len, c.bills.values())) for c in singles))
-    zone, best = problem.zone, dict[tuple[str, int], Candidate]()
-    for c in sorted(singles, key=lambda c: c.z):
-        part = int(PAIR_STATIONS * (c.layout[0].x - zone.start) / (zone.end - zone.start))
-        best.setdefault((c.layout[0].kind, part), c)
-    found: dict[Layout, float] = {}
-    for one in best.values():
-        for two in best.values():
-            both = tuple(sorted((*one.layout, *two.layout), key=lambda b: b.x))
-            if one is two or both in found or not problem.fits(both):
-                continue
-            value = one.annual + two.annual
-            for name in nothing.rates:
-                bills = nothing.bills[name], one.bills[name], two.bills[name]
-                if all(bills) and any(bills[0]):
-                    base, first, second = (float(np.mean(b)) for b in bills)
-                    value += problem.site.rate(name, both) * first * second / base
-            found[both] = value
-    return sorted(found, key=lambda layout: found[layout])[:PAIRS]
-
-
-def contenders(problem: DesignProblem, stations: int, first: int) -> list[Layout]:
-    """Return the best layouts of every combination of kinds, two each."""
-    menu = Menu(problem)
-    singles = race(problem, [(), *catalogue(menu, stations)], first)
-    built = [c for c in singles if c.layout]
-    double = race(problem, pairs(problem, built), first)
-    near: list[Layout] = []
-    length = problem.zone.end - problem.zone.start
-    for centre in [*singles[:3], *double[:3]]:
-        for step, level in ((length / 40.0, 1), (length / 80.0, 1)):
-            near += menu.neighbours(centre.layout, step, level)
-    last = race(problem, [*near, *(c.layout for c in [*singles[:LEFT], *double[:LEFT]])], 4 * first)
-    return best_by_kind([*last, *double, *singles])
-
-
-def best_by_kind(candidates: Iterable[Candidate]) -> list[Layout]:
-    """Return the first two layouts of every combination of kinds."""
-    kept: dict[str, list[Layout]] = {}
-    for candidate in candidates:
-        own = kept.setdefault(kinds_of(candidate.layout), [])
-        if len(own) < 2 and candidate.layout not in own:
-            own.append(candidate.layout)
-    return [layout for group in kept.values() for layout in group]
 
 
 def of_single_blocks(site: Site) -> Site:

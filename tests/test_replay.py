@@ -17,7 +17,7 @@ import shapely
 from rerun.chunk import RrdReader
 
 from rigdda.barriers import Built, Embankment, Fence, GravityWall, Wall
-from rigdda.dynamics.gauges import CROSSING, FAILED, HIT
+from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.dynamics.run import EVENT, Run
 from rigdda.errors import BadInput, Error
 from rigdda.model.block import Block

@@ -80,7 +80,7 @@ def add_contact(c: Contact, s: Solid) -> None:
     """Add a closed contact: N = k_n (-gap - d_n) and, while it sticks, S = S_0 - k_n d_s."""
     i, j, stiffness = c.a, c.b, c.stiffness
     stick = c.state == STICK
-    normal, shear = -stiffness * c.gap, c.memory_shear if stick else c.lag
+    normal, shear = -stiffness * c.gap, c.accumulated_shear if stick else c.lag
     en, es = rows(c, True)
     fn, fs = rows(c, False)
     coupled = c.pair >= 0
@@ -128,7 +128,7 @@ def forces(c: Contact, s: Solid) -> tuple[float, float]:
         if c.pair >= 0:
             dn += fn[a] * s.d[c.b, a]
             ds += fs[a] * s.d[c.b, a]
-    return -c.stiffness * (c.gap + dn), c.memory_shear - c.stiffness * ds
+    return -c.stiffness * (c.gap + dn), c.accumulated_shear - c.stiffness * ds
 
 
 @kernel

@@ -60,7 +60,7 @@ class Deformable:
         sim, a = self._sim, self._sim._arrays
         fits, swapped = advance(
             a.bodies, a.outlines, a.ground, a.interfaces, a.links, sim._now, sim._before,
-            a.system.matrix, a.work, a.gauges, a.parameters, self._counters, sim._deepest,
+            a.system.matrix, a.work, a.monitors, a.parameters, self._counters, sim._deepest,
             self._solid, n,
         )  # fmt: skip
         if not fits:

@@ -12,7 +12,7 @@ from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
 from rigdda.dynamics.correction import place_edges
 from rigdda.dynamics.detection import copy_index, detect
-from rigdda.dynamics.forces import keep_memory
+from rigdda.dynamics.forces import accumulate_forces
 from rigdda.dynamics.islands import find_islands, pair_blocks
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,
@@ -24,11 +24,11 @@ from rigdda.dynamics.records import (
     Bodies,
     Contacts,
     Floats,
-    Gauges,
     Ground,
     Interfaces,
     Links,
     Matrix,
+    Monitors,
     Outlines,
     Parameters,
     Work,
@@ -95,7 +95,7 @@ def rest_all(bodies: Bodies, velocity: Floats) -> None:
 @entry
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
-    now: Contacts, before: Contacts, m: Matrix, work: Work, gauges: Gauges, levels: NDArray,
+    now: Contacts, before: Contacts, m: Matrix, work: Work, monitors: Monitors, levels: NDArray,
     counters: NDArray, deepest: NDArray, s: Solid, steps: int,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Take steps with the contact detection of the core.
@@ -112,8 +112,8 @@ def advance(
             rest_all(bodies, s.velocity)
         copy_index(work.begin, work.first)
         count = detect(
-            bodies, outlines, ground, interfaces, links, before, now, work, gauges, start + p.dt, p,
-            counters, deepest,
+            bodies, outlines, ground, interfaces, links, before, now, work, monitors, start + p.dt,
+            p, counters, deepest,
         )  # fmt: skip
         if count < 0:
             return False, swapped
@@ -125,7 +125,7 @@ def advance(
         pairs, _ = pair_blocks(bodies, now, m, work.islands, 0, count)
         settle(bodies, outlines, now, count, s, m, n, pairs, p, counters)
         for k in range(count):
-            keep_memory(now[k], False, False)
+            accumulate_forces(now[k], False, False)
         for i in range(n):
             move_block(bodies, outlines, s, i, p.dt)
         counters[STEPS] += 1

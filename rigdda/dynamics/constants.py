@@ -37,7 +37,7 @@ TURN = 0.15
 """Turn of a lone block in contact, at its first rate, in each part of its step but the last [rad].
 Without it blocks of 0.05 m2 lose 11 % more energy in a bounce in steps of 10 ms than in 0.5 ms."""
 
-SHOCK_SPEED = 0.1
+PLASTIC_SPEED = 0.1
 """Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
 for what hits the block from the other side, and it is treated as a plastic impact."""
 
@@ -90,13 +90,13 @@ CHAIN = 8
 passes on what its contacts turn aside least of."""
 
 SAME_NORMAL = 0.7
-"""Least cosine between the normals of one vertex's contact in two steps that share memory [-]."""
+"""Least cosine between the normals of one vertex's contact in two steps, for it to be one [-]."""
 
 SAME_FACE = 0.999
 """Cosine above which two edges, or two contacts of one vertex, count as in one line [-]."""
 
 OTHER_FACE = 0.02
-"""Depth, over the slack, by which a face of the second body must be the better one [-]: parallel
+"""Depth, over the margin, by which a face of the second body must be the better one [-]: parallel
 faces do not alternate."""
 
 LATELY = 0.7
@@ -104,7 +104,7 @@ LATELY = 0.7
 are stopped and driven on step by step: the path of one that stands for a moment is not nothing.
 Without it the thrust of a row on an embankment is 53 kN in steps of 10 ms, 38 in shorter ones."""
 
-SLACK_RATIO = 5e-3
+MARGIN_RATIO = 5e-3
 """Distance over block size within which contacts are candidates even at rest [-]."""
 
 SLEEP_SPEED = 0.02
@@ -140,7 +140,7 @@ AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3
 # state of a contact
 OPEN, STICK, SLIP = 0, 1, 2
 # kind of a contact in one step
-REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN = 0, 1, 2, 3, 4, 5, 6, 7
+REST, NEW, IMPACT, PLASTIC, MOVING, PLAIN, BOLT, PIN = 0, 1, 2, 3, 4, 5, 6, 7
 # why the step loop returned
 DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE, GROUND_MOVED, ENDED = 0, 1, 2, 3, 4, 5
 # solver

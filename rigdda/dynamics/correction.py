@@ -113,8 +113,8 @@ def move_corners(bodies: Bodies, outlines: Outlines, i: int, motion: Motion, s: 
 
     What the post-correction replaces: body i expands as it turns.
     """
-    d, besides = motion.d[s], motion.besides[s]
-    u, v, r = d[0] + besides[0], d[1] + besides[1], d[2] + besides[2]
+    d, correction = motion.d[s], motion.correction[s]
+    u, v, r = d[0] + correction[0], d[1] + correction[1], d[2] + correction[2]
     body = bodies[i]
     body.radius = 0.0
     for place in range(polygons(body)):

@@ -18,18 +18,18 @@ from rigdda.dynamics.contact.links import add_link
 from rigdda.dynamics.contact.narrow_phase import collide_pair
 from rigdda.dynamics.contact.terrain_phase import collide_terrain
 from rigdda.dynamics.contact.transfer import copy_contact, recall
-from rigdda.dynamics.gauges import barrier_contact
+from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.records import (
     BROAD_PHASE,
     NARROW_PHASE,
     Bodies,
     Boxes,
     Contacts,
-    Gauges,
     Ground,
     Interfaces,
     Ints,
     Links,
+    Monitors,
     Outlines,
     Parameters,
     Polygons,
@@ -54,7 +54,7 @@ def candidate_pairs(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Paramete
 @kernel
 def keep_asleep(
     bodies: Bodies, contacts: Contacts, count: int, old: Contacts, first: Ints, a: int,
-    gauges: Gauges, time: float,
+    monitors: Monitors, time: float,
 ) -> int:  # fmt: skip
     """Keep the contacts of sleeping block a with what is still; returns the new number, or -1."""
     if count + first[a + 1] - first[a] > len(contacts):
@@ -64,9 +64,9 @@ def keep_asleep(
         if b == TERRAIN or bodies[b].status != AWAKE:
             copy_contact(contacts[count], old[m])
             count += 1
-            block, barrier = barrier_contact(gauges, a, b)
+            block, barrier = barrier_contact(monitors, a, b)
             if barrier >= 0:
-                gauges.last_touch[block, barrier] = time
+                monitors.last_touch[block, barrier] = time
     return count
 
 
@@ -90,7 +90,7 @@ def collide_block(
         count = collide_pair(bodies, outlines, contacts, count, a, boxes.partner[q], p)
     if count < 0 or count > room:
         return -1
-    recall(contacts, first, count, old, work.first, p.slack)
+    recall(contacts, first, count, old, work.first, p.margin)
     if p.bonded and start:
         bond_joints(contacts, first, count, p)
     for k in range(first, count):
@@ -109,7 +109,7 @@ def copy_index(index: Ints, to: Ints) -> None:
 @stage
 def detect(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
-    contacts: Contacts, old: Contacts, work: Work, gauges: Gauges, time: float, p: Parameters,
+    contacts: Contacts, old: Contacts, work: Work, monitors: Monitors, time: float, p: Parameters,
     counters: NDArray, deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
@@ -135,7 +135,7 @@ def detect(
                 add_link(bodies, links, q, contacts[count], p)
                 count += 1
         elif bodies[a].status == ASLEEP:
-            count = keep_asleep(bodies, contacts, count, old, work.first, a, gauges, time)
+            count = keep_asleep(bodies, contacts, count, old, work.first, a, monitors, time)
             if count < 0:
                 return -1
     work.begin[p.blocks] = count

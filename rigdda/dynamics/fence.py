@@ -25,15 +25,15 @@ from rigdda.dynamics.constants import (
     STICK,
 )
 from rigdda.dynamics.correction import set_body_coordinates
-from rigdda.dynamics.gauges import FAILED, write_event
+from rigdda.dynamics.monitors import FAILED, write_event
 from rigdda.dynamics.motion import kinetic_energy
 from rigdda.dynamics.open_close import open_close
 from rigdda.dynamics.records import (
     EVENTS,
     Bodies,
     Contacts,
-    Gauges,
     Islands,
+    Monitors,
     Outlines,
     Parameters,
     Rows,
@@ -63,7 +63,7 @@ def aim(
             c.free = max(c.un - 2.0 * along(normal_row(c, True), d[islands.slot[c.a]]) / dt, 0.0)
         c.kind = IMPACT
         c.state = STICK if c.free < SPEED_LIMIT else OPEN
-        c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+        c.accumulated_normal = c.accumulated_shear = c.start_normal = c.start_shear = 0.0
         c.bias = -dt * (share * c.free if c.free < SPEED_LIMIT else SPEED_LIMIT)
 
 
@@ -101,7 +101,7 @@ def break_through(
 @stage
 def charge_fences(
     bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
-    gauges: Gauges, time: float, p: Parameters, counters: NDArray,
+    monitors: Monitors, time: float, p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Charge the fences that an island leans on, which was settled, and break what that exceeds.
 
@@ -110,9 +110,9 @@ def charge_fences(
     broke, d = False, system.motion.d
     ways, trains = system.scratch.residual, system.scratch.direction
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
-    for fence in range(p.blocks, len(bodies) if gauges.fences > 0 else p.blocks):
-        barrier = gauges.barrier[fence]
-        target = gauges.target[barrier]
+    for fence in range(p.blocks, len(bodies) if monitors.fences > 0 else p.blocks):
+        barrier = monitors.barrier[fence]
+        target = monitors.target[barrier]
         if target.capacity == math.inf:
             continue
         if not find_ways(bodies, contacts, islands, island, fence, ways):
@@ -131,7 +131,7 @@ def charge_fences(
             if c.b != fence and kinetic_energy(bodies[c.b]) > kinetic_energy(bodies[i]):
                 i = c.b
             counters[EVENTS] = write_event(
-                gauges, counters[EVENTS], time, FAILED, bodies[i], i, barrier, c.x, c.y,
+                monitors, counters[EVENTS], time, FAILED, bodies[i], i, barrier, c.x, c.y,
                 c.y - target.ground,
             )  # fmt: skip
         target.absorbed += min(
@@ -146,10 +146,10 @@ def charge_fences(
 
 
 @stage
-def lower_fences(bodies: Bodies, outlines: Outlines, gauges: Gauges, p: Parameters) -> None:
+def lower_fences(bodies: Bodies, outlines: Outlines, monitors: Monitors, p: Parameters) -> None:
     """Lower the top of each fence by what it has lost of its height since the last step."""
-    for fence in range(p.blocks, len(bodies) if gauges.fences > 0 else p.blocks):
-        target = gauges.target[gauges.barrier[fence]]
+    for fence in range(p.blocks, len(bodies) if monitors.fences > 0 else p.blocks):
+        target = monitors.target[monitors.barrier[fence]]
         top = target.top - target.sag * target.absorbed
         if target.sag > 0.0 and outlines.local[fence, 2].y > top:
             outlines.local[fence, 2].y = outlines.local[fence, 3].y = top
@@ -158,10 +158,10 @@ def lower_fences(bodies: Bodies, outlines: Outlines, gauges: Gauges, p: Paramete
 
 @kernel
 def wake_behind(
-    bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, p: Parameters
+    bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, p: Parameters
 ) -> None:
     """Wake what sleeps against a fence that failed in this step."""
-    for k in range(count if gauges.fences > 0 else 0):
+    for k in range(count if monitors.fences > 0 else 0):
         c = contacts[k]
         if c.b < p.blocks or bodies[c.b].status != RETIRED:
             continue

@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from rigdda.dynamics.constants import ASLEEP, AWAKE, LATELY, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.forces import account_block, apply_forces, move_block
-from rigdda.dynamics.gauges import barrier_contact
+from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.motion import retire, top_speed
 from rigdda.dynamics.records import (
     Bodies,
     Body,
     Contacts,
-    Gauges,
     Ground,
     Ints,
     Islands,
     Matrix,
+    Monitors,
     Motion,
     Outlines,
     Parameters,
@@ -124,7 +124,7 @@ def steps_of_flight(
     """
     body, most = bodies[i], LONGEST_FLIGHT * p.dt
     speed = max(top_speed(body) + p.gravity * most, body.lately)
-    reach = 2.0 * (speed * p.dt + p.gravity * p.dt * p.dt + p.slack)
+    reach = 2.0 * (speed * p.dt + p.gravity * p.dt * p.dt + p.margin)
     time = time_to_bodies(bodies, i, outlines.polygon, speed, reach, most)
     if time > p.dt:
         time = time_to_ground(body, i, outlines, ground, speed, reach, time, p.gravity)
@@ -146,13 +146,15 @@ def take_off(
 
 
 @kernel
-def keep_touch(bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, time: float) -> None:
+def keep_touch(
+    bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, time: float
+) -> None:
     """Note that what sleeps against barriers still touches them."""
     for k in range(count):
         if bodies[contacts[k].a].status == ASLEEP:
-            block, barrier = barrier_contact(gauges, contacts[k].a, contacts[k].b)
+            block, barrier = barrier_contact(monitors, contacts[k].a, contacts[k].b)
             if barrier >= 0:
-                gauges.last_touch[block, barrier] = time
+                monitors.last_touch[block, barrier] = time
 
 
 @stage

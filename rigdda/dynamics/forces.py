@@ -14,20 +14,20 @@ from rigdda.dynamics.constants import (
     MOVING,
     OPEN,
     PIN,
+    PLASTIC,
+    PLASTIC_SPEED,
     REST,
-    SHOCK,
-    SHOCK_SPEED,
 )
-from rigdda.dynamics.gauges import barrier_contact
 from rigdda.dynamics.islands import root
+from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.records import (
     Bodies,
     Body,
     Contact,
     Contacts,
-    Gauges,
     Islands,
     Matrix,
+    Monitors,
     Motion,
     Parameters,
 )
@@ -36,15 +36,15 @@ from rigdda.kernel import inlined
 
 @inlined
 def add_contact_force(c: Contact, motion: Motion, i: int, of_a: bool) -> None:
-    """Add the force of a contact to slot i, in `motion.besides`, and the greatest share of impacts.
+    """Add the force of a contact to slot i, in `motion.correction`, and its share if an impact.
 
     An impact that another one forestalls counts, too: its corner stops no later.
     """
     if c.kind == IMPACT:
         motion.share[i] = max(motion.share[i], c.share)
     if c.state != OPEN:
-        add_force(motion.besides[i], c.normal, normal_row(c, of_a))
-        add_force(motion.besides[i], c.shear, shear_row(c, of_a))
+        add_force(motion.correction[i], c.normal, normal_row(c, of_a))
+        add_force(motion.correction[i], c.shear, shear_row(c, of_a))
 
 
 @inlined
@@ -67,7 +67,7 @@ def pass_on_shares(
         if c.pair < 0 or c.state == OPEN:
             continue
         lighter = min(bodies[c.a].mass, bodies[c.b].mass)
-        if c.normal * dt > SHOCK_SPEED * lighter:
+        if c.normal * dt > PLASTIC_SPEED * lighter:
             i, j = root(parent, slot[c.a]), root(parent, slot[c.b])
             first = min(i, j)
             parent[max(i, j)] = first
@@ -96,11 +96,11 @@ def apply_forces(
     assemble_blocks(bodies, m, islands, b0, b1, p)
     for s in range(b1 - b0):
         for j in range(3):
-            motion.besides[s, j] = 0.0
+            motion.correction[s, j] = 0.0
         motion.share[s] = 0.0
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
-        blow = c.kind == IMPACT or c.kind == SHOCK
+        blow = c.kind == IMPACT or c.kind == PLASTIC
         struck = struck or (blow and c.normal > 0.0)
         add_contact_force(c, motion, islands.slot[c.a], True)
         if c.pair >= 0:
@@ -112,17 +112,17 @@ def apply_forces(
         share = motion.share[s]
         late = (share - 0.5) * p.dt * p.dt if share > 0.0 else 0.0
         for j in range(3):
-            force = motion.besides[s, j]
+            force = motion.correction[s, j]
             motion.d[s, j] = (m.rhs[s, j] + force) / m.diagonal[s, j, j]
             inertia = body.inertia if j == 2 else body.mass
-            motion.besides[s, j] = motion.relaxed[s, j] if relaxed else force * late / inertia
+            motion.correction[s, j] = motion.relaxed[s, j] if relaxed else force * late / inertia
     return struck
 
 
 @inlined
 def account_block(body: Body, motion: Motion, s: int, p: Parameters, ledger: NDArray) -> None:
     """Add the work of damping, loads and supports on a block, slot s, to the ledger."""
-    d, besides = motion.d[s], motion.besides[s]
+    d, correction = motion.d[s], motion.correction[s]
     slow = body.mass * (d[0] ** 2 + d[1] ** 2) + body.inertia * d[2] ** 2
     ledger[2] -= damping_of(body, p) * slow / p.dt
     ledger[3] += body.force_x * d[0] + body.force_y * d[1]
@@ -130,29 +130,29 @@ def account_block(body: Body, motion: Motion, s: int, p: Parameters, ledger: NDA
     ledger[3] += body.mass * (p.field_x - p.gravity_x) * d[0]
     ledger[3] += body.mass * (p.field_y - p.gravity_y) * d[1]
     # an impulse that acts early or late in the step lifts or lowers the block
-    lift = p.gravity_x * besides[0] + p.gravity_y * besides[1]
+    lift = p.gravity_x * correction[0] + p.gravity_y * correction[1]
     ledger[1] -= body.mass * lift
 
 
 @inlined
 def account_contact(
-    c: Contact, d: NDArray, islands: Islands, ledger: NDArray, gauges: Gauges
+    c: Contact, d: NDArray, islands: Islands, ledger: NDArray, monitors: Monitors
 ) -> None:
     """Add the work of a closed contact to the ledger."""
     i = islands.slot[c.a]
     dn = along(normal_row(c, True), d[i])
     ds = along(shear_row(c, True), d[i])
-    block, barrier = barrier_contact(gauges, c.a, c.b)
-    if barrier >= 0 and gauges.target[barrier].capacity < math.inf:
+    block, barrier = barrier_contact(monitors, c.a, c.b)
+    if barrier >= 0 and monitors.target[barrier].capacity < math.inf:
         barrier = -1  # a fence is charged otherwise
     if barrier >= 0 and block == c.a:
-        gauges.target[barrier].absorbed -= c.normal * dn + c.shear * ds
+        monitors.target[barrier].absorbed -= c.normal * dn + c.shear * ds
     if c.pair >= 0:
         j = islands.slot[c.b]
         en = along(normal_row(c, False), d[j])
         es = along(shear_row(c, False), d[j])
         if barrier >= 0 and block != c.a:
-            gauges.target[barrier].absorbed -= c.normal * en + c.shear * es
+            monitors.target[barrier].absorbed -= c.normal * en + c.shear * es
         dn += en
         ds += es
     if c.kind == BOLT or c.kind == PIN:
@@ -165,17 +165,17 @@ def account_contact(
 @inlined
 def move_block(body: Body, motion: Motion, s: int, dt: float) -> None:
     """Move a block, slot s, by its displacement; the velocity is that of constant acceleration."""
-    d, besides = motion.d[s], motion.besides[s]
+    d, correction = motion.d[s], motion.correction[s]
     body.vx = 2.0 * d[0] / dt - body.vx
     body.vy = 2.0 * d[1] / dt - body.vy
     body.omega = 2.0 * d[2] / dt - body.omega
-    body.x += d[0] + besides[0]
-    body.y += d[1] + besides[1]
-    body.theta += d[2] + besides[2]
+    body.x += d[0] + correction[0]
+    body.y += d[1] + correction[1]
+    body.theta += d[2] + correction[2]
 
 
 @inlined
-def keep_memory(c: Contact, struck: bool, relaxed: bool) -> None:
+def accumulate_forces(c: Contact, struck: bool, relaxed: bool) -> None:
     """Carry the forces of a contact to the next step; an impulse does not last.
 
     In an island that was struck and solved as one every force may be part of an impulse: what the
@@ -183,12 +183,12 @@ def keep_memory(c: Contact, struck: bool, relaxed: bool) -> None:
     start.
     """
     if c.state == OPEN:
-        c.memory_normal = c.memory_shear = 0.0
+        c.accumulated_normal = c.accumulated_shear = 0.0
         c.start_normal = c.start_shear = 0.0
         return
     if c.kind == MOVING or not struck:
         elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
-        c.memory_normal += elastic * (c.normal - c.memory_normal)
-        c.memory_shear += elastic * (c.shear - c.memory_shear)
+        c.accumulated_normal += elastic * (c.normal - c.accumulated_normal)
+        c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)
     if not relaxed:
         c.start_normal, c.start_shear = c.normal, c.shear

@@ -15,12 +15,12 @@ from rigdda.dynamics.fence import charge_fences
 from rigdda.dynamics.forces import (
     account_block,
     account_contact,
+    accumulate_forces,
     apply_forces,
-    keep_memory,
     move_block,
 )
-from rigdda.dynamics.gauges import note_hits
 from rigdda.dynamics.lone_block import begin_part, recall_all, takes_parts
+from rigdda.dynamics.monitors import note_hits
 from rigdda.dynamics.motion import retire, top_speed
 from rigdda.dynamics.open_close import open_close
 from rigdda.dynamics.records import (
@@ -29,9 +29,9 @@ from rigdda.dynamics.records import (
     OPEN_CLOSE,
     Bodies,
     Contacts,
-    Gauges,
     Interfaces,
     Islands,
+    Monitors,
     Motion,
     Outlines,
     Parameters,
@@ -46,7 +46,7 @@ from rigdda.kernel import stage
 @stage
 def move_island(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, motion: Motion, islands: Islands,
-    island: int, gauges: Gauges, p: Parameters, ledger: NDArray,
+    island: int, monitors: Monitors, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
@@ -60,9 +60,9 @@ def move_island(
         c = contacts[islands.contact_item[item]]
         if c.state == OPEN:
             continue
-        account_contact(c, motion.d, islands, ledger, gauges)
-        if len(gauges.target) > 0:
-            press(c, gauges, p.dt)
+        account_contact(c, motion.d, islands, ledger, monitors)
+        if len(monitors.target) > 0:
+            press(c, monitors, p.dt)
         bodies[c.a].apart = 0.0
         if c.b >= 0:
             bodies[c.b].apart = 0.0
@@ -85,7 +85,7 @@ def move_island(
 @stage
 def step_island(
     bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
-    before: Contacts, system: System, work: Work, gauges: Gauges, time: float, s: int,
+    before: Contacts, system: System, work: Work, monitors: Monitors, time: float, s: int,
     p: Parameters, part: Parameters, counters: NDArray, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Settle island s, note its hits, and move its blocks, in one or in parts: see `lone_block`.
@@ -107,24 +107,24 @@ def step_island(
             in_substeps = open_close(bodies, contacts, system, islands, rows, s, now, counters)
             since = lap(counters, OPEN_CLOSE, since, p.timing)
         struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
-        if c1 > c0 and parts == 0 and takes_parts(bodies, contacts, islands, s, gauges, p):
+        if c1 > c0 and parts == 0 and takes_parts(bodies, contacts, islands, s, monitors, p):
             recall_all(contacts, islands, s, before, work.first, p)
             part.field_x, part.field_y = p.field_x, p.field_y
             parts = 1
             continue
         if c1 > c0:
             if charge_fences(
-                bodies, contacts, system, islands, rows, s, gauges, time, now, counters
+                bodies, contacts, system, islands, rows, s, monitors, time, now, counters
             ):
                 struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
-            if len(gauges.target) > 0:
+            if len(monitors.target) > 0:
                 counters[EVENTS] = note_hits(
-                    bodies, contacts, islands, c0, c1, gauges, counters[EVENTS], time
+                    bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time
                 )
         for item in range(c0, c1):
-            keep_memory(contacts[islands.contact_item[item]], struck, in_substeps)
+            accumulate_forces(contacts[islands.contact_item[item]], struck, in_substeps)
         push_out(bodies, contacts, motion, islands, rows, s, now)
-        bad = move_island(bodies, outlines, contacts, motion, islands, s, gauges, now, ledger)
+        bad = move_island(bodies, outlines, contacts, motion, islands, s, monitors, now, ledger)
         left -= now.dt
         parts += 1 if parts > 0 else 0
     lap(counters, MOTION, since, p.timing)

@@ -30,10 +30,10 @@ from rigdda.dynamics.records import (
     Bodies,
     Contact,
     Contacts,
-    Gauges,
     Interfaces,
     Ints,
     Islands,
+    Monitors,
     Motion,
     Parameters,
 )
@@ -42,7 +42,12 @@ from rigdda.kernel import inlined, kernel
 
 @kernel
 def takes_parts(
-    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, gauges: Gauges, p: Parameters
+    bodies: Bodies,
+    contacts: Contacts,
+    islands: Islands,
+    island: int,
+    monitors: Monitors,
+    p: Parameters,
 ) -> bool:
     """Return whether an island is a lone block with an impact, or that turns fast.
 
@@ -60,8 +65,8 @@ def takes_parts(
         parts = parts or c.kind == IMPACT
         if c.kind == BOLT or c.kind == PIN or c.kind == PLAIN or c.bond > 0.0:
             return False
-        if c.b >= 0 and gauges.barrier[c.b] >= 0:
-            if gauges.target[gauges.barrier[c.b]].capacity < math.inf:
+        if c.b >= 0 and monitors.barrier[c.b] >= 0:
+            if monitors.target[monitors.barrier[c.b]].capacity < math.inf:
                 return False
     return parts
 
@@ -73,14 +78,14 @@ def recall_all(
     """Let the contacts of an island be as they were before the step."""
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         k = islands.contact_item[item]
-        recall(contacts, k, k + 1, before, first, p.slack)
+        recall(contacts, k, k + 1, before, first, p.margin)
 
 
 @inlined
 def follow(bodies: Bodies, c: Contact, motion: Motion, p: Parameters) -> None:
-    """Move a contact with its block, which has moved; apart by more than the slack it is open."""
-    d, besides, a = motion.d[0], motion.besides[0], bodies[c.a]
-    u, v, turn = d[0] + besides[0], d[1] + besides[1], d[2] + besides[2]
+    """Move a contact with its block, which has moved; apart by more than the margin it is open."""
+    d, correction, a = motion.d[0], motion.correction[0], bodies[c.a]
+    u, v, turn = d[0] + correction[0], d[1] + correction[1], d[2] + correction[2]
     cos, sin = math.cos(turn), math.sin(turn)
     side = 0.0 if c.owner == 1 else c.gap  # the corner, or the point of the face that is over it
     x, y = c.x + side * c.nx - (a.x - u), c.y + side * c.ny - (a.y - v)
@@ -91,9 +96,9 @@ def follow(bodies: Bodies, c: Contact, motion: Motion, p: Parameters) -> None:
     else:
         c.nx, c.ny = cos * c.nx - sin * c.ny, sin * c.nx + cos * c.ny
         c.gap = c.nx * (x - c.x) + c.ny * (y - c.y)
-    if c.gap > p.slack or c.state == OPEN:
+    if c.gap > p.margin or c.state == OPEN:
         c.state, c.kind = OPEN, NEW
-        c.memory_normal = c.memory_shear = c.stiffness = 0.0
+        c.accumulated_normal = c.accumulated_shear = c.stiffness = 0.0
         c.start_normal = c.start_shear = c.bond = 0.0
 
 

@@ -57,7 +57,7 @@ CONTACT = _record(
     owner=np.int32,  # 1: the vertex belongs to a, 0: to b
     other=np.int32,  # surface of b
     state=np.int32,  # OPEN, STICK, SLIP
-    kind=np.int32,  # REST, NEW, IMPACT, SHOCK, MOVING, PLAIN, BOLT, PIN
+    kind=np.int32,  # REST, NEW, IMPACT, PLASTIC, MOVING, PLAIN, BOLT, PIN
     met=np.int32,  # 1 if it met a fence that breaks in this step
     pair=np.int32,  # off-diagonal block of the pair of bodies, -1: no coupling
     x=float,  # the vertex [m]
@@ -82,8 +82,8 @@ CONTACT = _record(
     bias=float,  # displacement at which the spring is free [m], see contact.law
     rebound=float,  # that of an impact as restitution asks [m]
     share=float,  # share of the step that remains when an impact acts
-    memory_normal=float,  # forces that last, carried over from the last step [N]
-    memory_shear=float,
+    accumulated_normal=float,  # forces that last, carried over from the last step [N]
+    accumulated_shear=float,
     start_normal=float,  # all of its forces, impulses included: where relaxation starts [N]
     start_shear=float,
     normal=float,  # force of this step [N], on a
@@ -194,7 +194,7 @@ PARAMETERS = _record(
     damping_in_contact_only=bool,
     block_weight=float,  # mean of the free blocks [N]
     penetration=float,
-    slack=float,
+    margin=float,
     tolerance=float,
     sweep_tolerance=float,  # [m/s]
     iterations=int,
@@ -321,7 +321,7 @@ class Motion(NamedTuple):
     """Displacements of the blocks of one island in a step, by slot."""
 
     d: Floats  # (N + 1, 3) Matrix.d itself: by forces that are constant over the step
-    besides: Floats  # (N, 3) since forces act early or late in the step; first the contact forces
+    correction: Floats  # (N, 3) position correction in a step; first the contact forces
     relaxed: Floats  # (N, 3) the same, as relaxation in substeps has found it
     share: Floats  # (N,) of the step that remains at the first impact on the block, 0 without one
 
@@ -381,7 +381,7 @@ class Work(NamedTuple):
     begin: Ints  # (M + 1,) the same in this step
 
 
-class Gauges(NamedTuple):
+class Monitors(NamedTuple):
     """What is watched during a run."""
 
     station: NDArray[np.void]  # (K,) of STATION, ascending

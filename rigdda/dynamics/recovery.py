@@ -35,8 +35,9 @@ def excess_gap(c: Contact, motion: Motion, i: int, j: int, p: Parameters) -> flo
     most.
     """
     dn, _ = relative_displacement(c, motion.d, i, j)
-    besides, _ = relative_displacement(c, motion.besides, i, j)
-    return c.gap + dn + besides + min(max(c.memory_normal, 0.0) / c.stiffness, p.penetration)
+    correction, _ = relative_displacement(c, motion.correction, i, j)
+    explained = min(max(c.accumulated_normal, 0.0) / c.stiffness, p.penetration)
+    return c.gap + dn + correction + explained
 
 
 @kernel
@@ -62,8 +63,8 @@ def find_deepest(
     """Set rows.height to the excess gaps of the contacts low:high; returns the deepest [m].
 
     Springs whose stiffness is given are as deep as they are to be, and what comes through a fence
-    as it will. A cluster in flight is left as
-    it is: to displace its blocks would change its angular momentum.
+    as it will. A cluster in flight is left as it is: to displace its blocks would change its
+    angular momentum.
     """
     deepest, grounded = 0.0, False
     for q in range(low, high):
@@ -106,7 +107,7 @@ def push_out(
     bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, island: int,
     p: Parameters,
 ) -> None:  # fmt: skip
-    """Add to `motion.besides` what pushes out the penetration of an island in this step."""
+    """Add to `motion.correction` what pushes out the penetration of an island in this step."""
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     first = islands.block_start[island]
     n = islands.block_start[island + 1] - first
@@ -125,4 +126,4 @@ def push_out(
         part_bodies(rows, count)
     for s in range(n):
         for q in range(3):
-            motion.besides[s, q] += rows.motion[s, NOW + q] * rows.scale[s, q]
+            motion.correction[s, q] += rows.motion[s, NOW + q] * rows.scale[s, q]

@@ -13,22 +13,16 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.barriers import GravityWall, from_table, to_tables
-from rigdda.dynamics.gauges import CROSSING, FAILED, HIT
+from rigdda.barriers import GravityWall
+from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.errors import BadInput
 from rigdda.files import atomic
-from rigdda.model.block import Block
-from rigdda.model.loads import BodyForce, LineLoad, PointLoad
 from rigdda.model.scene import Scene
-from rigdda.model.supports import Bolt, FixedPoint
-from rigdda.model.surface import Surface
+from rigdda.model.scene_json import scene_from_json, scene_to_json
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:
     from rigdda.results.marks import Marks
-
-LOADS = {kind.__name__: kind for kind in (PointLoad, LineLoad, BodyForce)}
-SUPPORTS = {kind.__name__: kind for kind in (FixedPoint, Bolt)}
 
 EVENT = np.dtype(
     [
@@ -196,60 +190,3 @@ class Run:
         from rigdda.results.replay import write_rerun
 
         write_rerun(self, path, marks)
-
-
-def scene_to_json(scene: Scene) -> bytes:
-    """Return a scene as JSON; numbers survive exactly."""
-    return msgspec.json.encode(
-        {
-            "terrain": scene.terrain
-            and {
-                "points": scene.terrain.points.tolist(),
-                "surfaces": scene.terrain.surfaces,
-            },
-            "blocks": [
-                {
-                    "vertices": b.vertices.tolist(),
-                    "density": b.density,
-                    "surface": b.surface,
-                    "velocity": b.velocity,
-                    "fixed": b.fixed,
-                }
-                for b in scene.blocks
-            ],
-            "surfaces": scene.surfaces,
-            "barriers": to_tables(scene.barriers),
-            "interfaces": [[*pair, surface] for pair, surface in scene.interfaces.items()],
-            "loads": [[type(load).__name__, load] for load in scene.loads],
-            "supports": [[type(support).__name__, support] for support in scene.supports],
-            "base_motion": scene.base_motion is not None and scene.base_motion.tolist(),
-            "gravity": scene.gravity,
-            "damping": scene.damping,
-            "damping_when": scene.damping_when,
-        }
-    )
-
-
-def scene_from_json(text: bytes) -> Scene:
-    """Return the scene that `scene_to_json` wrote.
-
-    Raises
-    ------
-    BadInput
-        If a value in it is not sound.
-    """
-    data = msgspec.json.decode(text)
-    terrain = data.pop("terrain")
-    return Scene(
-        terrain=terrain and Terrain(**terrain),
-        blocks=tuple(Block(**b) for b in data.pop("blocks")),
-        surfaces={name: Surface(**s) for name, s in data.pop("surfaces").items()},
-        barriers=tuple(
-            from_table(f"barriers[{i}]", table) for i, table in enumerate(data.pop("barriers"))
-        ),
-        interfaces={(a, b): Surface(**s) for a, b, s in data.pop("interfaces")},
-        loads=tuple(LOADS[name](**load) for name, load in data.pop("loads")),
-        supports=tuple(SUPPORTS[name](**support) for name, support in data.pop("supports")),
-        base_motion=data.pop("base_motion") or None,
-        **data,
-    )

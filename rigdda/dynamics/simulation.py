@@ -23,18 +23,18 @@ from rigdda.dynamics.constants import (
     EVENTS_FULL,
     FIXED,
     GROUND_MOVED,
+    MARGIN_RATIO,
     OPEN,
     PIN,
     PLAIN,
     QUIET_SPEED,
     REST,
-    SLACK_RATIO,
     SOFT,
     TERRAIN,
 )
 from rigdda.dynamics.contact.links import pull_of_bolts
 from rigdda.dynamics.frames import frame_of, no_frames, pieces
-from rigdda.dynamics.gauges import FAILED
+from rigdda.dynamics.monitors import FAILED
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.dynamics.pack.again import Template
 from rigdda.dynamics.pack.ground import pack_ground
@@ -80,7 +80,7 @@ normal points from b to a; shear is positive along the normal turned by +90 degr
 
 PHASES = ("broad phase", "narrow phase", "open-close", "motion")
 """Phases of a step: pairs of bodies that may touch; their contacts and the law of each; open-close
-iteration, solution and relaxation; islands, movement and gauges."""
+iteration, solution and relaxation; islands, movement and monitors."""
 
 STATES = np.array(["open", "stick", "slip"])
 
@@ -344,7 +344,7 @@ class Simulation:
         rest, plain = (c[c["kind"] == kind] for kind in (REST, PLAIN))
         rest, plain = (some["normal"] / some["stiffness"] for some in (rest, plain))
         typical = float(np.median(rest)) if len(rest) else 0.0
-        size = self._arrays.parameters[0].slack / SLACK_RATIO
+        size = self._arrays.parameters[0].margin / MARGIN_RATIO
         return max(typical, float(plain.max(initial=0.0))) / size
 
     def step(self, n: int = 1) -> None:
@@ -377,7 +377,7 @@ class Simulation:
                 self._before,
                 a.system,
                 a.work,
-                a.gauges,
+                a.monitors,
                 a.parameters,
                 self._counters,
                 self._ledger,
@@ -480,8 +480,8 @@ class Simulation:
         barrier_poses = np.repeat(self._barrier_start[None], len(steps), axis=0)
         barrier_poses[:, list(self.scene.bodies)] = frames[:, n:, :3]
         events = np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
-        gauges = self._arrays.gauges
-        rock, target = gauges.rock.view(np.ndarray), gauges.target.view(np.ndarray)
+        monitors = self._arrays.monitors
+        rock, target = monitors.rock.view(np.ndarray), monitors.target.view(np.ndarray)
         return Run(
             self.scene,
             steps * self.settings.dt,
@@ -497,7 +497,7 @@ class Simulation:
 
     def _drain_events(self) -> None:
         n = self._counters[EVENTS]
-        self._events.append(self._arrays.gauges.event.view(np.ndarray)[:n].copy())
+        self._events.append(self._arrays.monitors.event.view(np.ndarray)[:n].copy())
         self._counters[EVENTS] = 0
 
     def _move_ground(self) -> None:

@@ -16,13 +16,13 @@ from rigdda.dynamics.constants import (
     FRICTION_TOLERANCE,
     OPEN,
     PIN,
+    PLASTIC_SPEED,
     REST,
-    SHOCK_SPEED,
     SLIP,
     STICK,
 )
 from rigdda.dynamics.contact.joint import joint_breaks
-from rigdda.dynamics.contact.law import set_shock
+from rigdda.dynamics.contact.law import set_plastic
 from rigdda.dynamics.records import (
     Bodies,
     Contact,
@@ -39,7 +39,7 @@ def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[fl
     dn, ds = relative_displacement(c, d, i, j)
     after = 2.0 * dn / dt - c.un
     normal = c.kappa * (c.bias - dt * after)
-    shear = c.memory_shear - c.kappa * (2.0 * ds - dt * c.us)
+    shear = c.accumulated_shear - c.kappa * (2.0 * ds - dt * c.us)
     return normal, shear, after
 
 
@@ -127,8 +127,8 @@ def update_states(
         normal, shear, after = spring_forces(c, d, i, j, p.dt)
         breaks = c.bond > 0.0 and joint_breaks(contacts, islands, low, high, item)
         sinking = -after - max(c.gap, 0.0) / p.dt  # what closes a gap is not driven in
-        if c.state != OPEN and c.kind == REST and sinking > SHOCK_SPEED:
-            set_shock(bodies, c, p)
+        if c.state != OPEN and c.kind == REST and sinking > PLASTIC_SPEED:
+            set_plastic(bodies, c, p)
             changed = True
         elif next_state(c, normal, shear, coupled, breaks):
             changed = True

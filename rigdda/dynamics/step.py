@@ -20,9 +20,9 @@ from rigdda.dynamics.detection import copy_index, detect
 from rigdda.dynamics.fence import lower_fences, wake_behind
 from rigdda.dynamics.flight import fly, keep_touch, land, take_off
 from rigdda.dynamics.frames import keep_frame
-from rigdda.dynamics.gauges import is_over, note_passage
 from rigdda.dynamics.island_step import step_island
 from rigdda.dynamics.islands import find_islands
+from rigdda.dynamics.monitors import is_over, note_passage
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,
     CONTACTS,
@@ -31,10 +31,10 @@ from rigdda.dynamics.records import (
     STEPS,
     Bodies,
     Contacts,
-    Gauges,
     Ground,
     Interfaces,
     Links,
+    Monitors,
     Outlines,
     Parameters,
     Shaking,
@@ -50,7 +50,7 @@ from rigdda.kernel import entry_kernel, kernel, stage
 @stage
 def solve_and_move(
     bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts, count: int,
-    before: Contacts, system: System, work: Work, gauges: Gauges, time: float, p: Parameters,
+    before: Contacts, system: System, work: Work, monitors: Monitors, time: float, p: Parameters,
     part: Parameters, counters: NDArray, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Take the step of every island; `part` is for parts of the step of a lone block.
@@ -63,14 +63,14 @@ def solve_and_move(
     bad = -1
     for s in range(found):
         worse = step_island(
-            bodies, outlines, interfaces, contacts, before, system, work, gauges, time, s, p, part,
-            counters, ledger,
+            bodies, outlines, interfaces, contacts, before, system, work, monitors, time, s, p,
+            part, counters, ledger,
         )  # fmt: skip
         bad = max(bad, worse)
     if p.sleeping:
         since = lap(counters, MOTION, 0, p.timing)
         watch_quiet(bodies, work.islands, found, p)
-        wake_behind(bodies, contacts, count, gauges, p)
+        wake_behind(bodies, contacts, count, monitors, p)
         lap(counters, MOTION, since, p.timing)
     return bad
 
@@ -94,28 +94,28 @@ def set_out(bodies: Bodies, shaking: Shaking, since: float, time: float, p: Para
 
 @stage
 def end_step(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, work: Work, gauges: Gauges,
-    counters: NDArray, p: Parameters,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, work: Work,
+    monitors: Monitors, counters: NDArray, p: Parameters,
 ) -> int:  # fmt: skip
     """Watch what a whole step has brought; returns DONE, GROUND_MOVED or ENDED."""
     counters[STEPS] += 1
     time = counters[STEPS] * p.dt
-    counters[EVENTS] = note_passage(bodies, gauges, counters[EVENTS], time)
+    counters[EVENTS] = note_passage(bodies, monitors, counters[EVENTS], time)
     counters[EVENTS], pushed = watch_thrust(
-        bodies, contacts, count, gauges, work.islands, counters[EVENTS], counters[STEPS], time, p
+        bodies, contacts, count, monitors, work.islands, counters[EVENTS], counters[STEPS], time, p
     )
-    lower_fences(bodies, outlines, gauges, p)
+    lower_fences(bodies, outlines, monitors, p)
     if pushed:
         return GROUND_MOVED
-    return ENDED if is_over(bodies, gauges, counters, p) else DONE
+    return ENDED if is_over(bodies, monitors, counters, p) else DONE
 
 
 @entry_kernel
 def advance(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
-    shaking: Shaking, now: Contacts, before: Contacts, system: System, work: Work, gauges: Gauges,
-    parameters: NDArray[np.void], counters: NDArray, ledger: NDArray, deepest: NDArray,
-    steps: int, frames: NDArray, stride: int,
+    shaking: Shaking, now: Contacts, before: Contacts, system: System, work: Work,
+    monitors: Monitors, parameters: NDArray[np.void], counters: NDArray, ledger: NDArray,
+    deepest: NDArray, steps: int, frames: NDArray, stride: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Take up to `steps` steps, and keep a frame whenever a multiple of `stride` is left.
 
@@ -142,8 +142,8 @@ def advance(
     may_fly = len(links) == 0 and len(shaking) == 0 and not p.static and p.post_correction
     flyer, flown, flight = -1, 0, 0  # steps of a flight that are taken, and all of them
     while steps > 0 and reason == DONE:
-        room = len(gauges.event) - counters[EVENTS]
-        if room < (p.blocks + 1) * (len(gauges.station) + len(gauges.target)):
+        room = len(monitors.event) - counters[EVENTS]
+        if room < (p.blocks + 1) * (len(monitors.station) + len(monitors.target)):
             reason = EVENTS_FULL
             break
         time = (counters[STEPS] + 1) * p.dt
@@ -154,14 +154,14 @@ def advance(
         if flown < flight:
             flown += 1
             count = counters[CONTACTS]
-            keep_touch(bodies, now, count, gauges, time)
+            keep_touch(bodies, now, count, monitors, time)
             bad = fly(bodies, flyer, now, system.matrix, system.motion, work.islands, p, ledger)
             flight = flight if bodies[flyer].status == AWAKE else flown
         else:
             set_out(bodies, shaking, counters[STEPS] * p.dt, time, p)
             copy_index(work.begin, work.first)
             count = detect(
-                bodies, outlines, ground, interfaces, links, before, now, work, gauges, time, p,
+                bodies, outlines, ground, interfaces, links, before, now, work, monitors, time, p,
                 counters, deepest,
             )  # fmt: skip
             if count < 0:
@@ -171,14 +171,14 @@ def advance(
             now, before = before, now
             swapped = not swapped
             bad = solve_and_move(
-                bodies, outlines, interfaces, now, count, before, system, work, gauges, time, p,
+                bodies, outlines, interfaces, now, count, before, system, work, monitors, time, p,
                 parameters[1], counters, ledger,
             )  # fmt: skip
             ledger[4] += mend_links(bodies, outlines, links, p)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
-        press_asleep(bodies, now, count, gauges, p.dt)
-        reason = end_step(bodies, outlines, now, count, work, gauges, counters, p)
+        press_asleep(bodies, now, count, monitors, p.dt)
+        reason = end_step(bodies, outlines, now, count, work, monitors, counters, p)
         steps -= 1
         if bad >= 0:
             reason = BAD_STATE

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.constants import ASLEEP, BOLT, IMPACT, OPEN, PIN, RETIRED, SHOCK, TERRAIN
-from rigdda.dynamics.gauges import FAILED, barrier_contact, write_event
+from rigdda.dynamics.constants import ASLEEP, BOLT, IMPACT, OPEN, PIN, PLASTIC, RETIRED, TERRAIN
 from rigdda.dynamics.islands import root
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Gauges, Islands, Parameters
+from rigdda.dynamics.monitors import FAILED, barrier_contact, write_event
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Islands, Monitors, Parameters
 from rigdda.kernel import kernel, stage
 
 REST, HITS = 0, 1
@@ -25,47 +25,49 @@ REST, HITS = 0, 1
 
 
 @kernel
-def pressed(gauges: Gauges, c: Contact) -> int:
+def pressed(monitors: Monitors, c: Contact) -> int:
     """Return the barrier that a contact presses on, -1 for none."""
     if c.state == OPEN or c.kind == BOLT or c.kind == PIN:
         return -1
     if c.b != TERRAIN:
-        return barrier_contact(gauges, c.a, c.b)[1]
-    for barrier in range(len(gauges.target)):
-        if gauges.target[barrier].low <= c.x <= gauges.target[barrier].high:
+        return barrier_contact(monitors, c.a, c.b)[1]
+    for barrier in range(len(monitors.target)):
+        if monitors.target[barrier].low <= c.x <= monitors.target[barrier].high:
             return barrier
     return -1
 
 
 @kernel
-def press(c: Contact, gauges: Gauges, dt: float) -> None:
+def press(c: Contact, monitors: Monitors, dt: float) -> None:
     """Add the impulse of a contact in a time [s] to what presses on a barrier."""
-    barrier = pressed(gauges, c)
+    barrier = pressed(monitors, c)
     if barrier < 0:
         return
-    target, hit = gauges.target[barrier], c.kind == IMPACT or c.kind == SHOCK
+    target, hit = monitors.target[barrier], c.kind == IMPACT or c.kind == PLASTIC
     if hit and target.capacity < math.inf:
         return
     thrust = c.shear * c.ny - c.normal * c.nx  # on body b
-    if c.b != TERRAIN and barrier_contact(gauges, c.a, c.b)[0] != c.a:
+    if c.b != TERRAIN and barrier_contact(monitors, c.a, c.b)[0] != c.a:
         thrust = -thrust
-    gauges.push[barrier, HITS if hit else REST] += thrust * dt
+    monitors.push[barrier, HITS if hit else REST] += thrust * dt
     if thrust > target.most:
         target.most, target.block, target.x, target.y = thrust, c.a, c.x, c.y
 
 
 @stage
-def press_asleep(bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, dt: float) -> None:
+def press_asleep(
+    bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, dt: float
+) -> None:
     """Add the impulses in a step [s] of what sleeps on barriers."""
-    for k in range(count if len(gauges.target) > 0 else 0):
+    for k in range(count if len(monitors.target) > 0 else 0):
         if bodies[contacts[k].a].status == ASLEEP:
-            press(contacts[k], gauges, dt)
+            press(contacts[k], monitors, dt)
 
 
 @kernel
 def weight_on(
-    bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, islands: Islands, barrier: int,
-    p: Parameters,
+    bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, islands: Islands,
+    barrier: int, p: Parameters,
 ) -> float:  # fmt: skip
     """Return the weight of the blocks that lean on a barrier, through others or not [N]."""
     parent, leans = islands.parent, islands.slot
@@ -77,18 +79,18 @@ def weight_on(
             i, j = root(parent, c.a), root(parent, c.b)
             parent[max(i, j)] = min(i, j)
     for k in range(count):
-        if pressed(gauges, contacts[k]) == barrier:
+        if pressed(monitors, contacts[k]) == barrier:
             leans[root(parent, contacts[k].a)] = 1
     weight = 0.0
-    for i in range(len(gauges.rock)):
+    for i in range(len(monitors.rock)):
         weight += leans[root(parent, i)] * bodies[i].mass * p.gravity
     return weight
 
 
 @stage
 def watch_thrust(
-    bodies: Bodies, contacts: Contacts, count: int, gauges: Gauges, islands: Islands, events: int,
-    step: int, time: float, p: Parameters,
+    bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, islands: Islands,
+    events: int, step: int, time: float, p: Parameters,
 ) -> tuple[int, bool]:  # fmt: skip
     """End a step: set the means over a second, and let what they exceed fail.
 
@@ -100,27 +102,31 @@ def watch_thrust(
         Whether an embankment was pushed away, so that the ground is to change.
     """
     ground = False
-    for barrier in range(len(gauges.target)):
-        target, last, push = gauges.target[barrier], gauges.impulse[barrier], gauges.push[barrier]
+    for barrier in range(len(monitors.target)):
+        target, last, push = (
+            monitors.target[barrier],
+            monitors.impulse[barrier],
+            monitors.push[barrier],
+        )
         place, period = step % len(last), len(last) * p.dt
         for kind in range(2):
-            gauges.mean[barrier, kind] += (push[kind] - last[place, kind]) / period
+            monitors.mean[barrier, kind] += (push[kind] - last[place, kind]) / period
             last[place, kind], push[kind] = push[kind], 0.0
         target.most = 0.0
-        rest, hits = gauges.mean[barrier, REST], gauges.mean[barrier, HITS]
+        rest, hits = monitors.mean[barrier, REST], monitors.mean[barrier, HITS]
         if rest + hits <= target.thrust:
             continue
-        rest = min(rest, weight_on(bodies, contacts, count, gauges, islands, barrier, p))
+        rest = min(rest, weight_on(bodies, contacts, count, monitors, islands, barrier, p))
         target.thrust = max(target.thrust, rest + hits)
         if target.thrust <= target.limit:
             continue
         target.limit = math.inf
         ground = ground or target.low <= target.high
         events = write_event(
-            gauges, events, time, FAILED, bodies[target.block], target.block, barrier, target.x,
+            monitors, events, time, FAILED, bodies[target.block], target.block, barrier, target.x,
             target.y, target.y - target.ground,
         )  # fmt: skip
         for fence in range(p.blocks, len(bodies)):
-            if gauges.barrier[fence] == barrier:
+            if monitors.barrier[fence] == barrier:
                 bodies[fence].status = RETIRED
     return events, ground

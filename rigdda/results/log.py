@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from rigdda.dynamics.gauges import CROSSING, FAILED, HIT
+from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.dynamics.run import Run
 
 

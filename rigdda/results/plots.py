@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.gauges import CROSSING
+from rigdda.dynamics.monitors import CROSSING
 from rigdda.dynamics.run import Run
 from rigdda.geometry import polygon_properties
 from rigdda.results.frame import frame

@@ -53,8 +53,8 @@ class Lab:
 class Metered(Simulation):
     """A simulation whose steps are timed; what a case does between them is not."""
 
-    def __init__(self, lab: Lab, scene: Scene, settings: Settings, **gauges: Any):
-        super().__init__(scene, settings, **gauges)
+    def __init__(self, lab: Lab, scene: Scene, settings: Settings, **monitors: Any):
+        super().__init__(scene, settings, **monitors)
         self._lab = lab
 
     def step(self, n: int = 1) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import accumulate
 
 from rigdda.barriers import Fence
-from rigdda.dynamics.gauges import FAILED
+from rigdda.dynamics.monitors import FAILED
 from rigdda.model.scene import Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, box, kinetic_energy, masses, rock

@@ -7,6 +7,8 @@ pushed at its level or above it, by S = c L + N tan phi.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -63,7 +65,7 @@ def pushed(arm: float, share: float) -> Scene:
     return Scene(Terrain(FLAT), (block,), {"rock": surface}, loads=(load,))
 
 
-def strength(lab: Lab, build, dt: float) -> float:
+def strength(lab: Lab, build: Callable[[float], Scene], dt: float) -> float:
     """Return the share of the closed form at which a joint breaks, by bisection."""
     low, high = 0.25, 4.0
     for _ in range(HALVINGS):
@@ -72,9 +74,11 @@ def strength(lab: Lab, build, dt: float) -> float:
     return math.sqrt(low * high)
 
 
-def measure(lab: Lab, build, places: tuple[float, ...]) -> tuple[Measured]:
+def measure(
+    lab: Lab, build: Callable[[float, float], Scene], places: tuple[float, ...]
+) -> tuple[Measured]:
     """Break joints at all steps."""
-    found = [strength(lab, lambda s, x=x: build(x, s), dt) for x in places for dt in STEPS]
+    found = [strength(lab, partial(build, x), dt) for x in places for dt in STEPS]
     return (Measured(found, 1.0),)
 
 

@@ -20,7 +20,7 @@ from rigdda import (
     Terrain,
 )
 from rigdda.barriers import FENCE_CLASSES
-from rigdda.dynamics.gauges import FAILED
+from rigdda.dynamics.monitors import FAILED
 from rigdda.validation.fences import CAPACITY, FENCE, volley
 
 GROUND = Terrain(FLAT)
@@ -142,7 +142,7 @@ def test_a_fence_takes_what_its_blocks_lose_step_by_step():
     for seed in range(40):
         scene, energy = thrown(seed)
         sim = Simulation(scene, Settings(dt=2e-3))
-        target, before, had = sim._arrays.gauges.target, energy, 0.0
+        target, before, had = sim._arrays.monitors.target, energy, 0.0
         while sim.vertices(0)[:, 1].min() > 0.2 and sim.time < 1.0:  # on the ground it loses more
             sim.step()
             now, has = sim.energy().kinetic, float(target["absorbed"][0])

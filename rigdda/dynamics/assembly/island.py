@@ -61,7 +61,7 @@ def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float, coupled: 
     """
     stiffness = 2.0 * c.kappa
     normal = c.kappa * (c.bias + dt * c.un)
-    shear = c.memory_shear + c.kappa * dt * c.us
+    shear = c.accumulated_shear + c.kappa * dt * c.us
     en, es = normal_row(c, True), shear_row(c, True)
     bolt = c.kind == BOLT
     if bolt and c.state == SLIP:  # it yields

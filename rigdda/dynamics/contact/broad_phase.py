@@ -14,9 +14,9 @@ from rigdda.kernel import kernel
 
 @kernel
 def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> None:
-    """Set the box of each body that holds it over the step, however it is deflected, with slack."""
+    """Set the box of each body that holds it over the step, however deflected, with margin."""
     for i in range(len(bodies)):
-        body, outline, grow = bodies[i], polygon[i], p.slack
+        body, outline, grow = bodies[i], polygon[i], p.margin
         if body.status == AWAKE:
             body.lately = max(top_speed(body), LATELY * body.lately)
             body.path = body.lately * p.dt

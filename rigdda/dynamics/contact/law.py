@@ -19,7 +19,7 @@ impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is 
          impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
          blocks, and carries on with it as if they had always touched.
-shock    b = 0: a closed contact that the rest of its island drives together, a plastic impact.
+plastic  b = 0: a closed contact that the rest of its island drives together, a plastic impact.
 plain    b = -2 g and u_0 taken as 0: a penalty spring on the gap, the paper's contact.
 =======  ====================================================================================
 
@@ -41,9 +41,9 @@ from rigdda.dynamics.constants import (
     OPEN,
     PLAIN,
     PLAIN_CONTACT,
+    PLASTIC,
     REST,
     RETARDATION_TIME,
-    SHOCK,
     START_STIFFNESS,
     STICK,
 )
@@ -70,7 +70,7 @@ def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
     At least for `weight` [N]. It never falls: stiffness that fell with the load would feed the sway
     of a stack.
     """
-    return max(weight, c.memory_normal) / p.penetration
+    return max(weight, c.accumulated_normal) / p.penetration
 
 
 @kernel
@@ -85,13 +85,13 @@ def set_impact(c: Contact, closing: float, mass: float, p: Parameters) -> None:
     c.kind = IMPACT
     c.kappa = impact_stiffness(mass, p.dt)
     c.bias = c.rebound = p.dt * c.restitution * closing
-    c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+    c.accumulated_normal = c.accumulated_shear = c.start_normal = c.start_shear = 0.0
 
 
 @kernel
-def set_shock(bodies: Bodies, c: Contact, p: Parameters) -> None:
+def set_plastic(bodies: Bodies, c: Contact, p: Parameters) -> None:
     """Make a closed contact a plastic impact within the step."""
-    c.kind = SHOCK
+    c.kind = PLASTIC
     c.kappa = max(impact_stiffness(effective_mass(bodies, c), p.dt), c.kappa)
     c.bias = 0.0
 
@@ -102,10 +102,10 @@ def set_rest(c: Contact, p: Parameters) -> None:
     c.kind = REST
     c.kappa = c.stiffness * max(1.0, RETARDATION_TIME / p.dt)
     if c.gap > p.penetration and c.bond == 0.0:
-        c.memory_normal = c.start_normal = 0.0
+        c.accumulated_normal = c.start_normal = 0.0
         c.bias = -c.gap
     else:
-        c.bias = c.memory_normal / c.kappa
+        c.bias = c.accumulated_normal / c.kappa
 
 
 @kernel
@@ -170,7 +170,7 @@ def time_of_impact(bodies: Bodies, c: Contact, pull: float, p: Parameters) -> fl
     # what was foreseen may still come fast when it is closed already; but bodies that are in one
     # another are held apart by the force of the last step, from which an impact would not start
     least = threshold if c.state == OPEN else max(threshold, BLOW_SPEED)
-    sunk = c.state != OPEN and c.gap < -p.slack
+    sunk = c.state != OPEN and c.gap < -p.margin
     if sunk or mean <= least or gap >= mean * p.dt:
         return -1.0
     time = gap / mean
@@ -182,7 +182,10 @@ def time_of_impact(bodies: Bodies, c: Contact, pull: float, p: Parameters) -> fl
 
 @inlined
 def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: Parameters) -> None:
-    """Set the law of a contact from its geometry and memory; `start` is the very first step."""
+    """Set the law of a contact from its geometry and accumulated forces.
+
+    `start` tells whether this is the very first step.
+    """
     a, b = bodies[c.a], bodies[c.b]
     pull = pull_on(bodies, c, p)
     mass_b = b.mass if c.b >= 0 and b.status == AWAKE else 0.0
@@ -214,5 +217,5 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
     set_new(bodies, c, start, p)
     # what touches starts closed: in a stack no block moves before those below it are held, and
     # what hangs on a joint is held by it
-    if c.bond > 0.0 or (gap < p.slack and gap - mean * p.dt < p.penetration):
+    if c.bond > 0.0 or (gap < p.margin and gap - mean * p.dt < p.penetration):
         c.state = STICK

@@ -71,7 +71,7 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) ->
     c.a, c.b, c.key, c.owner, c.kind = a, b, -1 - q, 1, link.kind
     c.other, c.gap = 0, 0.0
     c.x, c.y, c.share, c.state = ax, ay, 0.5, STICK
-    c.memory_normal = c.memory_shear = c.start_normal = c.start_shear = 0.0
+    c.accumulated_normal = c.accumulated_shear = c.start_normal = c.start_shear = 0.0
     c.friction = c.restitution = c.bond = c.cohesion = 0.0
     c.ra_x, c.ra_y = arm(bodies[a], link.ax, link.ay, p.dt)
     if b >= 0:

@@ -32,7 +32,7 @@ def add_contact(
 @inlined
 def clip_contacts(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
-    edge: int, j: int, other: int, shift_x: float, shift_y: float, reach: float, slack: float,
+    edge: int, j: int, other: int, shift_x: float, shift_y: float, reach: float, margin: float,
     beside: float,
 ) -> int:  # fmt: skip
     """Add up to two contacts of bodies a and b where the incident edge lies over the face.
@@ -55,8 +55,8 @@ def clip_contacts(
     g1 = nx * (one.x - x0) + ny * (one.y - y0)
     g2 = nx * (two.x - x0) + ny * (two.y - y0)
     # a corner of j that touches the next edge of a notch, too, may be a little beyond the face
-    start = -slack if face.reentrant else -beside
-    stop = length + slack if next_corner.reentrant else length + beside
+    start = -margin if face.reentrant else -beside
+    stop = length + margin if next_corner.reentrant else length + beside
     low = s1 if s1 >= start else 0.0
     high = s2 if s2 <= stop else length
     if high < low:
@@ -89,7 +89,7 @@ def add_corner(
 ) -> int:  # fmt: skip
     """Add the contact of a corner of polygon `owner` with the face `edge` of polygon i.
 
-    Its key is that of the corner of the body, so that parts share the memory of contacts.
+    Its key is that of the corner of the body, so that parts share accumulated forces.
     """
     sign = 1.0 if outlines.polygon[i].body == b else -1.0  # the normal points to a
     body = outlines.polygon[owner].body
@@ -116,7 +116,7 @@ def collide_pair(
         dy += two.vy * dt
         path += two.path
         fall = 0.0
-    spread = path + fall + p.slack
+    spread = path + fall + p.margin
     beside = 0.5 * dt * (abs(one.omega) * one.radius + abs(two.omega) * two.radius)
     # both turn about their centroids
     other = two.omega if two.status == AWAKE else 0.0
@@ -125,17 +125,17 @@ def collide_pair(
     py = (one.omega * one.x - other * two.x) * dt
     if one.parts == 1 and two.parts == 1:
         return collide_parts(
-            bodies, outlines, contacts, k, a, b, a, b, dx, dy, px, py, turn, spread, p.slack, 0.0,
+            bodies, outlines, contacts, k, a, b, a, b, dx, dy, px, py, turn, spread, p.margin, 0.0,
             beside,
         )  # fmt: skip
     first = k
     k = collide_all_parts(
-        bodies, outlines, contacts, k, a, b, dx, dy, px, py, turn, spread, p.slack,
+        bodies, outlines, contacts, k, a, b, dx, dy, px, py, turn, spread, p.margin,
         0.0, beside,
     )  # fmt: skip
     if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
         k = collide_all_parts(
-            bodies, outlines, contacts, k, a, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p.slack, 1e300, 0.0
+            bodies, outlines, contacts, k, a, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p.margin, 1e300, 0.0
         )
     return k
 
@@ -143,7 +143,7 @@ def collide_pair(
 @kernel
 def collide_all_parts(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, dx: float,
-    dy: float, px: float, py: float, turn: float, spread: float, slack: float, sunk: float,
+    dy: float, px: float, py: float, turn: float, spread: float, margin: float, sunk: float,
     beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
@@ -153,7 +153,7 @@ def collide_all_parts(
             if k + 2 > len(contacts):
                 return -1
             found = collide_parts(
-                bodies, outlines, contacts, k, a, b, i, j, dx, dy, px, py, turn, spread, slack,
+                bodies, outlines, contacts, k, a, b, i, j, dx, dy, px, py, turn, spread, margin,
                 sunk, beside,
             )  # fmt: skip
             for new in range(k, found):
@@ -183,7 +183,7 @@ def keep_nearest(contacts: Contacts, first: int, k: int, new: int) -> int:
 @inlined
 def collide_parts(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int, j: int,
-    dx: float, dy: float, px: float, py: float, turn: float, spread: float, slack: float,
+    dx: float, dy: float, px: float, py: float, turn: float, spread: float, margin: float,
     sunk: float, beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
@@ -193,22 +193,22 @@ def collide_parts(
     """
     ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
     possible, time_i, gap_i, apart_i, edge_i = face_of_contact(
-        outlines, i, ni, j, nj, dx, dy, px, py, turn, spread, slack, sunk
+        outlines, i, ni, j, nj, dx, dy, px, py, turn, spread, margin, sunk
     )
     if not possible:
         return k
     possible, time_j, gap_j, apart_j, edge_j = face_of_contact(
-        outlines, j, nj, i, ni, -dx, -dy, -px, -py, -turn, spread, slack, sunk
+        outlines, j, nj, i, ni, -dx, -dy, -px, -py, -turn, spread, margin, sunk
     )
     if not possible:
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
-    of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * slack)
+    of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * margin)
     reach = (dx * dx + dy * dy) ** 0.5 + spread
-    touching = max(apart_i, apart_j) <= slack
-    # where they touch, not where they are deeper than the slack
-    time_i *= gap_i / (gap_i + slack) if gap_i > slack else 0.0
-    time_j *= gap_j / (gap_j + slack) if gap_j > slack else 0.0
+    touching = max(apart_i, apart_j) <= margin
+    # where they touch, not where they are deeper than the margin
+    time_i *= gap_i / (gap_i + margin) if gap_i > margin else 0.0
+    time_j *= gap_j / (gap_j + margin) if gap_j > margin else 0.0
     beside = 0.0 if touching else beside
     # corner beside corner, the better face may miss the other body where the second one does not;
     # and what is beside it at the time of entry may be driven into it from where it is now
@@ -220,7 +220,7 @@ def collide_parts(
         shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
         found = clip_contacts(
             bodies, outlines, contacts, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
-            reach, slack, beside,
+            reach, margin, beside,
         )  # fmt: skip
         if found > k or (shift == 0.0 and not touching):
             return found

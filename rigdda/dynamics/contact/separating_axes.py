@@ -61,7 +61,7 @@ def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
 @inlined
 def face_of_contact(
     outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
-    px: float, py: float, turn: float, spread: float, slack: float, sunk: float,
+    px: float, py: float, turn: float, spread: float, margin: float, sunk: float,
 ) -> tuple[bool, float, float, float, int]:  # fmt: skip
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
@@ -71,7 +71,7 @@ def face_of_contact(
     The best edge comes with its rank, time of entry and gap, after the greatest gap of any. Edges
     inside the body count as deeper by `sunk`, so that on a tie the real one is best.
 
-    A face is entered when the nearest corner is deeper than the slack: of two that it touches the
+    A face is entered when the nearest corner is deeper than the margin: of two that it touches the
     one that is approached more slowly is the best. By the velocity of that corner then: the middle
     of a block that rolls comes down, where it rests does not.
 
@@ -86,7 +86,7 @@ def face_of_contact(
         nx, ny = own.normal_x, own.normal_y
         if visit >= 0:
             most = over_edge(outlines, i, edge, j) - outlines.polygon[j].inside
-            if edge == facing or (most < -slack and (time > 0.0 or most < depth)):
+            if edge == facing or (most < -margin and (time > 0.0 or most < depth)):
                 continue
         gap, corner = axis_gap(nx, ny, own.x, own.y, outlines.corner, j, corners)
         if gap > spread:
@@ -95,14 +95,14 @@ def face_of_contact(
             gap -= sunk
         apart = max(apart, gap)
         entry = 0.0
-        if gap >= -slack:
+        if gap >= -margin:
             ux, uy = dx, dy
-            if gap <= slack:
+            if gap <= margin:
                 ux -= turn * outlines.corner[j, corner].y - px
                 uy += turn * outlines.corner[j, corner].x + py
             approach = -(nx * ux + ny * uy)
-            late = gap + slack >= NEVER * approach
-            entry = NEVER if late else (gap + slack) / approach
+            late = gap + margin >= NEVER * approach
+            entry = NEVER if late else (gap + margin) / approach
         later = entry > time or (entry == time and gap > depth)
         if later or (entry == time and gap == depth and edge < best):
             time, depth, best, nearest = entry, gap, edge, corner

@@ -61,7 +61,7 @@ def place_of_hit(
     Or (x, y) if it never does, or touches already. It may slide there along a neighbour, into a
     concave corner.
     """
-    if gap <= p.slack:
+    if gap <= p.margin:
         return x, y
     one, block = ground.segment[s], bodies[a]
     dx = (block.vx - block.omega * (y - block.y)) * p.dt
@@ -83,7 +83,7 @@ def corners_on_segment(
     """Add contacts of the corners of block a with segment s; returns the new number."""
     one, block = ground.segment[s], bodies[a]
     nx, ny, surface = one.normal_x, one.normal_y, one.surface
-    reach = block.path + p.gravity * p.dt * p.dt + p.slack
+    reach = block.path + p.gravity * p.dt * p.dt + p.margin
     concave = block.parts > 1
     lowest = below_segment(ground, s, block.x, block.y) - block.radius
     if lowest > reach:
@@ -102,7 +102,7 @@ def corners_on_segment(
             continue
         if shadowed(ground, s, hit_x, hit_y, gap):
             continue
-        if gap < -p.slack and beneath_roof(bodies, outlines, ground, a, vertex, s, gap):
+        if gap < -p.margin and beneath_roof(bodies, outlines, ground, a, vertex, s, gap):
             continue
         again = False
         for m in range(first, k):  # one face, cut in two segments
@@ -150,7 +150,7 @@ def edge_on_ridge(
         return k
     concave = part != a
     lean = abs(block.omega) * dt
-    reach = block.path + p.gravity * dt * dt + p.slack
+    reach = block.path + p.gravity * dt * dt + p.margin
     best, best_time, best_gap = -1, -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
@@ -164,7 +164,7 @@ def edge_on_ridge(
         if inner and gap <= 0.0:
             continue  # a corner inside the part is pushed out of the block, not into the next part
         time = 0.0
-        if gap > p.slack:
+        if gap > p.margin:
             time = NEVER if approach <= 0.0 else min(gap / approach, NEVER)
         # the normal out of the ground is opposite to that of the edge
         after_left = left.normal_x * -ny - left.normal_y * -nx <= lean
@@ -179,7 +179,7 @@ def edge_on_ridge(
         return k
     # beside a corner that slides over the ridge another edge is soon the nearest one: what fits
     # counts as long as the depths are alike, or while it bridges the ridge
-    alike = best_gap >= 2.0 * min(depth, 0.0) - p.slack
+    alike = best_gap >= 2.0 * min(depth, 0.0) - p.margin
     if not alike and not bridges(outlines, ground, part, best, corner, 0.5 * best_gap):
         return k
     start, end = outlines.corner[part, best], outlines.corner[part, following(best, n)]

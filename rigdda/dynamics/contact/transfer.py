@@ -1,7 +1,7 @@
-"""Memory of contacts from step to step: normal and shear force, stiffness.
+"""What contacts carry from step to step: accumulated normal and shear force, stiffness.
 
 Keyed by the vertex (its owner included) and both bodies; the normals must agree, so that a corner
-in a notch keeps the memories of its two contacts apart.
+in a notch keeps what its two contacts carry apart.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def recall_from(
     contacts: Contacts, k: int, new_low: int, new_high: int, old: Contacts, low: int, high: int,
     b: int, sign: float,
 ) -> bool:  # fmt: skip
-    """Give contact k the memory of the same closed contact among old[low:high], if there is one."""
+    """Give contact k what the same closed contact among old[low:high] had, if there is one."""
     c = contacts[k]
     for m in range(low, high):
         was = old[m]
@@ -45,7 +45,7 @@ def recall_from(
         if cosine < SAME_FACE and fits_another(contacts, k, new_low, new_high, was):
             continue
         c.state, c.kind = was.state, was.kind
-        c.memory_normal, c.memory_shear = was.memory_normal, was.memory_shear
+        c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
         c.start_normal, c.start_shear = was.start_normal, was.start_shear
         c.stiffness, c.bond = was.stiffness, was.bond
         return True
@@ -54,11 +54,11 @@ def recall_from(
 
 @inlined
 def recall(
-    contacts: Contacts, low: int, high: int, old: Contacts, first: NDArray, slack: float
+    contacts: Contacts, low: int, high: int, old: Contacts, first: NDArray, margin: float
 ) -> None:
-    """Give each new contact in low:high its memory; without one it starts OPEN.
+    """Give each new contact in low:high what it had in the last step, or it starts OPEN.
 
-    A contact that has come apart by more than `slack` starts OPEN, too: it closes by an impact.
+    A contact that has come apart by more than `margin` starts OPEN, too: it closes by an impact.
 
     Bodies change sides (a, b) when one of them falls asleep or wakes, so a pair is looked up both
     ways; its forces keep their sign, since normal and shear turn round together.
@@ -66,9 +66,9 @@ def recall(
     for k in range(low, high):
         c = contacts[k]
         c.state, c.kind = OPEN, NEW
-        c.memory_normal = c.memory_shear = c.stiffness = 0.0
+        c.accumulated_normal = c.accumulated_shear = c.stiffness = 0.0
         c.start_normal = c.start_shear = c.bond = 0.0
-        if c.gap > slack:
+        if c.gap > margin:
             continue
         a, b = c.a, c.b
         found = recall_from(contacts, k, low, high, old, first[a], first[a + 1], b, 1.0)
@@ -82,7 +82,7 @@ def copy_contact(c: Contact, was: Contact) -> None:
     c.a, c.b, c.key, c.owner, c.other = was.a, was.b, was.key, was.owner, was.other
     c.x, c.y, c.nx, c.ny, c.gap = was.x, was.y, was.nx, was.ny, was.gap
     c.state, c.kind = was.state, was.kind
-    c.memory_normal, c.memory_shear = was.memory_normal, was.memory_shear
+    c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
     c.start_normal, c.start_shear = was.start_normal, was.start_shear
     c.stiffness, c.normal, c.shear = was.stiffness, was.normal, was.shear
     c.bond = was.bond

@@ -119,7 +119,7 @@ def set_spring(row: Floats, c: Contact, flexible: float, rolling: float) -> None
     row[KEEP_SHEAR] = stiffness * rolling / (1.0 + stiffness * rolling)
     row[GAIN], row[GAIN_SHEAR] = row[KEEP] / flexible, row[KEEP_SHEAR] / rolling
     row[GAP], row[AIM], row[REBOUND] = -c.bias / factor, math.inf, -math.inf
-    row[FREE] = c.memory_shear / stiffness
+    row[FREE] = c.accumulated_shear / stiffness
 
 
 @inlined

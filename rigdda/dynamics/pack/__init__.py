@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.pack.bodies import free_bodies, pack_bodies, pack_links
-from rigdda.dynamics.pack.gauges import pack_gauges
 from rigdda.dynamics.pack.ground import pack_ground, pack_shaking
+from rigdda.dynamics.pack.monitors import pack_monitors
 from rigdda.dynamics.pack.parameters import pack_interfaces, pack_parameters
 from rigdda.dynamics.pack.space import empty_contacts, empty_system, empty_work
 from rigdda.dynamics.records import (
     Bodies,
     Contacts,
-    Gauges,
     Ground,
     Interfaces,
     Links,
+    Monitors,
     Outlines,
     Shaking,
     System,
@@ -42,7 +42,7 @@ class Arrays(NamedTuple):
     before: Contacts
     system: System
     work: Work
-    gauges: Gauges
+    monitors: Monitors
     parameters: NDArray[np.void]  # of PARAMETERS: of a step, and of the part of one
 
 
@@ -80,6 +80,6 @@ def pack(
         empty_contacts(room),
         empty_system(blocks, room),
         empty_work(len(bodies), blocks, room),
-        pack_gauges(scene, bodies, stations, watch, leave, settings.dt),
+        pack_monitors(scene, bodies, stations, watch, leave, settings.dt),
         pack_parameters(scene, settings, bodies, interfaces),
     )

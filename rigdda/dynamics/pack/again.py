@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rigdda.barriers import GravityWall
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.dynamics.pack.bodies import barrier_trait, block_traits, write_polygons
-from rigdda.dynamics.pack.gauges import start_rock, start_targets
+from rigdda.dynamics.pack.monitors import start_rock, start_targets
 from rigdda.dynamics.pack.parameters import frictions, rock_numbers
 from rigdda.geometry import is_convex
 from rigdda.model.scene import Scene
@@ -53,7 +53,7 @@ class Template:
             for array in (
                 self._arrays.bodies,
                 self._arrays.outlines.polygon,
-                self._arrays.gauges.rock,
+                self._arrays.monitors.rock,
                 self._arrays.parameters,
             )
         ]
@@ -96,7 +96,7 @@ class Template:
                 traits.append(barrier_trait(scene, i, self._names))
         write_polygons(polygons, traits, arrays.bodies, outlines)
         if scene.barriers != self.scene.barriers:
-            start_targets(arrays.gauges.target, scene)
+            start_targets(arrays.monitors.target, scene)
         if scene.surfaces is not self.scene.surfaces:
             arrays.interfaces["friction"] = frictions(scene, len(arrays.interfaces))
         start_rock(self._rock, bodies, self._stations)

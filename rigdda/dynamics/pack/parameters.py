@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from rigdda.barriers import Fence
 from rigdda.dynamics.constants import (
+    MARGIN_RATIO,
     PENETRATION_RATIO,
     PLAIN_CONTACT,
-    SLACK_RATIO,
 )
 from rigdda.dynamics.pack.bodies import free_bodies
 from rigdda.dynamics.records import (
@@ -76,7 +76,7 @@ def rock_numbers(scene: Scene, settings: Settings, bodies: Bodies) -> dict[str, 
     return {
         "block_weight": np.add.reduce(mass) / len(free) * (gravity or EARTH),
         "penetration": settings.penetration or PENETRATION_RATIO * size,
-        "slack": SLACK_RATIO * size,
+        "margin": MARGIN_RATIO * size,
     }
 
 

@@ -12,21 +12,21 @@ from rigdda.dynamics.records import (
     TARGET,
     WATCHED,
     Bodies,
-    Gauges,
+    Monitors,
 )
 from rigdda.dynamics.run import EVENT
 from rigdda.model.scene import Scene, Terrain
 
 
-def pack_gauges(
+def pack_monitors(
     scene: Scene,
     bodies: Bodies,
     stations: NDArray[np.float64],
     watch: tuple[float, float],
     leave: float,
     dt: float,
-) -> Gauges:
-    """Return the gauges, with no station passed that a block starts beyond; `dt`: the step [s]."""
+) -> Monitors:
+    """Return the monitors, with no station passed that a block starts beyond; `dt` in s."""
     blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.ground
     station = np.zeros(len(stations), dtype=STATION)
     station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
@@ -36,7 +36,7 @@ def pack_gauges(
     target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
     start_targets(target, scene)
     room = event_room(free_bodies(scene), len(stations), barriers)
-    return Gauges(
+    return Monitors(
         station.view(np.recarray),
         rock.view(np.recarray),
         target.view(np.recarray),

@@ -12,9 +12,9 @@ from rigdda.dynamics.records import (
     Bodies,
     Body,
     Contacts,
-    Gauges,
     Ints,
     Islands,
+    Monitors,
     Parameters,
 )
 from rigdda.kernel import inlined, kernel
@@ -26,14 +26,14 @@ breaks a barrier."""
 
 @kernel
 def write_event(
-    gauges: Gauges, n: int, time: float, kind: int, body: Body, i: int, target: int,
+    monitors: Monitors, n: int, time: float, kind: int, body: Body, i: int, target: int,
     x: float, y: float, height: float,
 ) -> int:  # fmt: skip
     """Write event n of body i; returns the new number of events."""
-    event = gauges.event[n]
-    rocks = len(gauges.rock)
+    event = monitors.event[n]
+    rocks = len(monitors.rock)
     event.time, event.kind, event.target = time, kind, target
-    event.block = i if i < rocks else rocks + gauges.barrier[i]
+    event.block = i if i < rocks else rocks + monitors.barrier[i]
     event.x, event.y, event.height = x, y, height
     event.speed = math.hypot(body.vx, body.vy)
     event.energy = kinetic_energy(body)
@@ -41,69 +41,71 @@ def write_event(
 
 
 @kernel
-def barrier_contact(gauges: Gauges, a: int, b: int) -> tuple[int, int]:
+def barrier_contact(monitors: Monitors, a: int, b: int) -> tuple[int, int]:
     """Return what strikes and what barrier it strikes in a contact of a and b, -1 for no barrier.
 
     A gravity wall that is carried along strikes other barriers.
     """
-    rocks = len(gauges.rock)
+    rocks = len(monitors.rock)
     if b >= rocks:
-        return a, gauges.barrier[b]
+        return a, monitors.barrier[b]
     if a >= rocks and b >= 0:
-        return b, gauges.barrier[a]
+        return b, monitors.barrier[a]
     return a, -1
 
 
 @inlined
 def note_hits(
-    bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, gauges: Gauges,
+    bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, monitors: Monitors,
     events: int, time: float,
 ) -> int:  # fmt: skip
     """Write a hit for each barrier that a block touches anew; velocities still those before."""
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
-        i, barrier = barrier_contact(gauges, c.a, c.b)
+        i, barrier = barrier_contact(monitors, c.a, c.b)
         if barrier < 0 or c.state == OPEN:
             continue
-        if time - gauges.last_touch[i, barrier] > APART:
-            height = c.y - gauges.target[barrier].ground
-            events = write_event(gauges, events, time, HIT, bodies[i], i, barrier, c.x, c.y, height)
-        gauges.last_touch[i, barrier] = time
+        if time - monitors.last_touch[i, barrier] > APART:
+            height = c.y - monitors.target[barrier].ground
+            events = write_event(
+                monitors, events, time, HIT, bodies[i], i, barrier, c.x, c.y, height
+            )
+        monitors.last_touch[i, barrier] = time
     return events
 
 
 @inlined
-def note_passage(bodies: Bodies, gauges: Gauges, events: int, time: float) -> int:
+def note_passage(bodies: Bodies, monitors: Monitors, events: int, time: float) -> int:
     """Write a crossing for each station that a centroid first passes; watch energies, extents."""
-    stations = len(gauges.station)
-    for i in range(len(gauges.rock)):
-        body, rock = bodies[i], gauges.rock[i]
+    stations = len(monitors.station)
+    for i in range(len(monitors.rock)):
+        body, rock = bodies[i], monitors.rock[i]
         x = body.x
         rock.low, rock.high = min(rock.low, x - body.radius), max(rock.high, x + body.radius)
-        if gauges.watch_low <= x <= gauges.watch_high:
+        if monitors.watch_low <= x <= monitors.watch_high:
             rock.energy = max(rock.energy, kinetic_energy(body))
-        while rock.next < stations and x >= gauges.station[rock.next].x:
+        while rock.next < stations and x >= monitors.station[rock.next].x:
             s, y = rock.next, body.y
-            height = y - gauges.station[s].ground
-            events = write_event(gauges, events, time, CROSSING, body, i, s, x, y, height)
+            height = y - monitors.station[s].ground
+            events = write_event(monitors, events, time, CROSSING, body, i, s, x, y, height)
             rock.next += 1
     return events
 
 
 @kernel
-def is_over(bodies: Bodies, gauges: Gauges, counters: Ints, p: Parameters) -> bool:
-    """Return whether nothing moves any more but what has left `gauges.leave` behind, downhill.
+def is_over(bodies: Bodies, monitors: Monitors, counters: Ints, p: Parameters) -> bool:
+    """Return whether nothing moves any more but what has left `monitors.leave` behind, downhill.
 
     Where there are barriers it must have been so for a second: what lies on them presses on, and
     thrust is a mean over a second. Looked at every so many steps of the run, so that it ends in the
     same one however it is called.
     """
-    if gauges.leave == -math.inf or counters[STEPS] % END_CHECK != 0:
+    if monitors.leave == -math.inf or counters[STEPS] % END_CHECK != 0:
         return False
     for i in range(p.blocks):
         body = bodies[i]
-        if body.status == AWAKE and not (body.x - body.radius > gauges.leave and body.vx > 0.0):
+        if body.status == AWAKE and not (body.x - body.radius > monitors.leave and body.vx > 0.0):
             counters[STILL] = 0
             return False
     counters[STILL] += END_CHECK
-    return len(gauges.target) == 0 or counters[STILL] * p.dt >= 1.0 + END_CHECK * p.dt
+    return len(monitors.target) == 0 or counters[STILL] * p.dt >= 1.0 + END_CHECK * p.dt

@@ -11,7 +11,6 @@ from rigdda.dynamics.assembly.springs import add_force, along, normal_row, shear
 from rigdda.dynamics.constants import (
     BOLT,
     IMPACT,
-    MOVING,
     OPEN,
     PIN,
     PLASTIC,
@@ -179,14 +178,14 @@ def accumulate_forces(c: Contact, struck: bool, relaxed: bool) -> None:
     """Carry the forces of a contact to the next step; an impulse does not last.
 
     In an island that was struck and solved as one every force may be part of an impulse: what the
-    contact carried before stays. Relaxation has set the forces from which the next step is to
-    start.
+    contact carried before stays, as in any impact. Relaxation has set the forces from which the
+    next step is to start.
     """
     if c.state == OPEN:
         c.accumulated_normal = c.accumulated_shear = 0.0
         c.start_normal = c.start_shear = 0.0
         return
-    if c.kind == MOVING or not struck:
+    if not struck or (relaxed and c.kind != IMPACT):
         elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
         c.accumulated_normal += elastic * (c.normal - c.accumulated_normal)
         c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)

@@ -123,7 +123,7 @@ def step_island(
                 )
         for item in range(c0, c1):
             accumulate_forces(contacts[islands.contact_item[item]], struck, in_substeps)
-        push_out(bodies, contacts, motion, islands, rows, s, now)
+        push_out(bodies, contacts, motion, islands, rows, s, struck, now)
         bad = move_island(bodies, outlines, contacts, motion, islands, s, monitors, now, ledger)
         left -= now.dt
         parts += 1 if parts > 0 else 0

@@ -14,11 +14,11 @@ from rigdda.dynamics.constants import (
     BOLT,
     DIRECT,
     IMPACT,
-    MOVING,
     OPEN,
     PIN,
     PLAIN,
     QUIET_SPEED,
+    REST,
     SLIP,
     SMALL_ISLAND,
     SOR,
@@ -119,7 +119,7 @@ def relax(
         within = limit > abs(c.shear)
         if c.bond > 0.0:
             if not joint_breaks(contacts, islands, c0, c1, item):
-                c.state, c.kind = STICK, MOVING
+                c.state, c.kind, c.kappa = STICK, REST, c.stiffness
                 continue
         kind = c.kind
         if kind == BOLT or kind == PIN:
@@ -127,7 +127,7 @@ def relax(
             continue
         c.state = OPEN if c.normal == 0.0 else (STICK if within else SLIP)
         if kind != IMPACT and kind != PLAIN:
-            c.kind = MOVING
+            c.kind, c.kappa = REST, c.stiffness
 
 
 @kernel

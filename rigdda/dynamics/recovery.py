@@ -28,15 +28,14 @@ from rigdda.kernel import inlined, kernel
 
 
 @inlined
-def excess_gap(c: Contact, motion: Motion, i: int, j: int, p: Parameters) -> float:
+def excess_gap(c: Contact, motion: Motion, i: int, j: int, most: float) -> float:
     """Return the gap after the step over the one that the load of a contact explains [m].
 
-    The stiffness follows the load in the next step, so that it explains the wanted penetration at
-    most.
+    That is `most` [m] at most.
     """
     dn, _ = relative_displacement(c, motion.d, i, j)
     correction, _ = relative_displacement(c, motion.correction, i, j)
-    explained = min(max(c.accumulated_normal, 0.0) / c.stiffness, p.penetration)
+    explained = min(max(c.accumulated_normal, 0.0) / c.stiffness, most)
     return c.gap + dn + correction + explained
 
 
@@ -58,7 +57,7 @@ def part_bodies(rows: Rows, count: int) -> None:
 @inlined
 def find_deepest(
     contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, low: int, high: int,
-    p: Parameters,
+    most: float,
 ) -> float:  # fmt: skip
     """Set rows.height to the excess gaps of the contacts low:high; returns the deepest [m].
 
@@ -73,7 +72,7 @@ def find_deepest(
         j = islands.slot[c.b] if c.pair >= 0 else -1
         rows.height[q] = math.inf
         if not is_elastic(c) and not (c.kind == IMPACT and c.bias < 0.0):
-            rows.height[q] = excess_gap(c, motion, islands.slot[c.a], j, p)
+            rows.height[q] = excess_gap(c, motion, islands.slot[c.a], j, most)
         deepest = max(deepest, -rows.height[q])
     return deepest if grounded else 0.0
 
@@ -105,13 +104,19 @@ def list_rows(
 @inlined
 def push_out(
     bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, island: int,
-    p: Parameters,
+    struck: bool, p: Parameters,
 ) -> None:  # fmt: skip
-    """Add to `motion.correction` what pushes out the penetration of an island in this step."""
+    """Add to `motion.correction` what pushes out the penetration of an island in this step.
+
+    In an island that was struck a force may be an impulse, which explains no lasting penetration
+    beyond the wanted one.
+    """
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     first = islands.block_start[island]
     n = islands.block_start[island + 1] - first
-    deepest = find_deepest(contacts, motion, islands, rows, low, high, p)
+    deepest = find_deepest(
+        contacts, motion, islands, rows, low, high, p.penetration if struck else math.inf
+    )
     if deepest <= 0.0:
         return
     for s in range(n + 1):

@@ -29,13 +29,13 @@ def fresh(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def same(one: Outcome, two: Outcome) -> None:
-    """Check that two outcomes agree, all numbers to the rounding of a ground with other corners."""
+    """Check that two outcomes agree, to what bounces make of the rounding of other corners."""
     first, second = asdict(one), asdict(two)
     tables = zip(first.pop("barriers"), second.pop("barriers"), strict=True)
     for a, b in [(first, second), *tables]:
         for name, value in a.items():
             number = isinstance(value, float) or name in ("reach", "run_out")
-            assert b[name] == (pytest.approx(value, rel=1e-6, abs=1e-4) if number else value), name
+            assert b[name] == (pytest.approx(value, rel=1e-6, abs=1e-3) if number else value), name
 
 
 def jobs(site: Site, layout: Layout, event: str) -> list[reuse.Job]:

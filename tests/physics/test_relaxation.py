@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigdda import Scene, Settings, Simulation, Site
-from rigdda.dynamics.constants import MOVING, OPEN
+from rigdda.dynamics.constants import OPEN, REST
 from rigdda.dynamics.records import CONTACTS
 from rigdda.validation.scenes import box, incline
 from rigdda.validation.slides import slide
@@ -38,7 +38,7 @@ def test_forces_of_an_avalanche_press_and_stay_within_friction(dt: float) -> Non
     for _ in range(round(FALL / dt)):
         sim.step()
         c = sim._now[: sim._counters[CONTACTS]]
-        c = c[(c["kind"] == MOVING) & (c["state"] != OPEN)]
+        c = c[(c["kind"] == REST) & (c["state"] != OPEN)]
         limit = c["friction"] * c["normal"] + c["cohesion"]
         assert (c["normal"] >= 0.0).all()
         assert (np.abs(c["shear"]) <= limit * (1.0 + 1e-12)).all()

@@ -13,8 +13,9 @@ from rigdda.barriers import (
     Wall,
 )
 from rigdda.barriers.files import load_layout, save_layout
+from rigdda.dynamics.many import simulate_many
 from rigdda.dynamics.run import Run
-from rigdda.dynamics.simulation import Simulation, simulate_many
+from rigdda.dynamics.simulation import Simulation
 from rigdda.errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from rigdda.lumped import Points, lumped
 from rigdda.model.block import Block

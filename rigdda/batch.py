@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from rigdda.barriers import Barrier, GravityWall, Mesh, as_layout
 from rigdda.dynamics.pack.again import Template
-from rigdda.dynamics.simulation import Simulation, chainages
+from rigdda.dynamics.simulation import Simulation
+from rigdda.dynamics.stations import chainages
 from rigdda.errors import BadInput, Error
 from rigdda.model.events import Drawn
 from rigdda.model.scene import Scene

@@ -76,7 +76,7 @@ class Deformable:
 
     @property
     def contacts(self) -> NDArray[np.void]:
-        """The contacts of the last step, see `rigdda.dynamics.simulation.CONTACT`."""
+        """The contacts of the last step, see `rigdda.dynamics.readings.CONTACT_TABLE`."""
         return self._sim.contacts()
 
     def vertices(self, block: int) -> Floats:

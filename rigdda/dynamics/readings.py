@@ -1,0 +1,227 @@
+"""What can be read of a simulation: contacts, forces of supports, energies, what it took."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.dynamics.constants import (
+    BOLT,
+    FIXED,
+    MARGIN_RATIO,
+    OPEN,
+    PIN,
+    PLAIN,
+    QUIET_SPEED,
+    REST,
+)
+from rigdda.dynamics.contact.links import pull_of_bolts
+from rigdda.dynamics.pack import Arrays
+from rigdda.dynamics.records import (
+    BROAD_PHASE,
+    CONTACT_TOTAL,
+    ITERATIONS,
+    LEDGER,
+    RELAXED,
+    SOLVER_ITERATIONS,
+    SOLVES,
+    STEPS,
+    SWEEPS,
+    Contacts,
+    Floats,
+    Ints,
+)
+from rigdda.model.scene import Scene
+
+CONTACT_TABLE = np.dtype(
+    [
+        ("block_a", "i4"),
+        ("block_b", "i4"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("nx", "f8"),
+        ("ny", "f8"),
+        ("normal_force", "f8"),
+        ("shear_force", "f8"),
+        ("state", "U5"),
+        ("penetration", "f8"),
+    ]
+)
+"""One contact. block_b: -1 terrain, N + i barrier i; block_a may be one, a gravity wall. The
+normal points from b to a; shear is positive along the normal turned by +90 degrees. Forces act on a
+[N]; penetration [m]."""
+
+PHASES = ("broad phase", "narrow phase", "open-close", "motion")
+"""Phases of a step: pairs of bodies that may touch; their contacts and the law of each; open-close
+iteration, solution and relaxation; islands, movement and monitors."""
+
+STATES = np.array(["open", "stick", "slip"])
+
+
+class Energy(NamedTuple):
+    """Energies of all blocks and gravity walls now, and work done on them so far [J].
+
+    `elastic` is stored in bolts and plain contacts. `friction`, `damping` and `impact` are what
+    shear forces, damping and the normal forces of contacts did, less what springs store: negative
+    where they took energy. The kinetic energy of a block that leaves the site counts as taken by
+    impact. `external` is the work of loads and of the motion of the ground.
+    kinetic + potential + elastic grows by the sum of the four.
+    """
+
+    kinetic: float
+    potential: float
+    elastic: float
+    friction: float
+    damping: float
+    impact: float
+    external: float
+
+
+class Diagnostics(NamedTuple):
+    """What the computation took so far.
+
+    `penetration` is the greatest depth of a vertex inside another polygon or the terrain [m];
+    `relaxed` counts islands whose contact forces were relaxed, since they move or their open-close
+    iteration did not settle. `compression` is how far contacts at rest give way now: their median,
+    of plain ones the greatest, over the mean block size [-].
+    `seconds` is the processor time by phase [s], nothing without `Settings.timing`.
+    """
+
+    steps: int
+    open_close_iterations: int
+    relaxed: int
+    sweeps: int
+    solves: int
+    solver_iterations: int
+    contacts: int
+    penetration: float
+    compression: float
+    seconds: dict[str, float]
+
+
+def contact_table(scene: Scene, c: Contacts) -> NDArray[np.void]:
+    """Return contacts of a step as a structured array, see `CONTACT_TABLE`."""
+    c = c[(c["kind"] != BOLT) & (c["kind"] != PIN)]
+    out = np.zeros(len(c), dtype=CONTACT_TABLE)
+    blocks = len(scene.blocks)
+    number = np.array([*range(blocks), *(blocks + i for i in scene.bodies), -1])
+    out["block_a"], out["block_b"] = number[c["a"]], number[c["b"]]
+    for name in ("x", "y", "nx", "ny"):
+        out[name] = c[name]
+    closed = c["state"] != OPEN
+    out["normal_force"] = np.where(closed, c["normal"], 0.0)
+    out["shear_force"] = np.where(closed, c["shear"], 0.0)
+    out["state"] = STATES[c["state"]]
+    out["penetration"] = np.maximum(-c["gap"], 0.0)
+    return out
+
+
+def support_forces(arrays: Arrays, c: Contacts) -> Floats:
+    """Return the force of each support on its (first) block, (S, 2) [N]."""
+    c = c[c["kind"] == PIN]
+    out = bolt_forces(arrays)
+    fx = c["normal"] * c["nx"] - c["shear"] * c["ny"]
+    fy = c["normal"] * c["ny"] + c["shear"] * c["nx"]
+    out[-1 - c["key"]] = np.stack([fx, fy], axis=1)
+    return out[np.argsort(arrays.links["number"])]
+
+
+def bolt_forces(arrays: Arrays) -> Floats:
+    """Return the force of each bolt, 0 for pins, in the order of the links, (S, 2) [N]."""
+    out = np.zeros((len(arrays.links), 2))
+    pull_of_bolts(arrays.bodies, arrays.links, out)
+    return out
+
+
+def elastic_energy(arrays: Arrays, c: Contacts) -> float:
+    """Return the energy stored in bolts and plain contacts now [J]."""
+    links = arrays.links
+    if len(links) + len(c) == 0:
+        return 0.0
+    bolts = links["kind"] == BOLT
+    pull = bolt_forces(arrays)[bolts]
+    total = 0.5 * ((pull**2).sum(axis=1) / links["stiffness"][bolts]).sum()
+    c = c[(c["kind"] == PLAIN) & (c["state"] != OPEN)]
+    return float(total + 0.5 * (c["stiffness"] * np.minimum(c["gap"], 0.0) ** 2).sum())
+
+
+def energies(scene: Scene, arrays: Arrays, c: Contacts, ledger: Floats, before: float) -> Energy:
+    """Return the energies of what is free to move now and the work done on it so far.
+
+    `before` is the elastic energy at the start [J].
+    """
+    b, n = arrays.bodies, arrays.parameters[0].blocks
+    free = b["status"][:n] != FIXED
+    speed = b["vx"][:n] ** 2 + b["vy"][:n] ** 2
+    kinetic = 0.5 * (b["mass"][:n] * speed + b["inertia"][:n] * b["omega"][:n] ** 2)
+    gx, gy = scene.gravity_vector
+    potential = -b["mass"][:n] * (gx * b["x"][:n] + gy * b["y"][:n])
+    work = dict(zip(LEDGER, ledger.tolist(), strict=True))
+    elastic = elastic_energy(arrays, c)
+    return Energy(
+        float(kinetic[free].sum()),
+        float(potential[free].sum()),
+        elastic,
+        work["friction"],
+        work["damping"],
+        work["impact"] + work["links"] + elastic - before,
+        work["external"],
+    )
+
+
+def diagnosed(
+    arrays: Arrays, c: Contacts, count: Ints, deepest: float, seconds: float
+) -> Diagnostics:
+    """Return what a computation took so far: its counters, and the time of its steps [s]."""
+    return Diagnostics(
+        int(count[STEPS]),
+        int(count[ITERATIONS]),
+        int(count[RELAXED]),
+        int(count[SWEEPS]),
+        int(count[SOLVES]),
+        int(count[SOLVER_ITERATIONS]),
+        int(count[CONTACT_TOTAL]),
+        deepest,
+        compression(arrays, c),
+        seconds_by_phase(count, seconds),
+    )
+
+
+def seconds_by_phase(count: Ints, seconds: float) -> dict[str, float]:
+    """Return the time spent in each phase [s], in proportion to its cycles."""
+    cycles = count[BROAD_PHASE:].astype(float)
+    total = cycles.sum()
+    share = cycles / total if total > 0.0 else cycles
+    return dict(zip(PHASES, (seconds * share).tolist(), strict=True))
+
+
+def compression(arrays: Arrays, c: Contacts) -> float:
+    """Return how far contacts at rest give way now, over the mean block size [-].
+
+    The median, since a blow loads one or another for a step; the greatest of plain contacts,
+    all of one stiffness.
+    """
+    b = arrays.bodies
+    quiet = np.hypot(b["vx"], b["vy"]) + np.abs(b["omega"]) * b["radius"] < QUIET_SPEED
+    c = c[(c["state"] != OPEN) & quiet[c["a"]]]
+    rest, plain = (c[c["kind"] == kind] for kind in (REST, PLAIN))
+    rest, plain = (some["normal"] / some["stiffness"] for some in (rest, plain))
+    typical = float(np.median(rest)) if len(rest) else 0.0
+    size = arrays.parameters[0].margin / MARGIN_RATIO
+    return max(typical, float(plain.max(initial=0.0))) / size
+
+
+def divergence(arrays: Arrays, contacts: NDArray[np.void], block: int, when: str) -> str:
+    """Return what is known of a block that moves too fast, and of the contact that did it."""
+    body = arrays.bodies[block]
+    speed = ", ".join(f"{body[name]:g}" for name in ("vx", "vy", "omega"))
+    told = f"{when}: block {block} moves at ({speed})"
+    touching = contacts[(contacts["block_a"] == block) | (contacts["block_b"] == block)]
+    if len(touching):
+        c = touching[np.argmax(np.abs(touching["normal_force"]))]
+        other = c["block_b"] if c["block_a"] == block else c["block_a"]
+        told += f", pressed with {c['normal_force']:g} N at ({c['x']:g}, {c['y']:g})"
+        told += f" by {'the terrain' if other < 0 else f'block {other}'}"
+    return f"{told}; use a smaller dt"

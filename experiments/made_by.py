@@ -16,6 +16,9 @@ import numba
 
 from rigdda.kernel import sources
 
+DECORATORS = ("kernel", "inlined", "arithmetic_kernel", "stage", "entry_kernel")
+"""Of functions that are compiled."""
+
 KERNELS = "kernels.csv"
 """Table of a folder of results that says which kernels made the others."""
 
@@ -26,15 +29,35 @@ def is_text(part: ast.AST) -> bool:
     return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
+def is_kernel(part: ast.stmt) -> bool:
+    """Return whether a statement is a function that is compiled."""
+    if not isinstance(part, ast.FunctionDef):
+        return False
+    return any(isinstance(d, ast.Name) and d.id in DECORATORS for d in part.decorator_list)
+
+
+def is_driver(part: ast.stmt) -> bool:
+    """Return whether a statement is code of a module that only calls kernels."""
+    if isinstance(part, ast.FunctionDef):
+        return not part.name.startswith("_")
+    return isinstance(part, ast.ClassDef) and not part.bases
+
+
 def statements(source: bytes) -> list[str]:
-    """Return the statements of a module as trees, without imports, docstrings and comments."""
+    """Return the kernels, constants and layouts of arrays of a module as trees.
+
+    Without docstrings and comments; none of a module that only calls kernels.
+    """
     tree = ast.parse(source)
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
             node.body = [part for part in body if not is_text(part)]  # type: ignore[attr-defined]
-    imports = ast.Import | ast.ImportFrom
-    return [ast.dump(part) for part in tree.body if not isinstance(part, imports)]
+    kernels = [part for part in tree.body if is_kernel(part)]
+    if not kernels and any(map(is_driver, tree.body)):
+        return []
+    data = ast.Assign | ast.AnnAssign | ast.ClassDef
+    return [ast.dump(part) for part in tree.body if part in kernels or isinstance(part, data)]
 
 
 @cache

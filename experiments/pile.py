@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
+from rigdda.dynamics.arrays import Matrix, System, Work
 from rigdda.dynamics.assembly.island import assemble_island
 from rigdda.dynamics.islands import find_islands, pair_blocks
-from rigdda.dynamics.records import CONTACTS, Bodies, Contacts, Matrix, System, Work
+from rigdda.dynamics.records import CONTACTS, Bodies, Contacts
 from rigdda.geometry import polygon_properties
 from rigdda.kernel import entry_kernel
 from rigdda.model.scene import Surface

@@ -20,10 +20,10 @@ from numba.core import config
 
 def sources() -> list[bytes]:
     """Return the sources that hold kernels or their constants."""
-    found = []
+    found, data = [], ("constants.py", "records.py", "arrays.py")
     for path in sorted(Path(__file__).parent.rglob("*.py")):
         source = path.read_bytes()
-        if b"rigdda.kernel import" in source or path.name in ("constants.py", "records.py"):
+        if b"rigdda.kernel import" in source or path.name in data:
             found.append(source)
     return found
 

@@ -12,8 +12,9 @@ from experiments.deformable.submatrices import (
     row_along,
     set_inertia,
 )
+from rigdda.dynamics.arrays import Matrix, Outlines
 from rigdda.dynamics.constants import OPEN, STICK
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Floats, Matrix, Outlines, Parameters
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Floats, Parameters
 from rigdda.kernel import kernel
 
 

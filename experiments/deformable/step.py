@@ -10,6 +10,7 @@ from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
 from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
+from rigdda.dynamics.arrays import Ground, Matrix, Monitors, Outlines, Work
 from rigdda.dynamics.correction import place_edges
 from rigdda.dynamics.detection import copy_index, detect
 from rigdda.dynamics.forces import accumulate_forces
@@ -24,14 +25,9 @@ from rigdda.dynamics.records import (
     Bodies,
     Contacts,
     Floats,
-    Ground,
     Interfaces,
     Links,
-    Matrix,
-    Monitors,
-    Outlines,
     Parameters,
-    Work,
 )
 from rigdda.kernel import kernel
 

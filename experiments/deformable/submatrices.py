@@ -8,7 +8,8 @@ gives the displacement of a point; the centroid is (x0, y0).
 
 from __future__ import annotations
 
-from rigdda.dynamics.records import Floats, Outlines
+from rigdda.dynamics.arrays import Outlines
+from rigdda.dynamics.records import Floats
 from rigdda.kernel import kernel
 
 UNKNOWNS = 6

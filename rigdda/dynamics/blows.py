@@ -22,6 +22,7 @@ import math
 
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.assembly.springs import along, normal_row, shear_row
 from rigdda.dynamics.constants import (
     CHAIN,
@@ -30,13 +31,7 @@ from rigdda.dynamics.constants import (
     OPEN,
 )
 from rigdda.dynamics.islands import root
-from rigdda.dynamics.records import (
-    Bodies,
-    Body,
-    Contact,
-    Contacts,
-    Islands,
-)
+from rigdda.dynamics.records import Bodies, Body, Contact, Contacts
 from rigdda.kernel import kernel
 
 

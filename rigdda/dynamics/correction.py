@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import math
 
+from rigdda.dynamics.arrays import Motion, Outlines
 from rigdda.dynamics.contact.separating_axes import following, over_edge
-from rigdda.dynamics.records import (
-    Bodies,
-    Body,
-    Motion,
-    Outlines,
-)
+from rigdda.dynamics.records import Bodies, Body
 from rigdda.kernel import inlined, kernel
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Boxes, Ground, Monitors, Outlines, Work
 from rigdda.dynamics.clock import lap
 from rigdda.dynamics.constants import (
     ASLEEP,
@@ -23,17 +24,12 @@ from rigdda.dynamics.records import (
     BROAD_PHASE,
     NARROW_PHASE,
     Bodies,
-    Boxes,
     Contacts,
-    Ground,
     Interfaces,
     Ints,
     Links,
-    Monitors,
-    Outlines,
     Parameters,
     Polygons,
-    Work,
 )
 from rigdda.dynamics.sleep import wake_neighbours
 from rigdda.kernel import kernel, stage

@@ -12,6 +12,7 @@ import math
 
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, System
 from rigdda.dynamics.assembly.springs import along, normal_row
 from rigdda.dynamics.blows import blows, find_trains, find_ways, hits
 from rigdda.dynamics.constants import (
@@ -28,17 +29,7 @@ from rigdda.dynamics.correction import set_body_coordinates
 from rigdda.dynamics.monitors import FAILED, write_event
 from rigdda.dynamics.motion import kinetic_energy
 from rigdda.dynamics.open_close import open_close
-from rigdda.dynamics.records import (
-    EVENTS,
-    Bodies,
-    Contacts,
-    Islands,
-    Monitors,
-    Outlines,
-    Parameters,
-    Rows,
-    System,
-)
+from rigdda.dynamics.records import EVENTS, Bodies, Contacts, Parameters
 from rigdda.dynamics.sleep import wake_island
 from rigdda.kernel import kernel, stage
 

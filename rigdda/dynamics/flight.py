@@ -12,25 +12,13 @@ import math
 
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Ground, Islands, Matrix, Monitors, Motion, Outlines
 from rigdda.dynamics.constants import ASLEEP, AWAKE, LATELY, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.forces import account_block, apply_forces, move_block
 from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.motion import retire, top_speed
-from rigdda.dynamics.records import (
-    Bodies,
-    Body,
-    Contacts,
-    Ground,
-    Ints,
-    Islands,
-    Matrix,
-    Monitors,
-    Motion,
-    Outlines,
-    Parameters,
-    Polygons,
-)
+from rigdda.dynamics.records import Bodies, Body, Contacts, Ints, Parameters, Polygons
 from rigdda.kernel import kernel, stage
 
 

@@ -6,6 +6,7 @@ import math
 
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Islands, Matrix, Monitors, Motion
 from rigdda.dynamics.assembly.island import assemble_blocks, damping_of, load_moment
 from rigdda.dynamics.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.dynamics.constants import (
@@ -19,17 +20,7 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.islands import root
 from rigdda.dynamics.monitors import barrier_contact
-from rigdda.dynamics.records import (
-    Bodies,
-    Body,
-    Contact,
-    Contacts,
-    Islands,
-    Matrix,
-    Monitors,
-    Motion,
-    Parameters,
-)
+from rigdda.dynamics.records import Bodies, Body, Contact, Contacts, Parameters
 from rigdda.kernel import inlined
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Islands, Monitors, Motion, Outlines, System, Work
 from rigdda.dynamics.clock import lap
 from rigdda.dynamics.constants import (
     OPEN,
@@ -30,13 +31,7 @@ from rigdda.dynamics.records import (
     Bodies,
     Contacts,
     Interfaces,
-    Islands,
-    Monitors,
-    Motion,
-    Outlines,
     Parameters,
-    System,
-    Work,
 )
 from rigdda.dynamics.recovery import push_out
 from rigdda.dynamics.thrust import press

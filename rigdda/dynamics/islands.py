@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Islands, Matrix
 from rigdda.dynamics.constants import AWAKE
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Ints, Islands, Matrix
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Ints
 from rigdda.kernel import kernel
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 
+from rigdda.dynamics.arrays import Islands, Monitors, Motion
 from rigdda.dynamics.constants import (
     AFTER_IMPACT,
     BOLT,
@@ -26,17 +27,7 @@ from rigdda.dynamics.constants import (
 from rigdda.dynamics.contact.approach import pull_on, strike
 from rigdda.dynamics.contact.law import prepare, time_of_impact
 from rigdda.dynamics.contact.transfer import recall
-from rigdda.dynamics.records import (
-    Bodies,
-    Contact,
-    Contacts,
-    Interfaces,
-    Ints,
-    Islands,
-    Monitors,
-    Motion,
-    Parameters,
-)
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Ints, Parameters
 from rigdda.kernel import inlined, kernel
 
 

@@ -4,19 +4,10 @@ from __future__ import annotations
 
 import math
 
+from rigdda.dynamics.arrays import Islands, Monitors
 from rigdda.dynamics.constants import APART, AWAKE, END_CHECK, OPEN
 from rigdda.dynamics.motion import kinetic_energy
-from rigdda.dynamics.records import (
-    STEPS,
-    STILL,
-    Bodies,
-    Body,
-    Contacts,
-    Ints,
-    Islands,
-    Monitors,
-    Parameters,
-)
+from rigdda.dynamics.records import STEPS, STILL, Bodies, Body, Contacts, Ints, Parameters
 from rigdda.kernel import inlined, kernel
 
 HIT, CROSSING, FAILED = 0, 1, 2

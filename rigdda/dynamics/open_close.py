@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Islands, Matrix, Motion, Rows, Scratch, System
 from rigdda.dynamics.assembly.island import assemble_blocks, assemble_island
 from rigdda.dynamics.assembly.springs import relative_displacement
 from rigdda.dynamics.constants import (
@@ -42,13 +43,7 @@ from rigdda.dynamics.records import (
     SWEEPS,
     Bodies,
     Contacts,
-    Islands,
-    Matrix,
-    Motion,
     Parameters,
-    Rows,
-    Scratch,
-    System,
 )
 from rigdda.dynamics.states import update_states
 from rigdda.kernel import kernel

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from rigdda.dynamics.arrays import Islands, Motion, Rows
 from rigdda.dynamics.assembly.springs import normal_row, relative_displacement
 from rigdda.dynamics.constants import IMPACT, RECOVERY_SWEEPS
 from rigdda.dynamics.linear.relaxation import NORMAL
@@ -23,7 +24,7 @@ from rigdda.dynamics.linear.rows import (
     product,
     write_row,
 )
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Islands, Motion, Parameters, Rows
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
 

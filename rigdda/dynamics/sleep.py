@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.constants import ASLEEP, AWAKE, GROWN, SLEEP_SPEED, SLEEP_TIME
 from rigdda.dynamics.motion import top_speed
-from rigdda.dynamics.records import Bodies, Ints, Islands, Parameters
+from rigdda.dynamics.records import Bodies, Ints, Parameters
 from rigdda.kernel import kernel
 
 

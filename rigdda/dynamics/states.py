@@ -10,6 +10,7 @@ import math
 
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.assembly.springs import relative_displacement
 from rigdda.dynamics.constants import (
     BOLT,
@@ -23,13 +24,7 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.contact.joint import joint_breaks
 from rigdda.dynamics.contact.law import set_plastic
-from rigdda.dynamics.records import (
-    Bodies,
-    Contact,
-    Contacts,
-    Islands,
-    Parameters,
-)
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Ground, Monitors, Outlines, System, Work
 from rigdda.dynamics.clock import lap
 from rigdda.dynamics.constants import (
     AWAKE,
@@ -31,15 +32,10 @@ from rigdda.dynamics.records import (
     STEPS,
     Bodies,
     Contacts,
-    Ground,
     Interfaces,
     Links,
-    Monitors,
-    Outlines,
     Parameters,
     Shaking,
-    System,
-    Work,
 )
 from rigdda.dynamics.shaking import set_field
 from rigdda.dynamics.sleep import watch_quiet

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import math
 
+from rigdda.dynamics.arrays import Islands, Monitors
 from rigdda.dynamics.constants import ASLEEP, BOLT, IMPACT, OPEN, PIN, PLASTIC, RETIRED, TERRAIN
 from rigdda.dynamics.islands import root
 from rigdda.dynamics.monitors import FAILED, barrier_contact, write_event
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Islands, Monitors, Parameters
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import kernel, stage
 
 REST, HITS = 0, 1

@@ -27,6 +27,8 @@ def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
 
 
 def test_comments_and_the_module_of_a_kernel_do_not_count():
-    one = b"import math\n\nA = 1  # why\ndef f(x):\n    'Return x.'\n    return A * x\n"
-    assert made_by.statements(one) == made_by.statements(b"A = 1\ndef f(x):\n    return A * x\n")
-    assert made_by.statements(one) != made_by.statements(b"A = 2\ndef f(x):\n    return A * x\n")
+    one = b"import math\n\nA = 1  # why\n@kernel\ndef f(x):\n    'Return x.'\n    return A * x\n"
+    two = b"A = 1\n@kernel\ndef f(x):\n    return A * x\n"
+    assert made_by.statements(one) == made_by.statements(two)
+    assert made_by.statements(one) != made_by.statements(two.replace(b"1", b"2"))
+    assert not made_by.statements(b"B = 3\ndef call():\n    return f(B)\n")

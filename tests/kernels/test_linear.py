@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rigdda.dynamics.arrays import Matrix, Scratch
 from rigdda.dynamics.linear import direct, pcg, skyline, sor
 from rigdda.dynamics.pack.space import empty_matrix, empty_scratch
-from rigdda.dynamics.records import Matrix, Scratch
 from rigdda.kernel import from_python
 
 solve_block, solve_two_blocks = map(from_python, (direct.solve_block, direct.solve_two_blocks))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+from rigdda.dynamics.arrays import Islands, Matrix
 from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.dynamics.assembly.springs import add_block, add_force, normal_row, shear_row
 from rigdda.dynamics.constants import APART, BOLT, OPEN, SLIP, SMALL_ISLAND, STICK
-from rigdda.dynamics.records import Bodies, Body, Contact, Contacts, Islands, Matrix, Parameters
+from rigdda.dynamics.records import Bodies, Body, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
 

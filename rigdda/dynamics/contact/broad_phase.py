@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from rigdda.dynamics.arrays import Boxes
 from rigdda.dynamics.constants import AWAKE, LATELY, RETIRED
 from rigdda.dynamics.motion import top_speed
-from rigdda.dynamics.records import Bodies, Boxes, Parameters, Polygons
+from rigdda.dynamics.records import Bodies, Parameters, Polygons
 from rigdda.kernel import kernel
 
 

@@ -13,8 +13,9 @@ it bears what cohesion and friction give in sum.
 
 from __future__ import annotations
 
+from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.constants import SAME_FACE
-from rigdda.dynamics.records import Contact, Contacts, Islands, Parameters
+from rigdda.dynamics.records import Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
 

@@ -31,6 +31,7 @@ from __future__ import annotations
 
 import math
 
+from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.constants import (
     AWAKE,
     BLOW_SPEED,
@@ -53,7 +54,7 @@ from rigdda.dynamics.contact.approach import (
     set_velocities_at_start,
     strike,
 )
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Islands, Parameters
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Parameters
 from rigdda.kernel import inlined, kernel
 
 

@@ -11,11 +11,12 @@ import math
 
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import BOLT, START_STIFFNESS, STICK
 from rigdda.dynamics.contact.approach import effective_mass, point_velocity
 from rigdda.dynamics.contact.law import impact_stiffness
 from rigdda.dynamics.correction import place_corners
-from rigdda.dynamics.records import Bodies, Body, Contact, Link, Links, Outlines, Parameters
+from rigdda.dynamics.records import Bodies, Body, Contact, Link, Links, Parameters
 from rigdda.kernel import entry_kernel, kernel
 
 

@@ -8,6 +8,7 @@ leads through a neighbouring part, and that one has the contact.
 
 from __future__ import annotations
 
+from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import AWAKE, OTHER_FACE, SAME_FACE
 from rigdda.dynamics.contact.separating_axes import (
     axis_gap,
@@ -15,7 +16,7 @@ from rigdda.dynamics.contact.separating_axes import (
     following,
     incident_edge,
 )
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Outlines, Parameters
+from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.records import Ground
+from rigdda.dynamics.arrays import Ground
 from rigdda.kernel import kernel
 
 

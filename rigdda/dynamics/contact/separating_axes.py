@@ -11,8 +11,9 @@ is not caught by the side of the next body, whose face is flush with it.
 
 from __future__ import annotations
 
+from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import SAME_FACE
-from rigdda.dynamics.records import Corners, Outlines
+from rigdda.dynamics.records import Corners
 from rigdda.kernel import inlined, kernel
 
 NEVER = 1e3

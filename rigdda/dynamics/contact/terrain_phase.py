@@ -7,6 +7,7 @@ fall through there.
 
 from __future__ import annotations
 
+from rigdda.dynamics.arrays import Ground, Outlines
 from rigdda.dynamics.constants import SAME_FACE, TERRAIN
 from rigdda.dynamics.contact.narrow_phase import add_contact, keep_nearest
 from rigdda.dynamics.contact.segments import (
@@ -17,7 +18,7 @@ from rigdda.dynamics.contact.segments import (
     shadowed,
 )
 from rigdda.dynamics.contact.separating_axes import following
-from rigdda.dynamics.records import Bodies, Box, Contacts, Ground, Outlines, Parameters
+from rigdda.dynamics.records import Bodies, Box, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
 NEVER = 2.0

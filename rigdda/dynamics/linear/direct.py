@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.records import Matrix
+from rigdda.dynamics.arrays import Matrix
 from rigdda.kernel import kernel
 
 

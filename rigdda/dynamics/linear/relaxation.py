@@ -24,6 +24,7 @@ import math
 
 import numpy as np
 
+from rigdda.dynamics.arrays import Islands, Motion, Rows
 from rigdda.dynamics.assembly.island import damping_of
 from rigdda.dynamics.constants import (
     LARGE_ISLAND,
@@ -58,17 +59,7 @@ from rigdda.dynamics.linear.rows import (
     pack_row,
     sort_by_height,
 )
-from rigdda.dynamics.records import (
-    Bodies,
-    Body,
-    Contacts,
-    Floats,
-    Ints,
-    Islands,
-    Motion,
-    Parameters,
-    Rows,
-)
+from rigdda.dynamics.records import Bodies, Body, Contacts, Floats, Ints, Parameters
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
 

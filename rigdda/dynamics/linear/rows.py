@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from rigdda.dynamics.arrays import Islands, Rows
 from rigdda.dynamics.assembly.springs import normal_row, shear_row
 from rigdda.dynamics.constants import (
     BOLT,
@@ -12,13 +13,7 @@ from rigdda.dynamics.constants import (
     PLAIN,
     SUBSTEPS,
 )
-from rigdda.dynamics.records import (
-    Contact,
-    Contacts,
-    Floats,
-    Islands,
-    Rows,
-)
+from rigdda.dynamics.records import Contact, Contacts, Floats
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
 # columns of rows.row, first what a visit to an open contact needs: the row of the contact for a and

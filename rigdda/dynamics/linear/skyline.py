@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.records import Matrix, Scratch
+from rigdda.dynamics.arrays import Matrix, Scratch
 from rigdda.kernel import kernel
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from rigdda.dynamics.arrays import Matrix, Scratch
 from rigdda.dynamics.linear.direct import solve_block
-from rigdda.dynamics.records import Matrix, Scratch
 from rigdda.kernel import kernel
 
 

@@ -8,23 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Ground, Monitors, Outlines, System, Work
 from rigdda.dynamics.pack.bodies import free_bodies, pack_bodies, pack_links
 from rigdda.dynamics.pack.ground import pack_ground, pack_shaking
 from rigdda.dynamics.pack.monitors import pack_monitors
 from rigdda.dynamics.pack.parameters import pack_interfaces, pack_parameters
 from rigdda.dynamics.pack.space import empty_contacts, empty_system, empty_work
-from rigdda.dynamics.records import (
-    Bodies,
-    Contacts,
-    Ground,
-    Interfaces,
-    Links,
-    Monitors,
-    Outlines,
-    Shaking,
-    System,
-    Work,
-)
+from rigdda.dynamics.records import Bodies, Contacts, Interfaces, Links, Shaking
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.barriers import Fence, GravityWall
+from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import (
     AWAKE,
     BOLT,
@@ -18,17 +19,7 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.correction import polygon_row, set_body_coordinates
 from rigdda.dynamics.correction import polygons as polygons_of
-from rigdda.dynamics.records import (
-    BODY,
-    CORNER,
-    LINK,
-    LOCAL,
-    POLYGON,
-    Bodies,
-    Floats,
-    Links,
-    Outlines,
-)
+from rigdda.dynamics.records import BODY, CORNER, LINK, LOCAL, POLYGON, Bodies, Floats, Links
 from rigdda.geometry import convex_parts, moments, polygon_properties, turns
 from rigdda.kernel import Direct, entry_kernel
 from rigdda.model.scene import Block, Scene

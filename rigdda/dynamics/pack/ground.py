@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigdda.dynamics.records import (
-    SEGMENT,
-    SHAKING,
-    Floats,
-    Ground,
-    Shaking,
-)
+from rigdda.dynamics.arrays import Ground
+from rigdda.dynamics.records import SEGMENT, SHAKING, Floats, Shaking
 from rigdda.model.scene import Scene, Terrain
 
 

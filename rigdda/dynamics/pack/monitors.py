@@ -6,14 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.barriers import Embankment, Fence
+from rigdda.dynamics.arrays import Monitors
 from rigdda.dynamics.pack.bodies import free_bodies
-from rigdda.dynamics.records import (
-    STATION,
-    TARGET,
-    WATCHED,
-    Bodies,
-    Monitors,
-)
+from rigdda.dynamics.records import STATION, TARGET, WATCHED, Bodies
 from rigdda.dynamics.run import EVENT
 from rigdda.model.scene import Scene, Terrain
 

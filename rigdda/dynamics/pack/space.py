@@ -5,23 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Boxes, Islands, Matrix, Motion, Rows, Scratch, System, Work
 from rigdda.dynamics.constants import (
     LAYERS,
 )
 from rigdda.dynamics.linear.rows import COLUMNS
-from rigdda.dynamics.records import (
-    BOX,
-    CONTACT,
-    Boxes,
-    Contacts,
-    Islands,
-    Matrix,
-    Motion,
-    Rows,
-    Scratch,
-    System,
-    Work,
-)
+from rigdda.dynamics.records import BOX, CONTACT, Contacts
 
 MOST_BANDWIDTH = 64
 """Blocks to the left of the diagonal, on average, up to which a skyline is kept room for."""

@@ -1,0 +1,139 @@
+"""Arrays that kernels are handed together, as named tuples of arrays of records: see `records`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.dynamics.records import Corners, Floats, Ints, Polygons
+
+
+class Outlines(NamedTuple):
+    """Polygons, anticlockwise and padded to P: bodies, then convex parts of non-convex bodies.
+
+    Parts have corners of their body only; an edge inside the body is never a face of contact.
+    """
+
+    polygon: Polygons
+    corner: Corners
+    local: NDArray[np.void]  # (R, P) of LOCAL: the corners in body coordinates
+
+
+class Ground(NamedTuple):
+    """Terrain segments with bins along x that list those above them."""
+
+    segment: NDArray[np.void]  # (S + 1,) of SEGMENT; the last is only where the one before ends
+    bin_start: Ints  # (bins + 1,)
+    bin_item: Ints
+    bin_origin: float
+    bin_width: float
+
+
+class Matrix(NamedTuple):
+    """The simultaneous equations K d = F of one island: n blocks, block-sparse, symmetric."""
+
+    diagonal: Floats  # (N, 3, 3), N with the gravity walls
+    off: Floats  # (pairs, 3, 3) row block pair_i, column block pair_j
+    pair_i: Ints
+    pair_j: Ints
+    lower: Floats  # (3, 3) block below the diagonal of two blocks with friction, unsymmetric
+    rhs: Floats  # (N, 3)
+    d: Floats  # (N + 1, 3) displacements u0, v0 [m], r0 [rad]; the last of what cannot move
+
+
+class Scratch(NamedTuple):
+    """What the solvers of the equations work on."""
+
+    dense: Floats  # (6, 7) matrix and forces of two blocks
+    residual: Floats  # (N, 3) vectors of the iterations
+    direction: Floats
+    product: Floats
+    scaled: Floats
+    first: Ints  # (N,) leftmost block of a row, or head of its chain of neighbours
+    row: Ints  # (3 N,) place in `factor` of column 0 of a scalar row
+    factor: Floats  # Cholesky factor within the profile
+    next: Ints  # (2 pairs,) next entry in a chain of neighbours, -1 at its end
+
+
+class Motion(NamedTuple):
+    """Displacements of the blocks of one island in a step, by slot."""
+
+    d: Floats  # (N + 1, 3) Matrix.d itself: by forces that are constant over the step
+    correction: Floats  # (N, 3) position correction in a step; first the contact forces
+    relaxed: Floats  # (N, 3) the same, as relaxation in substeps has found it
+    share: Floats  # (N,) of the step that remains at the first impact on the block, 0 without one
+
+
+class System(NamedTuple):
+    """An island in work."""
+
+    matrix: Matrix
+    scratch: Scratch
+    motion: Motion
+
+
+class Boxes(NamedTuple):
+    """Swept boxes of the bodies, and the pairs of bodies whose boxes overlap."""
+
+    swept: NDArray[np.void]  # (M,) of BOX
+    row: NDArray[np.void]  # (M,) the same in order of low_x, kept over steps
+    pairs: Ints  # (2 C,) candidate pairs of bodies
+    partner_start: Ints  # (M + 1,) second bodies of the pairs by their first one
+    partner: Ints  # (C,)
+
+
+class Islands(NamedTuple):
+    """Blocks and contacts island by island."""
+
+    parent: Ints  # (M,) union-find
+    slot: Ints  # (M,) place of a body in its island's matrix
+    block_start: Ints  # (M + 1,) blocks of each island
+    block_item: Ints
+    contact_start: Ints  # (M + 1,) contacts of each island
+    contact_item: Ints
+
+
+class Rows(NamedTuple):
+    """Contacts of one island in relaxation and the motion of its blocks, see linear.relaxation."""
+
+    row: Floats  # (C, columns)
+    row_i: Ints  # (C,) slots of their bodies
+    row_j: Ints
+    idle: Ints  # (C,) substep until which a contact cannot close
+    visit: Ints  # (C,) contacts that a sweep visits
+    place: Ints  # (C,) row of each contact
+    height: Floats  # (C,) of each contact [m]
+    layer: Ints  # (LAYERS + 1,) contacts below a height
+    moved_in: Ints  # (N + 1,) last sweep in which a slot moved
+    scale: Floats  # (N + 1, 3) displacement per unit of `motion` [m]
+    motion: Floats  # (N + 1, 9) displacements in substeps
+
+
+class Work(NamedTuple):
+    """Scratch arrays of a step, by what they are for: kernels are handed no more than they use."""
+
+    boxes: Boxes
+    islands: Islands
+    rows: Rows
+    first: Ints  # (M + 1,) first contact of each body a in the last step
+    begin: Ints  # (M + 1,) the same in this step
+
+
+class Monitors(NamedTuple):
+    """What is watched during a run."""
+
+    station: NDArray[np.void]  # (K,) of STATION, ascending
+    rock: NDArray[np.void]  # (N,) of WATCHED
+    target: NDArray[np.void]  # (B,) of TARGET
+    barrier: Ints  # (M,) barrier that a body is, -1: rock
+    fences: int  # their number
+    push: Floats  # (B, 2) impulse downhill of contacts at rest, and of others, in this step [N s]
+    impulse: Floats  # (B, K, 2) that in the last K steps, which are a second [N s]
+    mean: Floats  # (B, 2) thrust, mean over these [N]
+    last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
+    watch_low: float  # interval of x [m]
+    watch_high: float
+    leave: float  # x beyond which what moves on is left alone [m]; -inf: the run is not ended early
+    event: NDArray[np.void]

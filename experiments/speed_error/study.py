@@ -65,7 +65,8 @@ def run(quick: bool, out: Path) -> Number:
     others = peers()
     points = closed(quick, others)
     write(out / "speed_error.csv", [asdict(p) for p in points])
-    draw(out / "speed_error.png", (15.0, 10.0), lambda f: pictures.closed_forms(f, points))
+    panels = out / "speed_error.png"
+    draw(panels, (15.0, 10.0), lambda f: pictures.closed_forms(f, points), dpi=70)
     budget = highway.QUICK if quick else highway.FULL
     say(f"highway: reference, {budget.reference} releases")
     folder = out / SAMPLES

@@ -24,13 +24,10 @@ from experiments.script import (
     draw,
     interval,
     main,
-    say,
-    write,
 )
+from experiments.study import Row, tabulate
 from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Settings, Site
 from rigdda.release import release_many
-
-Row = dict[str, float | str]
 
 
 def benches(upper: float, lower: float) -> Layout:
@@ -63,21 +60,18 @@ MOST = 1.6
 deviations, which one of them exceeds in a tenth of such studies."""
 
 
-def row(name: str, dt: float, releases: int) -> Row:
+def measure(layout: str, dt_s: float, releases: int) -> Row:
     """Return debris share and number of failures of a layout at a step [s]: means, half intervals.
 
     With none or all of the releases alike the interval of a failure is that of one in between.
     """
-    site, layout = LAYOUTS[name]
-    found = Site.load(site)
-    found = replace(found, motion=replace(found.motion, dt=dt, damping_when="contact"))
-    outcomes = release_many([(found, layout, seed, "mass") for seed in range(releases)])
+    name, barriers = LAYOUTS[layout]
+    site = Site.load(name)
+    site = replace(site, motion=replace(site.motion, dt=dt_s, damping_when="contact"))
+    outcomes = release_many([(site, barriers, seed, "mass") for seed in range(releases)])
     debris, half = interval(outcome.debris_fraction for outcome in outcomes)
     failures, half_failures = interval(sum(b.failed for b in o.barriers) for o in outcomes)
     return {
-        "layout": name,
-        "dt_s": dt,
-        "releases": releases,
         "debris": debris,
         "debris_half": half,
         "failures": failures,
@@ -85,12 +79,18 @@ def row(name: str, dt: float, releases: int) -> Row:
     }
 
 
+def told(row: Row) -> str:
+    """Return what the terminal says of a row."""
+    words = f"{row['layout']}, {1e3 * row['dt_s']:g} ms"
+    return f"{words}: debris {row['debris']:.3f}, failures {row['failures']:.2f}"
+
+
 def difference(rows: list[Row]) -> float:
     """Return the greatest difference from the shortest step, over its 95 % interval [-]."""
     most = 0.0
     for name in LAYOUTS:
         for what in ("debris", "failures"):
-            here = [(float(r[what]), float(r[f"{what}_half"])) for r in rows if r["layout"] == name]
+            here = [(r[what], r[f"{what}_half"]) for r in rows if r["layout"] == name]
             value, half = np.array(here).T
             apart = np.abs(value - value[0]) / np.maximum(np.hypot(half, half[0]), 1e-9)
             most = max(most, float(apart.max()))
@@ -104,7 +104,7 @@ def picture(figure: Figure, rows: list[Row]) -> None:
         for name, colour in zip(LAYOUTS, COLOURS, strict=True):
             here = [r for r in rows if r["layout"] == name]
             dt, value, half = (
-                np.array([float(r[k]) for r in here]) for k in ("dt_s", what, f"{what}_half")
+                np.array([r[k] for r in here]) for k in ("dt_s", what, f"{what}_half")
             )
             axes.errorbar(1e3 * dt, value, half, fmt="o-", color=colour, capsize=3, label=name)
         axes.axvline(1e3 * Settings().dt, color="0.8", linewidth=6.0, zorder=0)
@@ -119,15 +119,12 @@ def picture(figure: Figure, rows: list[Row]) -> None:
 
 def run(quick: bool, out: Path) -> Number:
     """Write fence_step.csv and fence_step.png."""
-    rows = []
-    for name in LAYOUTS:
-        for dt in QUICK_STEPS if quick else STEPS:
-            say(f"barriers against step: {name}, {1e3 * dt:g} ms")
-            rows.append(row(name, dt, QUICK_RELEASES if quick else RELEASES))
-    write(out / "fence_step.csv", rows)
+    steps = QUICK_STEPS if quick else STEPS
+    releases = QUICK_RELEASES if quick else RELEASES
+    cases = [{"layout": k, "dt_s": dt, "releases": releases} for k in LAYOUTS for dt in steps]
+    rows = tabulate(out / "fence_step.csv", cases, measure, told)
     draw(out / "fence_step.png", (11.0, 4.5), lambda figure: picture(figure, rows))
     most = difference(rows)
-
     return Number("greatest difference from the shortest step, over its interval", most, high=MOST)
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from msgspec.structs import replace
 
-from experiments.script import BLUE, RED, Number, draw, interval, main, say, write
+from experiments.script import BLUE, RED, Number, draw, interval, main
+from experiments.study import Row, tabulate
 from rigdda import Settings, Site, Surface
 from rigdda.model.joints import JointSet
 from rigdda.model.place import BarrierZone, Motion, Road
@@ -53,33 +54,37 @@ deviations, which one of them exceeds in 3 % of such studies."""
 RELEASES, QUICK_RELEASES = {"ramp": 500, "quick": 200}, {"ramp": 40, "quick": 20}
 
 
-def row(name: str, dt: float, releases: int) -> dict[str, float | str]:
+def measure(site: str, dt_s: float, releases: int) -> Row:
     """Return the mean share of a site at a step [s] with its 95 % half interval."""
-    site = SITES[name]
-    site = replace(site, motion=replace(site.motion, dt=dt))
-    found = release_many([(site, (), seed, "mass") for seed in range(releases)])
+    here = replace(SITES[site], motion=replace(SITES[site].motion, dt=dt_s))
+    found = release_many([(here, (), seed, "mass") for seed in range(releases)])
     share, half = interval(outcome.debris_fraction for outcome in found)
-    return {"site": name, "dt_s": dt, "releases": releases, "share": share, "half_interval": half}
+    return {"share": share, "half_interval": half}
 
 
-def difference(rows: list[dict[str, float | str]]) -> float:
+def told(row: Row) -> str:
+    """Return what the terminal says of a row."""
+    return f"{row['site']}, {1e3 * row['dt_s']:g} ms: {row['share']:.3f}"
+
+
+def difference(rows: list[Row]) -> float:
     """Return the greatest difference from the first row of a site, over its 95 % interval [-]."""
     most = 0.0
     for name in SITES:
         share, half = np.array(
-            [(float(r["share"]), float(r["half_interval"])) for r in rows if r["site"] == name]
+            [(r["share"], r["half_interval"]) for r in rows if r["site"] == name]
         ).T
         most = max(most, float((np.abs(share - share[0]) / np.hypot(half, half[0])).max()))
     return most
 
 
-def picture(figure: Figure, rows: list[dict[str, float | str]]) -> None:
+def picture(figure: Figure, rows: list[Row]) -> None:
     """Draw the shares against the step."""
     axes = figure.subplots()
     for name, colour in COLOURS.items():
         here = [r for r in rows if r["site"] == name]
         dt, share, half = (
-            np.array([float(r[k]) for r in here]) for k in ("dt_s", "share", "half_interval")
+            np.array([r[k] for r in here]) for k in ("dt_s", "share", "half_interval")
         )
         axes.errorbar(1e3 * dt, share, half, fmt="o-", color=colour, capsize=3, label=name)
     axes.axvline(1e3 * Settings().dt, color="0.8", linewidth=6.0, zorder=0, label="default")
@@ -94,15 +99,11 @@ def picture(figure: Figure, rows: list[dict[str, float | str]]) -> None:
 def run(quick: bool, out: Path) -> Number:
     """Write outcome_step.csv and outcome_step.png."""
     releases = QUICK_RELEASES if quick else RELEASES
-    rows = []
-    for name in SITES:
-        for dt in QUICK_STEPS if quick else STEPS:
-            say(f"outcome against step: {name}, {1e3 * dt:g} ms")
-            rows.append(row(name, dt, releases[name]))
-    write(out / "outcome_step.csv", rows)
+    steps = QUICK_STEPS if quick else STEPS
+    cases = [{"site": s, "dt_s": dt, "releases": releases[s]} for s in SITES for dt in steps]
+    rows = tabulate(out / "outcome_step.csv", cases, measure, told)
     draw(out / "outcome_step.png", (7.0, 4.5), lambda figure: picture(figure, rows))
     most = difference(rows)
-
     return Number("greatest difference from the shortest step, over its interval", most, high=MOST)
 
 

@@ -114,12 +114,12 @@ def say(what: str) -> None:
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows as CSV and note beside it which kernels made them, see `experiments.made_by`."""
-    _write(path, rows)
+    put(path, rows)
     made = made_by(path.parent) | {path.name: kernels_hash()}
-    _write(path.parent / KERNELS, [{"table": k, "kernels": made[k]} for k in sorted(made)])
+    put(path.parent / KERNELS, [{"table": k, "kernels": made[k]} for k in sorted(made)])
 
 
-def _write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def put(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows as CSV, a column a key, numbers to six digits; whole or not at all.
 
     What is not a number does not apply: its cell is empty.

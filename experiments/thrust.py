@@ -20,12 +20,11 @@ from msgspec.structs import replace
 
 from agents.menu import HEIGHTS
 from envs.sizes import SLENDER
-from experiments.script import BLUE, GREEN, RED, Number, draw, main, say, write
+from experiments.script import BLUE, GREEN, RED, Number, draw, main
+from experiments.study import Row, tabulate
 from rigdda import Barrier, Embankment, Fence, GravityWall, Site
 from rigdda.barriers import FENCE_CLASSES, describe
 from rigdda.release import release_many
-
-Row = dict[str, float | str]
 
 SITES = {"shu-hwa": 83.6, "quick": 23.0}
 """Sites with a mass, and where the barriers stand [m]: at the toe, and on a bench."""
@@ -48,19 +47,27 @@ def barriers(x: float, highest: float) -> Iterator[Barrier]:
             yield GravityWall(x, h, max(0.5, SLENDER * h))
 
 
-def row(site: Site, barrier: Barrier, releases: int) -> Row:
+def catalogue() -> dict[tuple[str, str], Barrier]:
+    """Return the barriers that each site is asked about, by its name and their words."""
+    return {
+        (name, describe(b)): b
+        for name, x in SITES.items()
+        for b in barriers(x, Site.load(name).barrier_zone.max_height)
+    }
+
+
+def measure(site: str, barrier: str, dt_ms: float, releases: int) -> Row:
     """Return what a barrier bore in releases of the mass of a site; forces in kN/m."""
-    outcomes = release_many([(site, (barrier,), seed, "mass") for seed in range(releases)])
+    one = catalogue()[site, barrier]
+    here = Site.load(site)
+    here = replace(here, motion=replace(here.motion, dt=1e-3 * dt_ms))
+    outcomes = release_many([(here, (one,), seed, "mass") for seed in range(releases)])
     found = [outcome.barriers[0] for outcome in outcomes]
     thrust = np.array([f.thrust for f in found])
     wrong = sum(f.thrust > BEYOND * f.resistance and not f.failed for f in found)
     return {
-        "site": site.name,
-        "barrier": describe(barrier),
-        "kind": barrier.kind,
-        "height_m": float(getattr(barrier, "height", 0.0)),
-        "dt_ms": 1e3 * site.motion.dt,
-        "releases": releases,
+        "kind": one.kind,
+        "height_m": float(getattr(one, "height", 0.0)),
         "thrust_kn": round(1e-3 * float(thrust.mean()), 2),
         "greatest_thrust_kn": round(1e-3 * float(thrust.max()), 2),
         "resistance_kn": round(1e-3 * found[0].resistance, 2),
@@ -69,20 +76,26 @@ def row(site: Site, barrier: Barrier, releases: int) -> Row:
     }
 
 
+def told(row: Row) -> str:
+    """Return what the terminal says of a row."""
+    words = f"{row['site']}, {row['barrier']}, {row['dt_ms']:g} ms"
+    return f"{words}: fails in {row['failed']:g} of {row['releases']:g} releases"
+
+
 def picture(figure: Figure, rows: list[Row]) -> None:
     """Draw thrust over resistance against height, open where some stand and filled where none."""
-    names = list(dict.fromkeys(str(r["site"]) for r in rows))
+    names = list(dict.fromkeys(r["site"] for r in rows))
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
         for kind, colour in COLOURS.items():
             own = [r for r in rows if r["site"] == name and r["kind"] == kind]
             for r in own:
-                ratio = float(r["greatest_thrust_kn"]) / float(r["resistance_kn"])
-                gone = float(r["failed"]) / float(r["releases"])
+                ratio = r["greatest_thrust_kn"] / r["resistance_kn"]
+                gone = r["failed"] / r["releases"]
                 face = colour if gone == 1.0 else "none"
-                small = float(r["dt_ms"]) < 10.0
+                small = r["dt_ms"] < 10.0
                 axes.plot(
-                    float(r["height_m"]), max(ratio, 1e-2), "s" if small else "o",
+                    r["height_m"], max(ratio, 1e-2), "s" if small else "o",
                     color=colour, markerfacecolor=face, markersize=5 if small else 7,
                 )  # fmt: skip
             axes.plot([], [], "o", color=colour, label=kind.replace("_", " "))
@@ -94,18 +107,17 @@ def picture(figure: Figure, rows: list[Row]) -> None:
 
 def run(quick: bool, out: Path) -> Number:
     """Write thrust.csv and thrust.png."""
-    rows: list[Row] = []
-    for name, x in SITES.items():
-        base = Site.load(name)
-        for dt in QUICK_STEPS if quick else STEPS:
-            site = replace(base, motion=replace(base.motion, dt=dt))
-            say(f"thrust against resistance: {name}, {1e3 * dt:g} ms")
-            some = barriers(x, base.barrier_zone.max_height)
-            rows += [row(site, b, QUICK_RELEASES if quick else RELEASES) for b in some]
-    write(out / "thrust.csv", rows)
+    steps = [1e3 * dt for dt in (QUICK_STEPS if quick else STEPS)]
+    releases = QUICK_RELEASES if quick else RELEASES
+    cases = [
+        {"site": site, "barrier": barrier, "dt_ms": dt, "releases": releases}
+        for dt in steps
+        for site, barrier in catalogue()
+    ]
+    rows = tabulate(out / "thrust.csv", cases, measure, told)
     draw(out / "thrust.png", (11.0, 4.5), lambda figure: picture(figure, rows))
-    wrong = sum(float(r["stand_beyond_resistance"]) for r in rows)
-    ratio = [float(r["greatest_thrust_kn"]) / float(r["resistance_kn"]) for r in rows]
+    wrong = sum(r["stand_beyond_resistance"] for r in rows)
+    ratio = [r["greatest_thrust_kn"] / r["resistance_kn"] for r in rows]
     note = f"thrust over resistance up to {max(ratio):.1f}" if math.isfinite(max(ratio)) else ""
     return Number("barriers that stand beyond what they bear", wrong, high=0.0, note=note)
 

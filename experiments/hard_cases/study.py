@@ -6,15 +6,15 @@ must be refused may be.
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
 
 from experiments.hard_cases.case import DEGRADES, FAILS, HOLDS, REFUSES, Result
 from experiments.hard_cases.picture import verdicts
 from experiments.hard_cases.suite import CASES, QUICK_STEPS, STEPS
-from experiments.hard_cases.worker import sweep
-from experiments.script import Number, draw, say, write
+from experiments.hard_cases.worker import Worker
+from experiments.script import Number, draw
+from experiments.study import Row, tabulate
 from rigdda import Settings
 from rigdda.files import atomic
 
@@ -64,15 +64,18 @@ def allowed(refused: bool, dt: float) -> tuple[str, ...]:
     return (HOLDS,) if dt <= DEFAULT else (HOLDS, REFUSES)
 
 
+def told(row: Row) -> str:
+    """Return what the terminal says of a trial."""
+    return f"{row['case']} {1e3 * row['dt']:g} ms {row['verdict']} {row['note']}"
+
+
 def run(quick: bool, out: Path) -> Number:
     """Compute, write and draw."""
     steps = QUICK_STEPS if quick else STEPS
-    trials = [(case, dt) for case in CASES for dt in steps]
-    results = []
-    for result in sweep(trials, QUICK_LIMIT if quick else LIMIT):
-        results.append(result)
-        say(f"hard cases: {result.case} {1e3 * result.dt:g} ms {result.verdict} {result.note}")
-    write(out / "hard_cases.csv", [asdict(r) for r in results])
+    cases = [{"case": case.name, "dt": dt} for case in CASES for dt in steps]
+    with Worker(QUICK_LIMIT if quick else LIMIT) as worker:
+        rows = tabulate(out / "hard_cases.csv", cases, worker.measure, told)
+    results = [Result(**row) for row in rows]
     with atomic(out / "hard_cases.md") as part:
         part.write_text(table(results))
     draw(out / "hard_cases.png", (9.0, 11.0), lambda figure: verdicts(figure, results))

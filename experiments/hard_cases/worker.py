@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from multiprocessing.connection import Connection
 from typing import Any
 
-from experiments.hard_cases.case import FAILS, Case, Result
+from experiments.hard_cases.case import FAILS, Result
 from experiments.hard_cases.suite import CASES
 from experiments.hard_cases.trial import trial
 from rigdda import Scene, Simulation, Terrain
@@ -20,8 +20,6 @@ START = 1800.0
 IDLE = 20.0
 """Time over processor time after which a trial counts as hung although it does not compute [-]:
 more than a busy machine makes of it."""
-
-Trial = tuple[Case, float]
 
 
 def serve(pipe: Connection, limit: float) -> None:
@@ -74,6 +72,17 @@ class Worker:
         self.stop()
         return Result(name, dt, FAILS, note=note)
 
+    def measure(self, case: str, dt: float) -> dict[str, Any]:
+        """Return what came of a case at a step [s], but for these two, as columns of a table."""
+        found = asdict(self.run(case, dt))
+        return {name: found[name] for name in found if name not in ("case", "dt")}
+
+    def __enter__(self) -> Worker:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.stop()
+
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
@@ -94,13 +103,3 @@ class Worker:
             self._process.join()
             self._pipe.close()
             self._process = None
-
-
-def sweep(trials: Iterable[Trial], limit: float) -> Iterator[Result]:
-    """Yield the results of trials in their order, each ended after a processor time [s]."""
-    worker = Worker(limit)
-    try:
-        for case, dt in trials:
-            yield worker.run(case.name, dt)
-    finally:
-        worker.stop()

@@ -1,0 +1,71 @@
+"""The runner of studies: a table that grows case by case, and goes on where it was stopped."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from experiments.made_by import kernels_hash
+from experiments.script import say, write
+from rigdda.files import atomic
+
+Row = dict[str, Any]
+
+
+def tabulate(
+    path: Path,
+    cases: Sequence[Row],
+    measure: Callable[..., Row],
+    told: Callable[[Row], str],
+    processes: int = 1,
+) -> list[Row]:
+    """Return a row a case, the case's own columns before what is measured, and write the table.
+
+    Until the last row is there, rows are kept beside the table under the hash of the kernels: a
+    study that was stopped goes on by the same kernels, and begins anew by others.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    cases : sequence of dict
+        Arguments of `measure` by name, numbers and words; no two alike.
+    measure : callable
+        Returns the other columns of a case.
+    told : callable
+        What the terminal says of a row.
+    processes : int
+        Cases that are measured at once; more than one only if each is a process of its own.
+    """
+    kept = path.with_name(f"{path.stem}-{kernels_hash()}.part.json")
+    rows: list[Row] = json.loads(kept.read_text()) if kept.exists() else []
+    by_case = {key(row, cases[0]): row for row in rows}
+    todo = [case for case in cases if key(case, case) not in by_case]
+    if by_case:
+        say(f"{path.stem}: goes on with {len(todo)} of {len(cases)} cases")
+    for case, found in zip(todo, several(todo, measure, processes), strict=True):
+        row = by_case[key(case, case)] = case | found
+        with atomic(kept) as part:
+            part.write_text(json.dumps(list(by_case.values()), default=lambda x: x.item()))
+        say(f"{path.stem}: {told(row)}")
+    rows = [by_case[key(case, case)] for case in cases]
+    write(path, rows)
+    kept.unlink(missing_ok=True)
+    return rows
+
+
+def several(cases: Iterable[Row], measure: Callable[..., Row], processes: int) -> Iterator[Row]:
+    """Yield what is measured of each case, in their order."""
+    if processes == 1:
+        yield from (measure(**case) for case in cases)
+        return
+    with ThreadPoolExecutor(processes) as pool:
+        yield from pool.map(lambda case: measure(**case), cases)
+
+
+def key(row: Row, case: Mapping[str, Any]) -> str:
+    """Return what tells a row from the others: the columns of its case."""
+    return json.dumps({name: row[name] for name in case})

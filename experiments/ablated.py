@@ -60,7 +60,7 @@ VARIANTS = (
 """What each constant is set to; not those that only stop a run or warn."""
 
 DEAR = ("collisions", "eccentric-hits", "ritchie")
-"""How the names of dear closed forms begin that are left out: they hold for almost any constants."""
+"""How the names of dear closed forms begin that are left out: almost any constants keep them."""
 
 TESTS = ("test_fences", "test_thrust", "test_foreseen", "test_gravity_walls", "test_lone_block",
          "test_sleeping", "test_loads_and_supports")  # fmt: skip

@@ -116,6 +116,9 @@ class Settings:
 def longest_step(areas: NDArray[np.float64], gravity: float) -> float:
     """Return the longest step [s] that suits free blocks of these areas [m2].
 
+    A scene with a longer one is refused (`rigdda.dynamics.pack.parameters.check_step`), a site
+    divides its step (`Site.settings`).
+
     Without gravity as under that of the earth.
     """
     mean, least = math.sqrt(np.add.reduce(areas) / len(areas)), math.sqrt(areas.min())

@@ -1,4 +1,7 @@
-"""Supports of blocks: the paper's fixed point and rock bolt."""
+"""Supports of blocks: the paper's fixed point and rock bolt.
+
+What they do is computed in `rigdda.dynamics.contact.links`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inertia, mass-proportional damping and body force of a block (Koo and Chern 1998)."""
+"""Inertia and mass-proportional damping of a block (Koo and Chern 1998)."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@ r"""Contact springs as submatrices.
 
 A spring of stiffness k along direction e of a contact contributes k e_i^t e_j to the stiffness,
 with e_i = (l, m, r x (l, m)) the rows of T_i along (l, m) = the normal or the shear direction.
+`island.assemble_contact` adds the springs of a contact to the system, friction among them.
 """
 
 from __future__ import annotations

@@ -68,8 +68,8 @@ def carried_weight(mass_a: float, mass_b: float, p: Parameters) -> float:
 def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
     """Return k_n [N/m] for the wanted penetration under the load that a contact carries.
 
-    At least for `weight` [N]. It never falls: stiffness that fell with the load would feed the sway
-    of a stack.
+    At least for `weight` [N]. `prepare` lets it never fall: stiffness that fell with the load would
+    feed the sway of a stack.
     """
     return max(weight, c.accumulated_normal) / p.penetration
 

@@ -14,7 +14,7 @@ and loads, f_c the force of a contact and e_c its row. A contact whose gap g + e
 by that gap, one that is closed not at all; an impact that has closed leaves by what its restitution
 asks for. Forces start from those of the last substep, so that d starts as 2 d_{s-1} - d_{s-2}.
 
-The sweeps of a substep are few, so that contacts which are closed may close a little more. That is
+The sweeps of a substep end at a tolerance, so that closed contacts may close a little more. That is
 pushed out at the end of the step, see `recovery`. At rest the global solve takes over.
 """
 

@@ -93,6 +93,7 @@ def design(
     finalists = list(dict.fromkeys([(), *known, *last[:1], *fewer, *last[1:], *seen]))[:FINALISTS]
     budget, keep = int(FINAL * simulations), len(finalists)
     ends = track.race(finalists, budget, first, keep, stage="final", strict=True)
+    ends = ends or near or best or lone  # a small budget may not pay for a final
     return ledger.result(ledger.evaluate(simplest(ends, track.nothing), "report", ledger.left))
 
 

@@ -34,6 +34,10 @@ from rigdda.dynamics.islands import root
 from rigdda.dynamics.records import Bodies, Body, Contact, Contacts
 from rigdda.kernel import kernel
 
+STRIKES, HITS, COUNTED = 1.0, 2.0, 3.0
+"""Marks of blocks in a train that strikes another block, or that hits the fence, and of a train
+whose momentum is in the sum."""
+
 
 @kernel
 def strength(way: NDArray) -> float:
@@ -111,23 +115,41 @@ def is_hit(c: Contact, fence: int) -> bool:
 
 
 @kernel
+def share_of_hits(
+    bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, fence: int,
+    momentum: float, dt: float,
+) -> float:  # fmt: skip
+    """Return the share of the impulses of the impacts on a fence in this step that are their own.
+
+    What is beyond the momentum of the blocks that hit it, and beyond `momentum`, that of their
+    trains [N s], is thrust, or a blow that counts for itself.
+    """
+    impulse = brought = own = 0.0
+    last = -1
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if is_hit(c, fence):
+            if c.a != last:  # contacts are in order of their block
+                brought, own, last = brought + own, 0.0, c.a
+            own = max(own, bodies[c.a].mass * math.hypot(c.un, c.us))
+            impulse += c.normal * dt
+    brought = max(brought + own, momentum)
+    return brought / impulse if brought < impulse else 1.0
+
+
+@kernel
 def hits(
     bodies: Bodies, contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int,
     fence: int, momentum: float, dt: float,
 ) -> tuple[float, float, int]:  # fmt: skip
-    """Return the work of the impacts on a fence in this step, the most of one [J], and that one.
-
-    An impulse beyond that of the block alone, and beyond the `momentum` of the trains that hit the
-    fence [N s], is thrust.
-    """
+    """Return the work of the impacts on a fence in this step, the most of one [J], and that one."""
     total = most = 0.0
     k = -1
+    share = share_of_hits(bodies, contacts, islands, low, high, fence, momentum, dt)
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         if is_hit(c, fence):
             own = d[islands.slot[c.a]]
-            brought = max(bodies[c.a].mass * math.hypot(c.un, c.us), momentum)
-            share = min(brought / (c.normal * dt), 1.0)
             work = c.normal * along(normal_row(c, True), own)
             work = -share * (work + c.shear * along(shear_row(c, True), own))
             total += work
@@ -150,7 +172,10 @@ def follow(
     bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, ways: NDArray,
     trains: NDArray,
 ) -> bool:  # fmt: skip
-    """Let what comes on behind a block that strikes be of its train; returns whether any is new."""
+    """Let what comes on behind a block that strikes be of its train; returns whether any is new.
+
+    Behind one that hits the fence what is faster than both would go on strikes it itself: a blow.
+    """
     more = False
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
@@ -158,12 +183,15 @@ def follow(
             continue
         a, b = islands.slot[c.a], islands.slot[c.b]
         behind, ahead = (b, a) if strength(ways[a]) >= strength(ways[b]) else (a, b)
-        body = bodies[c.b if behind == b else c.a]
-        if trains[ahead, 2] == 1.0 and momentum_towards(body, ways[behind]) > 0.0:
+        last, first = (bodies[c.b], bodies[c.a]) if behind == b else (bodies[c.a], bodies[c.b])
+        coming = momentum_towards(last, ways[behind])
+        together = momentum_towards(first, ways[ahead]) * (1.0 + last.mass / first.mass)
+        mark = trains[ahead, 2]
+        if (mark == STRIKES and coming > 0.0) or (mark == HITS and 0.0 < coming <= together):
             i, j = root(islands.parent, a), root(islands.parent, b)
             more = more or i != j
             islands.parent[max(i, j)] = min(i, j)
-            trains[behind, 2] = 1.0
+            trains[behind, 2] = mark
     return more
 
 
@@ -185,10 +213,10 @@ def find_trains(
         trains[s, 0] = trains[s, 1] = trains[s, 2] = 0.0
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
-        hit = is_hit(c, fence) and c.kind == IMPACT
+        hit = is_hit(c, fence)
         striker = islands.slot[c.a] if hit else strikes(c, islands, ways)[0]
         if striker >= 0:
-            trains[striker, 2] = 1.0
+            trains[striker, 2] = max(trains[striker, 2], HITS if hit else STRIKES)
     for _ in range(CHAIN):
         if not follow(bodies, contacts, islands, low, high, ways, trains):
             break
@@ -196,13 +224,13 @@ def find_trains(
         body, train = bodies[islands.block_item[first + s]], trains[root(parent, s)]
         train[0] += body.mass
         train[1] += momentum_towards(body, ways[s])
-    momentum, last = 0.0, -1
+    momentum = 0.0
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         train = root(parent, islands.slot[c.a])
-        if is_hit(c, fence) and train != last:
+        if is_hit(c, fence) and trains[train, 2] != COUNTED:
             momentum += trains[train, 1]
-            last = train
+            trains[train, 2] = COUNTED
     return momentum
 
 
@@ -220,12 +248,12 @@ def blows(
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         striker, struck = strikes(c, islands, ways)
-        if striker < 0 or trains[struck, 2] == 1.0:
+        share = share_along(c, ways[struck], struck == islands.slot[c.a]) if striker >= 0 else 0.0
+        if share == 0.0 or root(islands.parent, striker) == root(islands.parent, struck):
             continue
         train = trains[root(islands.parent, striker)]
-        impulse = min(c.normal * dt, train[1])
-        share = share_along(c, ways[struck], struck == islands.slot[c.a])
-        work = 0.5 * impulse * train[1] * share * share / (train[0] + ways[struck, 0])
+        impulse = min(c.normal * dt, train[1] / share)  # what comes towards the fence has the share
+        work = 0.5 * impulse * train[1] * share / (train[0] + ways[struck, 0])
         total += work
         if work > most:
             most, k = work, islands.contact_item[item]

@@ -41,8 +41,9 @@ def aim(
 ) -> None:  # fmt: skip
     """Let the contacts with a fence leave a share of the velocities that blocks have without it.
 
-    They begin with no force, whatever comes; so the `first` time it finds these velocities. Those
-    that had not closed in the step stay open.
+    They begin open, with no force, whatever comes: a block that strikes the ground, too, might be
+    jammed between both. So the `first` time it finds these velocities. Those that had not closed in
+    the step stay open.
     """
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
@@ -53,9 +54,10 @@ def aim(
         elif c.met == 1 and c.free == SPEED_LIMIT:
             c.free = max(c.un - 2.0 * along(normal_row(c, True), d[islands.slot[c.a]]) / dt, 0.0)
         c.kind = IMPACT
-        c.state = STICK if c.free < SPEED_LIMIT else OPEN
+        c.state = OPEN
         c.accumulated_normal = c.accumulated_shear = c.start_normal = c.start_shear = 0.0
         c.bias = -dt * (share * c.free if c.free < SPEED_LIMIT else SPEED_LIMIT)
+        c.rebound = 0.0
 
 
 @stage
@@ -63,18 +65,21 @@ def break_through(
     bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
     fence: int, left: float, struck: float, passed: float, momentum: float, p: Parameters,
     counters: NDArray,
-) -> float:  # fmt: skip
-    """Settle an island whose blocks come through a fence; returns what that takes of them [J].
+) -> tuple[float, bool]:  # fmt: skip
+    """Settle an island whose blocks come through a fence.
 
-    It has `left` where it would take the work `struck` of impacts, and what blows pass on.
+    Returns what that takes of them [J], and what `open_close` does. The fence has `left` where it
+    would take the work `struck` of impacts, and what blows pass on.
     """
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     d, total = system.motion.d, struck + passed
-    taken, square = 0.0, 1.0 - left / total
+    taken, square, in_substeps = 0.0, 1.0 - left / total, False
     low_square, high_square, most, least = 0.0, 1.0, total, 0.0  # a bracket, and what its ends take
     for attempt in range(BREAK_SOLVES if left > 0.0 else 1):
+        if attempt == BREAK_SOLVES - 1 and taken - left > left - least:
+            square = high_square  # W(s) has a step where another impact comes first
         aim(contacts, d, islands, low, high, fence, attempt == 0, math.sqrt(square), p.dt)
-        open_close(bodies, contacts, system, islands, rows, island, p, counters)
+        in_substeps = open_close(bodies, contacts, system, islands, rows, island, p, counters)
         if attempt > 0:
             taken = hits(bodies, contacts, d, islands, low, high, fence, momentum, p.dt)[0]
             taken += (1.0 - square) * passed
@@ -86,17 +91,18 @@ def break_through(
                 high_square, least = square, taken
             share = min(max((most - left) / (most - least), 0.05), 0.95)  # no end for ever
             square = low_square + share * (high_square - low_square)
-    return taken
+    return taken, in_substeps
 
 
 @stage
 def charge_fences(
     bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
-    monitors: Monitors, time: float, p: Parameters, counters: NDArray,
-) -> bool:  # fmt: skip
+    monitors: Monitors, time: float, in_substeps: bool, p: Parameters, counters: NDArray,
+) -> tuple[bool, bool]:  # fmt: skip
     """Charge the fences that an island leans on, which was settled, and break what that exceeds.
 
-    Returns whether a fence broke, so that the island was settled again.
+    Returns whether a fence broke, so that the island was settled again, and whether that was
+    `in_substeps`, see `open_close`.
     """
     broke, d = False, system.motion.d
     ways, trains = system.scratch.residual, system.scratch.direction
@@ -125,15 +131,13 @@ def charge_fences(
                 monitors, counters[EVENTS], time, FAILED, bodies[i], i, barrier, c.x, c.y,
                 c.y - target.ground,
             )  # fmt: skip
-        target.absorbed += min(
-            break_through(
-                bodies, contacts, system, islands, rows, island, fence, left, struck, passed,
-                momentum, p, counters,
-            ),
-            left,
+        taken, in_substeps = break_through(
+            bodies, contacts, system, islands, rows, island, fence, left, struck, passed,
+            momentum, p, counters,
         )  # fmt: skip
+        target.absorbed += min(taken, left)
         broke = True
-    return broke
+    return broke, in_substeps
 
 
 @stage

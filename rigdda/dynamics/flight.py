@@ -13,7 +13,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Ground, Islands, Matrix, Monitors, Motion, Outlines
-from rigdda.dynamics.constants import ASLEEP, AWAKE, LATELY, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
+from rigdda.dynamics.constants import ASLEEP, AWAKE, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.forces import account_block, apply_forces, move_block
 from rigdda.dynamics.monitors import barrier_contact
@@ -155,8 +155,6 @@ def fly(
     Returns i if it went bad, else -1.
     """
     body = bodies[i]
-    body.lately = max(top_speed(body), LATELY * body.lately)
-    body.path = body.lately * p.dt
     apply_forces(bodies, contacts, m, motion, islands, 0, False, p)
     account_block(body, motion, 0, p, ledger)
     body.apart += p.dt

@@ -12,6 +12,7 @@ from rigdda.dynamics.assembly.springs import add_force, along, normal_row, shear
 from rigdda.dynamics.constants import (
     BOLT,
     IMPACT,
+    LATELY,
     OPEN,
     PIN,
     PLASTIC,
@@ -20,6 +21,7 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.islands import root
 from rigdda.dynamics.monitors import barrier_contact
+from rigdda.dynamics.motion import top_speed
 from rigdda.dynamics.records import Bodies, Body, Contact, Contacts, Parameters
 from rigdda.kernel import inlined
 
@@ -156,6 +158,7 @@ def account_contact(
 def move_block(body: Body, motion: Motion, s: int, dt: float) -> None:
     """Move a block, slot s, by its displacement; the velocity is that of constant acceleration."""
     d, correction = motion.d[s], motion.correction[s]
+    body.lately = LATELY * max(top_speed(body), body.lately)
     body.vx = 2.0 * d[0] / dt - body.vx
     body.vy = 2.0 * d[1] / dt - body.vy
     body.omega = 2.0 * d[2] / dt - body.omega

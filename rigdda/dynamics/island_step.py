@@ -108,9 +108,11 @@ def step_island(
             parts = 1
             continue
         if c1 > c0:
-            if charge_fences(
-                bodies, contacts, system, islands, rows, s, monitors, time, now, counters
-            ):
+            broke, in_substeps = charge_fences(
+                bodies, contacts, system, islands, rows, s, monitors, time, in_substeps, now,
+                counters,
+            )  # fmt: skip
+            if broke:
                 struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
             if len(monitors.target) > 0:
                 counters[EVENTS] = note_hits(

@@ -15,6 +15,7 @@ from rigdda.dynamics.constants import (
     BOLT,
     DIRECT,
     IMPACT,
+    NEW,
     OPEN,
     PIN,
     PLAIN,
@@ -122,7 +123,7 @@ def relax(
             continue
         c.state = OPEN if c.normal == 0.0 else (STICK if within else SLIP)
         if kind != IMPACT and kind != PLAIN:
-            c.kind, c.kappa = REST, c.stiffness
+            c.kind, c.kappa = NEW if kind == NEW else REST, c.stiffness
 
 
 @kernel
@@ -163,13 +164,19 @@ def is_waiting(bodies: Bodies, islands: Islands, low: int, high: int) -> bool:
 
 
 @kernel
-def is_bouncing(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
-    """Return whether one of the contacts low:high is an impact that asks for restitution."""
+def ask_rebound(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
+    """Let the impacts among the contacts low:high ask for their restitution; whether one does.
+
+    In a step in which a fence fails they are settled more than once. Its own contacts ask for none:
+    b < 0 lets blocks pass.
+    """
+    asked = False
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
-        if c.kind == IMPACT and c.bias > 0.0:
-            return True
-    return False
+        if c.kind == IMPACT and c.bias >= 0.0:
+            c.bias, c.state = c.rebound, STICK
+            asked = asked or c.rebound > 0.0
+    return asked
 
 
 @kernel
@@ -177,7 +184,7 @@ def set_rebound(contacts: Contacts, islands: Islands, low: int, high: int, share
     """Let the impacts among the contacts low:high rebound with a share of what was asked."""
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
-        if c.kind == IMPACT:
+        if c.kind == IMPACT and c.bias >= 0.0:
             c.bias = share * c.rebound
             c.state = STICK
 
@@ -213,7 +220,7 @@ def open_close(
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     m, motion = system.matrix, system.motion
     pairs, grounded = pair_blocks(bodies, contacts, m, islands, c0, c1)
-    bouncing = is_bouncing(contacts, islands, c0, c1)
+    bouncing = ask_rebound(contacts, islands, c0, c1)
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     speed = island_speed(bodies, islands, b0, b1)
     waiting = is_waiting(bodies, islands, b0, b1)

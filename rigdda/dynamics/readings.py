@@ -129,10 +129,13 @@ def support_forces(arrays: Arrays, c: Contacts) -> Floats:
 
 
 def bolt_forces(arrays: Arrays) -> Floats:
-    """Return the force of each bolt, 0 for pins, in the order of the links, (S, 2) [N]."""
+    """Return the force of each bolt on its first block, (S, 2) [N], in the order of the links.
+
+    0 for pins.
+    """
     out = np.zeros((len(arrays.links), 2))
     pull_of_bolts(arrays.bodies, arrays.links, out)
-    return out
+    return out * arrays.links["sign"][:, None]
 
 
 def elastic_energy(arrays: Arrays, c: Contacts) -> float:

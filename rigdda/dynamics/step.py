@@ -174,7 +174,10 @@ def advance(
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         press_asleep(bodies, now, count, monitors, p.dt)
+        events = counters[EVENTS]
         reason = end_step(bodies, outlines, now, count, work, monitors, counters, p)
+        if counters[EVENTS] > events:  # what a barrier held that failed wakes
+            flight = flown
         steps -= 1
         if bad >= 0:
             reason = BAD_STATE

@@ -15,13 +15,23 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Islands, Monitors
-from rigdda.dynamics.constants import ASLEEP, BOLT, IMPACT, OPEN, PIN, PLASTIC, RETIRED, TERRAIN
+from rigdda.dynamics.constants import (
+    ASLEEP,
+    BOLT,
+    FIXED,
+    IMPACT,
+    OPEN,
+    PIN,
+    PLASTIC,
+    RETIRED,
+    TERRAIN,
+)
 from rigdda.dynamics.islands import root
 from rigdda.dynamics.monitors import FAILED, barrier_contact, write_event
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import kernel, stage
 
-REST, HITS = 0, 1
+LEANING, STRIKING = 0, 1
 """Contacts of a barrier by which thrust is summed up."""
 
 
@@ -50,7 +60,7 @@ def press(c: Contact, monitors: Monitors, dt: float) -> None:
     thrust = c.shear * c.ny - c.normal * c.nx  # on body b
     if c.b != TERRAIN and barrier_contact(monitors, c.a, c.b)[0] != c.a:
         thrust = -thrust
-    monitors.push[barrier, HITS if hit else REST] += thrust * dt
+    monitors.push[barrier, STRIKING if hit else LEANING] += thrust * dt
     if thrust > target.most:
         target.most, target.block, target.x, target.y = thrust, c.a, c.x, c.y
 
@@ -76,7 +86,7 @@ def weight_on(
         parent[i], leans[i] = i, 0
     for k in range(count):
         c = contacts[k]
-        if c.state != OPEN and 0 <= c.b < p.blocks:
+        if c.state != OPEN and 0 <= c.b < p.blocks and bodies[c.b].status != FIXED:
             i, j = root(parent, c.a), root(parent, c.b)
             parent[max(i, j)] = min(i, j)
     for k in range(count):
@@ -114,7 +124,7 @@ def watch_thrust(
             monitors.mean[barrier, kind] += (push[kind] - last[place, kind]) / period
             last[place, kind], push[kind] = push[kind], 0.0
         target.most = 0.0
-        rest, hits = monitors.mean[barrier, REST], monitors.mean[barrier, HITS]
+        rest, hits = monitors.mean[barrier, LEANING], monitors.mean[barrier, STRIKING]
         if rest + hits <= target.thrust:
             continue
         rest = min(rest, weight_on(bodies, contacts, count, monitors, islands, barrier, p))

@@ -101,4 +101,6 @@ def holding(run: Run, index: int, state: str, at: Sequence[tuple[float, float]])
         return [False] * len(at)
     rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
     reach = barrier.holds(run.outline(index), scene.ground, rise)
+    sag = barrier.left_height(0.0) - barrier.left_height(float(run.absorbed[index]))
+    reach = reach._replace(top=reach.top - sag)
     return [reach.includes(x, y) for x, y in at]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,10 +36,11 @@ def scalars(run: Run, marks: Marks) -> dict[str, Floats]:
     inertia = (density * [moment for _, _, moment in shapes])[free]
     vx, vy, omega = np.moveaxis(run.velocities[:, free], -1, 0)
     squared = vx**2 + vy**2
-    height = run.poses[:, free, 1] - frame(run.scene)[1]
+    x, y = run.poses[:, free, 0], run.poses[:, free, 1] - frame(run.scene)[1]
+    gx, gy = run.scene.gravity_vector
     out = {
         "kinetic_energy": 0.5 * (squared @ mass + omega**2 @ inertia),
-        "potential_energy": math.hypot(*run.scene.gravity_vector) * (height @ mass),
+        "potential_energy": -(gx * x + gy * y) @ mass,
         "greatest_speed": np.sqrt(squared.max(axis=1)),
         "moving": np.count_nonzero(squared > MOVING**2, axis=1).astype(np.float64),
     }

@@ -88,6 +88,21 @@ def absorbed(lab: Lab, row: int, shots: Sequence[float]) -> tuple[Measured]:
     return (Measured(lab.simulate(scene).run(1.0).absorbed[0], exact),)
 
 
+def struck(lab: Lab, ahead: float) -> tuple[Measured]:
+    """Return what a fence takes, where a fast block strikes a slow one that hits it.
+
+    Both in the same step: it takes the energy of the slow one, and half of that of the fast one.
+    """
+    fast, dt = 20.0, lab.dt
+    blocks = (
+        box(-0.5 - 0.3 * ahead * dt, 0.5, velocity=(ahead, 0.0, 0.0)),
+        box(-1.5 - 0.3 * fast * dt, 0.5, velocity=(fast, 0.0, 0.0)),
+    )
+    scene = Scene(Terrain(FLAT), blocks, rock(0.0), barriers=(Fence(0.0, 5.0, 1e9),))
+    exact = 0.5 * masses(scene)[0][0] * (ahead**2 + 0.5 * fast**2)
+    return (Measured(lab.simulate(scene).run(1.0).absorbed[0], exact),)
+
+
 def train(name: str, row: int, *shots: float) -> Case:
     """Return the case of blocks that come one behind the other."""
     check = Check("absorbed energy", "momentum of blows and trains", "J", 0.08, "relative")
@@ -97,6 +112,11 @@ def train(name: str, row: int, *shots: float) -> Case:
 CASES = (
     train("fence-train", 0, -3.0, -4.0, -5.0),
     train("fence-row", 3, -6.0, -7.3, -8.6),
+    Case(
+        "fence-struck",
+        (Check("absorbed energy", "momentum of blow and hit", "J", 0.01, "relative"),),
+        lambda lab: struck(lab, 0.5),
+    ),
     case("fence-0.9", 0.9),
     case("fence-1.1", 1.1),
     case("fence-3x0.45", 0.45, 0.45, 0.45),

@@ -161,6 +161,32 @@ def test_eccentric_hits_never_take_more_than_the_capacity():
         assert math.isinf(run.failure(0)) or share > 0.99, seed
 
 
+def test_a_weak_fence_stops_no_block_that_strikes_the_ground_in_the_same_step():
+    """Of those of many shapes only few are much slower or faster than without the fence.
+
+    These are such as the ground stops in several blows within a step, which is one with a fence.
+    """
+    dt, apart, kept = 5e-3, 0, 0.0
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        speed = np.array([rng.uniform(8.0, 20.0), -rng.uniform(5.0, 15.0)])
+        corners = polygon(rough(rng, 6, 1.0), (0.0, 0.0), rng.uniform(0.0, 6.28))
+        right, bottom = corners[:, 0].max(), corners[:, 1].min()
+        start = corners - [right, bottom] - speed * rng.uniform(0.1, 0.9, 2) * dt
+        surfaces = rock(rng.uniform(20.0, 60.0), rng.uniform(0.5, 0.95))
+        block = Block(start, velocity=(*speed, 0.0))
+        found = []
+        for barriers in ((), (Fence(0.0, 5.0, 1e4),)):
+            scene = Scene(GROUND, (block,), surfaces, barriers=barriers)
+            sim = Simulation(scene, Settings(dt=dt))
+            sim.step()
+            found.append((sim.velocities[0, 0], sim.energy().kinetic))
+        apart += abs(found[1][0] - found[0][0]) > 2.0
+        kept += found[1][1] / found[0][1] / 200
+    assert apart <= 14
+    assert kept > 0.9
+
+
 @pytest.mark.parametrize("dt", [1e-2, 5e-3, 2.5e-3, 1.25e-3])
 def test_what_a_fence_takes_of_blows_does_not_depend_on_the_step(dt):
     """A row of blocks rests against it, others strike its end, one after the other or at once."""
@@ -179,6 +205,39 @@ def test_a_train_of_blocks_gives_a_fence_all_it_has(dt, gap):
     train = [box(-3.0 - (1.0 + gap) * i, 0.5, velocity=(10.0, 0.0, 0.0)) for i in range(3)]
     scene = Scene(GROUND, train, rock(0.0), barriers=(Fence(0.0, 5.0, 1e9),))
     assert Simulation(scene, Settings(dt=dt)).run(0.6).absorbed[0] == pytest.approx(3.9e5, rel=0.02)
+
+
+@pytest.mark.parametrize("dt", [1e-2, 5e-3, 2.5e-3, 1.25e-3])
+@pytest.mark.parametrize("ahead", [0.1, 0.5, 3.0, 9.9])
+def test_a_fast_block_strikes_one_that_hits_the_fence_in_the_same_step(ahead, dt):
+    """The fence takes the energy of the one that hits it, and half of that of the other."""
+    fast = 20.0
+    blocks = [
+        box(-0.5 - 0.3 * ahead * dt, 0.5, velocity=(ahead, 0.0, 0.0)),
+        box(-1.5 - 0.3 * fast * dt, 0.5, velocity=(fast, 0.0, 0.0)),
+    ]
+    scene = Scene(GROUND, blocks, rock(0.0), barriers=(Fence(0.0, 5.0, 1e9),))
+    taken = Simulation(scene, Settings(dt=dt)).run(1.0).absorbed[0]
+    mass = masses(scene)[0][0]
+    assert taken == pytest.approx(0.5 * mass * (ahead**2 + 0.5 * fast**2), rel=0.01)
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 20.0, 40.0])
+def test_an_oblique_blow_gives_the_share_that_is_directed_at_the_fence(tilt_deg):
+    """A corner strikes the face of a wedge that leans on the fence, along its normal."""
+    tilt, speed = math.radians(tilt_deg), 10.0
+    way = np.array([math.cos(tilt), -math.sin(tilt)])
+    wedge = Block([(-1.5 - math.tan(tilt), 0.0), (0.0, 0.0), (0.0, 1.0), (-1.5, 1.0)])
+    struck = np.array([-1.5 - 0.5 * math.tan(tilt), 0.5]) - 0.02 * way
+    corners = [(0.0, 0.0), (-0.5, 0.5), (-1.0, 0.0), (-0.5, -0.5)]
+    turn = np.array([[way[0], way[1]], [-way[1], way[0]]])
+    striker = Block(np.array(corners) @ turn + struck, velocity=(*(speed * way), 0.0))
+    barriers = (Fence(0.0, 5.0, 1e9),)
+    scene = Scene(GROUND, (wedge, striker), rock(0.0), barriers=barriers, gravity=0.0)
+    taken = Simulation(scene, Settings(dt=5e-3)).run(0.1).absorbed[0]
+    m_i, m_j = masses(scene)[0]
+    work = 0.5 * m_j**2 / (m_j + m_i) * speed**2 * math.cos(tilt) ** 2
+    assert taken == pytest.approx(work, rel=0.02)
 
 
 def test_a_blow_reaches_the_fence_through_a_row():

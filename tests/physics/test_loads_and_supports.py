@@ -33,6 +33,28 @@ def square(**how) -> Block:
     return box(0.0, 0.5, **how)
 
 
+def test_a_bolt_holds_whichever_of_its_ends_comes_first():
+    """On a fixed block, and between two that touch."""
+    held = Block([(-0.5, 3.0), (0.5, 3.0), (0.5, 4.0), (-0.5, 4.0)], fixed=True)
+    for ends in ((0, (0.0, 3.0), 1, (0.0, 1.0)), (1, (0.0, 1.0), 0, (0.0, 3.0))):
+        scene = Scene(None, (held, square()), rock(), supports=(Bolt(*ends, 1e7),))
+        sim = Simulation(scene)
+        sim.run(1.0)
+        assert abs(sim.poses[1, 1] - 0.5) < 2.1 * WEIGHT / 1e7
+        up = sim.supports()[0, 1] * (1.0 if ends[0] == 1 else -1.0)
+        assert 0.0 <= up < 2.1 * WEIGHT
+    ways = []
+    for first, second in ((0, 1), (1, 0)):
+        points = ((0.3, 0.2), (-0.3, 1.8))
+        bolt = Bolt(first, points[first], second, points[second], 3e8, prestress=1e5)
+        blocks = (square(), box(0.0, 1.5, velocity=(1.0, 0.0, 0.0)))
+        sim = Simulation(Scene(FLAT, blocks, rock(30.0), supports=(bolt,)))
+        sim.step(40)
+        ways.append((sim.poses.copy(), sim.supports()[0] * (1 if first == 0 else -1)))
+    np.testing.assert_allclose(ways[0][0], ways[1][0], atol=1e-9)
+    np.testing.assert_allclose(ways[0][1], ways[1][1], rtol=1e-6)
+
+
 LOADS = {
     "point": PointLoad(0, (0.0, 0.5), (3.0e4, 1.0e4)),
     "line": LineLoad(0, (-0.5, 0.2), (0.5, 0.8), (3.0e4 / math.hypot(1, 0.6), 0.0)),

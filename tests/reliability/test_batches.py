@@ -23,6 +23,7 @@ from rigdda import (
     Terrain,
     sites,
 )
+from rigdda.batch import Batch
 from rigdda.results.outcome import Outcome, measure, stations, watch
 
 SITE = sites.load("bench")
@@ -54,8 +55,23 @@ def test_friction_of_a_release():
     site = rigdda.Site.parse(
         (sites.text("bench") + "\n[scatter]\nfriction_deg = 3.0\n"), "scattered"
     )
-    wanted = [(site, (), seed, "block") for seed in range(6)]
-    assert rigdda.release_many(wanted, 1) == [rigdda.release(*job)[1] for job in wanted]
+    layouts = ((), (Embankment(31.0, 2.0),))  # whose resistance depends on it
+    wanted = [(site, lay, seed, e) for lay in layouts for e in EVENTS for seed in range(6)]
+    for found, job in zip(rigdda.release_many(wanted, 1), wanted, strict=True):
+        assert found == rigdda.release(*job)[1], job
+
+
+def test_what_an_embankment_bears_is_that_of_the_friction_of_its_release():
+    site = rigdda.Site.parse(
+        (sites.text("bench") + "\n[scatter]\nfriction_deg = 3.0\n"), "scattered"
+    )
+    batch = Batch(site, (Embankment(31.0, 2.0),))
+    limits = []
+    for seed in range(6):
+        sim = batch.simulation(batch.scene(site.draw(seed, "block")))
+        limits.append(float(sim._arrays.monitors.target["limit"][0]))
+        assert limits[-1] == pytest.approx(sim.scene.resistance(0)), seed
+    assert max(limits) > 1.1 * min(limits)
 
 
 def test_what_fails_is_told():

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rigdda.dynamics.arrays import Boxes
-from rigdda.dynamics.constants import AWAKE, LATELY, RETIRED
+from rigdda.dynamics.constants import AWAKE, RETIRED
 from rigdda.dynamics.motion import top_speed
 from rigdda.dynamics.records import Bodies, Parameters, Polygons
 from rigdda.kernel import kernel
@@ -19,8 +19,7 @@ def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) 
     for i in range(len(bodies)):
         body, outline, grow = bodies[i], polygon[i], p.margin
         if body.status == AWAKE:
-            body.lately = max(top_speed(body), LATELY * body.lately)
-            body.path = body.lately * p.dt
+            body.path = max(top_speed(body), body.lately) * p.dt
             grow += body.path + p.gravity * p.dt * p.dt
         box = boxes.swept[i]
         box.low_x, box.high_x = outline.low_x - grow, outline.high_x + grow

@@ -35,6 +35,7 @@ from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.constants import (
     AWAKE,
     BLOW_SPEED,
+    BOLT,
     IMPACT,
     IMPACT_STEPS,
     IMPACT_STIFFNESS,
@@ -154,6 +155,8 @@ def strike_at_once(
         return
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
+        if c.kind == BOLT or c.kind == PLAIN:  # what they ask for does not depend on velocities
+            continue
         closing = strike(bodies, c, (1.0 - share) * p.dt, 0.0, p)
         if c.kind == IMPACT:
             set_impact(c, max(closing, 0.0), effective_mass(bodies, c), p)

@@ -51,7 +51,7 @@ def tension(link: Link, length: float) -> float:
 
 @entry_kernel
 def pull_of_bolts(bodies: Bodies, links: Links, out: NDArray) -> None:
-    """Write the force of each bolt on its first block now, (S, 2) [N], into `out`; 0 for a pin."""
+    """Write the force of each bolt on its block a now, (S, 2) [N], into `out`; 0 for a pin."""
     for q in range(len(links)):
         link = links[q]
         if link.kind == BOLT:

@@ -95,9 +95,10 @@ class Template:
                 polygons.append(scene.outline(i))
                 traits.append(barrier_trait(scene, i, self._names))
         write_polygons(polygons, traits, arrays.bodies, outlines)
-        if scene.barriers != self.scene.barriers:
-            start_targets(arrays.monitors.target, scene)
-        if scene.surfaces is not self.scene.surfaces:
+        other_friction = scene.surfaces is not self.scene.surfaces
+        if other_friction or scene.barriers != self.scene.barriers:
+            start_targets(arrays.monitors.target, scene)  # of embankments friction is the strength
+        if other_friction:
             arrays.interfaces["friction"] = frictions(scene, len(arrays.interfaces))
         start_rock(self._rock, bodies, self._stations)
         for name, value in rock_numbers(scene, self._settings, bodies).items():

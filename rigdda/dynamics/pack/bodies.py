@@ -158,25 +158,35 @@ def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
 
 
 def pack_links(scene: Scene, bodies: Bodies) -> Links:
-    """Return the supports in order of their first block."""
+    """Return the supports in order of their block a.
+
+    Block a is free unless both are not, and the first of two that are free, as of contacts.
+    """
 
     def anchor(block: int, point: tuple[float, float]) -> tuple[float, float]:
         if block == TERRAIN:
             return point
         return point[0] - bodies["x"][block], point[1] - bodies["y"][block]
 
+    def place(end: tuple[int, tuple[float, float]]) -> tuple[bool, int]:
+        block = end[0]
+        return block == TERRAIN or bodies["status"][block] == FIXED, block
+
     links = np.zeros(len(scene.supports), dtype=LINK).view(np.recarray)
     for number, (link, support) in enumerate(zip(links, scene.supports, strict=True)):
-        link["number"], link["yielding"] = number, math.inf
+        link["number"], link["yielding"], link["sign"] = number, math.inf, 1.0
         if isinstance(support, FixedPoint):
             link["kind"], link["a"], link["b"] = PIN, support.block, TERRAIN
             link["ax"], link["ay"] = anchor(support.block, support.point)
             link["bx"], link["by"] = support.point
             continue
-        block_b = TERRAIN if support.block_b is None else support.block_b
-        link["kind"], link["a"], link["b"] = BOLT, support.block_a, block_b
-        link["ax"], link["ay"] = anchor(support.block_a, support.point_a)
-        link["bx"], link["by"] = anchor(block_b, support.point_b)
+        second = TERRAIN if support.block_b is None else support.block_b
+        ends = (support.block_a, support.point_a), (second, support.point_b)
+        (a, at_a), (b, at_b) = ends if second == TERRAIN else sorted(ends, key=place)
+        link["kind"], link["a"], link["b"] = BOLT, a, b
+        link["ax"], link["ay"] = anchor(a, at_a)
+        link["bx"], link["by"] = anchor(b, at_b)
+        link["sign"] = 1.0 if a == support.block_a else -1.0
         link["stiffness"], link["prestress"] = support.stiffness, support.prestress
         link["length"] = math.dist(support.point_a, support.point_b)
         if support.yield_force is not None:

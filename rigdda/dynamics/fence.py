@@ -23,7 +23,6 @@ from rigdda.dynamics.constants import (
     OPEN,
     RETIRED,
     SPEED_LIMIT,
-    STICK,
 )
 from rigdda.dynamics.correction import set_body_coordinates
 from rigdda.dynamics.monitors import FAILED, write_event

@@ -74,7 +74,7 @@ def design(
     ledger = Ledger(problem, simulations, seed, progress, store)
     events = len(problem.site.events)
     first = min(RELEASES, max(FEWEST, simulations // (FIELD * events))) * events
-    if simulations < 20 * first:
+    if simulations < 27 * first:  # or it would not pay for the final
         return search(ledger, offered(ledger))
     menu, track = Menu(problem), Track(ledger)
     ensemble = ensemble_for(ledger, menu.stations)
@@ -93,7 +93,6 @@ def design(
     finalists = list(dict.fromkeys([(), *known, *last[:1], *fewer, *last[1:], *seen]))[:FINALISTS]
     budget, keep = int(FINAL * simulations), len(finalists)
     ends = track.race(finalists, budget, first, keep, stage="final", strict=True)
-    ends = ends or near or best or lone  # a small budget may not pay for a final
     return ledger.result(ledger.evaluate(simplest(ends, track.nothing), "report", ledger.left))
 
 

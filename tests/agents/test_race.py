@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from valley import SITE, Barren, Valley
 
 from agents import race, random
@@ -52,6 +53,13 @@ def test_what_is_reported_does_not_flatter(name: str, valley: Valley) -> None:
     assert len(apart) >= 8
     assert abs(np.mean(apart)) < 3.0 / np.sqrt(len(apart))
     assert np.mean(np.abs(apart) < 1.96) >= 0.75
+
+
+def test_every_race_has_its_final(valley: Valley) -> None:
+    """A budget that does not pay for one would give nothing as the answer, whatever was found."""
+    single = Valley(replace(valley.site, events=valley.site.events[:1]))
+    for budget in range(150, 250, 10):
+        assert race.design(single, budget, 0).history.stage("final"), budget
 
 
 def test_where_nothing_helps_nothing_is_built(site: Site) -> None:

@@ -13,10 +13,12 @@ from rigdda.geometry import polygon_properties
 from rigdda.kernel import from_python
 from rigdda.validation.scenes import FLAT, box, ngon
 
+pytestmark = pytest.mark.slow
+"""Its kernels take a minute to compile, and nothing of the package depends on them."""
+
 PLAIN = {"rock": Surface(30.0, restitution=None)}
 
 
-@pytest.mark.slow
 def test_bar_bears_its_weight() -> None:
     computed, exact = cases.bar_under_its_weight()
     np.testing.assert_allclose(computed, exact, rtol=0.01)

@@ -13,7 +13,7 @@ from experiments import ablation, fig04_deformable, fig05_solvers, pile
 from experiments import all as every
 from experiments.script import Number
 
-SLOW = {"fig10_modes", "fig13_deposit", "fig14_retained", "hard_cases", "speed_error"}
+SLOW = {"fig10_modes", "fig13_deposit", "fig14_retained", "hard_cases", "speed_error", "thrust"}
 TIMED = {"fig04_deformable", "fig05_solvers", "ablation"}
 """Their numbers or notes are processor times: tested below without them."""
 
@@ -37,6 +37,7 @@ def test_figure_reaches_its_target(script: str, tmp_path: Path) -> None:
     assert 10_000 < (tmp_path / f"{script}.png").stat().st_size < 150_000
 
 
+@pytest.mark.slow
 def test_step_of_rigid_and_deformable_blocks_is_the_same_work() -> None:
     row = fig04_deformable.row(3, 1)
     assert row["rigid_unknowns"] == 3 * row["blocks"]

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from envs.registration import ENVIRONMENTS
 
 
+@pytest.mark.slow
 def test_every_batch_is_measured(tmp_path, monkeypatch):
     pytest.importorskip("stable_baselines3")
     from experiments import throughput_envs

@@ -41,8 +41,8 @@ FLOOR = 100.0
 FITTED, PREDICTED = (10.9, 0.9), (9.4, 0.8)
 """Width [m], and the share that it retains: one to fit to, one to predict."""
 
-BAR = 0.05
-"""Greatest distance of the prediction [-]."""
+BAR, QUICK_BAR = 0.05, 0.09
+"""Greatest distance of the prediction [-]; by 300 releases it scatters by 0.03."""
 
 RELEASES, QUICK_RELEASES = 1500, 300
 """Releases of each fit."""
@@ -175,6 +175,7 @@ def run(quick: bool, out: Path) -> Number:
     shares = [r["within_9.4_m"] for r in rows if r["fitted"] == "motion.damping"]
     off = np.abs(np.array(shares) - PREDICTED[1])
     worst = shares[int(off.argmax())]  # the first that is not a number, if there is one
-    low, high = PREDICTED[1] - BAR, PREDICTED[1] + BAR
+    bar = QUICK_BAR if quick else BAR
+    low, high = PREDICTED[1] - bar, PREDICTED[1] + bar
     note = ", ".join(f"{face:g} deg {s:.3f}" for face, s in zip(FACES, shares, strict=True))
     return Number("share within 9.4 m, the farthest from 0.8 [-]", worst, low, high, note)

@@ -13,7 +13,10 @@ from experiments import ablation, fig04_deformable, fig05_solvers, pile
 from experiments import all as every
 from experiments.script import Number
 
-SLOW = {"fig10_modes", "fig13_deposit", "fig14_retained", "hard_cases", "speed_error", "thrust"}
+SLOW = {
+    "catch_bench", "fence_step", "fig10_modes", "fig13_deposit", "fig14_retained", "hard_cases",
+    "speed_error", "thrust",
+}  # fmt: skip
 TIMED = {"fig04_deformable", "fig05_solvers", "ablation"}
 """Their numbers or notes are processor times: tested below without them."""
 

@@ -176,7 +176,7 @@ def advance(
         press_asleep(bodies, now, count, monitors, p.dt)
         events = counters[EVENTS]
         reason = end_step(bodies, outlines, now, count, work, monitors, counters, p)
-        if counters[EVENTS] > events:  # what a barrier held that failed wakes
+        if counters[EVENTS] > events:  # a barrier may have failed: detection wakes what it held
             flight = flown
         steps -= 1
         if bad >= 0:

@@ -25,10 +25,12 @@ def main() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # it prints
     os.chdir(tempfile.mkdtemp())  # and writes logs
     stand_in_for_gdal()
+    import platrock
     from platrock.Common import BounceModels, Debug
     from platrock.TwoD import Objects, Simulations
 
     Debug.init(Debug.ERROR)
+    platrock.SICONOS_FOUND = False  # for blocks with corners; only its own main program looks
     BounceModels.Toe_Tree_2022.__init__ = lambda self: None  # downloads
     for line in sys.stdin:
         asked = json.loads(line)

@@ -25,6 +25,7 @@ SCRIPTS = (
     "fig14_retained",
     "ablation",
     "outcome_step",
+    "run_out_step",
     "fence_step",
     "thrust",
     "one_slope",

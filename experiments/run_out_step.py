@@ -1,0 +1,135 @@
+"""Run-out of single blocks against step: small ones that bounce are most of the risk of a road.
+
+Blocks of 0.05 to 2 m2 roll off the crest of a slope of 45 degrees, 40 m high, onto level ground.
+The same blocks start in steps of every length. Judged by the greatest difference of the mean
+run-out from that of the shortest step, as far as it is beyond the 95 % interval of the mean
+difference, over that mean run-out from the toe.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from experiments.script import BLUE, GREEN, ORANGE, RED, Number, draw, interval, main
+from experiments.study import Row, tabulate
+from rigdda import Event, Site, Surface
+from rigdda.model.place import BarrierZone, Motion, Road
+from rigdda.model.slope import Slope
+from rigdda.model.source import Source
+from rigdda.release import release_many
+
+HEIGHT = 40.0
+"""Height of the slope, and chainage of its toe [m]."""
+
+AREAS, RESTITUTIONS = (0.05, 0.1, 0.5, 2.0), (0.0, 0.2, 0.4, 0.5)
+"""Areas of the blocks [m2], and their restitution [-]."""
+
+QUICK_AREAS, QUICK_RESTITUTIONS = (0.1,), (0.4,)
+
+STEPS, QUICK_STEPS = (6e-4, 2.5e-3, 1e-2), (2.5e-3, 1e-2)
+"""Steps [s], the shortest first."""
+
+RELEASES, QUICK_RELEASES = 8_000, 100
+MOST = 0.02
+COLOURS = (BLUE, GREEN, ORANGE, RED)
+
+
+def site(area: float, restitution: float, dt: float) -> Site:
+    """Return the slope with one block of this area [m2], for steps of `dt` [s]."""
+    return Site(
+        name="slope",
+        description="A slope of 45 degrees, 40 m high, above level ground.",
+        slope=Slope(
+            points=((-10.0, HEIGHT), (0.0, HEIGHT), (HEIGHT, 0.0), (440.0, 0.0)), toe=HEIGHT
+        ),
+        sources=(Source(name="crest", band=(1.0, 2.0), speed=(1.0, 2.0)),),
+        events=(Event("block", 1.0, "crest", area=(area, area)),),
+        road=Road(HEIGHT + 1.0, 400.0),
+        barrier_zone=BarrierZone(HEIGHT - 2.0, HEIGHT - 1.0),
+        surfaces={"rock": Surface(30.0, restitution=restitution)},
+        motion=Motion(damping=0.0, duration=60.0, dt=dt),
+    )
+
+
+@cache
+def run_outs(area: float, restitution: float, dt: float, releases: int) -> NDArray[np.float64]:
+    """Return the run-outs from the toe of so many releases [m]."""
+    here = site(area, restitution, dt)
+    outcomes = release_many([(here, (), seed, None) for seed in range(releases)])
+    return np.array([outcome.run_out[2] for outcome in outcomes]) - HEIGHT
+
+
+def measure(
+    area_m2: float, restitution: float, dt_s: float, shortest_s: float, releases: int
+) -> Row:
+    """Return the mean run-out, and how it differs from that of the shortest step [m]."""
+    found = run_outs(area_m2, restitution, dt_s, releases)
+    least = run_outs(area_m2, restitution, shortest_s, releases)
+    mean, half = interval(found)
+    other, other_half = interval(found - least)
+    return {
+        "run_out_m": mean, "half_interval_m": half, "difference_m": other,
+        "difference_half_interval_m": other_half,
+    }  # fmt: skip
+
+
+def told(row: Row) -> str:
+    """Return what the terminal says of a row."""
+    what = f"{row['area_m2']:g} m2, restitution {row['restitution']:g}, {1e3 * row['dt_s']:.3g} ms"
+    return f"{what}: {row['run_out_m']:.2f} m, {row['difference_m']:+.2f} m"
+
+
+def excess(rows: list[Row]) -> float:
+    """Return the greatest share by which a mean surely differs from that of the shortest step."""
+    base = {
+        (r["area_m2"], r["restitution"]): r["run_out_m"] for r in rows if r["difference_m"] == 0
+    }
+    return max(
+        (abs(r["difference_m"]) - r["difference_half_interval_m"])
+        / base[r["area_m2"], r["restitution"]]
+        for r in rows
+    )
+
+
+def picture(figure: Figure, rows: list[Row]) -> None:
+    """Draw the mean run-outs against the step, a panel an area."""
+    areas = list(dict.fromkeys(r["area_m2"] for r in rows))
+    for axes, area in zip(
+        figure.subplots(1, len(areas), squeeze=False, sharey=True)[0], areas, strict=True
+    ):
+        for e, colour in zip(RESTITUTIONS, COLOURS, strict=True):
+            own = [r for r in rows if r["area_m2"] == area and r["restitution"] == e]
+            dt, mean, half = (
+                np.array([r[k] for r in own]) for k in ("dt_s", "run_out_m", "half_interval_m")
+            )
+            axes.errorbar(1e3 * dt, mean, half, fmt="o-", color=colour, capsize=3, label=f"{e:g}")
+        axes.set(xscale="log", xlabel="step [ms]", title=f"{area:g} m2")
+    figure.axes[0].set(ylabel="mean run-out from the toe [m]")
+    figure.axes[0].legend(title="restitution")
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Write run_out_step.csv and run_out_step.png."""
+    steps = QUICK_STEPS if quick else STEPS
+    cases = [
+        {
+            "area_m2": area, "restitution": e, "dt_s": dt, "shortest_s": steps[0],
+            "releases": QUICK_RELEASES if quick else RELEASES,
+        }
+        for area in (QUICK_AREAS if quick else AREAS)
+        for e in (QUICK_RESTITUTIONS if quick else RESTITUTIONS)
+        for dt in steps
+    ]  # fmt: skip
+    rows = tabulate(out / "run_out_step.csv", cases, measure, told)
+    draw(out / "run_out_step.png", (12.0, 4.2), lambda figure: picture(figure, rows))
+    what = "greatest difference from the shortest step beyond its interval, over the mean run-out"
+    return Number(what, excess(rows), high=MOST)
+
+
+if __name__ == "__main__":
+    main(run)

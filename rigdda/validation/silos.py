@@ -28,6 +28,9 @@ DEPTHS = (20, 40, 60)
 WALL_DEG, FILLINGS = 20.0, 5
 """Friction of rough walls [deg], and how many fillings are averaged."""
 
+PILES = 30
+"""Fillings between smooth walls that are averaged."""
+
 JAKY = 0.5
 """Horizontal over vertical pressure of rock of 30 deg at rest, 1 - sin phi [-]."""
 
@@ -70,12 +73,14 @@ def silo(rng: np.random.Generator, layers: int, friction_deg: float = 0.0) -> Sc
 class Filled(NamedTuple):
     """What a silo comes to.
 
-    Greatest speed in the end [m/s], load of the base over the weight [-], greatest rise of kinetic
-    and potential energy over what was released [-], depth of the fill [m].
+    Greatest speed in the end [m/s], load of the base over the weight [-], mean thrust on a wall over
+    that of a fluid of the same weight [-], greatest rise of kinetic and potential energy over what
+    was released [-], depth of the fill [m].
     """
 
     speed: float
     base: float
+    thrust: float
     rise: float
     depth: float
 
@@ -97,15 +102,27 @@ def fill(lab: Lab, scene: Scene) -> Filled:
     areas = [polygon_properties(block.vertices)[0] for block in scene.blocks]
     weight = GRAVITY * sum(a * b.density for a, b in zip(areas, scene.blocks, strict=True))
     base = ground[ground["ny"] > 0.7]["normal_force"].sum() / weight
-    depth = np.sort(sim.poses[:, 1])[-COLUMNS:].mean() + 0.5 * SIZE
-    return Filled(speed, float(base), rise, float(depth))
+    depth = float(np.sort(sim.poses[:, 1])[-COLUMNS:].mean() + 0.5 * SIZE)
+    walls = 0.5 * ground[np.abs(ground["nx"]) > 0.7]["normal_force"].sum()
+    fluid = 0.5 * weight / WIDTH * depth
+    return Filled(speed, float(base), float(walls / fluid), rise, depth)
 
 
 def measure(lab: Lab) -> tuple[Measured, ...]:
     """Fill silos of several depths, between smooth walls."""
     found = [fill(lab, silo(lab.random(layers), layers)) for layers in DEPTHS]
-    speeds, loads, rises, _ = zip(*found, strict=True)
+    speeds, loads, _, rises, _ = zip(*found, strict=True)
     return Measured(speeds), Measured(loads, 1.0), Measured(rises)
+
+
+def measure_thrust(lab: Lab) -> tuple[Measured, ...]:
+    """Fill silos with smooth walls: the mean thrust on a wall over several fillings.
+
+    It is that of rock at rest, Jaky's K times that of a fluid. One filling differs from another by
+    0.1: a pile of polygons bears upon few points.
+    """
+    found = [fill(lab, silo(lab.random(20, k), 20)) for k in range(PILES)]
+    return (Measured(float(np.mean([f.thrust for f in found])), JAKY),)
 
 
 def measure_rough(lab: Lab) -> tuple[Measured, ...]:
@@ -140,8 +157,13 @@ ROUGH = (
     CHECKS[2],
 )
 
+THRUST = (Check("thrust of a wall over that of a fluid", "Jaky 1944", "-", 0.2, "relative"),)
+
 CASES = (
     Case("silo", CHECKS, measure),
+    Case("silo-thrust-2.5ms", THRUST, measure_thrust, dt=2.5e-3, slow=True),
+    Case("silo-thrust", THRUST, measure_thrust, slow=True),
+    Case("silo-thrust-10ms", THRUST, measure_thrust, dt=0.01, slow=True),
     Case("silo-10ms", COARSE, measure, dt=0.01, slow=True),
     Case("silo-rough", ROUGH, measure_rough, slow=True),
     Case("silo-rough-10ms", ROUGH, measure_rough, dt=0.01, slow=True),

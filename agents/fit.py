@@ -29,6 +29,7 @@ from rigdda import Site
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
+Compute = Callable[[Floats, range], Mapping[str, Floats]]
 
 FINALISTS, MORE = 8, 4
 """How many of the best are computed again, on how many times the releases."""
@@ -110,11 +111,59 @@ def fit(
     return found._replace(site=with_values(site, parameters, list(found.best.values)))
 
 
+class Trials:
+    """Sets of values that were tried, with the scores that they give each observed run.
+
+    Parameters
+    ----------
+    observed, parameters, compute
+        See `search`.
+
+    Attributes
+    ----------
+    tried : list of Candidate
+        In the order in which they were computed.
+    table : list of (runs,) array
+        Scores of each [m].
+    """
+
+    def __init__(
+        self, observed: Mapping[str, Floats], parameters: Sequence[Parameter], compute: Compute
+    ):
+        self._observed, self._compute = observed, compute
+        self._low = np.array([p.low for p in parameters])
+        self._range = np.array([p.high for p in parameters]) - self._low
+        self.tried: list[Candidate] = []
+        self.table: list[Floats] = []
+
+    def values(self, place: Floats) -> Floats:
+        """Return the values at a place of the unit cube, (P,)."""
+        return self._low + self._range * np.clip(place, 0.0, 1.0)
+
+    def compute(self, values: Floats, seeds: range) -> tuple[Candidate, Floats]:
+        """Return what values give, and the scores of the observed runs."""
+        found = self._compute(values, seeds)
+        each = [scores(found[event], self._observed[event]) for event in self._observed]
+        return Candidate(values, found), np.concatenate(each)
+
+    def add(self, place: Floats, seeds: range) -> float:
+        """Try a place of the unit cube; return its mean score [m]."""
+        candidate, each = self.compute(self.values(place), seeds)
+        self.tried.append(candidate)
+        self.table.append(each)
+        return float(each.mean())
+
+    def best(self, count: int) -> list[Candidate]:
+        """Return the candidates of the least mean scores, the best first."""
+        order = np.argsort([each.mean() for each in self.table])[:count]
+        return [self.tried[i] for i in order]
+
+
 def search(
     site: Site,
     observed: Mapping[str, Floats],
     parameters: Sequence[Parameter],
-    compute: Callable[[Floats, range], Mapping[str, Floats]],
+    compute: Compute,
     budget: int,
     releases: int,
     seed: int,
@@ -136,47 +185,43 @@ def search(
     Fit
         What was found.
     """
-    low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
-    tried, table = list[Candidate](), list[Floats]()
-
-    def attempt(place: Floats, seeds: range) -> tuple[Candidate, Floats]:
-        values = low + (high - low) * np.clip(place, 0.0, 1.0)
-        found = compute(values, seeds)
-        each = [scores(found[event], observed[event]) for event in observed]
-        return Candidate(values, found), np.concatenate(each)
+    trials, seeds = Trials(observed, parameters, compute), range(seed, seed + releases)
 
     def add(place: Floats) -> float:
-        candidate, each = attempt(place, range(seed, seed + releases))
-        tried.append(candidate)
-        table.append(each)
-        tick(len(tried), f"best score {min(map(np.mean, table)):.2f} m")
-        return float(each.mean())
+        score = trials.add(place, seeds)
+        tick(len(trials.tried), f"best score {min(map(np.mean, trials.table)):.2f} m")
+        return score
 
-    spread = 1 << max(2, round(math.log2(budget / 2)))
-    places = qmc.Sobol(len(parameters), rng=np.random.default_rng(seed)).random(spread)
-    best = places[int(np.argmin([add(place) for place in places]))]
-    options = {"bounds": [0, 1], "seed": seed + 1, "verbose": -9, "maxfevals": budget - spread}
-    evolution = cma.CMAEvolutionStrategy(best, 0.15, options)
-    while budget - len(tried) >= evolution.popsize and not evolution.stop():
-        asked = evolution.ask()
-        evolution.tell(asked, [add(np.asarray(place)) for place in asked])
+    explore(add, len(parameters), budget, seed)
     fresh = range(seed + releases, seed + (1 + MORE) * releases)
-    order = np.argsort([each.mean() for each in table])[:FINALISTS]
-    again = [attempt((tried[i].values - low) / (high - low), fresh) for i in order]
+    again = [trials.compute(candidate.values, fresh) for candidate in trials.best(FINALISTS)]
     winner, each = min(again, key=lambda pair: float(pair[1].mean()))
-    start, end = _intervals(np.array(table), np.array([c.values for c in tried]), seed)
-    left_out = _validate(tried, np.array(table), observed, seed)
-    toe = site.slope.toe
+    tried, table = trials.tried, np.array(trials.table)
+    low, high = _intervals(table, np.array([c.values for c in tried]), seed)
     whole = [winner.run_outs[event] for event in observed for _ in observed[event]]
     return Fit(
         site,
         tuple(parameters),
         winner,
-        np.minimum(start, winner.values),
-        np.maximum(end, winner.values),
-        quality(observed, whole, float(each.mean()), toe),
-        quality(observed, *left_out, toe),
+        np.minimum(low, winner.values),
+        np.maximum(high, winner.values),
+        quality(observed, whole, float(each.mean()), site.slope.toe),
+        quality(observed, *_validate(tried, table, observed, seed), site.slope.toe),
     )
+
+
+def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed: int) -> None:
+    """Score places of the unit cube: half of the budget over all of it, then about the best."""
+    spread = 1 << max(2, round(math.log2(budget / 2)))
+    places = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(spread)
+    best = places[int(np.argmin([score(place) for place in places]))]
+    options = {"bounds": [0, 1], "seed": seed + 1, "verbose": -9, "maxfevals": budget - spread}
+    evolution = cma.CMAEvolutionStrategy(best, 0.15, options)
+    done = spread
+    while budget - done >= evolution.popsize and not evolution.stop():
+        asked = evolution.ask()
+        evolution.tell(asked, [score(np.asarray(place)) for place in asked])
+        done += len(asked)
 
 
 def _intervals(table: Floats, values: Floats, seed: int) -> tuple[Floats, Floats]:

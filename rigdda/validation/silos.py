@@ -73,9 +73,9 @@ def silo(rng: np.random.Generator, layers: int, friction_deg: float = 0.0) -> Sc
 class Filled(NamedTuple):
     """What a silo comes to.
 
-    Greatest speed in the end [m/s], load of the base over the weight [-], mean thrust on a wall over
-    that of a fluid of the same weight [-], greatest rise of kinetic and potential energy over what
-    was released [-], depth of the fill [m].
+    Greatest speed in the end [m/s], load of the base over the weight [-], mean thrust on a wall
+    over that of a fluid of the same weight [-], greatest rise of kinetic and potential energy over
+    what was released [-], depth of the fill [m].
     """
 
     speed: float

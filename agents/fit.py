@@ -211,7 +211,10 @@ def search(
 
 
 def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed: int) -> None:
-    """Score places of the unit cube: half of the budget over all of it, then about the best."""
+    """Score places of the unit cube, (dimensions,): half of the budget over it, then the best ones.
+
+    `score` takes a place and returns what is to be least; places come by Sobol, then by CMA-ES.
+    """
     spread = 1 << max(2, round(math.log2(budget / 2)))
     places = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(spread)
     best = places[int(np.argmin([score(place) for place in places]))]

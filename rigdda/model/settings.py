@@ -55,7 +55,7 @@ class Settings:
         Relative residual at which conjugate gradients stop. 1e-7: looser, and the small forces at
         the top of a tall stack drown in the error of the large ones at its base.
     sweep_tolerance : float
-        Islands of several blocks in motion take a step in five substeps. In each their contacts
+        Islands of several blocks in motion take a step in ten substeps. In each their contacts
         are swept over until no velocity changes by more than this [m/s], up to 100 times. Islands
         of less than 128 blocks, and slow ones, are settled more closely.
     open_close_iterations : int

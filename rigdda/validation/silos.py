@@ -37,7 +37,7 @@ JAKY = 0.5
 LOOK = 0.02
 """Interval in which energy is looked at [s]."""
 
-RISE = 1e-2
+RISE = 2e-3
 """Bar of the rise of energy over what was released [-]: what sank in as layers struck one another
 is pushed out, which lifts those above. Shorter steps rise less, deeper piles more."""
 
@@ -149,7 +149,7 @@ CHECKS = (
     Check("rise of energy over release", "none: first law", "-", RISE, "bound"),
 )
 
-COARSE = (*CHECKS[:2], replace(CHECKS[2], bar=3.0 * RISE))
+COARSE = (*CHECKS[:2], replace(CHECKS[2], bar=2.0 * RISE))
 
 ROUGH = (
     CHECKS[0],

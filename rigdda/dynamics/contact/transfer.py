@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.constants import NEW, OPEN, SAME_FACE, SAME_NORMAL, TERRAIN
+from rigdda.dynamics.constants import OPEN, SAME_FACE, SAME_NORMAL, TERRAIN
 from rigdda.dynamics.records import Contact, Contacts
 from rigdda.kernel import inlined, kernel
 
@@ -44,7 +44,7 @@ def recall_from(
         # where a corner slides into a concave corner, the face ahead is not the one it comes from
         if cosine < SAME_FACE and fits_another(contacts, k, new_low, new_high, was):
             continue
-        c.state, c.kind = was.state, was.kind
+        c.state = was.state
         c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
         c.start_normal, c.start_shear = was.start_normal, was.start_shear
         c.stiffness, c.bond = was.stiffness, was.bond
@@ -65,7 +65,7 @@ def recall(
     """
     for k in range(low, high):
         c = contacts[k]
-        c.state, c.kind = OPEN, NEW
+        c.state = OPEN
         c.accumulated_normal = c.accumulated_shear = c.stiffness = 0.0
         c.start_normal = c.start_shear = c.bond = 0.0
         if c.gap > margin:

@@ -138,16 +138,10 @@ def sweep(
     return worst
 
 
-@kernel
-def velocity(body: Body) -> tuple[float, float, float]:
-    """Return the velocity of a body at the start of the step."""
-    return body.vx, body.vy, body.omega
-
-
 @inlined
 def start(body: Body, rhs: Floats, rows: Rows, s: int, h: float, p: Parameters) -> None:
     """Set the displacement of a block, slot s, in the first substep without contacts."""
-    v, alpha = velocity(body), damping_of(body, p)
+    v, alpha = (body.vx, body.vy, body.omega), damping_of(body, p)
     for q in range(3):
         inertia = body.inertia if q == 2 else body.mass
         scale = h / math.sqrt(inertia)
@@ -211,7 +205,8 @@ def relax_forces(
                 break
         go_on(motion, n, number == SUBSTEPS - 1)
     for s in range(n):
-        v = velocity(bodies[islands.block_item[first + s]])
+        body = bodies[islands.block_item[first + s]]
+        v = body.vx, body.vy, body.omega
         for q in range(3):
             scale = rows.scale[s, q]
             found.d[s, q] = 0.5 * p.dt * (v[q] + motion[s, NOW + q] * scale / h)

@@ -23,7 +23,7 @@ from rigdda import (
     Terrain,
     sites,
 )
-from rigdda.batch import Batch
+from rigdda.batch import EVERY, Batch
 from rigdda.results.outcome import Outcome, measure, stations, watch
 
 SITE = sites.load("bench")
@@ -85,7 +85,7 @@ def full(layout: Layout, seed: int, event: str) -> Outcome:
     drawn = SITE.draw(seed, event)
     scene = SITE.scene(drawn, SITE.built(layout, drawn.width))
     lines, duration = stations(SITE, scene.barriers), SITE.motion.duration
-    run = Simulation(scene, SITE.settings(scene), lines, watch(SITE)).run(duration, duration)
+    run = Simulation(scene, SITE.settings(scene), lines, watch(SITE)).run(duration, EVERY)
     return measure(SITE, run, drawn.event, drawn.width)
 
 

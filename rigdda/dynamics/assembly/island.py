@@ -14,8 +14,11 @@ from rigdda.kernel import inlined, kernel
 
 @kernel
 def damping_of(body: Body, p: Parameters) -> float:
-    """Return the damping coefficient of a block in this step [1/s]."""
-    if p.damping_in_contact_only and body.apart > APART:
+    """Return the damping coefficient of a block in this step [1/s].
+
+    In contact it lasts for `APART` after the last touch, however long the steps are: middles count.
+    """
+    if p.damping_in_contact_only and body.apart + 0.5 * p.dt > APART:
         return 0.0
     return p.damping
 

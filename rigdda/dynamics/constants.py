@@ -124,7 +124,8 @@ APART = 0.1
 """Time since the last touch after which a block is apart [s]: from a barrier, so that it may hit it
 anew; from everything, so that damping in contact ends. Were that to end with the touch, a block
 that rattles down would be damped in proportion to the step: of a mass .50 / .53 / .54 / .57 reached
-the road of `quick` at 10 / 5 / 2.5 / 1.25 ms; like this .43 / .43 / .45 / .42, +- .02."""
+the road of `quick` at 10 / 5 / 2.5 / 1.25 ms, +- .02; like this .44 / .45 / .44 at 10 / 5 / 1 ms,
++- .006."""
 
 LONGEST_FLIGHT = 64
 """Steps for which a flight is looked ahead: the more, the wider the search for what may be met."""

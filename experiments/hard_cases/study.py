@@ -1,11 +1,12 @@
 """Hard cases over the step: each holds, degrades, refuses with a clear error, or fails.
 
-Judged by the number of trials that neither hold nor are refused. Up to the default step only what
-must be refused may be.
+Judged by the share of trials that neither hold nor are refused. Up to the default step only what
+must be refused may be, and everything else is to hold; nowhere may a trial fail.
 """
 
 from __future__ import annotations
 
+import math
 from itertools import groupby
 from pathlib import Path
 
@@ -22,6 +23,11 @@ LIMIT, QUICK_LIMIT = 600.0, 60.0
 """Processor time after which a trial counts as hung [s]: twice what the longest takes."""
 
 DEFAULT = Settings().dt
+
+MOST = 0.02
+"""Greatest share of trials that may degrade, beyond the default step [-]. What flies by a good part
+of its size in a step sinks by chance: of 12 steps from 12.5 to 21 ms a volley at 100 m/s does in
+five, a hopper that 1,000 blocks fall into at 15 m/s in one."""
 
 
 def table(results: list[Result]) -> str:
@@ -69,6 +75,13 @@ def told(row: Row) -> str:
     return f"{row['case']} {1e3 * row['dt']:g} ms {row['verdict']} {row['note']}"
 
 
+def share_wrong(results: list[Result]) -> float:
+    """Return the share of what is not as it should be [-], infinite where no chance excuses it."""
+    found = wrong(results)
+    grave = any(r.dt <= DEFAULT or r.verdict != DEGRADES for r in found)
+    return math.inf if grave else len(found) / len(results)
+
+
 def run(quick: bool, out: Path) -> Number:
     """Compute, write and draw."""
     steps = QUICK_STEPS if quick else STEPS
@@ -80,8 +93,8 @@ def run(quick: bool, out: Path) -> Number:
         part.write_text(table(results))
     draw(out / "hard_cases.png", (9.0, 11.0), lambda figure: verdicts(figure, results))
     return Number(
-        f"trials of {len(results)} that are not as they should be",
-        len(wrong(results)),
-        high=0.0,
+        f"share of {len(results)} trials that are not as they should be",
+        share_wrong(results),
+        high=MOST,
         note=report(results),
     )

@@ -192,6 +192,13 @@ def test_only_beyond_the_default_step_may_what_has_an_answer_be_refused():
     assert study.wrong(amiss) == amiss
 
 
+def test_only_what_degrades_beyond_the_default_step_may_be_chance():
+    beyond = [Result("dominoes", 0.01, DEGRADES), Result("dominoes", 0.02, HOLDS)]
+    assert study.share_wrong(beyond) == 0.5
+    for grave in (Result("dominoes", 0.005, DEGRADES), Result("dominoes", 0.02, FAILS)):
+        assert study.share_wrong([*beyond, grave]) == np.inf
+
+
 def test_table_and_picture(tmp_path):
     results = [
         Result("stack-50", 0.005, HOLDS, 1e-6, 0.02, 1e-8),

@@ -57,7 +57,7 @@ SUBSTEPS = 10
 """Substeps in the relaxation of an island in motion [-]: a blow goes on from contact to contact in
 each, and what the sweeps leave of it is as much smaller as they are shorter. With five, 4 % more of
 the rock of the highway case reach the road in steps of 20 ms, and a pile in a silo that settles
-rises by three to five times the energy; with three, 60 layers do not come to rest in 10 ms."""
+rises by three to four times the energy; with three, 60 layers do not come to rest in 10 ms."""
 
 MOST_SWEEPS = 100
 """Most sweeps over the contacts of an island in a substep, where they change by more than the

@@ -91,7 +91,7 @@ def cost(
         _equal(axes, right, top)
         axes.plot([e.capital for e in tried], [e.harm + e.repair for e in tried], ".", color=TRIED,
                   markersize=4, alpha=0.6, zorder=2,
-                  label=f"layout of the search, by few releases ({len(tried):,})")  # fmt: skip
+                  label=_searched(tried))  # fmt: skip
         for i, point in enumerate(near):
             _named(axes, point, MARKERS[i % len(MARKERS)], EVENTS[i % len(EVENTS)])
         for point in points:
@@ -106,6 +106,18 @@ def cost(
                  ylabel="harm and repair to expect [EUR per metre of road and year]")  # fmt: skip
         figure.legend(loc="outside lower center", ncols=2, frameon=False)
         save(figure, path)
+
+
+def _searched(tried: Sequence[Evaluation]) -> str:
+    """Return what the points of a search are, and half their median 95 % interval.
+
+    The best of many is too good by about as much.
+    """
+    words = f"{len(tried):,} layouts of the search, by few releases"
+    if not tried:
+        return words
+    half = float(np.median([0.5 * (e.ci[1] - e.ci[0]) for e in tried]))
+    return f"{words}, ± {half:,.0f}"
 
 
 def _reach(points: Sequence[Point]) -> float:

@@ -81,10 +81,10 @@ def system(scene: Scene, h: float) -> tuple[System, int, int]:
     """
     sim = Simulation(scene, settings(h, mode="static", islands=False))
     sim.step(SETTLING)
-    a = sim._arrays
-    count = int(sim._counters[CONTACTS])
+    a = sim.loop.arrays
+    count = int(sim.loop.counters[CONTACTS])
     a.bodies["vx"] = a.bodies["vy"] = a.bodies["omega"] = 0.0
-    pairs = assemble(a.bodies, sim._now, count, a.system.matrix, a.work, a.parameters)
+    pairs = assemble(a.bodies, sim.loop.now, count, a.system.matrix, a.work, a.parameters)
     n = len(scene.blocks)
     stir = STIR * np.random.default_rng(n).standard_normal((n, 3))
     rhs = a.system.matrix.rhs

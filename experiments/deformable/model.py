@@ -53,21 +53,21 @@ class Deformable:
             raise ValueError("give convex blocks")
         self._sim = Simulation(scene, settings)  # its arrays serve the detection of contacts
         self._counters = np.zeros(COUNTERS, dtype=np.int64)
-        self._solid = empty_solid(scene, (rock or Rock()).elasticity, len(self._sim._now))
+        self._solid = empty_solid(scene, (rock or Rock()).elasticity, len(self._sim.loop.now))
 
     def step(self, n: int = 1) -> None:
         """Take `n` steps."""
-        sim, a = self._sim, self._sim._arrays
+        loop, a = self._sim.loop, self._sim.loop.arrays
         fits, swapped = advance(
-            a.bodies, a.outlines, a.ground, a.interfaces, a.links, sim._now, sim._before,
-            a.system.matrix, a.work, a.monitors, a.parameters, self._counters, sim._deepest,
+            a.bodies, a.outlines, a.ground, a.interfaces, a.links, loop.now, loop.before,
+            a.system.matrix, a.work, a.monitors, a.parameters, self._counters, loop.deepest,
             self._solid, n,
         )  # fmt: skip
         if not fits:
             raise RuntimeError("too many contacts")
         if swapped:
-            sim._now, sim._before = sim._before, sim._now
-        sim._counters[CONTACTS] = self._counters[CONTACTS]
+            loop.now, loop.before = loop.before, loop.now
+        loop.counters[CONTACTS] = self._counters[CONTACTS]
 
     @property
     def stress(self) -> Floats:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, System
 from rigdda.dynamics.assembly.springs import along, normal_row
-from rigdda.dynamics.blows import blows, find_trains, find_ways, hits
+from rigdda.dynamics.blows import blows, find_ways, hits
 from rigdda.dynamics.constants import (
     ASLEEP,
     BREAK_SOLVES,
@@ -30,6 +30,7 @@ from rigdda.dynamics.motion import kinetic_energy
 from rigdda.dynamics.open_close import open_close
 from rigdda.dynamics.records import EVENTS, Bodies, Contacts, Parameters
 from rigdda.dynamics.sleep import wake_island
+from rigdda.dynamics.trains import find_trains
 from rigdda.kernel import kernel, stage
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,3 +41,12 @@ def pieces(steps: int, stride: int) -> list[tuple[int, int]]:
     whole, rest = divmod(steps, stride)
     parts = [(min(PIECE, whole - done), stride) for done in range(0, whole, PIECE)]
     return parts + [(1, rest)] * (rest > 0)
+
+
+def tracked(parts: list[tuple[int, int]], progress: bool) -> Iterable[tuple[int, int]]:
+    """Return the pieces, with a progress bar over them if it is asked for."""
+    if not progress:
+        return parts
+    from rich.progress import track
+
+    return track(parts, description="simulating")

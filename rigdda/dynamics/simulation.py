@@ -3,62 +3,33 @@
 from __future__ import annotations
 
 import math
-import time
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check
-from rigdda.dynamics.constants import (
-    ASLEEP,
-    AWAKE,
-    BAD_STATE,
-    CONTACTS_FULL,
-    ENDED,
-    EVENTS_FULL,
-    GROUND_MOVED,
-    OPEN,
-    PLAIN,
-    SOFT,
-    TERRAIN,
-)
-from rigdda.dynamics.frames import frame_of, no_frames, pieces
-from rigdda.dynamics.monitors import FAILED
+from rigdda.dynamics.constants import PLAIN, SOFT
+from rigdda.dynamics.frames import frame_of, no_frames, pieces, tracked
+from rigdda.dynamics.loop import Loop
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.dynamics.pack.again import Template
-from rigdda.dynamics.pack.ground import pack_ground
-from rigdda.dynamics.pack.space import empty_contacts, empty_system, empty_work
 from rigdda.dynamics.readings import (
     Diagnostics,
     Energy,
     compression,
     contact_table,
     diagnosed,
-    divergence,
     elastic_energy,
     energies,
     support_forces,
 )
-from rigdda.dynamics.records import (
-    CONTACTS,
-    COUNTERS,
-    EVENTS,
-    LEDGER,
-    STEPS,
-    Contacts,
-)
-from rigdda.dynamics.run import EVENT, Run
+from rigdda.dynamics.run import Run
 from rigdda.dynamics.stations import chainages
-from rigdda.dynamics.step import advance
 from rigdda.errors import BadInput, Diverged, SoftContacts
-from rigdda.kernel import Direct
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
-
-advance_directly = Direct(advance)
-"""The step loop; the types of its arrays are the same for every scene."""
 
 MOST_STEPS = 1e9
 """Most steps of a run: a day or more of computing for a single block."""
@@ -84,6 +55,11 @@ class Simulation:
         Arrays packed for the same stations, interval, chainage and settings, and a scene from which
         this one differs in its rock: it is started in them.
 
+    Attributes
+    ----------
+    loop : Loop
+        The scene in arrays, and the step loop over them.
+
     Raises
     ------
     BadInput
@@ -107,12 +83,15 @@ class Simulation:
         self.scene = scene
         self.settings = settings or Settings()
         if template is None:
-            self._arrays = self._pack(stations, watch, leave)
+            arrays = self._packed(stations, watch, leave)
         else:
-            self._arrays = template.write(scene)
-        self._start()
+            arrays = template.write(scene)
+        self.loop = Loop(scene, arrays, self.settings.dt, self.settings.timing)
+        self._no_frames = no_frames(arrays.bodies)
+        self._elastic_at_start = elastic_energy(arrays, self.loop.contacts)
+        self._barrier_start = scene.barrier_poses
 
-    def _pack(
+    def _packed(
         self, stations: Sequence[float], watch: tuple[float, float] | None, leave: float | None
     ) -> Arrays:
         lines = chainages(stations)
@@ -122,28 +101,15 @@ class Simulation:
         end = -math.inf if leave is None else check.number("leave", leave)
         return pack(self.scene, self.settings, lines, (low, high), end)
 
-    def _start(self) -> None:
-        """Set what is counted and kept to what it is before the first step."""
-        scene = self.scene
-        self._now, self._before = self._arrays.now, self._arrays.before
-        self._counters = np.zeros(COUNTERS, dtype=np.int64)
-        self._ledger = np.zeros(len(LEDGER))
-        self._deepest = np.zeros(1)
-        self._seconds = 0.0
-        self._no_frames = no_frames(self._arrays.bodies)
-        self._elastic_at_start = elastic_energy(self._arrays, self._contacts)
-        self._barrier_start = scene.barrier_poses
-        self._events: list[NDArray[np.void]] = []
-
     @property
     def time(self) -> float:
         """Simulated time [s], counted in whole steps."""
-        return float(self._counters[STEPS] * self.settings.dt)
+        return self.loop.time
 
     @property
     def poses(self) -> NDArray[np.float64]:
         """Copy of x, y, theta of the centroids, (N, 3) [m, m, rad]."""
-        b, n = self._arrays.bodies, len(self.scene.blocks)
+        b, n = self.loop.arrays.bodies, len(self.scene.blocks)
         return np.stack([b["x"][:n], b["y"][:n], b["theta"][:n]], axis=1)
 
     @property
@@ -153,30 +119,25 @@ class Simulation:
         Only gravity walls move.
         """
         out = self._barrier_start.copy()
-        b, n = self._arrays.bodies, len(self.scene.blocks)
+        b, n = self.loop.arrays.bodies, len(self.scene.blocks)
         out[list(self.scene.bodies)] = np.stack([b["x"][n:], b["y"][n:], b["theta"][n:]], axis=1)
         return out
 
     @property
     def velocities(self) -> NDArray[np.float64]:
         """Copy of vx, vy, omega of the blocks, (N, 3) [m/s, m/s, rad/s]."""
-        b, n = self._arrays.bodies, len(self.scene.blocks)
+        b, n = self.loop.arrays.bodies, len(self.scene.blocks)
         return np.stack([b["vx"][:n], b["vy"][:n], b["omega"][:n]], axis=1)
 
     def vertices(self, block: int) -> NDArray[np.float64]:
         """Return the corners of a block now, (n, 2) [m]."""
-        n = self._arrays.bodies["count"][block]
-        corner = self._arrays.outlines.corner[block, :n]
+        n = self.loop.arrays.bodies["count"][block]
+        corner = self.loop.arrays.outlines.corner[block, :n]
         return np.stack([corner["x"], corner["y"]], axis=1)
-
-    @property
-    def _contacts(self) -> Contacts:
-        """The contacts of the last step."""
-        return self._now.view(np.ndarray)[: self._counters[CONTACTS]]
 
     def contacts(self) -> NDArray[np.void]:
         """Return the contacts of the last step as a structured array, see `CONTACT_TABLE`."""
-        return contact_table(self.scene, self._contacts)
+        return contact_table(self.scene, self.loop.contacts)
 
     def supports(self) -> NDArray[np.float64]:
         """Return the force of each support on its (first) block, (S, 2) [N].
@@ -184,18 +145,20 @@ class Simulation:
         Of bolts the one at the end of the last step, of pins the mean over it; if it was taken in
         parts, over the last one.
         """
-        return support_forces(self._arrays, self._contacts)
+        return support_forces(self.loop.arrays, self.loop.contacts)
 
     def energy(self) -> Energy:
         """Return the energies of what is free to move now and the work done on it so far."""
         before = self._elastic_at_start
-        return energies(self.scene, self._arrays, self._contacts, self._ledger, before)
+        return energies(self.scene, self.loop.arrays, self.loop.contacts, self.loop.ledger, before)
 
     @property
     def diagnostics(self) -> Diagnostics:
         """What the computation took so far."""
-        deepest = float(self._deepest[0])
-        return diagnosed(self._arrays, self._contacts, self._counters, deepest, self._seconds)
+        deepest = float(self.loop.deepest[0])
+        return diagnosed(
+            self.loop.arrays, self.loop.contacts, self.loop.counters, deepest, self.loop.seconds
+        )
 
     def step(self, n: int = 1) -> None:
         """Take `n` steps.
@@ -205,53 +168,7 @@ class Simulation:
         Diverged
             If a block's velocity is no longer finite or beyond any rockfall.
         """
-        self._advance(check.integer("n", n, 0), self._no_frames)
-
-    def _advance(self, steps: int, frames: NDArray[np.float64]) -> bool:
-        """Take steps, as many from each of the frames to be kept to the next.
-
-        Returns whether the run is over before that, see `leave`.
-        """
-        target, timing = self._counters[STEPS] + steps, self.settings.timing
-        stride = steps // max(len(frames), 1)
-        while self._counters[STEPS] < target:
-            a, before = self._arrays, time.thread_time() if timing else 0.0
-            reason, block, swapped = advance_directly.call(
-                a.bodies,
-                a.outlines,
-                a.ground,
-                a.interfaces,
-                a.links,
-                a.shaking,
-                self._now,
-                self._before,
-                a.system,
-                a.work,
-                a.monitors,
-                a.parameters,
-                self._counters,
-                self._ledger,
-                self._deepest,
-                target - self._counters[STEPS],
-                frames,
-                stride,
-            )
-            if timing:
-                self._seconds += time.thread_time() - before
-            if swapped:
-                self._now, self._before = self._before, self._now
-            if reason == EVENTS_FULL:
-                self._drain_events()
-            elif reason == CONTACTS_FULL:
-                self._grow()
-            elif reason == GROUND_MOVED:
-                self._move_ground()
-            elif reason == BAD_STATE:
-                when = f"step {self._counters[STEPS]} ({self.time:g} s)"
-                raise Diverged(divergence(self._arrays, self.contacts(), block, when))
-            elif reason == ENDED:
-                return True
-        return False
+        self.loop.advance(check.integer("n", n, 0), self._no_frames)
 
     def run(self, duration: float, every: float = 0.05, progress: bool = False) -> Run:
         """Simulate `duration` seconds and record a frame `every` so often, the start included.
@@ -282,25 +199,25 @@ class Simulation:
         check.boolean("progress", progress)
         stride = max(1, round(every / self.settings.dt))
         steps = max(1, round(duration / self.settings.dt))
-        start, bodies = self._counters[STEPS], self._arrays.bodies
+        start, bodies = self.loop.steps, self.loop.arrays.bodies
         kept, at = [frame_of(bodies)[None]], [0]
-        for count, apart in _track(pieces(steps, stride), progress):
+        for count, apart in tracked(pieces(steps, stride), progress):
             kept.append(np.empty((count, len(bodies), 6)))
             at += range(at[-1] + apart, at[-1] + (count + 1) * apart, apart)
             try:
-                if self._advance(count * apart, kept[-1]):
-                    last = self._counters[STEPS] - start
+                if self.loop.advance(count * apart, kept[-1]):
+                    last = self.loop.steps - start
                     at = [mark for mark in at if mark < last]
                     kept = [np.concatenate(kept)[: len(at)], frame_of(bodies)[None]]
                     at.append(last)
                     break
             except Diverged as error:
-                at = [mark for mark in at if start + mark < self._counters[STEPS]]
+                at = [mark for mark in at if start + mark < self.loop.steps]
                 error.run = self._record(kept, start + np.array(at))
                 raise
         # what follows from the load by default is as stiff as it should be
-        plain = bool((self._contacts["kind"] == PLAIN).any())
-        give = compression(self._arrays, self._contacts)
+        plain = bool((self.loop.contacts["kind"] == PLAIN).any())
+        give = compression(self.loop.arrays, self.loop.contacts)
         if (plain or self.settings.penetration is not None) and give > SOFT:
             warnings.warn(
                 f"contacts at rest give way by {give:.2g} of a block: what stands "
@@ -312,58 +229,20 @@ class Simulation:
 
     def _record(self, kept: list[NDArray], steps: NDArray) -> Run:
         """Return a run of the first frames that were kept, which were reached in such steps."""
-        self._drain_events()
         frames, n = np.concatenate(kept)[: len(steps)], len(self.scene.blocks)
         barrier_poses = np.repeat(self._barrier_start[None], len(steps), axis=0)
         barrier_poses[:, list(self.scene.bodies)] = frames[:, n:, :3]
-        events = np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
-        monitors = self._arrays.monitors
+        monitors = self.loop.arrays.monitors
         rock, target = monitors.rock.view(np.ndarray), monitors.target.view(np.ndarray)
         return Run(
             self.scene,
             steps * self.settings.dt,
             frames[:, :n, :3].copy(),
             frames[:, :n, 3:].copy(),
-            events,
+            self.loop.events(),
             target["absorbed"].copy(),
             target["thrust"].copy(),
             rock["energy"].copy(),
             np.stack([rock["low"], rock["high"]], axis=1),
             barrier_poses,
         )
-
-    def _drain_events(self) -> None:
-        n = self._counters[EVENTS]
-        self._events.append(self._arrays.monitors.event.view(np.ndarray)[:n].copy())
-        self._counters[EVENTS] = 0
-
-    def _move_ground(self) -> None:
-        """Take the embankments that were pushed away off the ground, and wake what sleeps."""
-        self._drain_events()
-        failed = np.concatenate(self._events)
-        gone = failed["target"][failed["kind"] == FAILED]
-        ground = pack_ground(self.scene.ground_without(gone), list(self.scene.surfaces))
-        self._arrays = self._arrays._replace(ground=ground)
-        bodies, contacts = self._arrays.bodies, self._now
-        bodies["quiet"][bodies["status"] == ASLEEP] = 0.0
-        bodies["status"][bodies["status"] == ASLEEP] = AWAKE
-        # its corners have other numbers now
-        contacts["state"][(contacts["b"] == TERRAIN) & (contacts["owner"] == 0)] = OPEN
-
-    def _grow(self) -> None:
-        room, bodies = 2 * len(self._now), self._arrays.bodies
-        blocks = self._arrays.parameters[0].blocks
-        grown = empty_contacts(room)
-        grown[: len(self._now)] = self._now
-        self._now, self._before = grown, empty_contacts(room)
-        work, before = empty_work(len(bodies), blocks, room), self._arrays.work
-        work.boxes.row[:], work.begin[:] = before.boxes.row, before.begin
-        self._arrays = self._arrays._replace(system=empty_system(blocks, room), work=work)
-
-
-def _track(parts: list[tuple[int, int]], progress: bool) -> Iterable[tuple[int, int]]:
-    if not progress:
-        return parts
-    from rich.progress import track
-
-    return track(parts, description="simulating")

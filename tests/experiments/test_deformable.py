@@ -42,7 +42,7 @@ def test_stiff_block_falls_and_stops_as_a_rigid_one() -> None:
 def test_inertia_of_a_polygon_is_that_of_a_rigid_block() -> None:
     corners = ngon(5, 1.3, (2.0, -1.0), 0.4)
     scene = Scene(None, (Block(corners, density=1.0),), PLAIN)
-    arrays = Simulation(scene)._arrays
+    arrays = Simulation(scene).loop.arrays
     area, (x, y), polar = polygon_properties(corners)
     moments = from_python(area_moments)(arrays.outlines, 0, len(corners), x, y)
     assert moments[0] == pytest.approx(area)

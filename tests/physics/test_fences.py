@@ -142,7 +142,7 @@ def test_a_fence_takes_what_its_blocks_lose_step_by_step():
     for seed in range(40):
         scene, energy = thrown(seed)
         sim = Simulation(scene, Settings(dt=2e-3))
-        target, before, had = sim._arrays.monitors.target, energy, 0.0
+        target, before, had = sim.loop.arrays.monitors.target, energy, 0.0
         while sim.vertices(0)[:, 1].min() > 0.2 and sim.time < 1.0:  # on the ground it loses more
             sim.step()
             now, has = sim.energy().kinetic, float(target["absorbed"][0])
@@ -255,7 +255,7 @@ def test_it_is_lower_by_what_it_took_where_others_follow():
         scene = volley((0.5, 0.3)[:others])
         sim = Simulation(scene)
         sim.step(round(0.8 / sim.settings.dt))
-        top = sim._arrays.outlines.corner["y"][others].max()
+        top = sim.loop.arrays.outlines.corner["y"][others].max()
         assert top == pytest.approx(FENCE.height * (1.0 - lost), rel=1e-3)
 
 

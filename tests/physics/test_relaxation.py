@@ -37,7 +37,7 @@ def test_forces_of_an_avalanche_press_and_stay_within_friction(dt: float) -> Non
     tried = 0
     for _ in range(round(FALL / dt)):
         sim.step()
-        c = sim._now[: sim._counters[CONTACTS]]
+        c = sim.loop.now[: sim.loop.counters[CONTACTS]]
         c = c[(c["kind"] == REST) & (c["state"] != OPEN)]
         limit = c["friction"] * c["normal"] + c["cohesion"]
         assert (c["normal"] >= 0.0).all()

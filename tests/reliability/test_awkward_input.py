@@ -64,12 +64,12 @@ SWITCHES = {
 
 
 def test_numbers_of_any_type_leave_the_kernels_types_as_they_are():
-    usual = numba.typeof(Simulation(Scene(Terrain(FLAT), [box(0.0, 0.5)], rock()))._arrays)
+    usual = numba.typeof(Simulation(Scene(Terrain(FLAT), [box(0.0, 0.5)], rock())).loop.arrays)
     for name, build in WHOLE.items():
-        assert numba.typeof(Simulation(build())._arrays) == usual, name
+        assert numba.typeof(Simulation(build()).loop.arrays) == usual, name
     scene = Scene(Terrain(FLAT), [box(0.0, 0.5)], rock())
     for name, value in SWITCHES.items():
-        found = Simulation(scene, Settings(**{name: value}))._arrays
+        found = Simulation(scene, Settings(**{name: value})).loop.arrays
         assert numba.typeof(found) == usual, name
 
 

@@ -69,7 +69,7 @@ def test_what_an_embankment_bears_is_that_of_the_friction_of_its_release():
     limits = []
     for seed in range(6):
         sim = batch.simulation(batch.scene(site.draw(seed, "block")))
-        limits.append(float(sim._arrays.monitors.target["limit"][0]))
+        limits.append(float(sim.loop.arrays.monitors.target["limit"][0]))
         assert limits[-1] == pytest.approx(sim.scene.resistance(0)), seed
     assert max(limits) > 1.1 * min(limits)
 

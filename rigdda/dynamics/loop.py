@@ -1,0 +1,186 @@
+"""The arrays of a scene and the compiled step loop over them: steps, room for contacts, events."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.dynamics.constants import (
+    ASLEEP,
+    AWAKE,
+    BAD_STATE,
+    CONTACTS_FULL,
+    ENDED,
+    EVENTS_FULL,
+    GROUND_MOVED,
+    OPEN,
+    TERRAIN,
+)
+from rigdda.dynamics.monitors import FAILED
+from rigdda.dynamics.pack import Arrays
+from rigdda.dynamics.pack.ground import pack_ground
+from rigdda.dynamics.pack.space import empty_contacts, empty_system, empty_work
+from rigdda.dynamics.readings import contact_table, divergence
+from rigdda.dynamics.records import CONTACTS, COUNTERS, EVENTS, LEDGER, STEPS, Contacts
+from rigdda.dynamics.run import EVENT
+from rigdda.dynamics.step import advance
+from rigdda.errors import Diverged
+from rigdda.kernel import Direct
+from rigdda.model.scene import Scene
+
+advance_directly = Direct(advance)
+"""The step loop; the types of its arrays are the same for every scene."""
+
+
+class Loop:
+    """A packed scene, and what is counted and kept while it moves.
+
+    Parameters
+    ----------
+    scene : Scene
+        What was packed.
+    arrays : Arrays
+        The scene in arrays, before the first step.
+    dt : float
+        Step [s].
+    timing : bool
+        Whether processor time is read.
+
+    Attributes
+    ----------
+    arrays : Arrays
+        The scene now.
+    now, before : (C,) array of CONTACT
+        Contacts of this step and of the last one, with room for more.
+    counters : (COUNTERS,) array of int
+        What `records` numbers.
+    ledger : (5,) array
+        Work done on the blocks so far, see `records.LEDGER` [J].
+    deepest : (1,) array
+        Greatest penetration so far [m].
+    seconds : float
+        Processor time so far [s].
+    """
+
+    def __init__(self, scene: Scene, arrays: Arrays, dt: float, timing: bool):
+        self._scene, self._dt, self._timing = scene, dt, timing
+        self.arrays = arrays
+        self.now, self.before = arrays.now, arrays.before
+        self.counters = np.zeros(COUNTERS, dtype=np.int64)
+        self.ledger = np.zeros(len(LEDGER))
+        self.deepest = np.zeros(1)
+        self.seconds = 0.0
+        self._events: list[NDArray[np.void]] = []
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        return int(self.counters[STEPS])
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.steps * self._dt
+
+    @property
+    def contacts(self) -> Contacts:
+        """The contacts of the last step."""
+        return self.now.view(np.ndarray)[: self.counters[CONTACTS]]
+
+    def advance(self, steps: int, frames: NDArray[np.float64]) -> bool:
+        """Take steps, as many from each of the frames to be kept to the next.
+
+        Parameters
+        ----------
+        steps : int
+            How many.
+        frames : (F, M, 6) array
+            What is kept, see `frames.keep_frame`; F divides the steps, or is 0.
+
+        Returns
+        -------
+        bool
+            Whether the run is over before that, see `leave` of `Simulation`.
+
+        Raises
+        ------
+        Diverged
+            If a block's velocity is no longer finite or beyond any rockfall.
+        """
+        target = self.counters[STEPS] + steps
+        stride = steps // max(len(frames), 1)
+        while self.counters[STEPS] < target:
+            a, before = self.arrays, time.thread_time() if self._timing else 0.0
+            reason, block, swapped = advance_directly.call(
+                a.bodies,
+                a.outlines,
+                a.ground,
+                a.interfaces,
+                a.links,
+                a.shaking,
+                self.now,
+                self.before,
+                a.system,
+                a.work,
+                a.monitors,
+                a.parameters,
+                self.counters,
+                self.ledger,
+                self.deepest,
+                target - self.counters[STEPS],
+                frames,
+                stride,
+            )
+            if self._timing:
+                self.seconds += time.thread_time() - before
+            if swapped:
+                self.now, self.before = self.before, self.now
+            if reason == EVENTS_FULL:
+                self._drain_events()
+            elif reason == CONTACTS_FULL:
+                self._grow()
+            elif reason == GROUND_MOVED:
+                self._move_ground()
+            elif reason == BAD_STATE:
+                when = f"step {self.steps} ({self.time:g} s)"
+                table = contact_table(self._scene, self.contacts)
+                raise Diverged(divergence(a, table, block, when))
+            elif reason == ENDED:
+                return True
+        return False
+
+    def events(self) -> NDArray[np.void]:
+        """Return what happened so far, an array of EVENT."""
+        self._drain_events()
+        return np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
+
+    def _drain_events(self) -> None:
+        """Keep the events that the kernels noted, and make room for others."""
+        n = self.counters[EVENTS]
+        self._events.append(self.arrays.monitors.event.view(np.ndarray)[:n].copy())
+        self.counters[EVENTS] = 0
+
+    def _move_ground(self) -> None:
+        """Take the embankments that were pushed away off the ground, and wake what sleeps."""
+        failed = self.events()
+        gone = failed["target"][failed["kind"] == FAILED]
+        ground = pack_ground(self._scene.ground_without(gone), list(self._scene.surfaces))
+        self.arrays = self.arrays._replace(ground=ground)
+        bodies, contacts = self.arrays.bodies, self.now
+        bodies["quiet"][bodies["status"] == ASLEEP] = 0.0
+        bodies["status"][bodies["status"] == ASLEEP] = AWAKE
+        # its corners have other numbers now
+        contacts["state"][(contacts["b"] == TERRAIN) & (contacts["owner"] == 0)] = OPEN
+
+    def _grow(self) -> None:
+        """Make room for twice as many contacts."""
+        room, bodies = 2 * len(self.now), self.arrays.bodies
+        blocks = self.arrays.parameters[0].blocks
+        grown = empty_contacts(room)
+        grown[: len(self.now)] = self.now
+        self.now, self.before = grown, empty_contacts(room)
+        work, before = empty_work(len(bodies), blocks, room), self.arrays.work
+        work.boxes.row[:], work.begin[:] = before.boxes.row, before.begin
+        self.arrays = self.arrays._replace(system=empty_system(blocks, room), work=work)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from agents.store import Release
 from envs import DesignProblem
-from envs.intervals import upper_bound
+from envs.intervals import CONFIDENCE, upper_bound
 from rigdda import Layout
 
 Floats = NDArray[np.float64]
@@ -94,13 +94,13 @@ class Arm:
     def shortfall(self) -> float:
         """Return the most by which a design event exceeds a target, 0 if none does.
 
-        By its estimate or, if it is to be strict, by its upper bound.
+        By its estimate or, if it is to be strict, by its upper bound: 1 without releases.
         """
         targets = self.problem.targets
         over = [0.0]
         for event in self.problem.site.events:
             own = self.releases[event.name]
-            if event.design and own:
+            if event.design and (own or self.strict):
                 for wanted, which in ((targets.reach, "reached"), (targets.failure, "failed")):
                     if wanted is not None:
                         count = sum(getattr(r, which) for r in own)
@@ -152,7 +152,8 @@ def allocation(
     `DesignProblem.allocation`. An event whose cost with the leaders spreads less than without them
     has less: what the leaders stop tells them apart no more. An event that would have no more than
     the two of every plan has none: a large mass takes as long as hundreds of blocks, and is the
-    same for all candidates until there are releases enough to tell.
+    same for all candidates until there are releases enough to tell. If something is asked of design
+    events, each has as many as can tell whether it is met, as far as half of all go.
     """
     shares = {name: float(count) for name, count in problem.allocation(max(n, PLANNED)).items()}
     for name in shares:
@@ -161,4 +162,26 @@ def allocation(
             shares[name] *= min(1.0, max(LEFT, float(np.mean(seen)) / nothing.spread(name)))
     whole = sum(shares.values())
     counts = {name: int(n * share / whole) for name, share in shares.items()}  # never more than n
-    return {name: count if count > 2 else 0 for name, count in counts.items()}
+    counts = {name: count if count > 2 else 0 for name, count in counts.items()}
+    return _with_floors(counts, _floors(problem, n), n)
+
+
+def _floors(problem: DesignProblem, n: int) -> dict[str, int]:
+    """Return how many of `n` releases each design event has at least, if a target is set.
+
+    So many that a target counts as met if it happens in none, at most an equal share of half.
+    """
+    asked = [t for t in (problem.targets.reach, problem.targets.failure) if t is not None]
+    design = [event.name for event in problem.site.events if event.design]
+    if not asked or not design:
+        return {}
+    enough = math.log(1.0 - CONFIDENCE) / math.log1p(-min(min(asked), 0.5))
+    return dict.fromkeys(design, min(math.ceil(enough), n // (2 * len(design))))
+
+
+def _with_floors(counts: Mapping[str, int], floors: Mapping[str, int], n: int) -> dict[str, int]:
+    """Return counts raised to their floors; the others have less, so that there are at most `n`."""
+    raised = {name: max(count, floors.get(name, 0)) for name, count in counts.items()}
+    spare = {name: count - floors.get(name, 0) for name, count in raised.items()}
+    over = max(sum(raised.values()) - n, 0) / max(sum(spare.values()), 1)
+    return {name: count - math.ceil(over * spare[name]) for name, count in raised.items()}

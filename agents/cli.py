@@ -136,15 +136,15 @@ def simulate(
 def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
     """Measure what fidelity "fast" costs and gains on SITE (a name or a TOML file).
 
-    Compares Z and the processor time of a release, for no barrier and for what the engineering
-    rule builds. Writes fidelity.csv.
+    Compares Z and the processor time of a release, for no barrier, the constant and what the
+    engineering rule builds. Writes fidelity.csv.
     """
     from agents import fidelity_bias as job
     from envs import DesignProblem
 
     where = DesignProblem(site).site
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
-    with kept(folder), progress(4 * releases) as tick:
+    with kept(folder), progress(6 * releases) as tick:
         found = job.compare(where, releases, seed, tick)
     job.write(folder / "fidelity.csv", where, found)
     show(job.table(found))

@@ -36,10 +36,9 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
         What is left of the risk, in words.
     """
     chosen = cases[-1][1]
-    parts = [_pays(cases[0][1], chosen)]
-    for name, other in cases[1:-1]:
-        if other.ci[1] < chosen.ci[0]:
-            parts.append(f"{name} costs less a year: the search wants a larger --budget")
+    cheap = [name for name, other in cases[1:-1] if other.ci[1] < chosen.ci[0]]
+    parts = [] if cheap and not chosen.layout else [_pays(cases[0][1], chosen)]
+    parts += [f"{name} costs less a year: the search wants a larger --budget" for name in cheap]
     if chosen.layout and result.on_bound:
         parts.append(f"the layout lies on a bound: {', '.join(result.on_bound)}")
     return "; ".join(filter(None, [*parts, left]))
@@ -48,7 +47,7 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
 def _pays(nothing: Evaluation, chosen: Evaluation) -> str:
     """Return in words that no layout pays, or that none is shown to pay; else nothing."""
     if not chosen.layout:
-        return "nothing pays: the search found no layout that costs less a year than it saves"
+        return "nothing pays: no layout was found that costs less a year than it saves"
     if chosen.ci[1] < nothing.ci[0]:
         return ""
     return (

@@ -218,7 +218,8 @@ def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed
     spread = 1 << max(2, round(math.log2(budget / 2)))
     places = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(spread)
     best = places[int(np.argmin([score(place) for place in places]))]
-    options = {"bounds": [0, 1], "seed": seed + 1, "verbose": -9, "maxfevals": budget - spread}
+    own = seed % (2**32 - 1) + 1  # of 0 cma would take the time
+    options = {"bounds": [0, 1], "seed": own, "verbose": -9, "maxfevals": budget - spread}
     evolution = cma.CMAEvolutionStrategy(best, 0.15, options)
     done = spread
     while budget - done >= evolution.popsize and not evolution.stop():

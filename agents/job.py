@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -129,7 +129,7 @@ def study(
             file.add(Entry(result.simulations, "verification", evaluation))
             cases.append(Case(case, evaluation))
     tick(simulations + releases * len(cases), "what is left")
-    left = _left(problem, cases[-1].evaluation, seed)
+    left = _left(problem, [case.evaluation for case in cases], seed)
     return Study(problem, result, tuple(cases), left), store
 
 
@@ -151,10 +151,13 @@ def _compared(
     return [*out, (words, result.layout)]
 
 
-def _left(problem: DesignProblem, chosen: Evaluation, seed: int) -> str:
-    """Return what is left of the risk, and whether anything holds the event that makes most."""
-    words, most = findings.left_over(chosen), findings.worst(chosen)
-    if most is None or chosen.reach[most].probability <= HOLDS:
+def _left(problem: DesignProblem, verified: Sequence[Evaluation], seed: int) -> str:
+    """Return what is left of the risk with the last of what was verified.
+
+    And whether anything holds the event that makes most of it.
+    """
+    words, most = findings.left_over(verified[-1]), findings.worst(verified[-1])
+    if most is None or any(e.reach[most].probability <= HOLDS for e in verified):
         return words
     held = unheld(problem, most, seed)
     return f"{held}: {words}" if held else words

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-
+import msgspec
 import numpy as np
 
+from agents.menu import Menu
 from agents.seeds import release_seeds
 from envs import DesignProblem
-from envs.sizes import SLENDER
-from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, GravityWall, Layout
-from rigdda.barriers import FENCE_CLASSES
+from rigdda import Barrier, Ditch, Embankment, Fence, Layout
+from rigdda.barriers import Standing
 from rigdda.geometry import polygon_properties
 
 STATIONS = 3
-"""Places across the zone where each kind is tried."""
+"""Places across the zone where each kind is tried, the last one near the road."""
+
+LARGE = 0.9
+"""Least size of what is tried over the largest that may be built of its kind [-]."""
 
 RELEASES = 4
 """Releases of the event with each."""
@@ -24,36 +26,46 @@ HOLDS = 0.5
 
 
 def tried(problem: DesignProblem) -> tuple[Layout, ...]:
-    """Return layouts of one barrier as large as the zone and its kind allow, at several places."""
-    zone = problem.zone
-    places = np.linspace(zone.start, zone.end, STATIONS + 2)[:-1].tolist()
-    return tuple((b,) for x in places for b in _largest(problem, x) if problem.fits((b,)))
+    """Return layouts of one barrier, of each kind the largest that may be built, at most places.
+
+    Mesh is none of them: it makes an event rarer, and holds no part of it.
+    """
+    menu, found = Menu(problem), list[Barrier]()
+    for kind in problem.kinds:
+        barriers = [_thick(menu, b) for b in menu.lone(kind)] if kind != "mesh" else []
+        least = LARGE * max(map(_size, barriers), default=0.0)
+        large = sorted((b for b in barriers if _size(b) >= least), key=lambda b: b.x)
+        places = np.linspace(0, len(large) - 1, min(STATIONS, len(large))).round().astype(int)
+        found += [large[i] for i in places.tolist()]
+    return tuple((barrier,) for barrier in found)
 
 
-def _largest(problem: DesignProblem, x: float) -> Iterator[Barrier]:
-    """Yield the largest barrier of each kind at a place; one that cannot be built there is left."""
-    zone = problem.zone
-    top = max(FENCE_CLASSES)
-    makers: dict[str, Callable[[], Barrier]] = {
-        "fence": lambda: Fence(
-            x, min(zone.max_height, FENCE_CLASSES[top].height), energy_class=top
-        ),
-        "ditch": lambda: Ditch(x, zone.max_depth, zone.max_width),
-        "embankment": lambda: Embankment(x, zone.max_height, zone.max_thickness),
-        "gravity_wall": lambda: GravityWall(
-            x, min(zone.max_height, zone.max_thickness / SLENDER), zone.max_thickness
-        ),
-    }
-    for kind, make in makers.items():
-        if kind in problem.kinds:
-            try:
-                yield make()
-            except BadInput:
-                continue
+def _size(barrier: Barrier) -> float:
+    """Return what the barriers of a kind are compared by."""
+    match barrier:
+        case Fence():
+            assert barrier.energy_class is not None  # of a menu
+            return barrier.energy_class * barrier.height
+        case Ditch():
+            return barrier.depth * barrier.width
+        case Embankment() | Standing():
+            return barrier.height
+    return 0.0
+
+
+def _thick(menu: Menu, barrier: Barrier) -> Barrier:
+    """Return an embankment or a wall as thick as may be where it stands."""
+    name = {"embankment": "width", "gravity_wall": "thickness"}.get(barrier.kind)
+    if name is None:
+        return barrier
+    thick = msgspec.structs.replace(barrier, **{name: menu.zone.max_thickness})
+    return menu.put(thick, barrier.x) or barrier
 
 
 def unheld(problem: DesignProblem, event: str, seed: int) -> str:
     """Return in words that no barrier holds an event, if none of the largest does; else nothing.
+
+    Nothing, too, where none may be built.
 
     Raises
     ------
@@ -66,9 +78,11 @@ def unheld(problem: DesignProblem, event: str, seed: int) -> str:
         outcomes = problem.sample(layout, seeds)
         if sum(outcome.reached for outcome in outcomes) <= HOLDS * len(outcomes):
             return ""
+    if not layouts:
+        return ""
     volume = _volume(problem, event, seeds[event][0])
     return (
-        f"no single barrier within the zone, at its largest, holds the event {event!r} "
+        f"no single barrier that may be built, at its largest, holds the event {event!r} "
         f"({volume:.2g} m3 per metre) back"
     )
 

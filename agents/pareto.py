@@ -39,7 +39,8 @@ class ParetoResult(DesignResult):
     ----------
     front : tuple of Evaluation
         Layouts of which none is both cheaper and safer than another, the cheapest first, evaluated
-        on releases that the search did not see.
+        on releases that the search did not see; by the search's own with a budget that does not pay
+        for finals, see `searching.Plan`: then some are in it by luck.
     """
 
     front: tuple[Evaluation, ...]

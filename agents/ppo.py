@@ -198,7 +198,7 @@ def resume(checkpoint: Path, copies: VecEnv) -> PPO:
     """Return the trainer that was kept in a file; it goes on with other random numbers."""
     torch.set_num_threads(1)
     model = PPO.load(checkpoint, copies, device="cpu")
-    model.set_random_seed((model.seed or 0) + model.num_timesteps)
+    model.set_random_seed(((model.seed or 0) + model.num_timesteps) % 2**32)
     return model
 
 

@@ -158,8 +158,9 @@ def ritchie(site: Site) -> tuple[float, float]:
     """Return width and depth of the ditch of Ritchie's table for a site's slope [m]."""
     points = np.array(site.slope.points)
     toe = site.slope.toe
-    rock = max(points[points[:, 0] < toe, 1].max() - np.interp(toe, *points.T), 0.1)
-    crest = points[np.argmax(points[:, 1] >= points[:, 1].max() - 0.1 * rock)]
+    above = points[points[:, 0] < toe]
+    rock = max(above[:, 1].max() - np.interp(toe, *points.T), 0.1)
+    crest = above[above[:, 1] >= above[:, 1].max() - 0.1 * rock][-1]  # from which the cut falls
     steep = math.degrees(math.atan2(rock, max(toe - crest[0], 1e-3)))
     row = RITCHIE[min(RITCHIE, key=lambda angle: abs(angle - steep))]
     return row[int(np.searchsorted(HIGH, rock))]

@@ -9,19 +9,23 @@ import csv
 import hashlib
 import io
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 import rigdda
 from agents.store import mechanics
 from agents.study_file import Study
 from agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from agents.wording import euros, span, standing
-from envs import intervals
-from rigdda import BadInput, Layout, Outcome, Site
+from envs.estimator import Account, stratified
+from envs.evaluation import Facts
+from envs.intervals import Known
+from rigdda import BadInput, Outcome, Site
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -166,29 +170,53 @@ def _number(text: str) -> float:
 def table(study: Study, path: Path) -> Table:
     """Return the table of what each layout costs [EUR per metre of road and year]."""
     out = empty_table(("layout", "Z (95 %)", "capital", "harm", "repair", "to build"))
-    rows = _read(path, _fields(study))
+    rows, site = _read(path, _fields(study)), study.site
+    facts = _facts(site, rows)
     for name, layout in study.layouts.items():
-        own = [row for row in rows if row["layout"] == name]
-        annual = study.site.annual(layout)
-        harm, repair, both = (_year(study.site, layout, own, which) for which in PARTS)
-        words = f"{euros(annual + both.value)} ({span([annual + end for end in both.interval])})"
-        parts = map(euros, (annual, harm.value, repair.value, study.site.capital(layout)))
+        own = _account([row for row in rows if row["layout"] == name])
+        sums, annual = stratified(site, layout, own, facts), site.annual(layout)
+        ends = [annual + end for end in sums.both.interval]
+        words = f"{euros(annual + sums.both.value)} ({span(ends)})"
+        parts = map(euros, (annual, sums.harm.value, sums.repair.value, site.capital(layout)))
         out.add_row(name, words, *parts)
     return out
 
 
-PARTS = (("harm",), ("repair",), _MONEY)
-"""What is summed for a table."""
+def _account(rows: Sequence[dict[str, str]]) -> Account:
+    """Return what the releases of some rows cost."""
+
+    def column(name: str) -> NDArray[np.float64]:
+        return np.array([_number(row[name]) for row in rows])
+
+    said = [[text for name, text in row.items() if _tells_failure(name)] for row in rows]
+    return Account(
+        event=np.array([row["event"] for row in rows]),
+        harm=column("harm"),
+        repair=column("repair"),
+        volume=column("road_volume"),
+        reached=column("reached") > 0.0,
+        failed=np.array(["True" in texts for texts in said], dtype=bool),
+    )
 
 
-def _year(
-    site: Site, layout: Layout, rows: list[dict[str, Any]], parts: tuple[str, ...]
-) -> intervals.Mean:
-    """Return what releases cost a year [EUR per metre of road and year]."""
-    means = []
+def _tells_failure(field: str) -> bool:
+    return field.startswith("barrier_") and field.endswith("_failed")
+
+
+def _facts(site: Site, rows: Sequence[dict[str, str]]) -> dict[str, Facts]:
+    """Return what the releases with any of the layouts tell of each event.
+
+    An event that none of them lets onto the road is taken as if all of its rock came: none of n is
+    not never.
+    """
+    facts = {}
     for event in site.event_names:
         own = [row for row in rows if row["event"] == event]
-        bills = [sum(float(row[part]) for part in parts) for row in own]
-        dear = [_number(row["reached"]) > 0.0 or float(row["repair"]) > 0.0 for row in own]
-        means.append(intervals.cost(bills, dear).times(site.rate(event, layout)))
-    return intervals.total(means)
+        came = [row for row in own if _number(row["reached"]) > 0.0]
+        volume = [_number(row["road_volume"]) for row in came]
+        harm = [_number(row["harm"]) for row in came]
+        if not came:
+            volume = [_number(row["released_volume"]) for row in own]
+            harm = [site.consequences.harm(v, True) for v in volume]
+        facts[event] = Facts(len(own), len(came), Known.of(harm), Known.of(volume), 1.0)
+    return facts

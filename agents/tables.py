@@ -12,10 +12,11 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.protocol import Entry
 from agents.wording import short, standing
-from envs.intervals import estimate, student_interval
+from envs.intervals import estimate, mid_p, student_interval
 from rigdda import Fence, GravityWall, Layout, Outcome, Points, Site
 from rigdda.barriers import Earthwork, Embankment, to_tables
 from rigdda.files import atomic
@@ -138,9 +139,9 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
     table = empty_table(("", "mean", "95 % interval"))
 
     def add(words: str, unit: str, factor: float, values: list[float], low: float = 0.0) -> None:
-        sample = factor * np.array(values)
-        interval = np.clip(student_interval(sample), low, 100.0 if unit == "%" else None)
-        table.add_row(f"{words} [{unit}]", f"{sample.mean():.4g}", _span(interval, ".4g"))
+        sample = factor * np.array(values, dtype=np.float64)
+        ends = _interval(sample, low, unit == "%")
+        table.add_row(f"{words} [{unit}]", f"{sample.mean():.4g}", _span(ends, ".4g"))
 
     chance = estimate(sum(outcome.reached for outcome in results), len(results))
     ends = 100.0 * chance.low, 100.0 * chance.high
@@ -160,6 +161,17 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
                 continue
             add(f"  {words}", unit, factor, [getattr(o.barriers[i], name) for o in results])
     return table
+
+
+def _interval(sample: NDArray[np.float64], low: float, percent: bool) -> Sequence[float]:
+    """Return the 95 % interval of a mean that is at least `low`, and at most 100 if in percent.
+
+    A share that is none or all in every release is at most the chance that it is not none.
+    """
+    if percent and np.isin(sample, (0.0, 100.0)).all():
+        return [100.0 * end for end in mid_p(int(np.count_nonzero(sample)), len(sample))]
+    ends = np.clip(student_interval(sample), low, 100.0 if percent else None)
+    return [float(end) for end in ends]
 
 
 def sites(found: Iterable[Site]) -> Table:

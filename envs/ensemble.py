@@ -121,14 +121,9 @@ def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:
             volume = np.array([o.released_volume for o in outcomes if o.event == name])
             harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
         blocks = [len(site.draw(seed, name).blocks) for seed in range(SEEDS, SEEDS + FIRST)]
-        known = (_known(harm), _known(volume))
+        known = (Known.of(harm), Known.of(volume))
         out[name] = Facts(int(own.sum()), int(came.sum()), *known, float(np.mean(blocks)))
     return out
-
-
-def _known(values: np.ndarray) -> Known:
-    mean = float(values.mean())
-    return Known(mean, float(values.std() / mean) if mean > 0.0 else 0.0)
 
 
 def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:

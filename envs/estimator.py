@@ -110,7 +110,7 @@ def judge(
         raise BadInput("outcomes", outcomes, "give at least one")
     found, names = account(site, layout, outcomes), site.event_names
     if len(outcomes) >= 2 * len(names):
-        sums = _stratified(site, layout, found, facts)
+        sums = stratified(site, layout, found, facts)
     else:
         sums = _weighted(site, layout, found, facts, shares)
     annual = site.annual(layout)
@@ -137,8 +137,14 @@ def judge(
     )
 
 
-def _stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, Facts]) -> Sums:
-    """Return sums in which each event's mean counts with its rate."""
+def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, Facts]) -> Sums:
+    """Return sums in which each event's mean counts with its rate.
+
+    Raises
+    ------
+    BadInput
+        If there are no releases of an event that has a rate.
+    """
     parts: list[tuple[Mean, ...]] = []
     mend = _mending(site, layout)
     by_event: dict[str, float] = {}
@@ -212,8 +218,11 @@ def _mixture(
 
 
 def _means(own: Account, known: Facts | None, mend: float) -> tuple[Mean, Mean, Mean, Mean]:
-    """Return the means of harm, repair, both and volume of releases that weigh the same."""
-    harm = cost(own.harm, own.reached, known.harm if known else None)
+    """Return the means of harm, repair, both and volume of releases that weigh the same.
+
+    A wall that slides onto the road does harm where no block reaches it.
+    """
+    harm = cost(own.harm, own.reached | (own.harm > 0.0), known.harm if known else None)
     repair = cost(own.repair, own.failed, Known(mend, REPAIR_VARIATION))
     volume = cost(own.volume, own.reached, known.volume if known else None)
     return harm, repair, pair(harm, repair, _correlation(own.harm, own.repair)), volume

@@ -77,6 +77,13 @@ class Known(NamedTuple):
     mean: float
     variation: float
 
+    @classmethod
+    def of(cls, values: ArrayLike) -> Known:
+        """Return what a sample of at least one cost tells; without spread if all are 0."""
+        sample = np.asarray(values, dtype=np.float64)
+        mean = float(sample.mean())
+        return cls(mean, float(sample.std() / mean) if mean > 0.0 else 0.0)
+
 
 class Mean(NamedTuple):
     """A mean and its 95 % interval."""
@@ -166,7 +173,7 @@ def cost(values: ArrayLike, dear: ArrayLike, known: Known | None = None) -> Mean
     values : (n,) array
         Cost of each release, at least 0.
     dear : (n,) array of bool
-        Whether a block reached the road, or a barrier failed.
+        Whether there was harm on the road, or a barrier failed.
     known : Known, optional
         What is known of the cost of a dear release; its mean counts only where none was seen.
     """

@@ -78,12 +78,13 @@ class Rules:
             found.append((low, high))
         return found
 
-    def beside(self, start: float, end: float, steepest: float) -> float:
-        """Return how wide the ground beside works is, that is at most so steep [deg]: [m]."""
-        gentle = self._gentle[steepest]
-        above = max((start - low for low, high in gentle if low <= start <= high), default=0.0)
-        below = max((high - end for low, high in gentle if low <= end <= high), default=0.0)
-        return above + below
+    def beside(self, start: Floats, end: Floats, steepest: float) -> Floats:
+        """Return how wide the ground beside works is, that is at most so steep [deg]: (n,) [m]."""
+        low, high = np.array(self._gentle[steepest]).reshape(-1, 2).T[:, :, None]
+        above = np.where((low <= start) & (start <= high), start - low, 0.0)
+        below = np.where((low <= end) & (end <= high), high - end, 0.0)
+        found: Floats = above.max(axis=0, initial=0.0) + below.max(axis=0, initial=0.0)
+        return found
 
     def level(self, x: Floats) -> Floats:
         """Return the elevation of the natural ground at chainages [m]."""
@@ -172,7 +173,7 @@ class Rules:
             if angle > steepest + TOLERANCE:
                 mend = f"put it where the ground is at most {steepest:g} deg steep, not {angle:.1f}"
                 raise BadInput(f"{where}.x", barrier.x, mend)
-            beside = self.beside(start, end, steepest)
+            beside = float(self.beside(np.array([start]), np.array([end]), steepest)[0])
             if beside < MACHINE - TOLERANCE:
                 mend = (
                     f"put it where {MACHINE:g} m beside it are left to a machine, not {beside:.1f}"

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from agents import findings
+from agents.largest import tried, unheld
+from agents.menu import Menu
+from agents.protocol import DesignResult, History
 from envs import DesignProblem, Evaluation
 
 
@@ -23,3 +28,32 @@ def test_what_costs_as_little_a_year_and_less_to_build_is_named(problem: DesignP
     assert not told("constant", replace(alike, cost=3_000.0))
     assert not told("constant", replace(alike, ci=(640.0, 660.0)))
     assert not told("constant", replace(alike, targets="missed"))
+
+
+def test_nothing_pays_only_if_nothing_that_was_verified_does(problem: DesignProblem) -> None:
+    nothing = problem.evaluate((), seeds=range(4))
+    dear, bare = replace(nothing, ci=(900.0, 920.0)), replace(nothing, ci=(900.0, 920.0))
+    result = DesignResult((), bare, History(()), 10, "start", (), 0.0)
+
+    def told(other: Evaluation) -> str:
+        return findings.limits(result, [("nothing", bare), ("rule", other), ("found", bare)], "")
+
+    assert told(dear).startswith("nothing pays")
+    assert told(replace(dear, ci=(700.0, 720.0))).startswith("rule costs less a year")
+
+
+@pytest.mark.parametrize(("name", "kind"), [("verge", "ditch"), ("narrow", "gravity_wall")])
+def test_what_a_single_barrier_holds_is_not_said_to_be_held_by_none(name: str, kind: str) -> None:
+    problem = DesignProblem(name, kinds=(kind,))
+    event = next(event.name for event in problem.site.events if event.design)
+    assert {barrier.kind for (barrier,) in tried(problem)} == {kind}
+    assert unheld(problem, event, 0) == ""
+
+
+def test_every_kind_that_may_be_built_is_tried() -> None:
+    for name in ("verge", "cliff", "talus"):
+        problem = DesignProblem(name)
+        found = {barrier.kind for (barrier,) in tried(problem)}
+        menu = Menu(problem)
+        assert found == {kind for kind in problem.kinds if kind != "mesh" and menu.lone(kind)}
+        assert all(problem.fits(layout) for layout in tried(problem))

@@ -96,3 +96,18 @@ def test_a_table_of_runs_is_checked(tmp_path, text, what):
     path.write_text(text)
     with pytest.raises(BadInput, match=what):
         read(path, SITE)
+
+
+def test_every_seed_may_be_given() -> None:
+    """The search of the fit takes no 0, which would be the time, and nothing above 2^32 - 1."""
+    seen: list[list[float]] = []
+    for _ in range(2):
+        places: list[float] = []
+
+        def score(place: np.ndarray, places: list[float] = places) -> float:
+            places += place.tolist()
+            return float(np.square(place - 0.3).sum())
+
+        fit.explore(score, 2, 24, 2**32 - 1)
+        seen.append(places)
+    assert seen[0] == seen[1] and len(seen[0]) == 44

@@ -172,3 +172,16 @@ def test_an_allocation_never_asks_for_more_than_it_may() -> None:
     for n in range(10, 400):
         assert sum(allocation(problem, n, [], nothing).values()) <= n
         assert sum(allocation(problem, n, [], nothing).values()) >= 0.6 * n or n < 100
+
+
+def test_a_design_event_with_a_target_is_released() -> None:
+    """Without releases nothing is known of it, and it must not count as met."""
+    problem = DesignProblem("verge", targets=Targets(reach=0.4))
+    design = [event.name for event in problem.site.events if event.design]
+    nothing = Arm(problem, ())
+    for n in range(10, 400):
+        assert sum(allocation(problem, n, [], nothing).values()) <= n
+    counts = allocation(problem, 71, [], nothing)
+    assert all(counts[name] >= 6 for name in design)  # 0 of 6: 0.39 at most
+    assert Arm(problem, (), strict=True).shortfall() == pytest.approx(0.6)
+    assert Arm(problem, ()).shortfall() == 0.0

@@ -98,3 +98,8 @@ def test_where_no_fence_takes_it_a_ditch_or_an_embankment_is_built(site: Site) -
 def test_ritchie_widens_with_the_height(site: Site) -> None:
     width, depth = ritchie(site)
     assert (width, depth) in ((4.6, 1.8), (6.1, 1.8))
+
+
+def test_the_inclination_is_that_of_the_cut_not_of_the_plateau_above_it() -> None:
+    """`bench` falls at 59 degrees from its crest, 48 from the far end of its plateau."""
+    assert ritchie(Site.load("bench")) == (7.6, 2.7)

@@ -9,12 +9,15 @@ import time
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from test_command_line import refused, rig, rows, run
 
 import rigdda
 from agents import studies, study_file
-from agents.tables import write_rows
+from agents.tables import _interval, write_rows
+from envs.estimator import stratified
+from envs.intervals import upper_bound
 from rigdda import Site
 
 EXAMPLES = Path(rigdda.__file__).parents[1] / "examples"
@@ -216,3 +219,24 @@ def test_the_example_in_python_says_that_stronger_fences_fail_less() -> None:
 def test_the_example_by_file_is_sound() -> None:
     asked = study_file.load(EXAMPLES / "study.toml")
     assert len(asked.layouts) == 4 and asked.size == 4 * 3 * 40
+
+
+def test_none_of_a_few_releases_is_not_never() -> None:
+    """The interval of a layout that stopped all 16 blocks holds what one of them would cost."""
+    site = Site.load("verge")
+    rows = [
+        {"event": name, "reached": "False", "harm": "0.0", "repair": "0.0", "road_volume": "0.0",
+         "released_volume": "1.0", "barrier_0_failed": "False"}
+        for name in site.event_names for _ in range(16)
+    ]  # fmt: skip
+    own = studies._account(rows)
+    assert not own.failed.any() and not own.reached.any()
+    sums = stratified(site, (), own, studies._facts(site, rows))
+    least = site.rate(site.event_names[0], ()) * site.consequences.harm(1.0, True) / 16
+    assert sums.both.low == 0.0 and sums.both.high > least
+
+
+def test_a_share_that_is_never_seen_has_an_interval() -> None:
+    low, high = _interval(np.zeros(16), 0.0, True)
+    assert low == 0.0 and 50.0 * upper_bound(0, 16) < high < 120.0 * upper_bound(0, 16)
+    assert _interval(np.zeros(16), 0.0, False) == [0.0, 0.0]

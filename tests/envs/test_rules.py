@@ -119,6 +119,15 @@ def test_the_nearest_place(problem: DesignProblem) -> None:
     assert place.nearest(Fence(12.0, 2.0, energy_class=100), taken) is None
 
 
+def test_the_nearest_place_may_be_far() -> None:
+    """On `quick` walls have room for a machine beside them only near the road."""
+    place = DesignProblem("quick").place
+    found = place.nearest(GravityWall(18.2, 1.69, 1.0), [])
+    assert found is not None and found[0].x > 29.0
+    dam, _ = DesignProblem("bench").place.nearest(Embankment(18.0, 2.0, 1.0), [])
+    assert DesignProblem("bench").fits((dam,))
+
+
 def test_a_ditch_gets_the_sides_and_the_depth_of_its_ground(problem: DesignProblem) -> None:
     ditch = problem.place.put(Ditch(0.0, 3.0, 3.0), 11.0)
     assert ditch.side_slope == 0.67

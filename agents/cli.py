@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import click
 from agents.commands import evaluate, fit, study, train, validate
 from agents.designing import design
 from agents.options import count_option, layout_option, out_option, read_layout, seed_option
-from agents.terminal import Stopped, fail, folder_for, kept, progress, show
+from agents.terminal import Stopped, fail, folder_for, kept, note, progress, show, warn
 
 BAD_PATH = (
     FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError, PermissionError,
@@ -32,7 +33,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # names may have letters that the locale lacks
     try:
-        return cli.main(argv, prog_name="rigdda", standalone_mode=False) or 0
+        with warnings.catch_warnings():
+            warnings.showwarning = warn
+            return cli.main(argv, prog_name="rigdda", standalone_mode=False) or 0
     except click.Abort:
         return fail("interrupted", 130)
     except click.ClickException as error:
@@ -106,7 +109,7 @@ def simulate(
     of the block just before it touches; a barrier absorbs what its forces take from all blocks.
     """
     import rigdda
-    from agents import job, section, tables
+    from agents import doubts, job, section, tables
 
     where, barriers = rigdda.Site.load(site), read_layout(layout)
     seeds = range(seed, seed + releases)
@@ -115,6 +118,7 @@ def simulate(
         folder = folder_for(out, f"simulate-{where.name}", "points.csv")
         tables.write_points(folder / "points.csv", seeds, points)
         show(tables.points(points))
+        note(doubts.unfitted(where))
         click.echo(f"{releases} releases of points; points.csv is in {folder}")
         return
     where.realise(barriers, seed, event)  # what cannot be built is said before a folder is made
@@ -125,6 +129,8 @@ def simulate(
         run.save(folder / "run.npz")
         section.released(folder / "section.png", where, barriers, seeds, event)
     show(tables.outcomes(barriers, outcomes))
+    if words := doubts.unbuildable(where, barriers):
+        note(f"the layout {words}")
     click.echo(f"{releases} releases; outcomes.csv, run.npz and section.png are in {folder}")
 
 

@@ -11,7 +11,7 @@ import click
 from agents.limits import SEED
 from agents.names import DESIGNERS
 from agents.options import count_option, out_option, seed_option
-from agents.terminal import Stopped, folder_for, kept, progress, show
+from agents.terminal import Stopped, folder_for, kept, note, progress, show
 
 
 @click.command()
@@ -25,7 +25,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
     and either `barriers`, as in a layout file, or the `file` that holds them. A study that was
     killed goes on from its study.csv.
     """
-    from agents import studies, study_file
+    from agents import doubts, studies, study_file
 
     asked = study_file.load(file)
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
@@ -33,6 +33,9 @@ def study(file: str, seed: int, out: Path | None) -> None:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
     click.echo("Z and its parts in EUR per metre of road and year; to build in EUR per metre")
     show(studies.table(asked, folder / "study.csv"))
+    for name, layout in asked.layouts.items():
+        if words := doubts.unbuildable(asked.site, layout):
+            note(f"the layout {name!r} {words}")
     words = f", {resumed} taken from a former run" if resumed else ""
     click.echo(f"{asked.size:,} releases{words}; study.csv is in {folder}")
 

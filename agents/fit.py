@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from agents.parameters import Parameter, with_values
+from agents.parameters import Parameter, check_parameters, with_values
 from agents.prediction import Quality, quality, scores
 from agents.run_outs import Model, run_outs
 from rigdda import Site
@@ -96,10 +96,12 @@ def fit(
     Raises
     ------
     BadInput
-        If a parameter is unknown, or the site unsound at a limit.
+        If a parameter is unknown, comes twice or has no influence on the run-outs of the model, or
+        the site is unsound at a limit.
     Diverged
         If a simulation diverges.
     """
+    check_parameters(parameters, model)
     low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
     with_values(site, parameters, list(low)), with_values(site, parameters, list(high))
     events = list(observed)

@@ -54,6 +54,27 @@ def parse(text: str) -> Parameter:
     return Parameter(path, low, high)
 
 
+TELLING = {"blocks": ("surfaces", "motion", "scatter"), "lumped": ("lumped", "scatter")}
+"""Tables of a site file whose numbers the run-outs of a model depend on."""
+
+
+def check_parameters(parameters: Sequence[Parameter], model: str) -> None:
+    """Check that the run-outs of a model can tell parameters, each named once.
+
+    Raises
+    ------
+    BadInput
+        If not.
+    """
+    for i, parameter in enumerate(parameters):
+        if parameter.path in (other.path for other in parameters[:i]):
+            raise BadInput("--parameters", parameter.path, "name each number once")
+        if parameter.path.partition(".")[0] not in TELLING[model]:
+            known = ", ".join(f"{name}.*" for name in TELLING[model])
+            mend = f"run-outs of the model {model} tell nothing of it: choose from {known}"
+            raise BadInput("--parameters", parameter.path, mend)
+
+
 def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[float]) -> Site:
     """Return a site with other values of some numbers.
 

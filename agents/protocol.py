@@ -16,7 +16,7 @@ from agents.reuse import Reuse
 from agents.seeds import release_seeds
 from agents.store import Batch, Store
 from envs import DesignProblem, Evaluation
-from rigdda import Layout, check
+from rigdda import BadInput, Layout, check
 
 Origin = Literal["start", "search"]
 
@@ -131,6 +131,8 @@ class Ledger:
         progress: Progress | None,
         store: Store | None,
     ):
+        if not isinstance(problem, DesignProblem):
+            raise BadInput("problem", problem, "give an envs.DesignProblem of the site")
         self.problem = problem
         self.budget = check.integer("simulations", simulations, 2, limits.RELEASES)
         self.seed = check.integer("seed", seed, 0, limits.SEED)

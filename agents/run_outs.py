@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-import math
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Site, check, release_many
+from rigdda.files import read as read_text
 from rigdda.lumped import lumped
 
 Floats = NDArray[np.float64]
@@ -24,30 +25,38 @@ def read(path: Path, site: Site) -> dict[str, Floats]:
     Raises
     ------
     BadInput
-        If the file is no table with `run_out_m` and, where the site has several, `event`.
+        If the file is no table with `run_out_m` and, where the site has several, `event`, or a
+        run-out is beyond the road, where computed ones are cut.
     """
     if not path.is_file():
         raise BadInput("observed", str(path), "name a CSV file with event and run_out_m")
     found: dict[str, list[float]] = {}
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        table = csv.DictReader(file)
-        names = table.fieldnames or ()
-        if "run_out_m" not in names or ("event" not in names and len(site.events) > 1):
-            mend = "head its columns event and run_out_m"
-            raise BadInput("observed", ", ".join(names), mend)
-        for i, row in enumerate(table):
-            event = row.get("event") or site.events[0].name
-            site.index(event)
-            try:
-                value = float(row["run_out_m"])
-            except (TypeError, ValueError):
-                value = math.nan
-            last = site.slope.points[-1][0]
-            check.number(f"observed row {i + 1} run_out_m", value, site.slope.points[0][0], last)
-            found.setdefault(event, []).append(value)
+    table = csv.DictReader(io.StringIO(read_text("observed", path), newline=""))
+    names = table.fieldnames or ()
+    if "run_out_m" not in names or ("event" not in names and len(site.events) > 1):
+        mend = "head its columns event and run_out_m"
+        raise BadInput("observed", ", ".join(names), mend)
+    for i, row in enumerate(table):
+        event = row.get("event") or site.events[0].name
+        site.index(event)
+        found.setdefault(event, []).append(_run_out(i + 1, row["run_out_m"], site))
     if sum(map(len, found.values())) < 3:
         raise BadInput("observed", str(path), "give three observed runs or more")
     return {event: np.array(values) for event, values in found.items()}
+
+
+def _run_out(number: int, text: str | None, site: Site) -> float:
+    """Return the run-out of a row of observations [m]."""
+    field = f"observed row {number} run_out_m"
+    try:
+        value = float(text or "")
+    except ValueError:
+        raise BadInput(field, text, "give a number") from None
+    check.number(field, value, site.slope.points[0][0], site.slope.points[-1][0])
+    if value > site.road.end:
+        mend = f"put road.end beyond it: computed run-outs are cut there, at {site.road.end:g} m"
+        raise BadInput(field, value, mend)
+    return value
 
 
 def run_outs(site: Site, model: Model, events: Sequence[str], seeds: range) -> dict[str, Floats]:

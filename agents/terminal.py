@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -39,6 +39,25 @@ def fail(message: str, code: int) -> int:
     """Write one line on standard error; return the exit code."""
     click.echo("rigdda: " + " ".join(message.split()), err=True)
     return code
+
+
+def note(words: str) -> None:
+    """Write one line beside the results, if there is anything to say."""
+    if words:
+        click.echo("note: " + " ".join(words.split()))
+
+
+def warn(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Write a warning as one line on standard error; takes what `warnings.showwarning` does."""
+    words = str(message) if issubclass(category, UserWarning) else f"{category.__name__}: {message}"
+    click.echo("rigdda: " + " ".join(words.split()), err=True)
 
 
 def folder_for(out: Path | None, name: str, *files: str) -> Path:

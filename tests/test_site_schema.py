@@ -86,6 +86,9 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
         ("block = 0.7", "blocks = 0.7", "meshes.face.factors", "block, group"),
         ("embankment = 110.0", "interest = 3.0", "prices.interest", "at most 0.5"),
         ("embankment = 110.0", "fence = { 750 = 300.0 }", "prices.fence", "1000"),
+        ("embankment = 110.0", "ditch = { sole = 5.0 }", "prices.ditch", "rock, soil"),
+        ("[road]", "[lumped.sole]\nnormal = 0.3\n\n[road]", "lumped", "rock"),
+        ("[61.0, -3.0]", "[61000.0, -3.0]", "slope.points", "give metres"),
         ("band = [1.0, 2.8]", "band = [1.0, 11.5]", "sources.face.band", "clear of the road"),
     ],
 )

@@ -13,6 +13,7 @@ from rigdda import check
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
 from rigdda.model import boulders
+from rigdda.model.economy import DITCHES
 from rigdda.model.settings import Settings
 from rigdda.model.source import NEAR, Point, Source
 from rigdda.model.surface import check_surface
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 BEYOND = 30.0
 """Least length of the ground beyond the road [m]: blocks that run past it shall not fall off the
 end of the ground before they count as beyond."""
+
+HIGHEST, LONGEST = 5_000.0, 20_000.0
+"""Height and length of a slope [m] above which millimetres were meant."""
 
 CHEAPEST = 100.0
 """Closure of a day [EUR] below which thousands of EUR may have been meant."""
@@ -85,6 +89,15 @@ def _check_surfaces(site: Site) -> None:
         check.one_of(f"interfaces[{i}].first", pair.first, site.surfaces)
         check.one_of(f"interfaces[{i}].second", pair.second, site.surfaces)
         check_surface(f"interfaces[{i}]", pair.surface)
+    pairs = [frozenset((pair.first, pair.second)) for pair in site.interfaces]
+    for i, names in enumerate(pairs):
+        if names in pairs[:i]:
+            mend = "say only once how two surfaces meet, in either order"
+            raise BadInput(f"interfaces[{i}]", " and ".join(sorted(names)), mend)
+    for name in site.lumped:
+        check.one_of("lumped", name, site.surfaces)
+    for name in site.prices.ditch:
+        check.one_of("prices.ditch", name, {*site.surfaces, *DITCHES})
     for source in site.sources:
         check.one_of(f"{source.words}.surface", source.surface, site.surfaces)
 
@@ -99,6 +112,10 @@ def _check_slope(site: Site) -> None:
             f"{len(points)} points",
             "list them downhill, the one of least x first, the one of greatest x last",
         )
+    tall, long = np.ptp(points[:, 1]), high - low
+    if tall > HIGHEST or long > LONGEST:
+        mend = f"give metres: at most {HIGHEST:g} m high and {LONGEST:g} m long"
+        raise BadInput("slope.points", f"{tall:g} m high and {long:g} m long", mend)
     check.number("slope.toe", site.slope.toe, low, high)
     check.number("road.start", road.start, low, high)
     check.number("road.end", road.end, low, high)

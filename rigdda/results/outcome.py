@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 
 from rigdda.barriers import Barrier
 from rigdda.dynamics.run import Run
+from rigdda.errors import DoubtfulInput
 from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Scene
 from rigdda.model.site import Site
@@ -22,6 +24,13 @@ from rigdda.results.states import states
 
 GRAIN = 2.0**40
 """Fractions are whole multiples of 1/GRAIN, so that they add up to 1 exactly in any order."""
+
+CUT_OFF = 2.0
+"""Speed of a block uphill of the road in the end from which on the release was cut off [m/s]: what
+creeps in a deposit is slower."""
+
+MUCH = 0.2
+"""Share of the rock that must then move so: a few of a mass of many may still roll."""
 
 AT_REST = 0.1
 """Speed below which a caught block is at rest [m/s], as in replays."""
@@ -111,6 +120,11 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
     """Return the outcome of a run that watched `stations` and `watch` of its site and layout.
 
     It is one of an event, so wide [m].
+
+    Warns
+    -----
+    DoubtfulInput
+        If `motion.duration` ends before the rock has come to rest or onto the road.
     """
     scene, road = run.scene, site.road
     area, weight, mass = _masses(scene)
@@ -118,7 +132,9 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
     at = list(zip(*run.poses[-1, :, :2].T.tolist(), strict=True))
     place = [2 if x > road.end else int(x >= road.start) for x, _ in at]
     came = [time < math.inf for time in log.passed[road.start]]
-    resting = [math.hypot(vx, vy) < AT_REST for vx, vy, _ in run.velocities[-1].tolist()]
+    speed = [math.hypot(vx, vy) for vx, vy, _ in run.velocities[-1].tolist()]
+    _doubt_duration(site, run, at, speed, weight)
+    resting = [v < AT_REST for v in speed]
     ends = [states(run, i)[-1][1] for i in range(len(scene.barriers))]
     reach = [holding(run, i, state, at) for i, state in enumerate(ends)]
     held = [on == 0 and any(r[k] for r in reach) for k, on in enumerate(place)]
@@ -150,6 +166,27 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
             for i in range(len(scene.barriers))
         ),
     )
+
+
+def _doubt_duration(
+    site: Site,
+    run: Run,
+    at: Sequence[tuple[float, float]],
+    speed: Sequence[float],
+    weight: Sequence[float],
+) -> None:
+    """Warn if much of the rock still moves above the road as the time of a release ends."""
+    duration = site.motion.duration
+    if run.times[-1] < duration - site.motion.dt:
+        return  # nothing moved any more that matters
+    left = [x < site.road.start and v > CUT_OFF for (x, _), v in zip(at, speed, strict=True)]
+    if sum(w for w, on in zip(weight, left, strict=True) if on) > MUCH * GRAIN:
+        warnings.warn(
+            f"motion.duration = {duration:g} of site {site.name!r}: rock above the road still "
+            "moves as a release ends, and counts as if it stopped there: give more",
+            DoubtfulInput,
+            stacklevel=3,
+        )
 
 
 def _masses(scene: Scene) -> tuple[list[float], list[float], float]:

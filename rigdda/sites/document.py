@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from rigdda import sites
-from rigdda.barriers import MeshOption
+from rigdda.barriers import KINDS, MeshOption
 from rigdda.files import atomic
 from rigdda.model.economy import Consequences, Prices
 from rigdda.model.events import Event
@@ -46,6 +46,23 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
 )
 """Every table of a site file and the class that reads it."""
 
+LAYOUT = """\
+## Layout files
+
+What `--layout` and the `barriers` of a study take: a table `[[barriers]]` for each barrier in TOML
+(or a list `barriers` in JSON), with its `kind` (without one
+it is a wall) and the keys below. `rigdda design` writes one,
+`layout.toml`. A layout that may not be built is computed as it is given, and the command says so.
+
+```toml
+[[barriers]]
+kind = "fence"
+x = 66.0
+height = 3.0
+energy_class = 1000
+```
+"""
+
 HEAD = """\
 # Site files
 
@@ -69,6 +86,9 @@ def document() -> str:
     parts = [HEAD.format(names=names)]
     for title, table in TABLES:
         parts.append(f"## {title}\n\n{summary(table)}\n\n{_fields(table)}")
+    parts.append(LAYOUT)
+    for name, kind in KINDS.items():
+        parts.append(f'### `kind = "{name}"`\n\n{summary(kind)}\n\n{_fields(kind)}')
     parts.append(f"## An example\n\n```toml\n{sites.text('narrow')}```\n")
     return "\n".join(parts)
 

@@ -183,3 +183,8 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
         "import random; random.random()"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_site_is_no_problem() -> None:
+    with pytest.raises(BadInput, match="DesignProblem"):
+        agents.race.design(SITE, simulations=10)

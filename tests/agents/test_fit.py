@@ -9,7 +9,7 @@ import pytest
 
 from agents import fit, prediction
 from agents.cli import main
-from agents.parameters import Parameter, parse, with_values
+from agents.parameters import Parameter, check_parameters, parse, with_values
 from agents.prediction import scores
 from agents.run_outs import read, run_outs
 from rigdda import BadInput, Site
@@ -89,6 +89,7 @@ def test_only_numbers_of_the_site_are_fitted(path):
         ("event,run_out_m\nrock,3\n", "rock"),
         ("event,run_out_m\nblock,far\n", "row 1"),
         ("event,run_out_m\nblock,10\n", "three observed runs"),
+        ("event,run_out_m\nblock,45\n", "put road.end beyond it"),
     ],
 )
 def test_a_table_of_runs_is_checked(tmp_path, text, what):
@@ -111,3 +112,24 @@ def test_every_seed_may_be_given() -> None:
         fit.explore(score, 2, 24, 2**32 - 1)
         seen.append(places)
     assert seen[0] == seen[1] and len(seen[0]) == 44
+
+
+@pytest.mark.parametrize(
+    ("paths", "model", "mend"),
+    [
+        (["motion.damping", "motion.damping"], "blocks", "name each number once"),
+        (["prices.concrete"], "blocks", "tell nothing of it"),
+        (["lumped.soil.normal"], "blocks", "choose from surfaces"),
+        (["surfaces.soil.restitution"], "lumped", "choose from lumped"),
+    ],
+)
+def test_what_run_outs_cannot_tell_is_not_fitted(paths, model, mend):
+    with pytest.raises(BadInput, match=mend):
+        check_parameters([Parameter(path, 0.1, 0.5) for path in paths], model)
+
+
+def test_a_table_that_is_not_utf_8_is_refused(tmp_path):
+    path = tmp_path / "seen.csv"
+    path.write_bytes("event,run_out_m\nGr\u00f6\u00dfe,5\n".encode("latin-1"))
+    with pytest.raises(BadInput, match="save it as UTF-8"):
+        read(path, Site.load("verge"))

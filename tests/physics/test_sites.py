@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from rigdda import BadInput, Simulation, Site, Surface, release_outcome, sites
+from rigdda import BadInput, DoubtfulInput, Simulation, Site, Surface, release_outcome, sites
 from rigdda.geometry import overlap
 from rigdda.model.place import Scatter
 from rigdda.results.outcome import measure, stations, watch
@@ -190,3 +190,13 @@ def test_undisturbed_surveyed_blocks_are_the_same_in_every_release():
 def test_a_disturbance_that_is_none_is_refused(value):
     with pytest.raises(BadInput, match=r"sources\.mass\.disturbance = "):
         surveyed(disturbance=value)
+
+
+def test_a_release_that_is_cut_off_is_told() -> None:
+    """Rock that still flies when the time is over counts as if it had stopped: not in silence."""
+    site = Site.load("verge")
+    event = next(e.name for e in site.events if e.design)
+    short = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, duration=1.0))
+    with pytest.warns(DoubtfulInput, match=r"motion.duration = 1 of site 'verge'.*give more"):
+        release_outcome(short, (), 0, event)
+    release_outcome(site, (), 0, event)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from rigdda.barriers import Barrier, Layout, as_layout
 from rigdda.batch import EVERY, Batch, Job, as_site, outcomes, simulation
 from rigdda.dynamics.run import Run
-from rigdda.errors import Error
+from rigdda.errors import DoubtfulInput, Error
 from rigdda.model.site import Site
 from rigdda.results.outcome import Outcome, measure
+
+MANY = 0.05
+"""Share of some releases that may be cut off without a warning: one late block in a hundred."""
 
 
 def release(
@@ -36,11 +40,28 @@ def release(
         If the layout does not stand on the slope, there is no such event or the seed is unsound.
     Diverged
         If the simulation diverges.
+
+    Warns
+    -----
+    DoubtfulInput
+        If `motion.duration` cuts it off, see `Outcome.cut_off`.
     """
     drawn = as_site(site).draw(seed, event)
     scene = site.scene(drawn, site.built(layout, drawn.width))
     run = simulation(site, scene).run(site.motion.duration, EVERY, progress)
-    return run, measure(site, run, drawn.event, drawn.width)
+    outcome = measure(site, run, drawn.event, drawn.width)
+    if outcome.cut_off:
+        _doubt_duration(site)
+    return run, outcome
+
+
+def _doubt_duration(site: Site) -> None:
+    warnings.warn(
+        f"motion.duration = {site.motion.duration:g} of site {site.name!r}: rock above the road "
+        "still moves as releases end, and counts as if it stopped there: give more",
+        DoubtfulInput,
+        stacklevel=3,
+    )
 
 
 def release_outcome(
@@ -67,6 +88,11 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     ------
     BadInput, Diverged
         As `release` does, for the first job that fails.
+
+    Warns
+    -----
+    DoubtfulInput
+        If `motion.duration` cuts more than one in twenty off, see `Outcome.cut_off`.
     """
     each = [(site, as_layout(layout), seed, event) for site, layout, seed, event in jobs]
     if threads is None:
@@ -81,4 +107,8 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     for _, outcome in found:
         if isinstance(outcome, Error):
             raise outcome
-    return [outcome for _, outcome in found if isinstance(outcome, Outcome)]
+    good = [outcome for _, outcome in found if isinstance(outcome, Outcome)]
+    cut = [each[place][0] for place, o in found if isinstance(o, Outcome) and o.cut_off]
+    if len(cut) > max(1.0, MANY * len(good)):
+        _doubt_duration(cut[0])
+    return good

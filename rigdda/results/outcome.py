@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ import numpy as np
 
 from rigdda.barriers import Barrier
 from rigdda.dynamics.run import Run
-from rigdda.errors import DoubtfulInput
 from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Scene
 from rigdda.model.site import Site
@@ -29,8 +27,8 @@ CUT_OFF = 2.0
 """Speed of a block uphill of the road in the end from which on the release was cut off [m/s]: what
 creeps in a deposit is slower."""
 
-MUCH = 0.2
-"""Share of the rock that must then move so: a few of a mass of many may still roll."""
+MUCH = 0.5
+"""Share of the rock that must then move so: some of a mass of many may still roll."""
 
 AT_REST = 0.1
 """Speed below which a caught block is at rest [m/s], as in replays."""
@@ -75,6 +73,9 @@ class Outcome:
         downhill edge.
     barriers : tuple of BarrierOutcome
         One for each barrier of the layout.
+    cut_off : bool
+        Whether half of the rock still moved above the road when `motion.duration` was over: it
+        counts as if it had stopped there.
     """
 
     event: str
@@ -93,6 +94,7 @@ class Outcome:
     road_fraction: float
     beyond_fraction: float
     barriers: tuple[BarrierOutcome, ...]
+    cut_off: bool = False
 
 
 def stations(site: Site, layout: Sequence[Barrier]) -> tuple[float, ...]:
@@ -120,11 +122,6 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
     """Return the outcome of a run that watched `stations` and `watch` of its site and layout.
 
     It is one of an event, so wide [m].
-
-    Warns
-    -----
-    DoubtfulInput
-        If `motion.duration` ends before the rock has come to rest or onto the road.
     """
     scene, road = run.scene, site.road
     area, weight, mass = _masses(scene)
@@ -133,7 +130,6 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
     place = [2 if x > road.end else int(x >= road.start) for x, _ in at]
     came = [time < math.inf for time in log.passed[road.start]]
     speed = [math.hypot(vx, vy) for vx, vy, _ in run.velocities[-1].tolist()]
-    _doubt_duration(site, run, at, speed, weight)
     resting = [v < AT_REST for v in speed]
     ends = [states(run, i)[-1][1] for i in range(len(scene.barriers))]
     reach = [holding(run, i, state, at) for i, state in enumerate(ends)]
@@ -165,28 +161,22 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
             measure_barrier(run, i, ends[i], log, share(map(and_, reach[i], resting)))
             for i in range(len(scene.barriers))
         ),
+        cut_off=_cut_off(site, run, at, speed, weight),
     )
 
 
-def _doubt_duration(
+def _cut_off(
     site: Site,
     run: Run,
     at: Sequence[tuple[float, float]],
     speed: Sequence[float],
     weight: Sequence[float],
-) -> None:
-    """Warn if much of the rock still moves above the road as the time of a release ends."""
-    duration = site.motion.duration
-    if run.times[-1] < duration - site.motion.dt:
-        return  # nothing moved any more that matters
-    left = [x < site.road.start and v > CUT_OFF for (x, _), v in zip(at, speed, strict=True)]
-    if sum(w for w, on in zip(weight, left, strict=True) if on) > MUCH * GRAIN:
-        warnings.warn(
-            f"motion.duration = {duration:g} of site {site.name!r}: rock above the road still "
-            "moves as a release ends, and counts as if it stopped there: give more",
-            DoubtfulInput,
-            stacklevel=3,
-        )
+) -> bool:
+    """Return whether much of the rock still moved above the road as the time was over."""
+    if run.times[-1] < site.motion.duration - site.motion.dt:
+        return False  # nothing moved any more that matters
+    moves = [x < site.road.start and v > CUT_OFF for (x, _), v in zip(at, speed, strict=True)]
+    return sum(w for w, on in zip(weight, moves, strict=True) if on) > MUCH * GRAIN
 
 
 def _masses(scene: Scene) -> tuple[list[float], list[float], float]:

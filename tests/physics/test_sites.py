@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 import shapely
 
-from rigdda import BadInput, DoubtfulInput, Simulation, Site, Surface, release_outcome, sites
+from rigdda import (
+    BadInput,
+    DoubtfulInput,
+    Simulation,
+    Site,
+    Surface,
+    release,
+    release_many,
+    release_outcome,
+    sites,
+)
 from rigdda.geometry import overlap
 from rigdda.model.place import Scatter
 from rigdda.results.outcome import measure, stations, watch
@@ -198,5 +208,7 @@ def test_a_release_that_is_cut_off_is_told() -> None:
     event = next(e.name for e in site.events if e.design)
     short = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, duration=1.0))
     with pytest.warns(DoubtfulInput, match=r"motion.duration = 1 of site 'verge'.*give more"):
-        release_outcome(short, (), 0, event)
-    release_outcome(site, (), 0, event)
+        release_many([(short, (), seed, event) for seed in range(4)])
+    with pytest.warns(DoubtfulInput, match="give more"):
+        release(short, (), 0, event)
+    assert not any(o.cut_off for o in release_many([(site, (), s, event) for s in range(4)]))

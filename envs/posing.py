@@ -36,6 +36,8 @@ def zone(site: Site, zone: object) -> BarrierZone:
     if zone is None:
         return own
     start, end = check.interval("zone", zone, own.start, own.end)
+    if start == end:
+        raise BadInput("zone", zone, "give two chainages, the first one less than the other")
     return msgspec.structs.replace(own, start=start, end=end)
 
 

@@ -116,8 +116,8 @@ def _check_slope(site: Site) -> None:
     if tall > HIGHEST or long > LONGEST:
         mend = f"give metres: at most {HIGHEST:g} m high and {LONGEST:g} m long"
         raise BadInput("slope.points", f"{tall:g} m high and {long:g} m long", mend)
-    check.number("slope.toe", site.slope.toe, low, high)
     check.number("road.start", road.start, low, high)
+    check.number("slope.toe", site.slope.toe, low, road.start)
     check.number("road.end", road.end, low, high)
     if road.end <= road.start:
         raise BadInput("road.end", road.end, f"put it beyond road.start {road.start}")

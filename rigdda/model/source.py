@@ -108,6 +108,8 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             for edge in self.edges:
                 check.number(f"{where}.edges", edge, 0.01, 30.0)
         given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
+        if not given:
+            raise BadInput(where, "no rock", "give one of band, polygon with joints, blocks")
         if len(given) > 1 or (self.joints and not self.polygon):
             what = given[-1] if len(given) > 1 else "joints"
             mend = "give one of band, polygon with joints, blocks"

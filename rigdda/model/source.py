@@ -108,11 +108,11 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             for edge in self.edges:
                 check.number(f"{where}.edges", edge, 0.01, 30.0)
         given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
+        mend = "give one of band, polygon with joints, blocks"
         if not given:
-            raise BadInput(where, "no rock", "give one of band, polygon with joints, blocks")
+            raise BadInput(f"{where}.polygon", self.polygon, mend)
         if len(given) > 1 or (self.joints and not self.polygon):
             what = given[-1] if len(given) > 1 else "joints"
-            mend = "give one of band, polygon with joints, blocks"
             raise BadInput(f"{where}.{what}", getattr(self, what), mend)
         if self.band is not None:
             check.interval(f"{where}.band", self.band, open_low=True)

@@ -22,9 +22,8 @@ from agents.store import mechanics
 from agents.study_file import Study
 from agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from agents.wording import euros, span, standing
-from envs.estimator import Account, stratified
+from envs.estimator import Account, learn, stratified
 from envs.evaluation import Facts
-from envs.intervals import Known
 from rigdda import BadInput, Outcome, Site
 
 if TYPE_CHECKING:
@@ -204,19 +203,10 @@ def _tells_failure(field: str) -> bool:
 
 
 def _facts(site: Site, rows: Sequence[dict[str, str]]) -> dict[str, Facts]:
-    """Return what the releases with any of the layouts tell of each event.
-
-    An event that none of them lets onto the road is taken as if all of its rock came: none of n is
-    not never.
-    """
-    facts = {}
-    for event in site.event_names:
-        own = [row for row in rows if row["event"] == event]
-        came = [row for row in own if _number(row["reached"]) > 0.0]
-        volume = [_number(row["road_volume"]) for row in came]
-        harm = [_number(row["harm"]) for row in came]
-        if not came:
-            volume = [_number(row["released_volume"]) for row in own]
-            harm = [site.consequences.harm(v, True) for v in volume]
-        facts[event] = Facts(len(own), len(came), Known.of(harm), Known.of(volume), 1.0)
-    return facts
+    """Return what the releases with any of the layouts tell of each event."""
+    found, out = _account(rows), {}
+    released = np.array([_number(row["released_volume"]) for row in rows])
+    for name in site.event_names:
+        own = found.event == name
+        out[name] = learn(site, found.of(own), released[own], 1.0)
+    return out

@@ -20,10 +20,6 @@ into a notch stops it up."""
 STEP = 0.25
 """Distance of the places that are looked at for a barrier that does not fit [m]."""
 
-TRIED, APART = 12, 4
-"""How many of them are tried, the nearest first, and which of the others: every fourth. Each costs
-about 0.2 ms for an embankment."""
-
 NEAR_ZERO = 1e-3
 """Flatter ground than this is not looked at for its inclination [-]."""
 
@@ -73,7 +69,7 @@ class Room(Rules):
         Returns
         -------
         (Barrier, (start, end)) or None
-            None if there is no such place among those that are looked at.
+            None if there is none every `STEP`.
         """
         found = self._try(barrier, barrier.x, taken)
         if found is not None:
@@ -120,5 +116,4 @@ class Room(Rules):
                 x = x[self.beside(x, x + length, steepest) >= MACHINE - TOLERANCE]
         for low, high in taken:
             x = x[(x >= high + MIN_GAP - TOLERANCE) | (x + give <= low - MIN_GAP + TOLERANCE)]
-        x = x[np.argsort(np.abs(x - barrier.x), kind="stable")]
-        return [*x[:TRIED].tolist(), *x[TRIED::APART].tolist()]
+        return x[np.argsort(np.abs(x - barrier.x), kind="stable")].tolist()

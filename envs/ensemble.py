@@ -19,9 +19,8 @@ import numpy as np
 
 import rigdda
 from envs import reuse
-from envs.estimator import account, judge
+from envs.estimator import account, judge, learn
 from envs.evaluation import Evaluation, Facts
-from envs.intervals import Known
 from envs.memory import Memory
 from envs.samples import Sample
 from rigdda import Outcome, Site
@@ -113,16 +112,11 @@ def _releases(site: Site, seeds: Mapping[str, range], executor: Executor | None)
 def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:
     """Return what releases without barriers tell of each event."""
     found, out = account(site, (), outcomes), {}
+    released = np.array([o.released_volume for o in outcomes])
     for name in site.event_names:
         own = found.event == name
-        came = own & found.reached
-        harm, volume = found.harm[came], found.volume[came]
-        if not came.any():  # as if all came
-            volume = np.array([o.released_volume for o in outcomes if o.event == name])
-            harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
         blocks = [len(site.draw(seed, name).blocks) for seed in range(SEEDS, SEEDS + FIRST)]
-        known = (Known.of(harm), Known.of(volume))
-        out[name] = Facts(int(own.sum()), int(came.sum()), *known, float(np.mean(blocks)))
+        out[name] = learn(site, found.of(own), released[own], float(np.mean(blocks)))
     return out
 
 

@@ -80,6 +80,28 @@ def account(site: Site, layout: Layout, outcomes: Sequence[Outcome]) -> Account:
     )
 
 
+def learn(site: Site, own: Account, released: Floats, blocks: float) -> Facts:
+    """Return what some releases of an event tell of it.
+
+    If none came onto the road it is as if all rock had come: none of n is not never.
+
+    Parameters
+    ----------
+    own : Account
+        What they cost.
+    released : (n,) array
+        Volume that each released [m3].
+    blocks : float
+        Mean number of blocks.
+    """
+    harm, volume = own.harm[own.reached], own.volume[own.reached]
+    if not len(harm):
+        volume = released
+        harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
+    count = len(own.harm), int(own.reached.sum())
+    return Facts(*count, Known.of(harm), Known.of(volume), blocks)
+
+
 def judge(
     site: Site,
     layout: Layout,

@@ -89,6 +89,13 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
         ("embankment = 110.0", "ditch = { sole = 5.0 }", "prices.ditch", "rock, soil"),
         ("[road]", "[lumped.sole]\nnormal = 0.3\n\n[road]", "lumped", "rock"),
         ("[61.0, -3.0]", "[61000.0, -3.0]", "slope.points", "give metres"),
+        (
+            "[road]",
+            '[[interfaces]]\nfirst = "rock"\nsecond = "soil"\nfriction_deg = 20.0\n\n'
+            '[[interfaces]]\nfirst = "soil"\nsecond = "rock"\nfriction_deg = 25.0\n\n[road]',
+            "interfaces[1]",
+            "only once",
+        ),
         ("toe = 5.0", "toe = 15.0", "slope.toe", "at most 12"),
         ("band = [1.0, 2.8]", "", "sources.face.polygon", "give one of band"),
         ("band = [1.0, 2.8]", "band = [1.0, 11.5]", "sources.face.band", "clear of the road"),

@@ -350,3 +350,8 @@ def test_bad_layouts_and_seeds_are_refused(
 ) -> None:
     with pytest.raises(BadInput, match=message):
         problem.evaluate(layout, seeds)
+
+
+def test_a_zone_of_no_length_is_refused() -> None:
+    with pytest.raises(BadInput, match="the first one less than the other"):
+        DesignProblem("quick", zone=(25.0, 25.0))

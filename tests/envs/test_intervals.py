@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from envs import intervals
+from envs import estimator, intervals
+from envs.estimator import Account
+from envs.evaluation import Facts
 from envs.intervals import Known, Mean, cost, estimate, mid_p, pair, student_interval, total
 
 
@@ -121,3 +123,14 @@ def test_costs_are_held_in_90_to_99_percent(names: tuple[str, ...]) -> None:
 
 def test_quantiles_are_student_s() -> None:
     assert intervals.quantile(7) == pytest.approx(stats.t.ppf(0.975, 7))
+
+
+def test_harm_without_a_block_on_the_road_is_rare_harm() -> None:
+    """A wall that slides onto the road: seen in none of 16, it may still come."""
+    known = Facts(100, 50, Known(1000.0, 0.1), Known(1.0, 0.1), 1.0)
+    harm = np.array([900.0] + [0.0] * 15)
+    none, failed = np.zeros(16, dtype=bool), np.eye(1, 16, dtype=bool)[0]
+    own = Account(np.full(16, "block"), harm, np.zeros(16), np.zeros(16), none, failed)
+    mean = estimator._means(own, known, 0.0)[0]
+    assert mean.interval == cost(harm, harm > 0.0, known.harm).interval
+    assert mean.high > 3.0 * mean.value

@@ -166,6 +166,7 @@ def _idle(built: Built, barrier: Built, there: Standing, holds: bool) -> Barrier
         caught=1.0 if holds else 0.0,
         state="stands",
         displacement=0.0,
+        road_area=0.0,
         thrust=0.0,
         resistance=bears,
         left_height=0.0 if isinstance(built, Ditch) else built.height,

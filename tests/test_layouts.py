@@ -24,6 +24,7 @@ from rigdda import (
 from rigdda.barriers import KINDS, describe
 from rigdda.results.marks import Marks
 from rigdda.results.outcome import stations
+from rigdda.results.states import states
 
 QUICK = Site.load("quick")
 LAYOUT = (
@@ -109,6 +110,41 @@ def test_what_passes_a_failed_fence_did_not_overtop_it(released):
     line = stations(QUICK, LAYOUT[:5]).index(LAYOUT[2].end)
     passed = run.crossings(line)["time"]
     assert outcome.barriers[2].overtopped == (passed < run.failure(2)).sum() < len(passed)
+
+
+def test_what_passes_a_wall_that_was_overturned_did_not_overtop_it():
+    wall = GravityWall(25.6, 4.0, 0.6)
+    run, outcome = rigdda.release(QUICK, (wall,), 0, "mass")
+    (over,) = (time for time, state in states(run, 0) if state == "overturned")
+    passed = run.crossings(stations(QUICK, (wall,)).index(wall.end))["time"]
+    assert outcome.barriers[0].overtopped == (passed < over).sum() < len(passed)
+
+
+def test_a_wall_blocks_the_road_with_what_lies_on_it():
+    wall = GravityWall(19.0, 4.0, 0.6)
+    run, outcome = rigdda.release(QUICK, (wall,), 0, "mass")
+    found = outcome.barriers[0]
+    assert wall.end + found.displacement > QUICK.road.start > run.outline(0)[:, 0].max()
+    assert (found.state, found.road_area) == ("overturned", 0.0)
+    fallen = np.array([[9.0, 0.0], [13.0, 3.0], [12.4, 3.8], [8.4, 0.8]])
+    assert wall.area_beyond(0.0, fallen) == pytest.approx(5.0)
+    assert wall.area_beyond(12.4, fallen) == pytest.approx(0.5 * 0.6 * (0.8 + 0.45))
+    assert wall.area_beyond(13.0, fallen) == 0.0
+
+
+def test_a_wall_that_rocks_and_comes_back_stands():
+    wall, times = GravityWall(0.0, 3.0, 1.2), np.arange(4.0)
+
+    def changes(*poses):
+        return wall.changes(times, np.array(poses), math.inf)
+
+    here, tilted, away = (0.0, 0.0, 0.0), (0.18, 0.0, -0.1), (0.2, 0.0, 0.0)
+    over = (2.0, -1.0, -1.5)
+    assert changes(here, tilted, tilted, here) == []
+    assert changes(here, tilted, here, away) == [(3.0, "slid")]
+    assert changes(here, away, away, away) == [(1.0, "slid")]
+    assert changes(here, away, over, over) == [(1.0, "slid"), (2.0, "overturned")]
+    assert changes(here, over, over, over) == [(1.0, "overturned")]
 
 
 def test_every_kind_is_described_and_known():

@@ -147,9 +147,9 @@ def test_a_wall_that_slid_onto_the_road_blocks_it():
     found = outcome_of(layout)
     fields = {name: getattr(found.barriers[0], name) for name in type(found.barriers[0]).__slots__}
     still = {"road_volume": 0.0, "reached": False, "held_fraction": 0.0, "width": 2.0}
-    road = FLAT.road.start
-    for moved, harm in ((road - 31.6, 0.0), (road - 31.4, FLAT.consequences.harm(2.5, True))):
-        barrier = type(found.barriers[0])(**{**fields, "failed": True, "displacement": moved})
+    assert found.barriers[0].road_area == 0.0
+    for area, harm in ((0.0, 0.0), (0.2, FLAT.consequences.harm(5.0 * 0.2, True))):
+        barrier = type(found.barriers[0])(**{**fields, "failed": True, "road_area": area})
         assert FLAT.bill(layout, outcome_of(layout, **still, barriers=(barrier,))).harm == harm
 
 

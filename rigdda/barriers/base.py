@@ -86,8 +86,8 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
         """Return the height that is left after it has absorbed so much [m]."""
         raise NotImplementedError
 
-    def area_beyond(self, x: float, displacement: float) -> float:
-        """Return its area that came to lie beyond a chainage, so displaced [m2]."""
+    def area_beyond(self, x: float, outline: Floats) -> float:
+        """Return its area that came to lie beyond a chainage, as `outline` at the end [m2]."""
         return 0.0
 
     def sizes(self, metres: Callable[[float], str]) -> str:

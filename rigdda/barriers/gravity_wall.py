@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import msgspec
 import numpy as np
+import shapely
 
 from rigdda.barriers.base import ELEMENT, Drawn, Floats, base_friction
 from rigdda.barriers.standing import Standing
@@ -91,19 +92,24 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
         return base_friction(scene, self.density, scene.barrier_surface, outline)
 
     def changes(self, times: Floats, poses: Floats, failure: float) -> list[tuple[float, str]]:
-        """Return when it "slid" and when it "overturned", after which it slides no more."""
-        x, y, theta = (poses - poses[0]).T
-        over = abs(theta) > math.atan2(self.thickness, self.height)
-        found = [
-            (float(times[int(there.argmax())]), state)
-            for there, state in ((np.hypot(x, y) > SLID, "slid"), (over, "overturned"))
-            if there.any()
-        ]
-        return found[1:] if len(found) == 2 and found[0][0] >= found[1][0] else found
+        """Return when it "slid" for good and when it "overturned", after which it slides no more.
 
-    def area_beyond(self, x: float, displacement: float) -> float:
-        """Return its area if, so displaced, it stands beyond a chainage [m2]."""
-        return self.height * self.thickness if self.end + displacement > x else 0.0
+        One that rocks and comes back to its place has not slid.
+        """
+        x, y, theta = (poses - poses[0]).T
+        here = np.flatnonzero(np.hypot(x, y) <= SLID)
+        over = np.flatnonzero(abs(theta) > math.atan2(self.thickness, self.height))
+        slid = float(times[here[-1] + 1]) if here[-1] + 1 < len(times) else math.inf
+        turned = float(times[over[0]]) if len(over) else math.inf
+        found = [(slid, "slid")] if slid < turned else []
+        return [*found, (turned, "overturned")] if turned < math.inf else found
+
+    def area_beyond(self, x: float, outline: Floats) -> float:
+        """Return its area that came to lie beyond a chainage, as `outline` at the end [m2]."""
+        (_, low), (far, high) = outline.min(axis=0), outline.max(axis=0)
+        if far <= x:
+            return 0.0
+        return float(shapely.clip_by_rect(shapely.Polygon(outline), x, low, far, high).area)
 
     def sizes(self, metres: Callable[[float], str]) -> str:
         """Return its sizes in words."""

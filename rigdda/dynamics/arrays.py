@@ -34,25 +34,25 @@ class Ground(NamedTuple):
 class Matrix(NamedTuple):
     """The simultaneous equations K d = F of one island: n blocks, block-sparse, symmetric."""
 
-    diagonal: Floats  # (N, 3, 3), N with the gravity walls
+    diagonal: Floats  # (G, 3, 3)
     off: Floats  # (pairs, 3, 3) row block pair_i, column block pair_j
     pair_i: Ints
     pair_j: Ints
     lower: Floats  # (3, 3) block below the diagonal of two blocks with friction, unsymmetric
-    rhs: Floats  # (N, 3)
-    d: Floats  # (N + 1, 3) displacements u0, v0 [m], r0 [rad]; the last of what cannot move
+    rhs: Floats  # (G, 3)
+    d: Floats  # (G + 1, 3) displacements u0, v0 [m], r0 [rad]; the last of what cannot move
 
 
 class Scratch(NamedTuple):
     """What the solvers of the equations work on."""
 
     dense: Floats  # (6, 7) matrix and forces of two blocks
-    residual: Floats  # (N, 3) vectors of the iterations
+    residual: Floats  # (G, 3) vectors of the iterations
     direction: Floats
     product: Floats
     scaled: Floats
-    first: Ints  # (N,) leftmost block of a row, or head of its chain of neighbours
-    row: Ints  # (3 N,) place in `factor` of column 0 of a scalar row
+    first: Ints  # (G,) leftmost block of a row, or head of its chain of neighbours
+    row: Ints  # (3 G,) place in `factor` of column 0 of a scalar row
     factor: Floats  # Cholesky factor within the profile
     next: Ints  # (2 pairs,) next entry in a chain of neighbours, -1 at its end
 
@@ -60,10 +60,10 @@ class Scratch(NamedTuple):
 class Motion(NamedTuple):
     """Displacements of the blocks of one island in a step, by slot."""
 
-    d: Floats  # (N + 1, 3) Matrix.d itself: by forces that are constant over the step
-    correction: Floats  # (N, 3) position correction in a step; first the contact forces
-    relaxed: Floats  # (N, 3) the same, as relaxation in substeps has found it
-    share: Floats  # (N,) of the step that remains at the first impact on the block, 0 without one
+    d: Floats  # (G + 1, 3) Matrix.d itself: by forces that are constant over the step
+    correction: Floats  # (G, 3) position correction in a step; first the contact forces
+    relaxed: Floats  # (G, 3) the same, as relaxation in substeps has found it
+    share: Floats  # (G,) of the step that remains at the first impact on the block, 0 without one
 
 
 class System(NamedTuple):
@@ -96,7 +96,7 @@ class Islands(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Contacts of one island in relaxation and the motion of its blocks, see linear.relaxation."""
+    """Contacts of one island and the motion of its blocks, in linear.relaxation and recovery."""
 
     row: Floats  # (C, columns)
     row_i: Ints  # (C,) slots of their bodies
@@ -104,11 +104,11 @@ class Rows(NamedTuple):
     idle: Ints  # (C,) substep until which a contact cannot close
     visit: Ints  # (C,) contacts that a sweep visits
     place: Ints  # (C,) row of each contact
-    height: Floats  # (C,) of each contact [m]
+    height: Floats  # (C,) of each contact [m]; in `recovery` its excess gap
     layer: Ints  # (LAYERS + 1,) contacts below a height
-    moved_in: Ints  # (N + 1,) last sweep in which a slot moved
-    scale: Floats  # (N + 1, 3) displacement per unit of `motion` [m]
-    motion: Floats  # (N + 1, 9) displacements in substeps
+    moved_in: Ints  # (G + 1,) last sweep in which a slot moved
+    scale: Floats  # (G + 1, 3) displacement per unit of `motion`: h / sqrt(M), or 1 / sqrt(M)
+    motion: Floats  # (G + 1, 9) displacements in substeps
 
 
 class Work(NamedTuple):
@@ -129,10 +129,10 @@ class Monitors(NamedTuple):
     target: NDArray[np.void]  # (B,) of TARGET
     barrier: Ints  # (M,) barrier that a body is, -1: rock
     fences: int  # their number
-    push: Floats  # (B, 2) impulse downhill of contacts at rest, and of others, in this step [N s]
+    push: Floats  # (B, 2) impulse downhill, in this step, of what leans and what strikes [N s]
     impulse: Floats  # (B, K, 2) that in the last K steps, which are a second [N s]
     mean: Floats  # (B, 2) thrust, mean over these [N]
-    last_touch: Floats  # (N, B), N with the gravity walls: time of the last touch [s]
+    last_touch: Floats  # (G, B) time of the last touch [s]
     watch_low: float  # interval of x [m]
     watch_high: float
     leave: float  # x beyond which what moves on is left alone [m]; -inf: the run is not ended early

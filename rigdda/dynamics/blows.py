@@ -3,17 +3,17 @@ r"""Blows and trains: what of an impact arrives at a fence, through which blocks
 A block that hits a fence is stopped: the fence takes the work of the impact. Blocks that rest
 against it cost it nothing, but pass blows on to it: within a step blow and support act at once,
 nothing moves and no work is done. One after the other, block j strikes block i with the closing
-speed u, both go on together, and the fence takes what of that is directed at it,
+speed w_c, both go on together, and the fence takes what of that is directed at it,
 
-.. math:: W = \frac{1}{2} \frac{m_j^2}{m_j + m_i} u^2 (n_q \cdot n)^2 ,
+.. math:: W = \frac{1}{2} \frac{m_j^2}{m_j + m_i} w_c^2 (n_q \cdot n)^2 ,
 
 with n_q and n the directions of the blow and of the push on the fence. Through a chain of blocks
 m_i is their mass, and each contact on the way passes on its own share. Blocks that strike one
 another in turn within the step, or come on behind one that strikes, are a train and m_j is all of
-it. With the impulse P of the blow for m_j u this holds for eccentric blows, too; what more than
-m_j u passes through a contact in a step is thrust, or another blow, which counts for itself. So the
-charge is a sum over the blows: it does not matter how many of them fall into one step, nor how many
-steps a blow takes to go through a row.
+it. With the impulse P of the blow for m_j w_c this holds for eccentric blows, too; what more than
+m_j w_c passes through a contact in a step is thrust, or another blow, which counts for itself. So
+the charge is a sum over the blows: it does not matter how many of them fall into one step, nor how
+many steps a blow takes to go through a row.
 """
 
 from __future__ import annotations
@@ -39,9 +39,10 @@ from rigdda.kernel import kernel
 def strength(way: NDArray) -> float:
     """Return how well a block passes blows on: the share of their direction over the mass [1/kg].
 
-    `way` is the mass between the blow and the fence, 0 if the block does not lean on it [kg], and
-    the direction in which a push on the block is one on the fence, its length the root of the
-    share that arrives [-].
+    A `way` says how a block leans on the fence. way[0] is the mass from the block to the fence
+    [kg], 0 if it does not lean on it. (way[1], way[2]) is the direction in which a push on the
+    block is one on the fence; its squared length is the share of a blow's energy that arrives [-].
+    Of several ways the strongest counts.
     """
     return (way[1] ** 2 + way[2] ** 2) / way[0] if way[0] > 0.0 else 0.0
 

@@ -14,16 +14,16 @@ an impact misses its target by half the inverse of this, 5e-5 of the change."""
 
 START_STIFFNESS = 1e3
 """Factor of that in the first step of a simulation [-]: the blocks of a stack give way one after
-the other, and a tall one must start without a jolt."""
+the other, and a tall one must start without a jolt. And of a pin, in every step."""
 
 IMPACT_STEPS = 3.0
 """Least closing speed of an impact in units of g dt [-]: what gravity alone gives a resting block
 in a few steps is no impact."""
 
 BLOW_SPEED = 1.0
-"""Least closing speed with which a contact that was closed already begins an impact [m/s]: it was
-foreseen, and closed from afar in the step before. Lower, and contacts of a pressed pile that close
-slowly are never pushed out."""
+"""Least closing speed with which a closed contact begins an impact [m/s]. Such a contact was
+foreseen, and closed in the step before, ahead of the impact. Lower: contacts of a pressed pile that
+close slowly count as impacts, and are never pushed out."""
 
 AFTER_IMPACT = 0.02
 """Time that a part of a step of a lone block goes on after the impact that it ends with, over what
@@ -60,23 +60,24 @@ the rock of the highway case reach the road in steps of 20 ms, and a pile in a s
 rises by three to four times the energy; with three, 60 layers do not come to rest in 10 ms."""
 
 MOST_SWEEPS = 100
-"""Most sweeps over the contacts of an island in a substep, where they change by more than the
-tolerance: `Settings.sweep_tolerance`, or less."""
+"""Most sweeps over the contacts of an island in a substep. Sweeps end once none changes a normal
+displacement by more than the tolerance times the substep. That tolerance [m/s] is
+`Settings.sweep_tolerance`, lessened by the next two."""
 
 LARGE_ISLAND = 128
-"""Blocks of an island from which on it is used whole; less in proportion in smaller ones. Where a
-train of ten blocks hits the ground it is the difference between one blow and ten: with 1 m/s
-instead of 0.1 a seventh more of it reached a road."""
+"""Blocks of an island from which on the tolerance is `Settings.sweep_tolerance` itself; in smaller
+ones it is less in proportion. Where a train of ten blocks hits the ground it is the difference
+between one blow and ten: with 1 m/s instead of 0.1 a seventh more of it reached a road."""
 
 RELAXATION_SHARE = 0.05
-"""Greatest such tolerance over the speed of the island [-], so that slow ones come to rest."""
+"""Greatest tolerance over the speed of the island [-], so that slow islands come to rest."""
 
 LAYERS = 64
 """Layers in which the contacts of an island are ordered by height for relaxation."""
 
 QUIET_SPEED = 0.1
 """Speed below which all blocks of an island are solved together, accurately; faster islands of
-several blocks are relaxed [m/s]."""
+more than SMALL_ISLAND blocks are relaxed [m/s]."""
 
 SMALL_ISLAND = 2
 """Most blocks of an island that is solved as a whole at any speed."""
@@ -134,7 +135,8 @@ END_CHECK = 8
 """Steps from one look at whether a release is over to the next."""
 
 SPEED_LIMIT = 1e4
-"""Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall."""
+"""Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall. In
+`fence.aim` it stands for a velocity that is not known yet."""
 
 WAIT_STEPS = 40
 """Steps for which an island that did not settle as a whole is relaxed before it is tried again."""

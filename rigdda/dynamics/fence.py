@@ -1,9 +1,9 @@
 """Fences: they are charged with what a step takes of their capacity, and fail beyond it.
 
-What that is `blows` finds. If it is more than is left, the blocks come through with a share s of
-the velocities that they would have without the fence, which takes W(s) = (1 - s^2) W of impacts in
-proportion. Friction and neighbours bend this law, so s^2 is sought by false position between 0 and
-1.
+What that is `blows` finds. If it is more than is left, the blocks come through with a share sigma
+of the velocities that they would have without the fence, which takes (1 - sigma^2) W of impacts in
+proportion. Friction and neighbours bend this law, so sigma^2 is sought by false position between 0
+and 1.
 """
 
 from __future__ import annotations
@@ -39,11 +39,12 @@ def aim(
     contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int, fence: int,
     first: bool, share: float, dt: float,
 ) -> None:  # fmt: skip
-    """Let the contacts with a fence leave a share of the velocities that blocks have without it.
+    """Let blocks leave a failing fence with a share of the velocities that they have without it.
 
-    They begin open, with no force, whatever comes: a block that strikes the ground, too, might be
-    jammed between both. So the `first` time it finds these velocities. Those that had not closed in
-    the step stay open.
+    The `first` solve lets them through, by a bias of -dt SPEED_LIMIT; the second reads from it the
+    closing velocity `free` that each contact keeps. From then on the bias is -dt share free.
+    Contacts start open and without force each time, since a block that strikes the ground, too,
+    might be jammed between both. One that was not closed as the fence failed stays open.
     """
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]

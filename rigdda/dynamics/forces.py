@@ -79,7 +79,7 @@ def apply_forces(
     rounding whatever the residual of the solver. A constant force over the step displaces a block
     by dt^2 F / 2M; an impulse that acts for the share s of the step displaces it by s dt^2 F / M.
     The first impact sets the share of all, or the corner that hits first would go on until then.
-    Relaxation in substeps has found the correction.
+    `relaxed` is what `open_close` returns: if True, relaxation has found the correction.
 
     Returns whether an impact acted on the island.
     """
@@ -113,7 +113,7 @@ def apply_forces(
 
 @inlined
 def account_block(body: Body, motion: Motion, s: int, p: Parameters, ledger: NDArray) -> None:
-    """Add the work of damping, loads and supports on a block, slot s, to the ledger."""
+    """Add the work of damping, loads, ground motion and late impulses on slot s to the ledger."""
     d, correction = motion.d[s], motion.correction[s]
     slow = body.mass * (d[0] ** 2 + d[1] ** 2) + body.inertia * d[2] ** 2
     ledger[2] -= damping_of(body, p) * slow / p.dt
@@ -171,9 +171,9 @@ def move_block(body: Body, motion: Motion, s: int, dt: float) -> None:
 def accumulate_forces(c: Contact, struck: bool, relaxed: bool) -> None:
     """Carry the forces of a contact to the next step; an impulse does not last.
 
-    In an island that was struck and solved as one every force may be part of an impulse: what the
-    contact carried before stays, as in any impact. Relaxation has set the forces from which the
-    next step is to start.
+    `relaxed` is what `open_close` returns. Where it is False and the island was struck, every force
+    may be part of an impulse: accumulated forces stay as they were. Where it is True, relaxation
+    has set the forces from which the next step starts, and only those of impacts are left out.
     """
     if c.state == OPEN:
         c.accumulated_normal = c.accumulated_shear = 0.0

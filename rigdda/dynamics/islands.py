@@ -1,4 +1,4 @@
-"""Islands: clusters of free blocks joined by contacts, solved one by one.
+"""Islands: clusters of free blocks joined by contacts, open ones too, or by bolts; one by one.
 
 Fixed and sleeping bodies and the terrain have no unknowns and join nothing.
 """

@@ -1,6 +1,7 @@
 """Open-close iteration: find the state of every contact of an island with which the forces agree.
 
-Which state that is `states` says. What does not settle, or moves, is relaxed.
+Which state that is `states` says. What does not settle, and islands of more than two blocks that
+move, are relaxed.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def relax(
     bodies: Bodies, contacts: Contacts, m: Matrix, motion: Motion, islands: Islands, rows: Rows,
     island: int, p: Parameters, counters: NDArray, speed: float,
 ) -> None:  # fmt: skip
-    """Find the forces of an island by relaxation, from those of the last step."""
+    """Find the forces of an island by relaxation; set the state of each contact from its force."""
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     assemble_blocks(bodies, m, islands, b0, b1, p)
@@ -156,21 +157,23 @@ def open_close(
     bodies: Bodies, contacts: Contacts, system: System, islands: Islands, rows: Rows, island: int,
     p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
-    """Settle the contacts of an island, with less restitution where impacts would gain energy.
+    """Settle the contacts of an island: solve or relax; lessen restitution that gains energy.
 
-    Newton's restitution with friction can raise the kinetic energy of an eccentric impact; a
-    plastic one cannot, since the springs act on the velocity after the step. The gain is convex in
-    the share of restitution, as energy is quadratic in the velocities: it is at most zero at the
-    share at which the chord from plastic to asked is.
+    The open-close iteration itself is `solve_states`. Islands at rest, and those of one or two
+    blocks, are solved as one. Others are relaxed; so is, for a while, what did not settle.
 
-    Islands at rest, and those of one or two blocks, are solved as one; the others are relaxed, and
-    for a while what did not settle as one.
+    Restitution with friction can raise the kinetic energy of an eccentric impact. A plastic impact
+    cannot, since the springs act on the velocity after the step. So impacts are settled as asked;
+    if that gains, as plastic ones; then with a share of restitution. Energy is quadratic in the
+    velocities, so the gain is convex in that share. Where the chord from plastic to asked is zero,
+    the gain is zero at most.
 
     Returns
     -------
     bool
-        Whether the island was relaxed in substeps, so that its displacements are known; not of a
-        cluster in flight, which keeps its angular momentum: its impulses act at one time.
+        Whether the displacements that relaxation found are to be used. False if the island was
+        solved as one, and of a relaxed cluster in flight: its impulses act at one time, so that its
+        angular momentum is kept.
     """
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     m, motion = system.matrix, system.motion

@@ -1,8 +1,9 @@
 """Records that the kernels work on, in structured arrays. `pack` fills them.
 
-M bodies: the N blocks of the scene, its gravity walls, then its walls and fences. B: barriers. R:
-polygons, the M outlines of the bodies, then the convex parts of those that are not convex. P: most
-corners of a polygon. S: terrain segments. C: room for contacts.
+M bodies: the N blocks of the scene, its gravity walls, then its walls and fences. G: those that may
+move, the blocks and the gravity walls. B: barriers. R: polygons, the M outlines of the bodies, then
+the convex parts of those that are not convex. P: most corners of a polygon. S: terrain segments. C:
+room for contacts.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ BODY = _record(
     quiet=float,  # time it has been quiet [s]
     slowest=float,  # its least speed for so long [m/s]
     lately=float,  # what is left of its greatest speed of late, see constants.LATELY [m/s]
-    path=float,  # longest way of any point of it in this step, undeflected [m]
+    path=float,  # bound on the way of its points in this step: dt max(top speed, lately) [m]
     count=int,  # corners
     part=int,  # first polygon of its convex parts: itself where it is convex
     parts=int,  # number of them
@@ -88,9 +89,9 @@ CONTACT = _record(
     start_shear=float,
     normal=float,  # force of this step [N], on a
     shear=float,
-    lag=float,  # shear force of a slipping contact in the current iteration [N]
+    lag=float,  # friction force assumed in this iteration; its sign is the direction of slip [N]
 )
-"""One contact in one step."""
+"""One contact in one step: a vertex and a face that may meet in it. OPEN: they do not."""
 
 LINK = _record(
     a=int,  # block
@@ -194,16 +195,16 @@ PARAMETERS = _record(
     damping=float,
     damping_in_contact_only=bool,
     block_weight=float,  # mean of the free blocks [N]
-    penetration=float,
-    margin=float,
-    tolerance=float,
+    penetration=float,  # wanted [m]
+    margin=float,  # of contact [m], see constants.MARGIN_RATIO
+    tolerance=float,  # of the solver: residual over forces [-]
     sweep_tolerance=float,  # [m/s]
-    iterations=int,
+    iterations=int,  # most open-close iterations
     static=bool,
     post_correction=bool,
     islands=bool,
     solver=int,  # PCG, BLOCK_PCG, SOR, DIRECT
-    relaxation=float,
+    relaxation=float,  # over-relaxation factor of SOR [-]; not that of linear.relaxation
     sleeping=bool,
     timing=bool,
     floor=float,  # a centroid below it is retired [m]

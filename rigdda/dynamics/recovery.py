@@ -13,11 +13,11 @@ import math
 from rigdda.dynamics.arrays import Islands, Motion, Rows
 from rigdda.dynamics.assembly.springs import normal_row, relative_displacement
 from rigdda.dynamics.constants import IMPACT, RECOVERY_SWEEPS
-from rigdda.dynamics.linear.relaxation import NORMAL
 from rigdda.dynamics.linear.rows import (
     AIM,
     FORCE,
     GAIN,
+    NORMAL,
     NOW,
     along_six,
     is_elastic,
@@ -30,9 +30,9 @@ from rigdda.kernel import inlined, kernel
 
 @inlined
 def excess_gap(c: Contact, motion: Motion, i: int, j: int, most: float) -> float:
-    """Return the gap after the step over the one that the load of a contact explains [m].
+    """Return the gap after the step plus the compression that accumulated force explains [m].
 
-    That is `most` [m] at most.
+    Negative: too deep. The compression counts up to `most` [m].
     """
     dn, _ = relative_displacement(c, motion.d, i, j)
     correction, _ = relative_displacement(c, motion.correction, i, j)

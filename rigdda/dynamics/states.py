@@ -51,8 +51,8 @@ def next_state_of_link(c: Contact, normal: float, shear: float) -> bool:
 def close(c: Contact, normal: float, shear: float, coupled: bool) -> None:
     """Close a contact that would bear these forces if it stuck.
 
-    Where friction is coupled to the normal force it slips at once if it slides faster than it
-    closes: a contact that stuck would be torn open again.
+    Where friction is coupled to the normal force it slips at once if its shear force exceeds its
+    friction limit: a contact that stuck would be torn open again.
     """
     c.state = STICK
     if coupled and abs(shear) > c.friction * normal:

@@ -215,8 +215,8 @@ def bill(site: Site, layout: Layout, outcome: Outcome) -> Bill:
     """Return what a release with a layout costs.
 
     Of what failed, the length that the event was wide is built anew, but at least a panel or an
-    element; what the barriers hold is carried off. A gravity wall that came onto the road blocks it
-    as rock does.
+    element; what the barriers hold is carried off. What of a gravity wall came onto the road
+    blocks it as rock does.
     """
     volume, reached = outcome.road_volume, outcome.reached
     repair = site.prices.removal * outcome.held_fraction * outcome.released_volume
@@ -228,8 +228,8 @@ def bill(site: Site, layout: Layout, outcome: Outcome) -> Bill:
                 continue
             length = max(outcome.width, barrier.repaired)
             repair += cost[barrier] * length
-            fallen = barrier.area_beyond(site.road.start, found.displacement) * length
-            volume, reached = volume + fallen, reached or fallen > 0.0
+            volume += found.road_area * length
+            reached = reached or found.road_area > 0.0
     return Bill(site.consequences.harm(volume, reached), repair)
 
 

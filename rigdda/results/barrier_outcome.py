@@ -35,19 +35,22 @@ class BarrierOutcome:
     impact_heights : tuple of float
         Height of each hit above the ground at the barrier's uphill face at the start [m].
     overtopped : int
-        Blocks that started uphill of the barrier and first passed it while it stood: beyond its
-        downhill face, the downhill edge of a ditch or of an embankment's crest. A gravity wall
-        counts as where it stood at the start.
+        Blocks that started uphill of the barrier and first passed it before it failed, was pushed
+        away or overturned: beyond its downhill face, the downhill edge of a ditch or of an
+        embankment's crest. A gravity wall counts as where it stood at the start.
     failed : bool
         Whether it no longer stands as it was built.
     caught : float
         Share of the released mass at rest at the end that it holds, or that is in the ditch.
     state : {"stands", "failed", "slid", "overturned", "pushed"}
         At the end. A fence failed, a gravity wall has slid if it is more than 0.1 m away from its
-        place, and is overturned if it is turned beyond the angle of its diagonal; an embankment was
-        pushed away.
+        place, and is overturned if it was turned beyond the angle of its diagonal; an embankment
+        was pushed away.
     displacement : float
         Distance of its centroid at the end from where it was at the start [m].
+    road_area : float
+        Its area that lies beyond the uphill edge of the road at the end [m2]: only a gravity wall
+        comes there.
     thrust : float
         Greatest mean over a second of the horizontal force on it, downhill [N/m]: of a fence that
         of contacts at rest, of a ditch none.
@@ -68,14 +71,21 @@ class BarrierOutcome:
     caught: float
     state: str
     displacement: float
+    road_area: float
     thrust: float
     resistance: float
     left_height: float
 
 
-def measure_barrier(run: Run, index: int, state: str, log: Log, caught: float) -> BarrierOutcome:
-    """Return the outcome of a barrier that ends in a state and caught a share of the mass."""
-    barrier, hits, failure = run.scene.barriers[index], log.hits[index], log.failure[index]
+def measure_barrier(
+    run: Run, index: int, states: Sequence[tuple[float, str]], log: Log, caught: float, edge: float
+) -> BarrierOutcome:
+    """Return the outcome of a barrier that was in these states and caught a share of the mass.
+
+    `edge` is the uphill edge of the road [m].
+    """
+    barrier, hits, state = run.scene.barriers[index], log.hits[index], states[-1][1]
+    gone = next((time for time, state in states if state in GONE), math.inf)
     passed = zip(run.poses[0, :, 0].tolist(), log.passed[barrier.end], strict=True)
     return BarrierOutcome(
         hits=len(hits),
@@ -83,11 +93,12 @@ def measure_barrier(run: Run, index: int, state: str, log: Log, caught: float) -
         total_energy=math.fsum(energy for energy, _ in hits),
         absorbed_energy=float(run.absorbed[index]),
         impact_heights=tuple(height for _, height in hits),
-        overtopped=sum(x < barrier.x and time < failure for x, time in passed),
+        overtopped=sum(x < barrier.x and time < gone for x, time in passed),
         failed=state != STANDS,
         caught=caught,
         state=state,
         displacement=math.dist(*run.barrier_poses[[0, -1], index, :2].tolist()),
+        road_area=barrier.area_beyond(edge, run.outline(index)),
         thrust=float(run.thrust[index]),
         resistance=run.scene.resistance(index),
         left_height=0.0 if state in GONE else barrier.left_height(float(run.absorbed[index])),

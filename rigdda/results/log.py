@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
+from rigdda.dynamics.monitors import CROSSING, HIT
 from rigdda.dynamics.run import Run
 
 
@@ -14,7 +14,6 @@ class Log(NamedTuple):
     """The events of a run: what happened to each barrier, and when blocks first passed stations."""
 
     hits: list[list[tuple[float, float]]]  # energy [J] and height [m] of each hit of a barrier
-    failure: list[float]  # when it failed, inf if it did not [s]
     passed: dict[float, list[float]]  # by station: when each block passed it, inf if it did not [s]
 
 
@@ -23,7 +22,6 @@ def log_of(run: Run, lines: Sequence[float]) -> Log:
     barriers, blocks = len(run.scene.barriers), len(run.scene.blocks)
     log = Log(
         [[] for _ in range(barriers)],
-        [math.inf] * barriers,
         {line: [math.inf] * blocks for line in lines},
     )
     for time, kind, block, target, _, _, height, _, energy in run.events.tolist():
@@ -31,6 +29,4 @@ def log_of(run: Run, lines: Sequence[float]) -> Log:
             log.hits[target].append((energy, height))
         elif kind == CROSSING:
             log.passed[lines[target]][block] = time
-        elif kind == FAILED:
-            log.failure[target] = min(time, log.failure[target])
     return log

@@ -131,8 +131,8 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
     came = [time < math.inf for time in log.passed[road.start]]
     speed = [math.hypot(vx, vy) for vx, vy, _ in run.velocities[-1].tolist()]
     resting = [v < AT_REST for v in speed]
-    ends = [states(run, i)[-1][1] for i in range(len(scene.barriers))]
-    reach = [holding(run, i, state, at) for i, state in enumerate(ends)]
+    known = [states(run, i) for i in range(len(scene.barriers))]
+    reach = [holding(run, i, own[-1][1], at) for i, own in enumerate(known)]
     held = [on == 0 and any(r[k] for r in reach) for k, on in enumerate(place)]
 
     def share(where: Iterable[bool]) -> float:
@@ -158,8 +158,8 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
         road_fraction=share(on == 1 for on in place),
         beyond_fraction=share(on == 2 for on in place),
         barriers=tuple(
-            measure_barrier(run, i, ends[i], log, share(map(and_, reach[i], resting)))
-            for i in range(len(scene.barriers))
+            measure_barrier(run, i, own, log, share(map(and_, reach[i], resting)), road.start)
+            for i, own in enumerate(known)
         ),
         cut_off=_cut_off(site, run, at, speed, weight),
     )

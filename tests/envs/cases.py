@@ -98,6 +98,7 @@ def outcome(
                 caught=0.0,
                 state="failed" if state else "stands",
                 displacement=0.0,
+                road_area=0.0,
                 thrust=0.0,
                 resistance=1.0,
                 left_height=1.0,

@@ -59,9 +59,10 @@ def assemble_blocks(
 def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float, coupled: bool) -> None:
     """Add the springs of a closed contact between slots i and j (-1: no unknowns).
 
-    On the displacement d of the step the spring N = kappa (b - dt u_1) has stiffness 2 kappa and
-    force kappa (b + dt u_0). The friction of a slipping contact is a force; `coupled` takes it
-    from the unknown normal force, which makes the matrix of one or two blocks unsymmetric.
+    On the displacement d of the step the spring N = kappa (b - dt w_1) has stiffness 2 kappa and
+    force kappa (b + dt w_0). The friction of a slipping contact is a force; `coupled` takes it
+    from the unknown normal force, which makes the matrix of one or two blocks unsymmetric. A bolt
+    has no shear; one that yields is a force.
     """
     stiffness = 2.0 * c.kappa
     normal = c.kappa * (c.bias + dt * c.un)

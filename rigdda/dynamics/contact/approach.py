@@ -56,12 +56,12 @@ def set_velocities(bodies: Bodies, c: Contact) -> None:
 
 @kernel
 def set_velocities_at_start(bodies: Bodies, c: Contact, dt: float) -> None:
-    """Set the velocities from the places at the start, after those with the arms of mid-step.
+    """Set w_0 and the shear velocity from where the bodies are at the start of the step.
 
-    Points of a turning body do not go straight, and a face that turns comes nearer to what slides
-    along it. With the displacement along the rows of mid-step u_1 then is the velocity at the end,
-    to second order: a block that rocks on a corner neither lifts nor sinks it. But u_0 is at most
-    that along the rows: greater, it would let the contact give energy.
+    `strike` has set them at mid-step before. A point of a turning body does not go straight, and a
+    face that turns comes nearer to what slides along it. With both counted the law gives the true
+    velocity at the end, to second order: a block that rocks on a corner neither rises nor sinks.
+    But w_0 is at most that of mid-step: greater, it would let the contact give energy.
     """
     ax, ay = point_velocity(bodies, c.a, c.x, c.y)
     bx, by = point_velocity(bodies, c.b, c.x, c.y)

@@ -1,8 +1,9 @@
 r"""Joints that hold by cohesion and tensile strength until they break, once and for good.
 
 A joint is what is closed at the start of a simulation. Each of its contacts stands for a share of
-its length L, but they are judged together. The forces N_1 and N_2 of a joint's two ends are those
-of a traction that is linear along it, and at its end 1 that is
+its length L, but they are judged together. Here, unlike elsewhere, pulling is positive. The forces
+N_1 and N_2 of a joint's two ends, of sum N and moment M about its middle, are those of a traction
+that is linear along it, and at its end 1 that is
 
 .. math:: \sigma_1 = \frac{N}{L} + \frac{6 M}{L^2} = \frac{2 (2 N_1 - N_2)}{L} .
 
@@ -40,7 +41,7 @@ def bond_joints(contacts: Contacts, low: int, high: int, p: Parameters) -> None:
 
 @inlined
 def of_one_joint(c: Contact, other: Contact) -> bool:
-    """Return whether two contacts are on one joint and hold still."""
+    """Return whether two contacts are on one joint, and the other one still holds."""
     same = c.a == other.a and c.b == other.b and c.nx * other.nx + c.ny * other.ny > SAME_FACE
     return same and other.bond > 0.0
 

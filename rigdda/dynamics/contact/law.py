@@ -2,25 +2,25 @@ r"""The law that a contact follows over one step.
 
 Every closed contact is a penalty spring on the *end* velocity of the step,
 
-.. math:: N = \kappa\,(b - \Delta t\,u_1), \qquad u_1 = 2 d_n / \Delta t - u_0,
+.. math:: N = \kappa\,(b - \Delta t\,w_1), \qquad w_1 = 2 d_n / \Delta t - w_0,
 
-with d_n the relative normal displacement of the step and u_0, u_1 the normal relative velocities
-at its ends (positive separates). A spring on d_n itself (plain DDA) turns u_0 into -u_0 when it is
+with d_n the relative normal displacement of the step and w_0, w_1 the normal relative velocities
+at its ends (positive separates). A spring on d_n itself (plain DDA) turns w_0 into -w_0 when it is
 stiff, which makes resting contacts chatter; on the end velocity it loses energy at any stiffness.
 What differs is the bias b:
 
 =======  ====================================================================================
 at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
          shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
-         on, the rest viscous (Kelvin and Voigt's solid). u_0 is that of the points that touch at
+         on, the rest viscous (Kelvin and Voigt's solid). w_0 is that of the points that touch at
          the start of the step, see `set_velocities_at_start`. An open gap gives b = -g: what would
          close within the step is slowed down to the speed that closes it in one more.
-impact   b = dt e u_c, so that u_1 = e u_c for closing speed u_c; the spring is stiff and the
+impact   b = dt e w_c, so that w_1 = e w_c for closing speed w_c; the spring is stiff and the
          impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
          blocks, and carries on with it as if they had always touched.
 plastic  b = 0: a closed contact that the rest of its island drives together, a plastic impact.
-plain    b = -2 g and u_0 taken as 0: a penalty spring on the gap, the paper's contact.
+plain    b = -2 g and w_0 taken as 0: a penalty spring on the gap, the paper's contact.
 =======  ====================================================================================
 
 The shear spring is the same on the shear velocity, from the shear force of the last step, limited
@@ -123,7 +123,7 @@ def set_new(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
 def set_plain(c: Contact, p: Parameters) -> None:
     """Make a contact the paper's penalty spring on the displacement of the step.
 
-    N = k_n (-gap - d_n) and S = S_0 - k_n d_s: the law above with u_0 = 0, and one k_n for all
+    N = k_n (-gap - d_n) and S = S_0 - k_n d_s: the law above with w_0 = 0, and one k_n for all
     contacts. It has no memory of speed, so its rebound is what step and stiffness make of it.
     """
     c.kind = PLAIN
@@ -142,7 +142,7 @@ def strike_at_once(
     """Let all contacts of a cluster in flight act at the time of its first impact.
 
     Impulses at different times would act on arms that the earlier ones have changed, and angular
-    momentum would not be kept. What touches the ground, or a fixed body, has none to keep.
+    momentum would not be kept. What may touch the ground, or a fixed body, has none to keep.
     """
     share = 0.0
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
@@ -164,9 +164,12 @@ def strike_at_once(
 
 @inlined
 def time_of_impact(bodies: Bodies, c: Contact, pull: float, p: Parameters) -> float:
-    """Return when in the step a contact begins an impact [s], or -1.0.
+    """Return when in the step a contact begins an impact [s], or -1.0 if it does not.
 
-    Arms and velocities are those of mid-step before, and after if there is none.
+    On entry arms and velocities are those of mid-step; on return those of the impact, or of
+    mid-step if there is none. An open contact begins an impact if it closes faster than
+    IMPACT_STEPS g dt, a closed one if faster than BLOW_SPEED, too, and if it is not deeper than the
+    contact margin.
     """
     threshold = IMPACT_STEPS * p.gravity * p.dt
     gap = max(c.gap, 0.0)

@@ -2,7 +2,7 @@
 
 They enter the system of equations, the exchange of forces and the ledger like any closed contact,
 and follow the same law (`contact.law`): a pin with b = 0. The mean tension of a bolt over a step,
-T + k d / 2, is this law with u_0 = 0, kappa = k / 4 and b = -T / kappa: at no step energy is lost.
+T + k d / 2, is this law with w_0 = 0, kappa = k / 4 and b = -T / kappa: at no step energy is lost.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def anchor(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
 def arm(body: Body, x: float, y: float, dt: float) -> tuple[float, float]:
     """Return the mean of the arms before and after a step of a point in body coordinates [m].
 
-    With d = dt (v_0 + v_1) / 2 and t = dt (w_0 + w_1) / 2 a point that had no velocity before and
-    that d + t e x r does not move along this arm r has none afterwards, exactly if w stays.
+    At the rate at which the body turns now. A point that is at rest before the step, and that the
+    displacement along this arm does not move, is at rest after it: exactly, if the rate stays.
     """
     half = 0.5 * dt * body.omega
     theta, mean = body.theta + half, math.cos(half)

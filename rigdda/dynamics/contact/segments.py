@@ -10,7 +10,7 @@ from rigdda.kernel import kernel
 
 @kernel
 def below_segment(ground: Ground, s: int, x: float, y: float) -> float:
-    """Return the gap of a point above the line of segment s [m]."""
+    """Return the gap of a point over the line of segment s [m]: < 0 in the ground."""
     one = ground.segment[s]
     return one.normal_x * (x - one.x) + one.normal_y * (y - one.y)
 

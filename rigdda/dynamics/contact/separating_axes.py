@@ -30,7 +30,7 @@ def following(corner: int, corners: int) -> int:
 def axis_gap(
     nx: float, ny: float, x0: float, y0: float, corners: Corners, j: int, n: int
 ) -> tuple[float, int]:
-    """Return the least gap of the n corners of body j above a line, and the corner."""
+    """Return the least gap of the n corners of polygon j above a line [m], and the corner."""
     least, corner = 1e300, 0
     for k in range(n):
         own = corners[j, k]
@@ -66,11 +66,14 @@ def face_of_contact(
 ) -> tuple[bool, float, float, float, int]:  # fmt: skip
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
+    Besides its time of entry, over the step, its gap now and the greatest gap of any edge that was
+    looked at [m]: (possible, time, gap, apart, edge). If a contact is ruled out, the rest is not to
+    be used.
+
     (dx, dy) is the displacement of j relative to i over the step if nothing deflects them,
     (px - turn y, py + turn x) what turning adds to it at (x, y), `spread` how far any of their
-    points may come nearer, whatever does.
-    The best edge comes with its rank, time of entry and gap, after the greatest gap of any. Edges
-    inside the body count as deeper by `sunk`, so that on a tie the real one is best.
+    points may come nearer, whatever does. Edges inside the body count as deeper by `sunk`, so that
+    on a tie the real one is best.
 
     A face is entered when the nearest corner is deeper than the margin: of two that it touches the
     one that is approached more slowly is the best. By the velocity of that corner then: the middle

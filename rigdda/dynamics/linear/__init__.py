@@ -1,1 +1,1 @@
-"""Solvers of the simultaneous equilibrium equations."""
+"""Solvers of the simultaneous equations; relaxation of forces, which needs no matrix."""

@@ -87,11 +87,12 @@ def sweep(
     row: Floats, row_i: Ints, row_j: Ints, motion: Floats, still: int, visit: Ints, visits: int,
     tries: int, number: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
 ) -> float:  # fmt: skip
-    """Visit the contacts listed once, from the lowest up, or down; returns the greatest change [m].
+    """Visit the contacts listed once, from the lowest up, or down.
 
-    One that is open waits for as long as it cannot close, at twice the speed at which it closes and
-    `reach` [m] a substep besides. A slot has moved if it did by more than `quiet` [m]; slot `still`
-    never does.
+    Returns the greatest change of a normal displacement [m]; shear does not count. One that is open
+    is not visited for as long as it cannot close, at the speed at which it moves now and `reach`
+    [m] a substep besides. A slot has moved if it did by more than `quiet` [m]; slot `still` never
+    does.
 
     A visit reads the bodies once: what the normal force changes along the shear direction is added
     to what was read. Unsigned indices spare numba's test for negative ones.
@@ -171,8 +172,8 @@ def relax_forces(
 ) -> int:  # fmt: skip
     """Find the forces of an island in substeps, in the rows of its contacts: see `take_forces`.
 
-    `speed` is the greatest of the island [m/s]. `rhs` holds inertia and weight only. found.d is set
-    to the displacements at constant mean force, found.relaxed to what the blocks move besides,
+    `speed` is the greatest of the island [m/s]. `rhs` holds inertia, weight and loads. found.d is
+    set to the displacements at constant mean force, found.relaxed to what the blocks move besides,
     since forces act early or late in the step. Returns the number of sweeps.
     """
     low, high = islands.contact_start[island], islands.contact_start[island + 1]

@@ -16,37 +16,31 @@ from rigdda.dynamics.constants import (
 from rigdda.dynamics.records import Contact, Contacts, Floats
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
-# columns of rows.row, first what a visit to an open contact needs: the row of the contact for a and
-# b, times h over the roots of their inertia [(m/N)^1/2]; normal and shear force [N]
+# columns of rows.row. NORMAL to + 5: normal row for a and b, times h / sqrt(M) [(m/N)^1/2]. FORCE
+# and + 1: normal and shear force [N]. What a visit to an open contact reads comes first.
 NORMAL, FORCE = 0, 6
 
-
-# gap at the start of the substep, normal displacement that it aims at once closed [m], infinite
-# where a spring has a gap at which it is free; displacement in the substep in which an impact has
-# closed [m]; its number
+# HERE: gap at the start of the substep [m]. AIM: normal displacement to reach once closed [m];
+# infinite for a spring, which is free at a gap. REBOUND: displacement of the substep in which an
+# impact bounces [m]. HIT: number of that substep, -1 before.
 HERE, AIM, REBOUND, HIT = 8, 9, 10, 11
 
-
-# share of the normal force that a visit keeps [-], what a displacement takes [N/m]; shear and
-# tension that it bears besides [N]
+# N = KEEP N + GAIN (aim - moved), see relaxation.sweep [-], [N/m]. COHESION, TENSION: shear and
+# tension that the contact bears besides friction and pressure [N].
 KEEP, GAIN, COHESION, TENSION = 12, 13, 14, 15
 
-
-# the same of the shear force, and what a normal force takes from it [-]
+# SHEAR to + 5, KEEP_SHEAR, GAIN_SHEAR: the same for shear. CROSS: shear force that a change of the
+# normal force takes [-].
 SHEAR, KEEP_SHEAR, GAIN_SHEAR, CROSS = 16, 22, 23, 24
 
-
-# normal displacement per force [m/N]; friction; shear displacement at which a spring is free, gap
-# at the start of the step [m]
+# FLEXIBLE: normal displacement per force [m/N]. FRICTION: tan phi. FREE: shear displacement at
+# which a spring is free [m]. GAP: at the start of the step, or at which a spring is free [m].
 FLEXIBLE, FRICTION, FREE, GAP = 25, 26, 27, 28
 
-
-# substep from which on it has borne its force; sum of the forces of all substeps [N]
+# SINCE: substep from which on the force is borne. SUM and + 1: sums of forces over substeps [N].
 SINCE, SUM = 29, 30
 
-
 COLUMNS = 32
-
 
 # columns of rows.motion, each in three directions, times the roots of inertia over h: displacement
 # in this substep, since the start of the step, and in the substep before

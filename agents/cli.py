@@ -119,6 +119,7 @@ def simulate(
         tables.write_points(folder / "points.csv", seeds, points)
         show(tables.points(points))
         note(doubts.unfitted(where))
+        note(doubts.of_layout(where, barriers, event))
         click.echo(f"{releases} releases of points; points.csv is in {folder}")
         return
     where.realise(barriers, seed, event)  # what cannot be built is said before a folder is made
@@ -129,8 +130,7 @@ def simulate(
         run.save(folder / "run.npz")
         section.released(folder / "section.png", where, barriers, seeds, event)
     show(tables.outcomes(barriers, outcomes))
-    if words := doubts.unbuildable(where, barriers):
-        note(f"the layout {words}")
+    note(doubts.of_layout(where, barriers, event))
     click.echo(f"{releases} releases; outcomes.csv, run.npz and section.png are in {folder}")
 
 
@@ -169,6 +169,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     For a site, writes episode.rrd and prints its path; for a run, FILE.rrd beside it.
     """
     import rigdda
+    from agents import doubts
     from agents.wording import short, standing
     from rigdda.results.marks import Marks
     from rigdda.results.viewer import open_viewer
@@ -192,6 +193,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     notes = {"event": outcome.event, "seed": str(seed), "comes onto the road": came}
     road, labels = (where.road.start, where.road.end), tuple(map(short, standing(barriers)))
     run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels))
+    note(doubts.of_layout(where, barriers, event))
     click.echo(folder / "episode.rrd")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from envs.building import Room
-from rigdda import BadInput, Layout, Site
+from rigdda import BadInput, Layout, Mesh, Site
 from rigdda.barriers import KINDS
 
 
@@ -14,6 +14,18 @@ def unbuildable(site: Site, layout: Layout) -> str:
     except BadInput as error:
         return f"is computed as given, but may not be built: {error}"
     return ""
+
+
+def of_layout(site: Site, layout: Layout, event: str | None) -> str:
+    """Return in words what is to be known of a layout in releases of an event, or by rate."""
+    found = unbuildable(site, layout)
+    words = [f"the layout {found}"] if found else []
+    if event is None and any(isinstance(barrier, Mesh) for barrier in layout):
+        words.append(
+            "mesh makes events rarer, and changes no release: these are drawn by the rates "
+            "without it; `design` and `study` count it"
+        )
+    return "; ".join(words)
 
 
 def unfitted(site: Site) -> str:

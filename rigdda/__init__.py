@@ -1,6 +1,6 @@
 """Rigid-block discontinuous deformation analysis for the design of rockfall protection."""
 
-from rigdda import sites
+from rigdda import limit_equilibrium, sites
 from rigdda.barriers import (
     Barrier,
     Ditch,
@@ -72,6 +72,7 @@ __all__ = [
     "Surface",
     "Terrain",
     "Wall",
+    "limit_equilibrium",
     "load_layout",
     "lumped",
     "release",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.barriers import Barrier, Earthwork, Mesh, as_layout, earthworks
+from rigdda.batch import as_site
 from rigdda.dynamics.lumped import (
     FRICTION,
     HEIGHT,
@@ -21,6 +22,7 @@ from rigdda.dynamics.lumped import (
 )
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
+from rigdda.model.composition import check_known
 from rigdda.model.place import Rebound
 from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
@@ -71,12 +73,19 @@ def lumped(
     Raises
     ------
     BadInput
-        If a barrier stands on the ground, the ground overhangs, or as `Site.draw`.
+        If a barrier stands on the ground or where loose rock lies, the ground overhangs, there is
+        no seed, or as `Site.draw`.
     """
-    for i, barrier in enumerate(as_layout(layout)):
+    site, layout = as_site(site), as_layout(layout)
+    for i, barrier in enumerate(layout):
         if not isinstance(barrier, Earthwork | Mesh):
             mend = "leave it out, or use the block model: points know only what is cut or filled"
             raise BadInput(f"barriers[{i}]", barrier.kind, mend)
+    site.built(layout, 1.0)
+    check_known(site.surfaces, "barrier surface", site.soil)
+    own = list(seeds) if isinstance(seeds, Iterable) else []
+    if not own:
+        raise BadInput("seeds", seeds, "give at least one seed")
     ground, _ = earthworks(site.profile, layout, site.soil)
     corners = np.ascontiguousarray(ground.points)
     if (np.diff(corners[:, 0]) <= 0.0).any():
@@ -84,7 +93,7 @@ def lumped(
         raise BadInput("slope.points", "an overhang", mend)
     laws = np.array([law(site, name) for name in ground.surfaces])
     starts, masses, release, shifts = [], [], [], []
-    for k, seed in enumerate(seeds):
+    for k, seed in enumerate(own):
         drawn = site.draw(seed, event)
         for block in drawn.blocks:
             area, centroid, _ = polygon_properties(block.vertices)

@@ -7,10 +7,11 @@ import warnings
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
+from rigdda import check
 from rigdda.barriers import Barrier, Layout, as_layout
 from rigdda.batch import EVERY, Batch, Job, as_site, outcomes, simulation
 from rigdda.dynamics.run import Run
-from rigdda.errors import DoubtfulInput, Error
+from rigdda.errors import BadInput, DoubtfulInput, Error
 from rigdda.model.site import Site
 from rigdda.results.outcome import Outcome, measure
 
@@ -26,6 +27,9 @@ def release(
     progress: bool = False,
 ) -> tuple[Run, Outcome]:
     """Simulate one release of an event, or of one that the seed draws by rate, with a layout.
+
+    Events are drawn by their rates without mesh, which makes them rarer and changes no release: the
+    same seed gives the same rock with every layout.
 
     Returns
     -------
@@ -71,6 +75,13 @@ def release_outcome(
     return Batch(site, layout).outcome(seed, event)
 
 
+def _job(i: int, job: Job) -> tuple[Site, Layout, int, str | None]:
+    if not isinstance(job, tuple | list) or len(job) != 4:
+        raise BadInput(f"jobs[{i}]", job, "give (site, layout, seed, event)")
+    site, layout, seed, event = job
+    return site, as_layout(layout), seed, event
+
+
 def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcome]:
     """Return the outcomes of many releases (site, layout, seed, event), in threads.
 
@@ -94,9 +105,8 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     DoubtfulInput
         If `motion.duration` cuts more than one in twenty off, see `Outcome.cut_off`.
     """
-    each = [(site, as_layout(layout), seed, event) for site, layout, seed, event in jobs]
-    if threads is None:
-        threads = os.cpu_count() or 1
+    each = [_job(i, job) for i, job in enumerate(jobs)]
+    threads = os.cpu_count() or 1 if threads is None else check.integer("threads", threads, 1)
     groups: dict[tuple[int, Layout], list[int]] = {}
     for place, (site, layout, _, _) in enumerate(each):
         groups.setdefault((id(site), layout), []).append(place)

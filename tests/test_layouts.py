@@ -60,6 +60,7 @@ def test_a_table_without_kind_is_a_wall(tmp_path):
         ('kind = "gravity_wall"\nx = 1.0\nheight = 1.0\ndensity = nan', ["gravity wall density"]),
         ('kind = "ditch"\nx = 1.0\ndepth = 1.0\nwidth = 3.0\nside_slope = 9.0', ["side_slope"]),
         ("x = 1.0\nheight = 1.0\nheigth = 1.0", ["heigth"]),
+        ("x = 1.0\nheight = -1.0", ["barriers[0]", "height"]),
     ],
 )
 def test_bad_tables_are_named(text, words, tmp_path):

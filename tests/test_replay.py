@@ -248,6 +248,10 @@ def test_bad_input_is_refused(run: Run, tmp_path: Path) -> None:
         open_viewer(tmp_path / "other.rrd")
     with pytest.raises(BadInput, match="uphill"):
         Marks(road=(5.0, 5.0))
+    with pytest.raises(BadInput, match="two numbers"):
+        Marks(road=(1.0, 2.0, 3.0))
+    with pytest.raises(BadInput, match="labels"):
+        run.to_rerun(tmp_path / "episode.rrd", Marks(labels=("a", "b", "c")))
     assert os.listdir(tmp_path) == ["other.rrd"]
 
 

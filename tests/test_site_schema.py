@@ -139,8 +139,31 @@ def test_closure_in_thousands_is_warned_of():
 
 def test_without_events_each_mass_comes_down_once_a_year():
     assert Site.load("toppling").events == (Event("mass", 1.0, "mass"),)
-    with pytest.raises(BadInput, match="the least and the greatest area"):
-        replace(QUICK, events=())
+    assert replace(QUICK, events=(), meshes=()).events == (Event("mass", 1.0, "mass"),)
+
+
+def test_without_events_a_band_alone_brings_nothing_down():
+    with pytest.raises(BadInput, match="events = "):
+        replace(QUICK, events=(), sources=QUICK.sources[:1], meshes=())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field"),
+    [
+        ("restitution = 0.2", "restitution = 3.0", "surfaces.rock.restitution"),
+        ("[motion]", "[lumped.rock]\nnormal = 3.0\n\n[motion]", "lumped.rock.normal"),
+        ("damping = 0.3", "dt = 5.0", "motion.dt"),
+    ],
+)
+def test_fields_are_told_with_their_table(old, new, field, tmp_path):
+    assert refused(tmp_path, "quick", old, new).field == field
+
+
+def test_the_plain_contact_has_no_word_in_a_file(tmp_path):
+    site = replace(QUICK, surfaces={"rock": Surface(28.0, restitution=None)})
+    with pytest.raises(BadInput, match=r"surfaces\.rock\.restitution = None"):
+        site.save(tmp_path / "site.toml")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_stretch_of_the_slope_has_its_own_surface():

@@ -106,7 +106,8 @@ def from_table(where: str, table: Any) -> Barrier:
         return msgspec.convert({**table, "kind": kind}, KINDS[kind])
     except msgspec.ValidationError as error:
         if isinstance(error.__cause__, BadInput):
-            raise error.__cause__ from None
+            bad = error.__cause__
+            raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
         raise BadInput(where, table, f"mend it: {error}") from None
 
 

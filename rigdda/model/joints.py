@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -38,7 +39,8 @@ class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     scatter : float
         Standard deviation of the spacing over its mean [-], at most 0.4.
     persistence : float
-        Share of the joint that is open [-]; across the rest, blocks stay joined.
+        Share of the joint that is open [-]; across the rest blocks stay joined, two by two, where
+        the block that they make is convex.
 
     Raises
     ------
@@ -143,9 +145,10 @@ def _join_bridges(
     other = first != second
     ends = np.cumsum(np.bincount(first[other], minlength=len(parts)))
     beside = [near.tolist() for near in np.split(second[other], ends[:-1])]
-    bridge = 1.0 - min(j.persistence for j in joints)
-    for i in np.flatnonzero(rng.random(len(parts)) < bridge):
-        _join(parts, beside, int(i))
+    for place, drawn in enumerate(rng.random(len(parts)).tolist()):
+        bridged = [drawn < 1.0 - joint.persistence for joint in joints]
+        if any(bridged):
+            _join(parts, beside, place, Bridges(joints, bridged))
     size = shapely.area(parts)  # not a number where a part is gone
     for i in np.argsort(np.where(size > 0.0, size, math.inf), kind="stable"):
         if 0.0 < shapely.area(parts[i]) < SLIVER * block_area:
@@ -156,12 +159,32 @@ def _join_bridges(
     return [c for c in parts if c is not None]
 
 
+class Bridges(NamedTuple):
+    """The joint sets, and across which of them a block stays joined."""
+
+    joints: tuple[JointSet, ...]
+    bridged: list[bool]
+
+    def across(self, edges: NDArray[np.object_]) -> NDArray[np.bool_]:
+        """Return which common edges of blocks are of a set across which blocks stay joined."""
+        dips = np.array([joint.dip_deg for joint in self.joints])
+        ends = [shapely.get_coordinates(edge)[[0, -1]] for edge in edges]
+        x, y = np.diff(ends, axis=1)[:, 0].T
+        off = (np.degrees(np.arctan2(-y, x))[:, None] - dips) % 180.0
+        return np.array(self.bridged)[np.minimum(off, 180.0 - off).argmin(axis=1)]
+
+
 def _join(
-    parts: list[shapely.Polygon | None], beside: list[list[int]], i: int, convex: bool = True
+    parts: list[shapely.Polygon | None],
+    beside: list[list[int]],
+    i: int,
+    bridges: Bridges | None = None,
+    convex: bool = True,
 ) -> None:
     """Join part i to the neighbour with the longest common edge that gives a convex block.
 
-    Or that gives any simple polygon, if not `convex`.
+    Across such edges only as are bridged, if any are told. Or to the one that gives any simple
+    polygon, if not `convex`.
     """
     cell = parts[i]
     others = [j for j in beside[i] if parts[j] is not None]
@@ -170,7 +193,10 @@ def _join(
     shapes = np.array([parts[j] for j in others])
     if not convex:  # where cells were joined, an edge may have lost the node that they share
         shapes = shapely.snap(shapes, cell, 1e-7 * cell.length)
-    edges = shapely.length(shapely.intersection(cell, shapes)).round(9)
+    common = shapely.intersection(cell, shapes)
+    edges = shapely.length(common).round(9)
+    if bridges is not None:
+        edges[edges > 0.0] *= bridges.across(common[edges > 0.0])
     for place in np.argsort(-edges, kind="stable"):
         if edges[place] == 0.0:
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from rigdda import check
-from rigdda.model.settings import USUAL_DT
+from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
 
 
 class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -102,7 +102,7 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         check.number("motion.damping", self.damping, 0.0, 100.0)
         check.one_of("motion.damping_when", self.damping_when, ("always", "contact"))
         check.number("motion.duration", self.duration, 0.0, open_low=True)
-        check.number("motion.dt", self.dt, 0.0, open_low=True)
+        check.number("motion.dt", self.dt, SHORTEST_DT, LARGEST_DT)
 
 
 class Rebound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -129,9 +129,9 @@ class Rebound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     friction_deg: float = 30.0
 
     def __post_init__(self) -> None:
-        check.number("lumped.normal", self.normal, 0.0, 1.0)
-        check.number("lumped.tangential", self.tangential, 0.0, 1.0)
-        check.number("lumped.friction_deg", self.friction_deg, 0.0, 80.0)
+        check.number("normal", self.normal, 0.0, 1.0)
+        check.number("tangential", self.tangential, 0.0, 1.0)
+        check.number("friction_deg", self.friction_deg, 0.0, 80.0)
 
 
 class Scatter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

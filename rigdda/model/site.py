@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ from rigdda.geometry import polygon_properties
 from rigdda.model import economy, realisation
 from rigdda.model.economy import Bill
 from rigdda.model.events import Drawn, Event
+from rigdda.model.place import Rebound
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
 from rigdda.model.site_tables import SiteTables
@@ -43,7 +45,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     def __post_init__(self) -> None:
         if not self.events:
-            usual = tuple(Event(s.name, 1.0, s.name) for s in self.sources)
+            usual = tuple(Event(s.name, 1.0, s.name) for s in self.sources if s.band is None)
+            if not usual:
+                raise BadInput("events", (), "give at least one: what comes down, and how often")
             msgspec.structs.force_setattr(self, "events", usual)
         check_site(self)
 
@@ -78,17 +82,29 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             return msgspec.toml.decode(text, type=cls)
         except msgspec.ValidationError as error:
             if isinstance(error.__cause__, BadInput):
-                raise error.__cause__ from None
+                raise _placed(error.__cause__, str(error), text) from None
             raise BadInput("site file", name, str(error)) from None
         except (msgspec.DecodeError, RecursionError) as error:
             raise BadInput("site file", name, f"mend its TOML: {error}") from None
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the site as TOML; `load` gives it back."""
+        """Write the site as TOML; `load` gives it back.
+
+        Raises
+        ------
+        BadInput
+            If a surface has the plain contact of restitution None, for which TOML has no word.
+        """
         data = msgspec.to_builtins(self)
         for table in (*data["sources"], *data["events"]):  # TOML has no null
             for name in [name for name, value in table.items() if value is None]:
                 del table[name]
+        laws = {f"surfaces.{name}": table for name, table in data["surfaces"].items()}
+        laws |= {f"interfaces[{i}]": table for i, table in enumerate(data["interfaces"])}
+        for where, table in laws.items():
+            if table["restitution"] is None:
+                mend = "give a number: a site file has no plain contact, only Python has"
+                raise BadInput(f"{where}.restitution", None, mend)
         with atomic(path) as part:
             part.write_text(tomli_w.dumps(data), encoding="utf-8")
 
@@ -202,3 +218,27 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         A reference: nothing reaches the road below it.
         """
         return self.prices.shed * self.prices.annual("shed")
+
+
+def _placed(bad: BadInput, told: str, text: str) -> BadInput:
+    """Return an error with the table that its field is of, if it is a bare name.
+
+    `told` is what msgspec says of it, which ends with the path, but for the keys of tables.
+    """
+    path = told.rpartition(" - at `$.")[2].rstrip("`")
+    if not bad.field.isidentifier() or not path or " " in path:
+        return bad
+    head, _, tail = path.partition("[...]")
+    if tail or path != head:
+        kind = {"surfaces": Surface, "lumped": Rebound}.get(head)
+        tables = tomllib.loads(text)[head] if kind is not None else {}
+        head = next((f"{head}.{name}" for name in tables if _is_bad(tables[name], kind)), head)
+    return BadInput(f"{head}.{bad.field}", bad.value, bad.mend)
+
+
+def _is_bad(table: object, kind: type | None) -> bool:
+    try:
+        msgspec.convert(table, kind)
+    except msgspec.ValidationError:
+        return True
+    return False

@@ -37,14 +37,16 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     sources : tables
         Where rock starts.
     events : tables
-        What comes down and how often. By default each source that is no band, once a year.
+        What comes down and how often. By default each source that is no band, once a year on
+        100 m of slope.
     road : table
         The road.
     barrier_zone : table
         Where barriers may stand.
     surfaces : tables
         The surfaces, by name: friction_deg, cohesion, tension, restitution. "soil" is that of
-        embankments, "concrete" that of walls and fences, "rock" where they are missing.
+        embankments, "concrete" that of walls and fences, and of embankments where "soil" is
+        missing; "rock" where they are missing.
     interfaces : tables
         How two surfaces meet.
     prices : table

@@ -128,7 +128,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not least <= self.block_area <= rock:
             mend = f"give {least:g} to {rock:g} m2: the mass has {rock:g} m2"
             raise BadInput(f"{self.words}.block_area", self.block_area, mend)
-        if len({j.dip_deg for j in self.joints}) < 2:
+        if len({j.dip_deg % 180.0 for j in self.joints}) < 2:  # -90 and 90 are one
             mend = "give at least two sets of different dip"
             raise BadInput(f"{self.words}.joints", self.joints, mend)
 

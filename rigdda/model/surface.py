@@ -20,7 +20,8 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         [Pa]; it breaks once, as a whole.
     restitution : float or None
         Coefficient of restitution of a central impact, 0 (plastic) to 1. None: the paper's plain
-        penalty contact, whose rebound is what step and stiffness make of it.
+        penalty contact, whose rebound is what step and stiffness make of it; in Python only, site
+        files have no word for it.
 
     Raises
     ------

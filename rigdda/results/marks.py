@@ -39,6 +39,6 @@ class Marks:
     def __post_init__(self) -> None:
         if self.road is None:
             return
-        uphill, downhill = (check.number("road", x) for x in self.road)
-        if uphill >= downhill:
+        uphill, downhill = check.interval("road", self.road)
+        if uphill == downhill:
             raise BadInput("road", self.road, "give its uphill edge, then its downhill edge")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rigdda.barriers import describe
 from rigdda.dynamics.run import Run
+from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
 from rigdda.results.blueprint import PLACEMENT, TIMELINE, run_blueprint
@@ -89,7 +90,16 @@ def recording(
 def log_run(
     rec: rr.RecordingStream, run: Run, marks: Marks, root: str = "", placement: int | None = None
 ) -> None:
-    """Log a whole run below the entity `root`; its frames are those of a `placement`, if any."""
+    """Log a whole run below the entity `root`; its frames are those of a `placement`, if any.
+
+    Raises
+    ------
+    BadInput
+        If there are labels, but not one for each barrier.
+    """
+    if marks.labels and len(marks.labels) != len(run.scene.barriers):
+        mend = f"give one for each of {len(run.scene.barriers)} barriers, or none"
+        raise BadInput("labels", marks.labels, mend)
 
     def clock(times: Sequence[float] | Floats) -> list[rr.TimeColumn]:
         columns = [rr.TimeColumn(TIMELINE, duration=times)]

@@ -52,7 +52,8 @@ LAYOUT = """\
 What `--layout` and the `barriers` of a study take: a table `[[barriers]]` for each barrier in TOML
 (or a list `barriers` in JSON), with its `kind` (without one
 it is a wall) and the keys below. `rigdda design` writes one,
-`layout.toml`. A layout that may not be built is computed as it is given, and the command says so.
+`layout.toml`. A layout that may not be built is computed as it is given, and `simulate`, `study`
+and `replay` say so.
 
 ```toml
 [[barriers]]

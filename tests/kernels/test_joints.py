@@ -70,3 +70,17 @@ def test_seed_decides():
     assert len(first) != len(other) or any(
         a.shape != b.shape or (a != b).any() for a, b in zip(first, other, strict=True)
     )
+
+
+def test_a_set_that_is_open_is_not_bridged():
+    def faces(flat: float, steep: float) -> tuple[float, float]:
+        """Return the length of level and of upright faces between blocks over their area [1/m]."""
+        joints = (JointSet(0.0, 0.7, persistence=flat), JointSet(90.0, 1.4, persistence=steep))
+        blocks = cut(SQUARE, joints, 2.0, np.random.default_rng(1))
+        edges = np.concatenate([np.roll(b, -1, axis=0) - b for b in blocks])
+        return tuple(abs(edges).sum(axis=0) / SQUARE.area)
+
+    level, upright = faces(1.0, 1.0)
+    assert level > 1.9 * upright  # slabs twice as long as high
+    assert faces(1.0, 0.5)[0] / faces(1.0, 0.5)[1] > 1.2 * level / upright
+    assert faces(0.5, 1.0)[0] / faces(0.5, 1.0)[1] < level / upright / 1.2

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigdda import BadInput, Ditch, GravityWall, Site, lumped
+from rigdda import BadInput, Ditch, Embankment, GravityWall, Site, lumped
 from rigdda.dynamics.lumped import trajectories
 
 G = 9.81
@@ -86,3 +86,8 @@ def test_it_says_what_it_does_not_know():
         lumped(Site.load("verge"), (GravityWall(9.0, 2.0),))
     with pytest.raises(BadInput, match="overhangs"):
         lumped(Site.load("toppling"))
+    with pytest.raises(BadInput, match="where loose rock lies"):
+        lumped(Site.load("quick"), (Embankment(7.0, 2.0),))
+    for seeds in ([], 3):
+        with pytest.raises(BadInput, match="seeds"):
+            lumped(Site.load("quick"), (), seeds)

@@ -78,6 +78,10 @@ def test_what_fails_is_told():
     wanted = [(SITE, (), 0, "block"), (SITE, (), 1, "no such"), (SITE, (), 2, "nor this")]
     with pytest.raises(BadInput, match="no such"):
         rigdda.release_many(wanted)
+    with pytest.raises(BadInput, match=r"jobs\[1\]"):
+        rigdda.release_many([wanted[0], wanted[0][:3]])
+    with pytest.raises(BadInput, match="threads = 0"):
+        rigdda.release_many(wanted[:1], threads=0)
 
 
 def full(layout: Layout, seed: int, event: str) -> Outcome:

@@ -66,6 +66,19 @@ def test_access_makes_barriers_dearer_with_height():
     assert FLAT.capital((Wall(x, 2.0, 0.5),)) == pytest.approx(1.75 * 350.0)
 
 
+def test_access_makes_every_kind_dearer():
+    x = 29.8 * (1.0 - 30.0 / 45.0)  # 30 m above the road
+    free = replace(FLAT, prices=replace(PRICES, access=0.0))
+    for barrier in (
+        Wall(x, 2.0, 0.5),
+        GravityWall(x, 2.0, 0.8),
+        Fence(x, 3.0, energy_class=1000),
+        Ditch(x, 1.0, 3.0),
+        Embankment(x, 2.0),
+    ):
+        assert FLAT.capital((barrier,)) == pytest.approx(1.75 * free.capital((barrier,)))
+
+
 def test_a_ditch_is_priced_by_the_ground_that_it_is_cut_in():
     ditch = Ditch(30.0, 1.0, 3.0, 0.5)  # on level ground: a trapezoid of 3 m above, 2 m below
     assert FLAT.capital((ditch,)) == pytest.approx(20.0 + 40.0 * 2.5)

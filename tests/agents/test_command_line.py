@@ -255,7 +255,18 @@ def test_designers_are_compared_in_money(tmp_path: Path) -> None:
     for row in table:
         fall = float(row["nothing"]) - float(row["objective"])
         assert float(row["gain"]) == pytest.approx(fall)
-    assert "behind the best" in words or "behind" in words
+    assert "behind the best" in words
+    written = (tmp_path / "o/scores.csv").read_bytes()
+    words = run("evaluate", *options, *more, folder=tmp_path)
+    assert "taken from a former run" in words
+    assert (tmp_path / "o/scores.csv").read_bytes() == written
+
+
+def test_a_quick_look_with_points(tmp_path: Path) -> None:
+    options = ("--model", "lumped", "--releases", 20, "--out", "o")
+    words = run("simulate", "verge", *options, folder=tmp_path)
+    assert "defaults that nothing was fitted to" in words
+    assert len({row["seed"] for row in rows(tmp_path / "o/points.csv")}) == 20
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -76,9 +76,22 @@ def test_a_search_is_better_than_no_barrier(name: str, valley: Valley) -> None:
     assert () in {e.evaluation.layout for e in found.history.stage("final")}
 
 
-def test_cma_goes_on_from_its_starts(valley: Valley) -> None:
-    searched, drawn = design("cma", valley, 3000), design("random", valley, 300)
-    assert valley.truth(searched.layout) < valley.truth(drawn.layout)
+@pytest.mark.parametrize("name", ["cma", "tpe"])
+def test_a_search_goes_on_from_its_starts(
+    name: str, valley: Valley, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From a fence that is too high and of too high a class, and 1 m off."""
+    first: Layout = (Fence(21.0, 4.0, energy_class=500),)
+
+    def starts(ledger: Ledger) -> list[Layout]:
+        ledger.starts |= {first, ()}
+        return [first, ()]
+
+    monkeypatch.setattr(f"agents.{name}.starts", starts)
+    found = design(name, valley, 3000)
+    assert found.origin == "search"
+    gain = valley.truth(first) - valley.truth((Fence(20.0, 3.0, energy_class=250),))
+    assert valley.truth(found.layout) < valley.truth(first) - 0.3 * gain
 
 
 @pytest.mark.parametrize("name", ["cma", "random", "tpe"])

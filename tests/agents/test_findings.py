@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from valley import SITE, Barren, Valley
 
 from agents import findings
 from agents.largest import tried, unheld
@@ -48,6 +49,11 @@ def test_what_a_single_barrier_holds_is_not_said_to_be_held_by_none(name: str, k
     event = next(event.name for event in problem.site.events if event.design)
     assert {barrier.kind for (barrier,) in tried(problem)} == {kind}
     assert unheld(problem, event, 0) == ""
+
+
+def test_what_nothing_holds_is_said() -> None:
+    assert unheld(Valley(SITE), "block", 0) == ""
+    assert "no single barrier" in unheld(Barren(SITE), "block", 0)
 
 
 def test_every_kind_that_may_be_built_is_tried() -> None:

@@ -1,4 +1,4 @@
-"""The policy: its file, its network against torch, and that it always has an answer."""
+"""The policy: its file, and that it always has an answer."""
 
 from __future__ import annotations
 

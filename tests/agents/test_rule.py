@@ -8,12 +8,14 @@ from valley import SITE
 
 from agents.crossings import CROSSING, Ensemble
 from agents.menu import Menu
-from agents.rule import ENERGY, FREEBOARD, MASS, SPEED, demands, ritchie, rule
+from agents.rule import demands, ritchie, rule
 from envs import DesignProblem
 from rigdda import Ditch, Embankment, Fence, Site
 from rigdda.barriers import FENCE_CLASSES
 
 STATIONS = np.array([14.0, 20.0, 27.0])
+SPEED, MASS, ENERGY, FREEBOARD = 1.122, 1.02, 1.2, 0.5
+"""Partial factors of UNI 11211-4, of trajectories by 1.10 x 1.02, and the free height [m]."""
 
 
 def crossings(speeds: dict[int, float], height: float = 1.0, mass: float = 1000.0) -> Ensemble:

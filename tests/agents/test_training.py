@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import time
 import zipfile
@@ -160,6 +161,27 @@ def test_ppo_learns_and_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
     after = ppo.export(kept, zeros, ones, {})(zeros)[0]
     assert abs(after - 0.8) < abs(before - 0.8) - 0.05
     assert seen[-1] == 16 * 4 * 60
+
+
+def test_the_exported_network_says_what_torch_says(tmp_path: Path) -> None:
+    model = ppo.learner(Toy(), 0, tmp_path)
+    mean, scale = np.arange(1.0, 5.0, dtype=np.float32), np.array([2, 1, 0.5, 4], np.float32)
+    made = ppo.export(model, mean, scale, {})
+    for seen in (np.zeros(4, np.float32), np.ones(4, np.float32)):
+        said, _ = model.predict(seen, deterministic=True)
+        np.testing.assert_allclose(made(mean + scale * seen), said, atol=1e-5)
+    assert (made(mean) != made(mean + scale)).any()
+
+
+def test_a_training_that_is_done_is_not_done_again(
+    trained: tuple[Path, str], tmp_path: Path
+) -> None:
+    folder = tmp_path / "o"
+    shutil.copytree(trained[0], folder)
+    before = (folder / "policy.safetensors").read_bytes()
+    seen: list[int] = []
+    training.train(training.Terms(2, 16, 0), folder, 1, lambda done, *_: seen.append(done))
+    assert seen == [] and (folder / "policy.safetensors").read_bytes() == before
 
 
 NAMES = sites.split(training.SPLIT)[:2]

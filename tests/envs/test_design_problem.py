@@ -194,6 +194,13 @@ def test_small_verifications_hold_the_true_cost(problem: DesignProblem, site: Si
     assert 180 <= held <= 199
 
 
+def test_a_target_of_failure_asks_for_the_failures_of_design_events(site: Site) -> None:
+    problem = DesignProblem(site, targets=Targets(failure=0.2))
+    counts = {"small": 10, "low": 10, "block": 0}
+    assert problem.judge(FENCE, hand_made(counts, {"block": 10})).targets == "missed"
+    assert problem.judge(FENCE, hand_made(counts, {"small": 10})).targets != "missed"
+
+
 @pytest.mark.parametrize(
     ("targets", "reached", "state"),
     [

@@ -5,10 +5,11 @@ did. The two are compared by the continuous ranked probability score (Gneiting a
 the mean distance of observed from computed ones less half of their own mean distance [m]. It is
 least in expectation for the distribution that the observed run-outs came from.
 
-Half of the budget is spread over the box of parameters (Sobol), the other half follows CMA-ES from
-the best of them; all releases have the same seeds. The best ones are computed again on fresh
-seeds, to choose without luck. Every interval and the cross-validation choose among all that were
-computed, by resampled or left-out observed runs: neither costs a release.
+About half of the budget, a power of two, is spread over the box of parameters (Sobol), the rest
+follows CMA-ES from the best of them; all releases have the same seeds. The best ones are computed
+again on fresh seeds, to choose without luck. Intervals choose among all that were computed, by
+resampled observed runs. The cross-validation chooses among those that were spread: what follows was
+placed by all observed runs, those that are left out among them.
 """
 
 from __future__ import annotations
@@ -60,6 +61,8 @@ class Fit(NamedTuple):
     fitted: Quality
     validated: Quality
     """Each observed run predicted by what fits the others best."""
+    left_out: Floats
+    """Score of each observed run by that, (runs,) [m]."""
 
 
 def fit(
@@ -194,13 +197,14 @@ def search(
         tick(len(trials.tried), f"best score {min(map(np.mean, trials.table)):.2f} m")
         return score
 
-    explore(add, len(parameters), budget, seed)
+    spread = explore(add, len(parameters), budget, seed)
     fresh = range(seed + releases, seed + (1 + MORE) * releases)
     again = [trials.compute(candidate.values, fresh) for candidate in trials.best(FINALISTS)]
     winner, each = min(again, key=lambda pair: float(pair[1].mean()))
     tried, table = trials.tried, np.array(trials.table)
     low, high = _intervals(table, np.array([c.values for c in tried]), seed)
     whole = [winner.run_outs[event] for event in observed for _ in observed[event]]
+    left, left_out = _validate(trials, spread, observed, seed, fresh)
     return Fit(
         site,
         tuple(parameters),
@@ -208,14 +212,16 @@ def search(
         np.minimum(low, winner.values),
         np.maximum(high, winner.values),
         quality(observed, whole, float(each.mean()), site.slope.toe),
-        quality(observed, *_validate(tried, table, observed, seed), site.slope.toe),
+        quality(observed, left, float(left_out.mean()), site.slope.toe),
+        left_out,
     )
 
 
-def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed: int) -> None:
-    """Score places of the unit cube, (dimensions,): half of the budget over it, then the best ones.
+def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed: int) -> int:
+    """Score places of the unit cube, (dimensions,): spread over it, then about the best of them.
 
     `score` takes a place and returns what is to be least; places come by Sobol, then by CMA-ES.
+    Returns how many were spread.
     """
     spread = 1 << max(2, round(math.log2(budget / 2)))
     places = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(spread)
@@ -228,6 +234,7 @@ def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed
         asked = evolution.ask()
         evolution.tell(asked, [score(np.asarray(place)) for place in asked])
         done += len(asked)
+    return spread
 
 
 def _intervals(table: Floats, values: Floats, seed: int) -> tuple[Floats, Floats]:
@@ -240,18 +247,26 @@ def _intervals(table: Floats, values: Floats, seed: int) -> tuple[Floats, Floats
 
 
 def _validate(
-    tried: Sequence[Candidate], table: Floats, observed: Mapping[str, Floats], seed: int
-) -> tuple[list[Floats], float]:
-    """Return the run-outs that predict each observed run, left out of the fit, and their score."""
+    trials: Trials, spread: int, observed: Mapping[str, Floats], seed: int, fresh: range
+) -> tuple[list[Floats], Floats]:
+    """Return the run-outs that predict each observed run, left out of the fit, and its score.
+
+    Of the sets of values that were spread, what fits the others best, computed on fresh seeds.
+    """
     events = [event for event in observed for _ in observed[event]]
+    table = np.array(trials.table[:spread])
     count = table.shape[1]
     parts = np.random.default_rng([seed, 2]).permutation(count) % min(FOLDS, count)
     predicted: list[Floats] = [np.zeros(0)] * count
-    score = 0.0
+    left_out = np.zeros(count)
+    again: dict[int, tuple[Candidate, Floats]] = {}
     for part in range(min(FOLDS, count)):
         out = np.flatnonzero(parts == part)
         best = int(np.delete(table, out, axis=1).mean(axis=1).argmin())
-        score += float(table[best, out].sum())
+        if best not in again:
+            again[best] = trials.compute(trials.tried[best].values, fresh)
+        candidate, each = again[best]
+        left_out[out] = each[out]
         for i in out:
-            predicted[i] = tried[best].run_outs[events[i]]
-    return predicted, score / count
+            predicted[i] = candidate.run_outs[events[i]]
+    return predicted, left_out

@@ -1,4 +1,6 @@
-"""What breaks without each constant of the mechanics: `python -m experiments.ablated [--out DIR]`.
+"""What breaks without each constant of the mechanics.
+
+`python -m experiments.ablated [--out DIR]`.
 
 Each is set to the value at which it does nothing, or where there is none to a half or twice. For
 each of these the closed forms, the hard cases at 10 ms, the tests of what is confined, held or
@@ -20,6 +22,8 @@ import tempfile
 import time
 from pathlib import Path
 from typing import Any
+
+import click
 
 VARIANTS = (
     "START_STIFFNESS=1",
@@ -160,8 +164,18 @@ def attempt(variant: str) -> Row:
     return {"amiss": "", "cpu_s": float("nan"), "penetration_m": float("nan")} | found
 
 
-def main(out: Path) -> None:
-    """Run all variants and write the table."""
+@click.command(help=__doc__)
+@click.argument("changes", nargs=-1, metavar="[NAME=VALUE]...")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("experiments/results"),
+              show_default=True, help="Folder of results.")  # fmt: skip
+def main(changes: tuple[str, ...], out: Path) -> None:
+    """Run all variants and write the table, or run once with changes and print what is found."""
+    if changes:
+        with tempfile.TemporaryDirectory() as folder:
+            os.environ["XDG_CACHE_HOME"] = folder
+            change(list(changes))
+            print(json.dumps(measure()))
+        return
     from experiments.study import tabulate
 
     cases = [{"variant": variant} for variant in (USUAL, *VARIANTS)]
@@ -169,10 +183,4 @@ def main(out: Path) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1 and "=" in sys.argv[1]:
-        with tempfile.TemporaryDirectory() as folder:
-            os.environ["XDG_CACHE_HOME"] = folder
-            change(sys.argv[1:])
-            print(json.dumps(measure()))
-    else:
-        main(Path(sys.argv[2] if len(sys.argv) > 2 else "experiments/results"))
+    main()

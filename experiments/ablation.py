@@ -1,7 +1,7 @@
 """What each part of the mechanics costs: switched off where it helps, present where it is idle.
 
 Rockfalls down the highway slope. Of the parts that are there to save time or to be exact (islands,
-sleep, limit of displacement, post-correction) each is switched off; of those that a scene may hold
+sleep, post-correction) each is switched off; of those that a scene may hold
 (bolts, loads, cohesion, motion of the base, barriers) one that does nothing is added. Processor
 time is that over the scene as it is, in the same round; the greatest penetration says what it does
 to the contacts.

@@ -1,4 +1,8 @@
-"""Every figure, table and study that is judged by a number, one after the other."""
+"""Figures, tables and studies that are judged by a number, one after the other.
+
+Not those that take hours or other engines: outcome_cost, tschamut, reference, designers, bench,
+ablated.
+"""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ Judged by the least share of what would reach the road that a structure of the d
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -78,11 +79,16 @@ def draw_heights(axes: Axes, rows: list[dict[str, Any]]) -> None:
         here = [r for r in rows if r["contact"] == contact]
         height = [r["height_m"] for r in here]
         kept = np.array([r["retained"] for r in here])
-        spread = [r["half_interval"] / here[0]["debris_fraction"] for r in here]
+        base = here[0]
+        spread = [  # of a ratio, by the delta method; the share at no height is not known exactly
+            math.hypot(r["half_interval"], (1.0 - r["retained"]) * base["half_interval"])
+            / base["debris_fraction"]
+            for r in here
+        ]
         axes.errorbar(height, kept, yerr=spread, fmt="o-", color=colour, capsize=2, label=contact)
     axes.axhline(LEAST, color="0.7", zorder=0)
     axes.set(xlabel="height of the structure [m]", ylabel="retained of what would reach the road")
-    axes.set(ylim=(0.0, 1.05))
+    axes.set(ylim=(-0.5, 1.1))
     axes.set_title("Retained against height", fontsize=10)
     axes.legend(loc="lower right")
 

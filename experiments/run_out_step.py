@@ -97,20 +97,30 @@ def excess(rows: list[Row]) -> float:
 
 
 def picture(figure: Figure, rows: list[Row]) -> None:
-    """Draw the mean run-outs against the step, a panel an area."""
+    """Draw how the mean run-outs differ from those of the shortest step, a panel an area."""
     areas = list(dict.fromkeys(r["area_m2"] for r in rows))
     for axes, area in zip(
         figure.subplots(1, len(areas), squeeze=False, sharey=True)[0], areas, strict=True
     ):
-        for e, colour in zip(RESTITUTIONS, COLOURS, strict=True):
+        axes.axhspan(-100.0 * MOST, 100.0 * MOST, color="0.92", zorder=0)
+        for apart, (e, colour) in enumerate(zip(RESTITUTIONS, COLOURS, strict=True)):
             own = [r for r in rows if r["area_m2"] == area and r["restitution"] == e]
-            dt, mean, half = (
-                np.array([r[k] for r in own]) for k in ("dt_s", "run_out_m", "half_interval_m")
+            if not own:
+                continue
+            dt, off, half = (
+                np.array([r[k] for r in own])
+                for k in ("dt_s", "difference_m", "difference_half_interval_m")
             )
-            axes.errorbar(1e3 * dt, mean, half, fmt="o-", color=colour, capsize=3, label=f"{e:g}")
+            share = 100.0 / own[0]["run_out_m"]
+            axes.errorbar(
+                1e3 * dt * 1.06**apart, share * off, share * half, fmt="o-", color=colour,
+                capsize=3, label=f"{e:g}",
+            )  # fmt: skip
         axes.set(xscale="log", xlabel="step [ms]", title=f"{area:g} m2")
-    figure.axes[0].set(ylabel="mean run-out from the toe [m]")
-    figure.axes[0].legend(title="restitution")
+        axes.set_xticks([1e3 * dt for dt in STEPS], [f"{1e3 * dt:g}" for dt in STEPS])
+        axes.set_xticks([], minor=True)
+    figure.axes[0].set(ylabel=f"mean run-out over that at {1e3 * STEPS[0]:g} ms [%]")
+    figure.axes[-1].legend(title="restitution", loc="upper left", fontsize=8)
 
 
 def run(quick: bool, out: Path) -> Number:

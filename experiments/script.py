@@ -19,6 +19,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from envs.intervals import quantile
 from experiments.made_by import KERNELS, kernels_hash, made_by
 from rigdda.files import atomic
 
@@ -164,7 +165,8 @@ def cpu_time(call: Callable[[], object], repeats: int = 5, least: float = 0.01) 
 
 
 def interval(values: Iterable[float]) -> tuple[float, float]:
-    """Return the mean of independent values and the half width of its 95 % interval."""
+    """Return the mean of independent values and half of its 95 % interval, Student's."""
     sample = np.array(list(values), dtype=np.float64)
-    half = 1.96 * sample.std(ddof=1) / math.sqrt(len(sample)) if len(sample) > 1 else math.nan
+    n = len(sample)
+    half = quantile(n - 1) * sample.std(ddof=1) / math.sqrt(n) if n > 1 else math.nan
     return float(sample.mean()), float(half)

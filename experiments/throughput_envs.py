@@ -77,6 +77,7 @@ def measure(
     ended, steps = play(env, episodes)
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
     env.close()
+    comparable = not processes and len(site.events) > 1  # before, an episode was one of a mass
     return {
         "environment": name,
         "copies": copies,
@@ -88,7 +89,7 @@ def measure(
         "episodes_per_second": round(ended / wall, 3),
         "steps_per_second": round(steps / wall, 3),
         "episodes_per_processor_second": None if processes else round(ended / busy, 3),
-        "times_before": None if processes else round(ended / busy / BEFORE[name], 2),
+        "times_before": round(ended / busy / BEFORE[name], 2) if comparable else None,
     }
 
 

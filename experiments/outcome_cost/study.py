@@ -134,7 +134,9 @@ def picture(figure: Figure, every: dict[str, dict[Setting, Sample]]) -> None:
             )
         axes.axhline(100.0 * JUDGED, color=GREY, lw=0.8, ls="--")
         axes.set(xscale="log", title=name, xlabel="processor time of a release [ms]")
-        axes.set_ylim(0.0, 40.0)
+        axes.set_yscale("symlog", linthresh=10.0, linscale=2.0)
+        axes.set_ylim(0.0, 2000.0)
+        axes.set_yticks([0, 2, 4, 6, 8, 10, 100, 1000], [0, 2, 4, 6, 8, 10, 100, 1000])
     for engine, colour in COLOURS.items():
         figure.axes[0].plot([], [], "o", color=colour, label=engine)
     figure.axes[0].set_ylabel("greatest bias of the three outcomes [%]")

@@ -52,7 +52,7 @@ def _panel(ax: Axes, points: Sequence[Point]) -> None:
         here = [(p.cpu_us_per_simulated_s, max(p.error, LEAST))
                 for p in points if p.engine == engine]  # fmt: skip
         if best := front(here, lambda p: p):
-            ax.plot(*zip(*best, strict=True), "-", color=colour, linewidth=1.2, label=engine)
+            ax.plot(*zip(*best, strict=True), ".-", color=colour, linewidth=1.2, label=engine)
     for p in points:
         if p.engine != "rigdda" or not math.isfinite(p.error):
             continue

@@ -41,11 +41,11 @@ def highway_rows(samples: Iterable[Sample], reference: Sample) -> list[dict[str,
 def total_error(sample: Sample, reference: Sample, releases: int) -> np.ndarray:
     """Return the root mean square error of the means of so many releases, (3,): bias and noise.
 
-    Of the bias, what goes beyond the noise with which it is known.
+    The noise with which the bias is known counts, too: what few releases tell is not better.
     """
     off, sure = bias(sample, reference)
-    certain = np.maximum(off**2 - (sure / 1.96) ** 2, 0.0)
-    return np.sqrt(certain + sample.outcomes.var(axis=0, ddof=1) / releases)
+    square = off**2 + (sure / 1.96) ** 2
+    return np.sqrt(square + sample.outcomes.var(axis=0, ddof=1) / releases)
 
 
 def highway_table(samples: Sequence[Sample], reference: Sample) -> str:

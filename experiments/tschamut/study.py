@@ -27,7 +27,7 @@ from agents import fit, fit_results, run_outs
 from agents.fit import Fit, Floats
 from agents.parameters import parse
 from agents.prediction import seen
-from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
+from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, interval, say, write
 from experiments.tschamut.platrock import PARAMETERS, PYTHON, PlatRock
 from rigdda import Site, release
 
@@ -73,6 +73,15 @@ BAR = 5.0
 def table(model: str, fitted: Fit, observed: dict[str, Floats], seconds: float) -> list[dict]:
     """Return the rows of `agents.fit_results.rows` with the model and its processor time [s]."""
     return [{"model": model, "cpu_s": seconds} | row for row in fit_results.rows(fitted, observed)]
+
+
+def behind(model: str, left_out: Floats, blocks: Floats, seconds: float) -> dict[str, Any]:
+    """Return the row of how far a model's scores of runs left out are above those of the blocks."""
+    mean, half = interval(left_out - blocks)
+    return {
+        "model": model, "cpu_s": seconds, "what": "score of a run over that of blocks",
+        "unit": "m", "low": mean - half, "high": mean + half, "left_out": mean,
+    }  # fmt: skip
 
 
 def cumulative(axes: Axes, values: Floats, colour: str, words: str, band: int = 0) -> None:
@@ -141,7 +150,11 @@ def run(quick: bool, out: Path) -> Number:
         start = time.process_time()
         parameters = [parse(name) for name in names]
         found[model] = fit.fit(site, observed, parameters, budget, releases, 0, tell(model), model)
-        rows += table(model, found[model], observed, time.process_time() - start)
+        seconds = time.process_time() - start
+        rows += table(model, found[model], observed, seconds)
+        if model != "blocks":
+            lost = found["blocks"].left_out
+            rows.append(behind(model, found[model].left_out, lost, seconds))
         predicted[model] = run_outs.run_outs(found[model].site, model, list(observed), seeds)
     if os.environ.get(PYTHON):
         try:
@@ -149,8 +162,10 @@ def run(quick: bool, out: Path) -> Number:
                 fitted = fit.search(
                     site, observed, PARAMETERS, peer.run_outs, budget, releases, 0, tell("PlatRock")
                 )
-                predicted["PlatRock"] = dict(peer.run_outs(fitted.best.values, seeds))
                 rows += table("PlatRock", fitted, observed, peer.cpu)
+                lost = found["blocks"].left_out
+                rows.append(behind("PlatRock", fitted.left_out, lost, peer.cpu))
+                predicted["PlatRock"] = dict(peer.run_outs(fitted.best.values, seeds))
                 found["PlatRock"] = fitted
         except RuntimeError as error:  # what was computed of the others is kept
             say(f"tschamut: {error}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 import pty
@@ -10,13 +11,14 @@ import re
 import struct
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
 from rerun.chunk import RrdReader
 
 import rigdda
-from agents import DESIGNERS
+from agents import DESIGNERS, cli
 from rigdda import Site
 from rigdda.barriers import to_tables
 
@@ -51,12 +53,14 @@ def run(*arguments: object, folder: Path) -> str:
 
 
 def refused(*arguments: object, folder: Path) -> str:
-    """Run to exit code 2; return the one line on standard error."""
-    process = rig(*arguments, folder=folder)
-    out, err = process.communicate(timeout=300)
-    assert process.returncode == 2, err
-    assert out == "" and err.count("\n") == 1 and "Traceback" not in err
-    return err
+    """Ask for what is refused, in this process; return the one line on standard error."""
+    out, err = io.StringIO(), io.StringIO()
+    with chdir(folder), redirect_stdout(out), redirect_stderr(err):
+        code = cli.main(list(map(str, arguments)))
+    assert (code, out.getvalue()) == (2, ""), err.getvalue()
+    line = err.getvalue()
+    assert line.count("\n") == 1 and line.endswith("\n") and "Traceback" not in line
+    return line
 
 
 def png_size(file: Path) -> tuple[int, int]:
@@ -165,6 +169,13 @@ def test_a_design_of_another_problem_is_left_alone(
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
+def test_a_refusal_is_the_exit_code_of_a_process(tmp_path: Path) -> None:
+    process = rig("design", "no-such-site", folder=tmp_path)
+    out, err = process.communicate(timeout=300)
+    assert (process.returncode, out) == (2, "")
+    assert err.count("\n") == 1 and "no-such-site" in err and "Traceback" not in err
+
+
 def test_a_folder_that_does_not_tell_its_problem_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "layout.toml").write_text("# mine\n")
     line = refused("design", "quick", *TINY, "--out", tmp_path, folder=tmp_path)
@@ -181,11 +192,12 @@ def test_kinds_zone_and_target_are_kept_to(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("designer", [name for name in DESIGNERS if name != "race"])
-def test_every_designer_can_be_chosen(designer: str, tmp_path: Path) -> None:
-    words = run("design", "quick", "--designer", designer, *TINY, folder=tmp_path)
+def test_every_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
+    tiny = ("--budget", 40, "--verify", 12)
+    words = run("design", toml, "--designer", designer, *tiny, folder=tmp_path)
     own = designer in ("rule", "constant")
     assert (designer if own else f"optimised ({designer})") in words
-    assert (tmp_path / "runs/design-quick/layout.toml").is_file()
+    assert list(tmp_path.glob("runs/design-*/layout.toml"))
 
 
 def test_simulate_writes_what_it_says(toml: Path, tmp_path: Path) -> None:

@@ -140,9 +140,11 @@ def test_a_wall_that_rocks_and_comes_back_stands():
         return wall.changes(times, np.array(poses), math.inf)
 
     here, tilted, away = (0.0, 0.0, 0.0), (0.18, 0.0, -0.1), (0.2, 0.0, 0.0)
+    leaning = (0.02, 0.0, -0.1)  # its top by 0.15 m
     over = (2.0, -1.0, -1.5)
     assert changes(here, tilted, tilted, here) == []
     assert changes(here, tilted, here, away) == [(3.0, "slid")]
+    assert changes(here, here, leaning, leaning) == [(2.0, "slid")]
     assert changes(here, away, away, away) == [(1.0, "slid")]
     assert changes(here, away, over, over) == [(1.0, "slid"), (2.0, "overturned")]
     assert changes(here, over, over, over) == [(1.0, "overturned")]

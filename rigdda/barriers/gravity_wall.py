@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from rigdda.model.site import Site
 
 SLID = 0.1
-"""Displacement beyond which a gravity wall has slid [m]: what its contacts give under load is a
-hundredth of it."""
+"""Displacement of a corner beyond which a gravity wall has slid [m]: what its contacts give under
+load is a hundredth of it."""
 
 
 class GravityWall(Standing, frozen=True, tag="gravity_wall"):
@@ -94,10 +94,16 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     def changes(self, times: Floats, poses: Floats, failure: float) -> list[tuple[float, str]]:
         """Return when it "slid" for good and when it "overturned", after which it slides no more.
 
-        One that rocks and comes back to its place has not slid.
+        One that rocks and comes back to its place has not slid; one that is left leaning has.
         """
         x, y, theta = (poses - poses[0]).T
-        here = np.flatnonzero(np.hypot(x, y) <= SLID)
+        cos, sin = np.cos(theta) - 1.0, np.sin(theta)
+        moved = [
+            np.hypot(x + cos * rx - sin * ry, y + sin * rx + cos * ry)
+            for rx in (-0.5 * self.thickness, 0.5 * self.thickness)
+            for ry in (-0.5 * self.height, 0.5 * self.height)
+        ]
+        here = np.flatnonzero(np.max(moved, axis=0) <= SLID)
         over = np.flatnonzero(abs(theta) > math.atan2(self.thickness, self.height))
         slid = float(times[here[-1] + 1]) if here[-1] + 1 < len(times) else math.inf
         turned = float(times[over[0]]) if len(over) else math.inf

@@ -43,9 +43,9 @@ class BarrierOutcome:
     caught : float
         Share of the released mass at rest at the end that it holds, or that is in the ditch.
     state : {"stands", "failed", "slid", "overturned", "pushed"}
-        At the end. A fence failed, a gravity wall has slid if it is more than 0.1 m away from its
-        place, and is overturned if it was turned beyond the angle of its diagonal; an embankment
-        was pushed away.
+        At the end. A fence failed, a gravity wall has slid if a corner is more than 0.1 m away from
+        its place, and is overturned if it was turned beyond the angle of its diagonal; an
+        embankment was pushed away.
     displacement : float
         Distance of its centroid at the end from where it was at the start [m].
     road_area : float

@@ -102,7 +102,8 @@ def picture(figure: Figure, rows: list[Row]) -> None:
         axes.axhline(1.0, color="0.8", zorder=0)
         axes.set(title=f"mass of {name}", xlabel="height [m]", yscale="log")
         axes.set_ylabel("greatest thrust over resistance [-]")
-        axes.legend(title="filled: fails in every release")
+        words = "filled: fails in every release\nsquares: 2.5 ms; at 0.01: failed by a blow"
+        axes.legend(title=words, fontsize=8, title_fontsize=8)
 
 
 def run(quick: bool, out: Path) -> Number:

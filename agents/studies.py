@@ -22,7 +22,8 @@ from agents.store import mechanics
 from agents.study_file import Study
 from agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from agents.wording import euros, span, standing
-from envs.estimator import Account, learn, stratified
+from envs.accounts import Account, learn
+from envs.estimator import stratified
 from envs.evaluation import Facts
 from rigdda import BadInput, Outcome, Site
 

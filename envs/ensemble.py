@@ -19,7 +19,8 @@ import numpy as np
 
 import rigdda
 from envs import reuse
-from envs.estimator import account, judge, learn
+from envs.accounts import account, learn
+from envs.estimator import judge
 from envs.evaluation import Evaluation, Facts
 from envs.memory import Memory
 from envs.samples import Sample
@@ -154,7 +155,10 @@ def _shared(shares: Mapping[str, float], releases: int) -> dict[str, int]:
 @lru_cache(maxsize=1)
 def _sources() -> str:
     """Return a hash of all that decides what is kept: the mechanics and the estimator."""
-    own = [Path(__file__).parent / f"{n}.py" for n in ("ensemble", "estimator", "intervals")]
+    own = [
+        Path(__file__).parent / f"{n}.py"
+        for n in ("accounts", "ensemble", "estimator", "intervals")
+    ]
     digest = hashlib.sha256()
     for path in [*sorted(Path(rigdda.__file__).parent.rglob("*.py")), *own]:
         digest.update(path.read_bytes())

@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 
-from agents import fit, prediction
+from agents import fit, fit_trials, prediction
 from agents.cli import main
 from agents.parameters import Parameter, check_parameters, parse, with_values
 from agents.prediction import scores
@@ -109,7 +109,7 @@ def test_every_seed_may_be_given() -> None:
             places += place.tolist()
             return float(np.square(place - 0.3).sum())
 
-        fit.explore(score, 2, 24, 2**32 - 1)
+        fit_trials.explore(score, 2, 24, 2**32 - 1)
         seen.append(places)
     assert seen[0] == seen[1] and len(seen[0]) == 44
 

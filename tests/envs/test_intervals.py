@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from envs import estimator, intervals
-from envs.estimator import Account
+from envs.accounts import Account
 from envs.evaluation import Facts
 from envs.intervals import Known, Mean, cost, estimate, mid_p, pair, student_interval, total
 

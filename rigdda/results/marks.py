@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rigdda import check
+from rigdda.barriers import describe
 from rigdda.errors import BadInput
+from rigdda.model.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,3 +44,17 @@ class Marks:
         uphill, downhill = check.interval("road", self.road)
         if uphill == downhill:
             raise BadInput("road", self.road, "give its uphill edge, then its downhill edge")
+
+    def labels_of(self, scene: Scene) -> Sequence[str]:
+        """Return what each barrier of a scene is called.
+
+        Raises
+        ------
+        BadInput
+            If there are labels, but not one for each barrier.
+        """
+        count = len(scene.barriers)
+        if self.labels and len(self.labels) != count:
+            mend = f"give one for each of {count} barriers, or none"
+            raise BadInput("labels", self.labels, mend)
+        return self.labels or [describe(barrier) for barrier in scene.barriers]

@@ -17,9 +17,7 @@ import rerun.blueprint as rrb
 import shapely
 from numpy.typing import NDArray
 
-from rigdda.barriers import describe
 from rigdda.dynamics.run import Run
-from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
 from rigdda.results.blueprint import PLACEMENT, TIMELINE, run_blueprint
@@ -97,9 +95,7 @@ def log_run(
     BadInput
         If there are labels, but not one for each barrier.
     """
-    if marks.labels and len(marks.labels) != len(run.scene.barriers):
-        mend = f"give one for each of {len(run.scene.barriers)} barriers, or none"
-        raise BadInput("labels", marks.labels, mend)
+    labels = marks.labels_of(run.scene)
 
     def clock(times: Sequence[float] | Floats) -> list[rr.TimeColumn]:
         columns = [rr.TimeColumn(TIMELINE, duration=times)]
@@ -108,7 +104,6 @@ def log_run(
         return columns
 
     _log_setting(rec, f"{root}/world", run, marks)
-    labels = marks.labels or [describe(barrier) for barrier in run.scene.barriers]
     for i, label in enumerate(labels):
         _log_barrier(rec, f"{root}/world/barriers/{i}", clock, run, i)
         _log_state(rec, f"{root}/world/labels/{i}", clock, run, i, label)

@@ -44,6 +44,9 @@ FITTED, PREDICTED = (10.9, 0.9), (9.4, 0.8)
 BAR, QUICK_BAR = 0.05, 0.09
 """Greatest distance of the prediction [-]; by 300 releases it scatters by 0.03."""
 
+NEAR = 0.05
+"""Part of a width within which the growth of the share is measured [-]."""
+
 RELEASES, QUICK_RELEASES = 1500, 300
 """Releases of each fit."""
 
@@ -101,6 +104,13 @@ def within(found: Floats, width: float) -> float:
     return float((found <= width).mean())
 
 
+def steepness(found: Floats, width: float) -> float:
+    """Return how fast the retained share grows with the logarithm of the width [-]."""
+    return (within(found, (1.0 + NEAR) * width) - within(found, (1.0 - NEAR) * width)) / (
+        2.0 * NEAR
+    )
+
+
 def fitted(site: Site, variant: Variant, releases: int) -> float | None:
     """Return the value with which the width to fit to retains its share; None: none does."""
     width, share = FITTED
@@ -119,8 +129,12 @@ def row(
 ) -> dict[str, Any]:
     """Return the row of a face and a variant that was fitted to so many releases."""
     share = within(found, PREDICTED[0]) if value is not None else math.nan
-    fit = FITTED[1] * (1.0 - FITTED[1]) / releases  # as wrong as the share that was fitted
-    half = 1.96 * math.sqrt(share * (1.0 - share) / max(len(found), 1) + fit)
+    half = math.nan
+    if len(found):
+        # a number that is fitted wrongly scales all widths: so does what it makes of the share
+        carried = steepness(found, PREDICTED[0]) / steepness(found, FITTED[0])
+        fit = carried**2 * FITTED[1] * (1.0 - FITTED[1]) / releases
+        half = 1.96 * math.sqrt(share * (1.0 - share) / len(found) + fit)
     ends = np.quantile(found, (0.5, 0.8, 0.95)) if len(found) else [math.nan] * 3
     return {
         "model": VARIANTS[name].model,

@@ -7,9 +7,9 @@ least in expectation for the distribution that the observed run-outs came from.
 
 About half of the budget, a power of two, is spread over the box of parameters (Sobol), the rest
 follows CMA-ES from the best of them; all releases have the same seeds. The best ones are computed
-again on fresh seeds, to choose without luck. Intervals choose among all that were computed, by
-resampled observed runs. The cross-validation chooses among those that were spread: what follows was
-placed by all observed runs, those that are left out among them.
+again on fresh seeds, to choose without luck. Intervals and the cross-validation choose among all
+that were computed, by resampled or left-out observed runs. CMA-ES was led by all runs, so that the
+validation is a little too good; what it chooses is computed again on fresh seeds, too.
 """
 
 from __future__ import annotations
@@ -139,14 +139,14 @@ def search(
         tick(len(trials.tried), f"best score {min(map(np.mean, trials.table)):.2f} m")
         return score
 
-    spread = explore(add, len(parameters), budget, seed)
+    explore(add, len(parameters), budget, seed)
     fresh = range(seed + releases, seed + (1 + MORE) * releases)
     again = [trials.compute(candidate.values, fresh) for candidate in trials.best(FINALISTS)]
     winner, each = min(again, key=lambda pair: float(pair[1].mean()))
     tried, table = trials.tried, np.array(trials.table)
     low, high = _intervals(table, np.array([c.values for c in tried]), seed)
     whole = [winner.run_outs[event] for event in observed for _ in observed[event]]
-    left, left_out = _validate(trials, spread, observed, seed, fresh)
+    left, left_out = _validate(trials, observed, seed, fresh)
     return Fit(
         site,
         tuple(parameters),
@@ -169,14 +169,14 @@ def _intervals(table: Floats, values: Floats, seed: int) -> tuple[Floats, Floats
 
 
 def _validate(
-    trials: Trials, spread: int, observed: Mapping[str, Floats], seed: int, fresh: range
+    trials: Trials, observed: Mapping[str, Floats], seed: int, fresh: range
 ) -> tuple[list[Floats], Floats]:
     """Return the run-outs that predict each observed run, left out of the fit, and its score.
 
-    Of the sets of values that were spread, what fits the others best, computed on fresh seeds.
+    By the set of values that fits the others best, computed on fresh seeds.
     """
     events = [event for event in observed for _ in observed[event]]
-    table = np.array(trials.table[:spread])
+    table = np.array(trials.table)
     count = table.shape[1]
     parts = np.random.default_rng([seed, 2]).permutation(count) % min(FOLDS, count)
     predicted: list[Floats] = [np.zeros(0)] * count

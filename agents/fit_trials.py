@@ -73,11 +73,10 @@ class Trials:
         return [self.tried[i] for i in order]
 
 
-def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed: int) -> int:
+def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed: int) -> None:
     """Score places of the unit cube, (dimensions,): spread over it, then about the best of them.
 
     `score` takes a place and returns what is to be least; places come by Sobol, then by CMA-ES.
-    Returns how many were spread.
     """
     spread = 1 << max(2, round(math.log2(budget / 2)))
     places = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(spread)
@@ -90,4 +89,3 @@ def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed
         asked = evolution.ask()
         evolution.tell(asked, [score(np.asarray(place)) for place in asked])
         done += len(asked)
-    return spread

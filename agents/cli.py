@@ -191,9 +191,10 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
         run, outcome = rigdda.release(where, barriers, seed, event)
     came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
     notes = {"event": outcome.event, "seed": str(seed), "comes onto the road": came}
+    if words := doubts.of_layout(where, barriers, event):
+        notes["doubt"] = words
     road, labels = (where.road.start, where.road.end), tuple(map(short, standing(barriers)))
     run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels))
-    note(doubts.of_layout(where, barriers, event))
     click.echo(folder / "episode.rrd")
 
 

@@ -53,7 +53,7 @@ What `--layout` and the `barriers` of a study take: a table `[[barriers]]` for e
 (or a list `barriers` in JSON), with its `kind` (without one
 it is a wall) and the keys below. `rigdda design` writes one,
 `layout.toml`. A layout that may not be built is computed as it is given, and `simulate`, `study`
-and `replay` say so.
+and the notes of a replay say so.
 
 ```toml
 [[barriers]]

@@ -60,13 +60,14 @@ def test_blocks_have_the_area_asked_for():
 
 
 def test_error_of_a_mean_is_bias_and_noise():
-    reference = sample(1.0, 0.1, 400)
-    assert total_error(sample(1.0, 0.1, 400), reference, 100) == pytest.approx(0.01, rel=1e-6)
+    reference, unknown = sample(1.0, 0.1, 400), 2.0 * 0.1**2 / 400.0
+    least = math.sqrt(unknown + 0.01**2)
+    assert total_error(sample(1.0, 0.1, 400), reference, 100) == pytest.approx(least, rel=1e-6)
     off, sure = bias(sample(1.3, 0.1, 400), reference)
     assert off == pytest.approx(0.3)
     assert sure == pytest.approx(1.96 * 0.1 * math.sqrt(2.0 / 400.0))
-    certain = math.sqrt(0.3**2 - 2.0 * 0.1**2 / 400.0 + 0.01**2)
-    assert total_error(sample(1.3, 0.1, 400), reference, 100) == pytest.approx(certain)
+    both = math.sqrt(0.3**2 + unknown + 0.01**2)
+    assert total_error(sample(1.3, 0.1, 400), reference, 100) == pytest.approx(both)
 
 
 def test_the_number_is_the_bias_over_the_interval_of_100_releases():

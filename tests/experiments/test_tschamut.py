@@ -55,7 +55,7 @@ def test_platrock_is_asked_in_its_own_process_and_its_end_is_told(tmp_path, monk
 def test_blocks_predict_runs_that_were_left_out_and_points_do_not():
     rows = list(csv.DictReader((RECORDED / "tschamut.csv").read_text().splitlines()))
     left = {(r["model"], r["what"]): float(r["left_out"]) for r in rows if r["left_out"]}
-    seen = {r["what"]: float(r["observed"]) for r in rows if r["left_out"]}
+    seen = {r["what"]: float(r["observed"]) for r in rows if r["observed"]}
     for what, bar in (("mean run-out", 5.0), ("50% of run-outs", 8.0), ("95% of run-outs", 8.0),
                       ("mean run-out, block 4", 8.0), ("stops on the slope", 0.1)):  # fmt: skip
         assert left["blocks", what] == pytest.approx(seen[what], abs=bar)

@@ -19,7 +19,8 @@ OPTIONS = (
     {"substeps": 1, "hertz": 120.0},
     {"substeps": 8, "hertz": 240.0},
 )
-"""What is swept beside the step; 4 sub-steps and 30 Hz are the defaults."""
+"""What is swept beside the step; 4 sub-steps and 30 Hz are the defaults. Rockfalls take the first
+three: to 5 cm one sub-step costs 1.2 to 1.4 times as much, eight 1.3 to 1.8 times."""
 
 FASTEST = 1000.0
 """Speed beyond which Box2D brakes bodies [m/s], above any rockfall."""

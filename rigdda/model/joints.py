@@ -195,8 +195,9 @@ def _join(
         shapes = shapely.snap(shapes, cell, 1e-7 * cell.length)
     common = shapely.intersection(cell, shapes)
     edges = shapely.length(common).round(9)
-    if bridges is not None:
-        edges[edges > 0.0] *= bridges.across(common[edges > 0.0])
+    shared = edges > 0.0
+    if bridges is not None and shared.any():
+        edges[shared] *= bridges.across(common[shared])
     for place in np.argsort(-edges, kind="stable"):
         if edges[place] == 0.0:
             return

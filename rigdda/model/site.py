@@ -228,8 +228,8 @@ def _placed(bad: BadInput, told: str, text: str) -> BadInput:
     path = told.rpartition(" - at `$.")[2].rstrip("`")
     if not bad.field.isidentifier() or not path or " " in path:
         return bad
-    head, _, tail = path.partition("[...]")
-    if tail or path != head:
+    head = path.partition("[...]")[0]
+    if head != path:
         kind = {"surfaces": Surface, "lumped": Rebound}.get(head)
         tables = tomllib.loads(text)[head] if kind is not None else {}
         head = next((f"{head}.{name}" for name in tables if _is_bad(tables[name], kind)), head)

@@ -121,6 +121,8 @@ class Ledger:
     ----------
     starts : set of Layout
         Layouts that the designer begins with.
+    known : tuple of Layout
+        Layouts that need no search: whatever it finds must beat them in the final.
     """
 
     def __init__(
@@ -138,6 +140,7 @@ class Ledger:
         self.seed = check.integer("seed", seed, 0, limits.SEED)
         self.used = 0
         self.starts: set[Layout] = {()}
+        self.known: tuple[Layout, ...] = ()
         self.entries: list[Entry] = []
         self._progress = progress
         self._store = store or Store()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -31,25 +31,40 @@ def read(path: Path, site: Site) -> dict[str, Floats]:
     if not path.is_file():
         raise BadInput("observed", str(path), "name a CSV file with event and run_out_m")
     found: dict[str, list[float]] = {}
-    table = csv.DictReader(io.StringIO(read_text("observed", path), newline=""))
-    names = table.fieldnames or ()
-    if "run_out_m" not in names or ("event" not in names and len(site.events) > 1):
-        mend = "head its columns event and run_out_m"
-        raise BadInput("observed", ", ".join(names), mend)
-    for i, row in enumerate(table):
-        event = row.get("event") or site.events[0].name
-        site.index(event)
-        found.setdefault(event, []).append(_run_out(i + 1, row["run_out_m"], site))
+    only = site.event_names[0] if len(site.events) == 1 else ""
+    for field, row in _rows(path, only):
+        event = row.get("event") or only
+        if event not in site.event_names:
+            raise BadInput(f"{field} event", event, "choose " + " or ".join(site.event_names))
+        found.setdefault(event, []).append(_run_out(f"{field} run_out_m", row["run_out_m"], site))
     if sum(map(len, found.values())) < 3:
         raise BadInput("observed", str(path), "give three observed runs or more")
     return {event: np.array(values) for event, values in found.items()}
 
 
-def _run_out(number: int, text: str | None, site: Site) -> float:
-    """Return the run-out of a row of observations [m]."""
-    field = f"observed row {number} run_out_m"
+def _rows(path: Path, only: str) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield what to call each row of a table, and its cells; `only` is the only event, if so."""
+    table = csv.reader(io.StringIO(read_text("observed", path), newline=""))
     try:
-        value = float(text or "")
+        names, *rows = [row for row in table if any(row)] or [[]]
+    except csv.Error as error:
+        raise BadInput("observed", str(path), f"mend its line {table.line_num}: {error}") from None
+    if "run_out_m" not in names or not ("event" in names or only):
+        mend = "head its columns event and run_out_m"
+        raise BadInput("observed", ", ".join(names), mend)
+    if len(set(names)) < len(names):
+        raise BadInput("observed", ", ".join(names), "head each column with a name of its own")
+    for i, row in enumerate(rows):
+        if len(row) != len(names):
+            mend = f"give {len(names)} cells, one a heading; a number has a decimal point"
+            raise BadInput(f"observed row {i + 1}", ",".join(row), mend)
+        yield f"observed row {i + 1}", dict(zip(names, row, strict=True))
+
+
+def _run_out(field: str, text: str, site: Site) -> float:
+    """Return the run-out of a row of observations [m]."""
+    try:
+        value = float(text if "_" not in text else "")  # Python takes 4_0 for 40
     except ValueError:
         raise BadInput(field, text, "give a number") from None
     check.number(field, value, site.slope.points[0][0], site.slope.points[-1][0])

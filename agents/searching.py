@@ -99,7 +99,8 @@ def search(
 def finish(ledger: Ledger, plan: Plan, choose: Choose = best) -> DesignResult:
     """Evaluate the best of a search on other releases, choose one, report it on yet others.
 
-    No barrier at all is among the finalists, so that the choice is not worse.
+    No barrier at all and what needs no search, `Ledger.known`, are among the finalists, so that the
+    choice is not worse: of a few releases in the search the luckiest layouts come out best.
 
     Raises
     ------
@@ -113,9 +114,8 @@ def finish(ledger: Ledger, plan: Plan, choose: Choose = best) -> DesignResult:
         n = plan.semifinal_releases
         left = [ledger.evaluate(e.layout, "semifinal", n) for e in chosen]
     if plan.finalists > 0:
-        layouts = [e.layout for e in choose(problem, left, plan.finalists)]
-        if () not in layouts:
-            layouts = [*layouts[: plan.finalists - 1], ()]
+        layouts = [(), *ledger.known, *(e.layout for e in choose(problem, left, plan.finalists))]
+        layouts = list(dict.fromkeys(layouts))[: plan.finalists]
         left = [ledger.evaluate(layout, "final", plan.final_releases) for layout in layouts]
         winner = min(left, key=lambda e: final_score(problem, e))
     else:

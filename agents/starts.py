@@ -25,6 +25,7 @@ def starts(ledger: Ledger) -> list[Layout]:
     """Return the different layouts that an ensemble suggests, the most promising first."""
     menu = Menu(ledger.problem)
     ensemble = ensemble_for(ledger, menu.stations)
+    ledger.known = tuple(unsearched(ledger.problem, ensemble, menu))
     optima = [choice.layout for choice in convex.optima(ledger.problem, ensemble, menu)]
     found = list(dict.fromkeys([*optima, *known(ledger.problem, ensemble, menu), ()]))
     ledger.starts |= set(found)

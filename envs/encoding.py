@@ -77,7 +77,10 @@ def vector(field: str, value: ArrayLike, size: int) -> Floats:
         If the shape is wrong or an entry is not a number; the message names `field`.
     """
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = np.asarray(value)
+        if np.iscomplexobj(array):
+            raise TypeError
+        array = array.astype(np.float64)
     except (TypeError, ValueError):
         raise BadInput(field, value, f"give {size} numbers from -1 to 1") from None
     if array.shape != (size,):

@@ -120,7 +120,8 @@ def _remember(fresh: Mapping[Key, Outcome], jobs: Mapping[Key, Job]) -> None:
     bare, stood = {}, {}
     for key, outcome in fresh.items():
         site = jobs[key][0]
-        if untouched.misses(site, key.site, key.layout, outcome):
+        struck = any(barrier.hits for barrier in outcome.barriers)  # of a moved wall elsewhere
+        if not struck and untouched.misses(site, key.site, key.layout, outcome):
             lies = outcome.slope_fraction + outcome.held_fraction
             alone = replace(outcome, barriers=(), held_fraction=0.0, slope_fraction=lies)
             bare[key._replace(layout=())] = alone
@@ -149,5 +150,9 @@ def _of_class(fence: Fence, before: Outcome) -> Outcome | None:
     if took.absorbed_energy > own.capacity or took.thrust > own.bears:
         return None
     left = own.left_height(took.absorbed_energy)
+    if left < took.left_height and before.held_fraction > 0.0:
+        return None  # so low it may not hold what lies there
+    if left > took.left_height and before.slope_fraction > 0.0:
+        return None  # so high it may
     mine = replace(took, resistance=own.bears, left_height=left)
     return replace(before, barriers=(mine,))

@@ -28,8 +28,9 @@ from rigdda.model.place import BarrierZone
 Floats = NDArray[np.float64]
 
 STEEPEST = {"ditch": 30.0, "embankment": 25.0, "gravity_wall": 30.0, "wall": 30.0}
-"""Greatest mean inclination of the ground under a barrier [deg]. On steeper ground fill slides,
-and what is dug or founded there starts a fall itself. Fences stand on posts, anywhere."""
+"""Greatest mean inclination of the ground under a barrier [deg], of a gravity wall of all of it. On
+steeper ground fill slides, and what is dug or founded there starts a fall itself. Fences stand on
+posts, anywhere."""
 
 MACHINE = 3.0
 """Width of a machine that builds, empties and mends what is dug, filled or cast [m]: so much ground
@@ -169,9 +170,11 @@ class Rules:
         self._check_place(where, barrier, start, end)
         steepest = STEEPEST.get(barrier.kind)
         if steepest is not None:
-            angle = self.inclination(start, end)
-            if angle > steepest + TOLERANCE:
-                mend = f"put it where the ground is at most {steepest:g} deg steep, not {angle:.1f}"
+            angle, most = self.inclination(start, end), steepest
+            if isinstance(barrier, GravityWall):
+                angle, most = self.foundation(start, end)
+            if angle > most + TOLERANCE:
+                mend = f"put it where the ground is at most {most:g} deg steep, not {angle:.1f}"
                 raise BadInput(f"{where}.x", barrier.x, mend)
             beside = float(self.beside(np.array([start]), np.array([end]), steepest)[0])
             if beside < MACHINE - TOLERANCE:
@@ -225,3 +228,16 @@ class Rules:
         """Return the mean inclination of the ground between two chainages [deg]."""
         high, low = self.level(np.array([start, end])).tolist()
         return math.degrees(math.atan2(abs(high - low), end - start))
+
+    def foundation(self, start: float, end: float) -> tuple[float, float]:
+        """Return the steepest ground under a gravity wall, and what it may be at most [deg].
+
+        A wall of which a corner stands on ground that is steeper than its friction angle slides
+        before any rock comes.
+        """
+        under = np.flatnonzero((self._x[:-1] < end) & (start < self._x[1:]))
+        rise, run = np.abs(np.diff(self._y))[under], np.diff(self._x)[under]
+        names = {self.site.profile.surfaces[k] for k in under}
+        friction = min(self.site.surfaces[name].friction_deg for name in names)
+        steepest = math.degrees(math.atan2(*max(zip(rise, run, strict=True), key=lambda s: s[0] / s[1])))
+        return steepest, min(STEEPEST["gravity_wall"], friction)

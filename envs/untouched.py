@@ -15,9 +15,10 @@ import numpy as np
 from envs.memory import Memory
 from rigdda import BarrierOutcome, Ditch, Embankment, Fence, GravityWall, Outcome, Site
 from rigdda.barriers import Built, Earthwork, earthworks
+from rigdda.model.settings import EARTH
 
 MARGIN = 0.1
-"""Distance from a barrier beyond which blocks are sure not to touch it [m]."""
+"""Distance from a barrier beyond which blocks are sure not to touch it, at ends of steps [m]."""
 
 LARGEST = 1.5
 """Upper bound of the radius of a block over the root of its area [-]."""
@@ -64,9 +65,22 @@ def misses(site: Site, key: bytes, layout: tuple[Built, ...], outcome: Outcome) 
     outcome : Outcome
         Of the release, with or without the layout.
     """
+    if not layout:
+        return True
     low, high = outcome.reach
-    stands = _standing(site, key, layout) if layout else ()
-    return all(high < b.start - MARGIN or low > b.end + MARGIN for b in stands)
+    low, high = low - _margin(site), high + _margin(site)
+    return all(high < b.start or low > b.end for b in _standing(site, key, layout))
+
+
+def _margin(site: Site) -> float:
+    """Return how far from a barrier the reach of blocks ends that are sure not to touch it [m].
+
+    Reach is taken at the ends of steps. A block that falls from the top of the slope may come so
+    much nearer within a step, and go back: half of what a corner moves that has all of its energy,
+    twice the speed of a fall.
+    """
+    drop = float(np.ptp(site.profile.points[:, 1]))
+    return MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop)
 
 
 def outcome(site: Site, key: bytes, layout: tuple[Built, ...], without: Outcome) -> Outcome | None:

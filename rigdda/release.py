@@ -111,6 +111,7 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     for place, (site, layout, _, _) in enumerate(each):
         groups.setdefault((id(site), layout), []).append(place)
     queue = iter([place for group in groups.values() for place in group])
+    threads = max(1, min(threads, len(each)))
     with ThreadPoolExecutor(threads) as pool:
         parts = list(pool.map(lambda _: outcomes(each, queue), range(threads)))
     found = sorted((pair for part in parts for pair in part), key=lambda pair: pair[0])

@@ -121,7 +121,9 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         if self.energy_class not in tuple(FENCE_CLASSES):
             known = ", ".join(str(name) for name in FENCE_CLASSES)
             raise BadInput("fence energy_class", self.energy_class, f"give one of {known} kJ")
-        found = FENCE_CLASSES[self.energy_class]
+        energy_class = int(self.energy_class)
+        msgspec.structs.force_setattr(self, "energy_class", energy_class)  # 1000.0 is in it, too
+        found = FENCE_CLASSES[energy_class]
         if self.height > found.height:
             mend = f"give at most {found.height:g} m, or a higher class than {self.energy_class} kJ"
             raise BadInput("fence height", self.height, mend)

@@ -31,7 +31,7 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
         raise BadInput("layout", str(path), "name an existing TOML or JSON file")
     decode = msgspec.json.decode if file.suffix == ".json" else msgspec.toml.decode
     try:
-        tables = decode(read("layout", file), type=_LayoutFile).barriers
+        tables = decode(read("layout", file), type=_LayoutFile).barriers  # an empty file is none
         return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))
     except msgspec.ValidationError as error:
         raise BadInput("layout", str(path), str(error)) from None
@@ -50,4 +50,4 @@ def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None
 
 
 class _LayoutFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    barriers: tuple[dict[str, Any], ...] = ()
+    barriers: tuple[dict[str, Any], ...]

@@ -165,10 +165,15 @@ class Simulation:
 
         Raises
         ------
+        BadInput
+            If `n` is no whole number from 0 to 1e9.
         Diverged
             If a block's velocity is no longer finite or beyond any rockfall.
         """
-        self.loop.advance(check.integer("n", n, 0), self._no_frames)
+        left = check.integer("n", n, 0, int(MOST_STEPS))
+        while left > 0:
+            self.loop.advance(min(left, PIECE), self._no_frames)
+            left -= PIECE
 
     def run(self, duration: float, every: float = 0.05, progress: bool = False) -> Run:
         """Simulate `duration` seconds and record a frame `every` so often, the start included.

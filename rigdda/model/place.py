@@ -7,6 +7,9 @@ import msgspec
 from rigdda import check
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
 
+DURATION = (1.0, 3600.0)
+"""Least and greatest `motion.duration` [s]: in less nothing has begun to fall."""
+
 
 class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The road.
@@ -101,7 +104,7 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         check.number("motion.damping", self.damping, 0.0, 100.0)
         check.one_of("motion.damping_when", self.damping_when, ("always", "contact"))
-        check.number("motion.duration", self.duration, 0.0, open_low=True)
+        check.number("motion.duration", self.duration, *DURATION)
         check.number("motion.dt", self.dt, SHORTEST_DT, LARGEST_DT)
 
 

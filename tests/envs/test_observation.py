@@ -97,7 +97,7 @@ def test_envelopes_are_simulated_once_and_on_seeds_that_are_not_scored(
 
 def test_no_block_passes_means_zero() -> None:
     short = msgspec.structs.replace(
-        CUT, name="short", motion=msgspec.structs.replace(CUT.motion, duration=0.02)
+        CUT, name="short", motion=msgspec.structs.replace(CUT.motion, duration=1.0)
     )
     found = envelope(short)
     assert not found.often[1].any() and not found.energy[1].any()

@@ -35,7 +35,8 @@ def claim(folder: Path, problem: DesignProblem, *files: str) -> None:
     """
     file, asked = folder / FILE, posed(problem)
     if file.exists():
-        other = _differ(_read(file), asked)
+        known = _read(file)
+        other = _differ(known, asked) if known else f"{FILE}, which is damaged"
     else:
         found = [name for name in files if (folder / name).exists()]
         other = f"{found[0]} of a problem that it does not tell" if found else ""

@@ -5,6 +5,7 @@ Start-up imports click only; a command imports what it needs.
 
 from __future__ import annotations
 
+import errno
 import io
 import sys
 import warnings
@@ -16,7 +17,7 @@ import click
 from agents.commands import evaluate, fit, study, train, validate
 from agents.designing import design
 from agents.options import count_option, layout_option, out_option, read_layout, seed_option
-from agents.terminal import Stopped, fail, folder_for, kept, note, progress, show, warn
+from agents.terminal import Stopped, fail, folder_for, kept, note, once, progress, show
 
 BAD_PATH = (
     FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError, PermissionError,
@@ -34,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # names may have letters that the locale lacks
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = warn
+            warnings.showwarning = once()
             return cli.main(argv, prog_name="rigdda", standalone_mode=False) or 0
     except click.Abort:
         return fail("interrupted", 130)
@@ -43,7 +44,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Stopped as stop:
         return fail(str(stop), stop.code)
     except OSError as error:
-        return fail(str(error), 2 if isinstance(error, BAD_PATH) else 1)
+        bad = isinstance(error, BAD_PATH) or error.errno == errno.ENAMETOOLONG
+        return fail(str(error), 2 if bad else 1)
     except Exception as error:
         from rigdda import BadInput, Error
 

@@ -18,11 +18,23 @@ layout_option = click.option(
 )
 
 
+class Folder(click.Path):
+    """A folder, whose name is not empty: an unset variable of the shell would give this one."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, context: click.Context | None
+    ) -> Any:
+        """Return the path."""
+        if value == "":
+            self.fail("name a folder", param, context)
+        return super().convert(value, param, context)
+
+
 def out_option(default: str) -> Callable[..., Any]:
     """Return the option --out, into runs/ by default."""
     return click.option(
         "--out",
-        type=click.Path(file_okay=False, path_type=Path),
+        type=Folder(file_okay=False, path_type=Path),
         help=f"Folder to write into.  [default: runs/{default}]",
     )
 

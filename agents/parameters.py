@@ -13,13 +13,14 @@ from rigdda import BadInput, Site
 from rigdda.model.place import Rebound
 
 RANGES = {
+    "scatter.friction_deg": (0.0, 10.0),
     "friction_deg": (15.0, 65.0),
     "restitution": (0.0, 0.8),
     "damping": (0.0, 2.0),
     "normal": (0.0, 0.8),
     "tangential": (0.4, 1.0),
 }
-"""Where to look for a field that comes without limits."""
+"""Where to look for a field, or for a path, that comes without limits."""
 
 
 class Parameter(NamedTuple):
@@ -38,9 +39,9 @@ def parse(text: str) -> Parameter:
     BadInput
         If it is written otherwise, or has no limits and no usual ones.
     """
-    path, _, limits = text.partition("=")
-    if not limits:
-        usual = RANGES.get(path.rpartition(".")[2])
+    path, given, limits = text.partition("=")
+    if not given:
+        usual = RANGES.get(path, RANGES.get(path.rpartition(".")[2]))
         if usual is None:
             raise BadInput("--parameters", text, f"give limits: {path}=LOW:HIGH")
         return Parameter(path, *usual)
@@ -100,6 +101,9 @@ def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[fl
     try:
         return msgspec.convert(tables, Site)
     except msgspec.ValidationError as error:
-        if isinstance(error.__cause__, BadInput):
-            raise error.__cause__ from None
-        raise BadInput("--parameters", parameters[0].path, str(error)) from None
+        bad = error.__cause__
+        if not isinstance(bad, BadInput):
+            raise BadInput("--parameters", parameters[0].path, str(error)) from None
+        given = [p.path for p, value in zip(parameters, values, strict=True) if value == bad.value]
+        where = next((name for name in given if name.endswith(f".{bad.field}")), bad.field)
+        raise BadInput(where, bad.value, bad.mend) from None

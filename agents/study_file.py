@@ -14,6 +14,7 @@ from agents import limits
 from rigdda import BadInput, Layout, Site, check
 from rigdda.barriers import from_table
 from rigdda.files import read
+from rigdda.mistyped import mistyped
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +67,22 @@ def load(path: str | os.PathLike[str]) -> Study:
     try:
         data = msgspec.toml.decode(read("study", file), type=_StudyFile)
     except msgspec.ValidationError as error:
-        raise BadInput("study", str(path), str(error)) from None
+        bad = mistyped(str(error), msgspec.toml.decode(read("study", file)))
+        raise bad or BadInput("study", str(path), str(error)) from None
     except (msgspec.DecodeError, RecursionError) as error:
         raise BadInput("study", str(path), f"mend its TOML: {error}") from None
     near = file.parent / data.site
     site = Site.load(near if near.suffix == ".toml" else data.site)
     layouts: dict[str, Layout] = {}
     for i, table in enumerate(data.layouts):
-        if table.name in layouts:
+        if table.name in layouts or not table.name:
             raise BadInput(f"layouts[{i}].name", table.name, "give each layout a name of its own")
-        layouts[table.name] = _layout(f"layouts[{i}]", table, file.parent)
-        site.realise(layouts[table.name])  # what cannot be built is said before all
-        check.number(f"capital of layouts[{i}]", site.capital(layouts[table.name]))
+        try:
+            layouts[table.name] = _layout(table, file.parent)
+            site.realise(layouts[table.name])  # what cannot be built is said before all
+            check.number("capital", site.capital(layouts[table.name]))
+        except BadInput as bad:
+            raise BadInput(f"layouts[{i}].{bad.field}", bad.value, bad.mend) from None
     if not layouts:
         raise BadInput("layouts", 0, "give at least one table [[layouts]]")
     most = limits.RELEASES // len(layouts) // len(site.events)
@@ -85,11 +90,10 @@ def load(path: str | os.PathLike[str]) -> Study:
     return Study(site, releases, layouts)
 
 
-def _layout(field: str, table: _LayoutTable, folder: Path) -> Layout:
+def _layout(table: _LayoutTable, folder: Path) -> Layout:
     """Return the layout of one table."""
     if table.file is None:
-        rows = enumerate(table.barriers)
-        return tuple(from_table(f"{field}.barriers[{i}]", row) for i, row in rows)
+        return tuple(from_table(f"barriers[{i}]", row) for i, row in enumerate(table.barriers))
     if table.barriers:
-        raise BadInput(f"{field}.file", table.file, "give either a file or barriers, not both")
+        raise BadInput("file", table.file, "give either a file or barriers, not both")
     return rigdda.load_layout(folder / table.file)

@@ -10,9 +10,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -60,6 +65,18 @@ def warn(
     click.echo("rigdda: " + " ".join(words.split()), err=True)
 
 
+def once() -> Callable[..., None]:
+    """Return `warn`, which says nothing twice."""
+    told: set[str] = set()
+
+    def tell(message: Warning | str, *others: Any, **named: Any) -> None:
+        if str(message) not in told:
+            told.add(str(message))
+            warn(message, *others, **named)
+
+    return tell
+
+
 def folder_for(out: Path | None, name: str, *files: str) -> Path:
     """Return the folder to write files into, which exists: `out`, or the one in runs/ of a name.
 
@@ -70,7 +87,7 @@ def folder_for(out: Path | None, name: str, *files: str) -> Path:
     """
     from rigdda import BadInput
 
-    folder = out or Path("runs") / _part(name)
+    folder = Path("runs") / _part(name) if out is None else out
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -93,12 +110,19 @@ def _part(name: str) -> str:
 
 @contextmanager
 def kept(folder: Path) -> Iterator[None]:
-    """Say what this run leaves in the folder if a simulation diverges or the user interrupts."""
+    """Say what this run leaves in the folder if a simulation diverges or the user interrupts.
+
+    Raises
+    ------
+    BadInput
+        If another process writes into the folder.
+    """
     from rigdda import Diverged
 
     before = _stamps(folder)
     try:
-        yield
+        with _alone(folder):
+            yield
     except (Diverged, KeyboardInterrupt) as error:
         if isinstance(error, Diverged) and error.run is not None:
             error.run.save(folder / "diverged.npz")
@@ -106,6 +130,28 @@ def kept(folder: Path) -> Iterator[None]:
         reason, code = ("interrupted", 130) if isinstance(error, KeyboardInterrupt) else (error, 1)
         names = ", ".join(sorted(written)) or "nothing"
         raise Stopped(f"{reason}; kept in {folder}: {names}", code) from None
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep other processes of this package out of a folder, on systems that can lock one."""
+    from rigdda import BadInput
+
+    if fcntl is None:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            mend = "another run writes into it: wait for its end or name another folder"
+            raise BadInput("--out", str(folder), mend) from None
+        except OSError:  # some network drives lock nothing
+            pass
+        yield
+    finally:
+        os.close(handle)
 
 
 def _stamps(folder: Path) -> set[tuple[str, tuple[int, int, int]]]:

@@ -40,7 +40,7 @@ def mask(options: Options, copies: int) -> tuple[NDArray[np.bool_] | None, Optio
     BadInput
         If the option `reset_mask` is not one boolean a copy, or none is true.
     """
-    if not options or MASK not in options:
+    if not isinstance(options, Mapping) or MASK not in options:  # others are checked by each copy
         return None, options
     chosen = np.asarray(options[MASK])
     if chosen.shape != (copies,) or chosen.dtype != np.bool_ or not chosen.any():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,9 +44,9 @@ class Evaluation:
         One for each release; empty where they are not kept.
     releases, simulated : int
         Releases that it rests on, and how many of these were simulated for it; what the others
-        give was known.
+        give was known. The latter is not compared.
     seconds : float
-        Processor time of the simulations [s].
+        Processor time of the simulations [s]; not compared.
     """
 
     layout: Layout
@@ -68,8 +68,8 @@ class Evaluation:
     targets: str | None
     outcomes: tuple[Outcome, ...]
     releases: int
-    simulated: int = 0
-    seconds: float = 0.0
+    simulated: int = field(default=0, compare=False)
+    seconds: float = field(default=0.0, compare=False)
 
     @property
     def typical(self) -> tuple[int, str]:

@@ -112,6 +112,8 @@ class Venue:
         BadInput
             If there is no such site, or there are other options.
         """
+        if options is not None and not isinstance(options, Mapping):
+            raise BadInput("options", options, "give a mapping, such as {'site': 'quick'}")
         unknown = [name for name in options or () if name != "site"]
         if unknown:
             raise BadInput("options", unknown, "give nothing but site")

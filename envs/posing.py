@@ -67,13 +67,15 @@ def targets(site: Site, targets: Targets | None) -> Targets:
 
 
 def seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int, ...]:
-    """Return seeds as a tuple of at least so many."""
+    """Return seeds as a tuple of at least so many, all different."""
     try:
         drawn = tuple(check.integer(f"{name}[{i}]", seed, 0) for i, seed in enumerate(seeds))
     except TypeError:
         raise BadInput(name, seeds, "give a sequence of whole numbers") from None
     if len(drawn) < least:
         raise BadInput(name, drawn, "give at least one")
+    if len(set(drawn)) < len(drawn):
+        raise BadInput(name, drawn, "give each once: the same seed gives the same release")
     return drawn
 
 

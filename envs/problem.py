@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from envs import encoding, ensemble, estimator, plan, posing, reuse
 from envs.building import Room
+from envs.comparison import Difference, difference
 from envs.evaluation import Evaluation
 from envs.memory import fingerprint
 from envs.samples import Sample
@@ -84,6 +85,9 @@ class DesignProblem:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
+    def __hash__(self) -> int:
+        return hash((self.key, self.max_barriers, self.kinds, self.targets, self.zone))
+
     @property
     def size(self) -> int:
         """Numbers in a vector: 4 a slot, and a score for each kind if there are several."""
@@ -136,13 +140,14 @@ class DesignProblem:
         With at least two releases an event each has two or more; with fewer it is by chance, which
         `seed` decides.
         """
-        seeds = range(seed, seed + check.integer("releases", releases, 1))
+        first = check.integer("seed", seed, 0)
+        seeds = range(first, first + check.integer("releases", releases, 1))
         count = Counter(self.plan(seeds))
         return {name: count[name] for name in self.site.event_names}
 
     def plan(self, seeds: Sequence[int]) -> tuple[str, ...]:
         """Return the event of each release, see `envs.plan`; a part of the seeds has a part."""
-        return plan.events(self._known.shares, seeds)
+        return plan.events(self._known.shares, posing.seeds("seeds", seeds))
 
     @property
     def _known(self) -> ensemble.Ensemble:
@@ -176,6 +181,25 @@ class DesignProblem:
         jobs = [(self.site, standing, seed, event) for seed, event in pairs]
         return self.judge(standing, reuse.outcomes(jobs, executor), drawn)
 
+    def compare(
+        self,
+        one: Sequence[Barrier] | ArrayLike,
+        two: Sequence[Barrier] | ArrayLike,
+        seeds: Sequence[int],
+        executor: Executor | None = None,
+    ) -> Difference:
+        """Return what one layout costs more than another in the same releases.
+
+        Layouts, seeds and executor as of `evaluate`; at least two seeds for each event.
+
+        Raises as `evaluate`.
+        """
+        pair, drawn = (self._standing(one), self._standing(two)), posing.seeds("seeds", seeds)
+        events = list(zip(drawn, self.plan(drawn), strict=True))
+        jobs = [(self.site, layout, seed, event) for layout in pair for seed, event in events]
+        found = reuse.outcomes(jobs, executor)
+        return difference(self.site, pair, (found[: len(events)], found[len(events) :]))
+
     def sample(
         self,
         layout: Sequence[Barrier],
@@ -196,6 +220,7 @@ class DesignProblem:
         jobs, ends = [], [0]
         for layout, chosen in asks:
             standing = self.check(layout)
+            check.mapping("seeds", chosen, Sequence, "sequences of whole numbers")
             for event, seeds in chosen.items():
                 self.site.event(event)
                 drawn = posing.seeds(f"seeds[{event!r}]", seeds, 0)

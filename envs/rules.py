@@ -239,5 +239,5 @@ class Rules:
         rise, run = np.abs(np.diff(self._y))[under], np.diff(self._x)[under]
         names = {self.site.profile.surfaces[k] for k in under}
         friction = min(self.site.surfaces[name].friction_deg for name in names)
-        steepest = math.degrees(math.atan2(*max(zip(rise, run, strict=True), key=lambda s: s[0] / s[1])))
+        steepest = float(np.degrees(np.arctan2(rise, run)).max())
         return steepest, min(STEEPEST["gravity_wall"], friction)

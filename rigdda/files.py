@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -17,10 +18,12 @@ def read(field: str, path: Path) -> str:
     Raises
     ------
     BadInput
-        If it is not UTF-8; the message names `field`.
+        If it cannot be read or is not UTF-8; the message names `field`.
     """
     try:
         return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise BadInput(field, str(path), f"name a file to read ({error.strerror})") from None
     except UnicodeDecodeError as error:
         mend = f"save it as UTF-8: byte {error.start} is not ({error.reason})"
         raise BadInput(field, str(path), mend) from None
@@ -28,8 +31,16 @@ def read(field: str, path: Path) -> str:
 
 @contextmanager
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside `path` that replaces it when the block ends without error."""
+    """Yield a temporary path beside `path` that replaces it when the block ends without error.
+
+    Raises
+    ------
+    OSError
+        If nothing can be written there; it names `path` or its folder.
+    """
     target = Path(path)
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     os.close(handle)

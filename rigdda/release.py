@@ -105,6 +105,8 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     DoubtfulInput
         If `motion.duration` cuts more than one in twenty off, see `Outcome.cut_off`.
     """
+    if not isinstance(jobs, Sequence):
+        raise BadInput("jobs", jobs, "give a sequence of (site, layout, seed, event)")
     each = [_job(i, job) for i, job in enumerate(jobs)]
     threads = os.cpu_count() or 1 if threads is None else check.integer("threads", threads, 1)
     groups: dict[tuple[int, Layout], list[int]] = {}

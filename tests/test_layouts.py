@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def test_a_table_without_kind_is_a_wall(tmp_path):
         ('kind = "fence"\nx = 1.0\nheight = 1.0', ["fence capacity", "energy_class"]),
         ('kind = "fence"\nx = 1.0\nheight = 1.0\ncapacity = -1.0', ["fence capacity", "at least"]),
         ('kind = "ditch"\nx = 1.0\ndepth = "1.0"\nwidth = 3.0', ["barriers[0]", "depth"]),
-        ('x = "1.0"\nheight = 1.0', ["barriers[0]", "$.x"]),
+        ('x = "1.0"\nheight = 1.0', ["barriers[0].x", "give a number"]),
         ('kind = "gravity_wall"\nx = 1.0\nheight = 1.0\ndensity = nan', ["gravity wall density"]),
         ('kind = "ditch"\nx = 1.0\ndepth = 1.0\nwidth = 3.0\nside_slope = 9.0', ["side_slope"]),
         ("x = 1.0\nheight = 1.0\nheigth = 1.0", ["heigth"]),
@@ -203,3 +204,16 @@ def test_a_fence_that_stands_holds_what_a_failed_one_does_not():
         assert math.isclose(weak.held_fraction, 0.0) and strong.held_fraction > 0.05
         passed += weak.debris_fraction, strong.debris_fraction
     assert passed[1] < passed[0]
+
+
+def test_classes_of_fences_are_whole_numbers_in_files(tmp_path: Path) -> None:
+    for number in (1000.0, np.int64(1000), np.float64(1000.0)):
+        layout = (Fence(17.0, 3.0, energy_class=number),)  # type: ignore[arg-type]
+        for name in ("layout.toml", "layout.json"):
+            save_layout(layout, tmp_path / name)
+            assert load_layout(tmp_path / name) == (Fence(17.0, 3.0, energy_class=1000),)
+
+
+def test_a_layout_takes_the_place_of_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(IsADirectoryError, match=tmp_path.name):
+        save_layout((), tmp_path)

@@ -13,6 +13,7 @@ import tomli_w
 from rigdda.barriers.layout import Barrier, Layout, as_layout, from_table, to_tables
 from rigdda.errors import BadInput
 from rigdda.files import atomic, read
+from rigdda.mistyped import mistyped
 
 
 def load_layout(path: str | os.PathLike[str]) -> Layout:
@@ -31,10 +32,11 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
         raise BadInput("layout", str(path), "name an existing TOML or JSON file")
     decode = msgspec.json.decode if file.suffix == ".json" else msgspec.toml.decode
     try:
-        tables = decode(read("layout", file), type=_LayoutFile).barriers  # an empty file is none
+        tables = decode(read("layout", file), type=_LayoutFile).barriers
         return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))
     except msgspec.ValidationError as error:
-        raise BadInput("layout", str(path), str(error)) from None
+        bad = mistyped(str(error), decode(read("layout", file)))
+        raise bad or BadInput("layout", str(path), str(error)) from None
     except (msgspec.DecodeError, RecursionError) as error:
         raise BadInput("layout", str(path), f"mend the file: {error}") from None
 
@@ -50,4 +52,6 @@ def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None
 
 
 class _LayoutFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An empty file is no layout; `barriers = []` is one without barriers."""
+
     barriers: tuple[dict[str, Any], ...]

@@ -17,6 +17,7 @@ from rigdda.barriers.gravity_wall import GravityWall
 from rigdda.barriers.mesh import Mesh
 from rigdda.barriers.wall import Wall
 from rigdda.errors import BadInput
+from rigdda.mistyped import mistyped
 from rigdda.model.terrain import Terrain
 
 Built = Wall | GravityWall | Fence | Ditch | Embankment
@@ -108,6 +109,9 @@ def from_table(where: str, table: Any) -> Barrier:
         if isinstance(error.__cause__, BadInput):
             bad = error.__cause__
             raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
+        wrong = mistyped(str(error), table)
+        if wrong is not None:
+            raise BadInput(f"{where}.{wrong.field}", wrong.value, wrong.mend) from None
         raise BadInput(where, table, f"mend it: {error}") from None
 
 

@@ -34,6 +34,9 @@ from rigdda.model.settings import Settings
 MOST_STEPS = 1e9
 """Most steps of a run: a day or more of computing for a single block."""
 
+PIECE = 10_000
+"""Most steps between which nothing interrupts a simulation."""
+
 
 class Simulation:
     """A scene in motion.

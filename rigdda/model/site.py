@@ -18,6 +18,7 @@ from rigdda.barriers import Barrier, Built, as_layout
 from rigdda.errors import BadInput
 from rigdda.files import atomic, read
 from rigdda.geometry import polygon_properties
+from rigdda.mistyped import mistyped
 from rigdda.model import economy, realisation
 from rigdda.model.economy import Bill
 from rigdda.model.events import Drawn, Event
@@ -83,7 +84,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         except msgspec.ValidationError as error:
             if isinstance(error.__cause__, BadInput):
                 raise _placed(error.__cause__, str(error), text) from None
-            raise BadInput("site file", name, str(error)) from None
+            bad = mistyped(str(error), msgspec.toml.decode(text))
+            raise bad or BadInput("site file", name, str(error)) from None
         except (msgspec.DecodeError, RecursionError) as error:
             raise BadInput("site file", name, f"mend its TOML: {error}") from None
 

@@ -15,6 +15,7 @@ from agents.protocol import DesignResult, Ledger
 from agents.ranking import MISSED, final_score, score, value
 from agents.searching import Plan, search
 from agents.seeds import STREAMS, release_seeds
+from agents.starts import starts
 from agents.verify import verify
 from envs import DesignProblem
 from envs.targets import Targets
@@ -74,6 +75,16 @@ def test_a_search_is_better_than_no_barrier(name: str, valley: Valley) -> None:
     found = design(name, valley, 1500)
     assert valley.truth(found.layout) < valley.truth(())
     assert () in {e.evaluation.layout for e in found.history.stage("final")}
+
+
+@pytest.mark.parametrize("name", ["cma", "tpe"])
+def test_what_needs_no_search_is_in_the_final(name: str, valley: Valley) -> None:
+    """Of two releases a layout the luckiest come out best."""
+    found = design(name, valley, 400)
+    last = {e.evaluation.layout for e in found.history.stage("final")}
+    ledger = Ledger(valley, 400, 0, None, None)
+    starts(ledger)
+    assert ledger.known and {(), *ledger.known} < last
 
 
 @pytest.mark.parametrize("name", ["cma", "tpe"])

@@ -10,7 +10,7 @@ import pytest
 import rigdda
 from agents import cli
 from agents.terminal import Stopped, folder_for, kept
-from rigdda import Diverged, Run, Site
+from rigdda import BadInput, Diverged, Run, Site
 from rigdda.files import atomic
 
 
@@ -151,6 +151,14 @@ def test_only_what_a_run_has_written_is_said_to_be_kept(tmp_path: Path) -> None:
             with atomic(tmp_path / "same.csv") as part:
                 part.write_text("former\n")
             raise KeyboardInterrupt
+
+
+def test_a_folder_is_written_by_one_run_at_a_time(tmp_path: Path) -> None:
+    with kept(tmp_path):
+        with pytest.raises(BadInput, match="another run writes into it"), kept(tmp_path):
+            pass
+    with kept(tmp_path):
+        pass
 
 
 def test_replay_opens_recordings_and_converts_runs(

@@ -76,6 +76,17 @@ def test_limits_are_checked(text):
         parse(text)
 
 
+def test_scatter_has_limits_of_its_own():
+    assert parse("scatter.friction_deg") == Parameter("scatter.friction_deg", 0.0, 10.0)
+    with pytest.raises(BadInput, match=r"write motion\.damping=LOW:HIGH"):
+        parse("motion.damping=")
+
+
+def test_an_unsound_value_is_told_by_its_path():
+    with pytest.raises(BadInput, match=r"^surfaces\.rock\.friction_deg = 95\.0: "):
+        with_values(SITE, [Parameter("surfaces.rock.friction_deg", 0.0, 99.0)], [95.0])
+
+
 @pytest.mark.parametrize("path", ["surfaces.sand.restitution", "name", "road", "motion.friction"])
 def test_only_numbers_of_the_site_are_fitted(path):
     with pytest.raises(BadInput, match="name a number of the site file"):
@@ -90,6 +101,12 @@ def test_only_numbers_of_the_site_are_fitted(path):
         ("event,run_out_m\nblock,far\n", "row 1"),
         ("event,run_out_m\nblock,10\n", "three observed runs"),
         ("event,run_out_m\nblock,45\n", "put road.end beyond it"),
+        ("event,run_out_m\nblock,3,1\n", "row 1 = 'block,3,1': give 2 cells"),
+        ("event,run_out_m\n,3\n", "row 1 event = '': choose small, face or "),
+        ("event,run_out_m,run_out_m\nblock,3,4\n", "a name of its own"),
+        ("event,run_out_m\nblock,4_0\n", "row 1 run_out_m = '4_0': give a number"),
+        ("event,run_out_m\nblock," + 140_000 * "3" + "\n", "mend its line 2"),
+        ("", "head its columns"),
     ],
 )
 def test_a_table_of_runs_is_checked(tmp_path, text, what):

@@ -346,6 +346,7 @@ def test_targets_between_0_and_1_of_sites_with_design_events(site: Site) -> None
         ((), 5, "seeds = 5: give a sequence"),
         ((), [1, -1], r"seeds\[1\] = -1: give a whole number of at least 0"),
         ((), [1.5], r"seeds\[0\] = 1.5"),
+        ((), [1, 2, 1], r"seeds = \(1, 2, 1\): give each once"),
         ((Wall(14.0, 1.0),), [1], r"layout\[0\]\.kind = 'wall'"),
         ((Ditch(3.0, 1.0, 2.0),), [1], r"layout\[0\]"),
         (FENCE * 4, [1], "layout = '4 barriers': give at most 3"),
@@ -357,6 +358,63 @@ def test_bad_layouts_and_seeds_are_refused(
 ) -> None:
     with pytest.raises(BadInput, match=message):
         problem.evaluate(layout, seeds)
+
+
+def test_layouts_are_compared_in_the_same_releases(problem: DesignProblem, site: Site) -> None:
+    """Sums by hand; what both let past does not widen the interval."""
+    weak, seeds = (Fence(12.0, 2.0, energy_class=100),), range(200)
+    found = problem.compare(FENCE, weak, seeds)
+    one, two = (problem.evaluate(layout, seeds) for layout in (FENCE, weak))
+    by_hand = site.annual(FENCE) - site.annual(weak)
+    for event in site.events:
+        bills = [
+            [
+                b.harm + b.repair
+                for b in (site.bill(e.layout, o) for o in e.outcomes if o.event == event.name)
+            ]
+            for e in (one, two)
+        ]
+        by_hand += site.rate(event.name, FENCE) * (np.mean(bills[0]) - np.mean(bills[1]))
+    assert found.value == pytest.approx(by_hand)
+    assert found.value == pytest.approx(one.objective - two.objective, abs=1e-6)
+    assert found.ci[0] < found.value < found.ci[1]
+    assert np.ptp(found.ci) < 0.8 * min(np.ptp(one.ci), np.ptp(two.ci))
+    assert 0 < found.differ < found.releases == 200
+    same = problem.compare(FENCE, FENCE, seeds)
+    assert (same.value, same.ci, same.differ) == (0.0, (0.0, 0.0), 0)
+    other = problem.compare(weak, FENCE, seeds)
+    assert (other.value, other.ci[0]) == pytest.approx((-found.value, -found.ci[1]))
+    with pytest.raises(BadInput, match=r"seeds = .*: give 2 or more of every event"):
+        problem.compare(FENCE, weak, range(2))
+
+
+def test_paired_intervals_hold_the_difference(problem: DesignProblem) -> None:
+    """In 95 % of 40 repetitions; a binomial of 40 is below 33 once in 3,000 times."""
+    weak = (Fence(12.0, 2.0, energy_class=100),)
+    true = problem.compare(FENCE, weak, range(10_000, 14_000)).value
+    parts = [problem.compare(FENCE, weak, range(k * 100, k * 100 + 100)).ci for k in range(40)]
+    assert sum(low <= true <= high for low, high in parts) >= 33
+
+
+def test_other_arguments_are_checked(problem: DesignProblem) -> None:
+    with pytest.raises(BadInput, match=r"seeds = .*: give at least one"):
+        problem.plan([])
+    with pytest.raises(BadInput, match="seed = -1"):
+        problem.allocation(10, seed=-1)
+    with pytest.raises(BadInput, match="seeds = -1: give a mapping"):
+        problem.sample((), -1)  # type: ignore[arg-type]
+    with pytest.raises(BadInput, match=r"vector = .*numbers from -1 to 1"):
+        problem.decode(np.full(problem.size, 1.0 + 2.0j))
+
+
+def test_problems_and_evaluations_compare_by_what_they_say(
+    problem: DesignProblem, site: Site
+) -> None:
+    same = DesignProblem(site, problem.max_barriers, problem.kinds)
+    assert same == problem and hash(same) == hash(problem)
+    assert hash(same) != hash(DesignProblem(site, 1))
+    first = problem.evaluate(FENCE, range(10))
+    assert problem.evaluate(FENCE, range(10)) == first  # recalled, in less time
 
 
 def test_a_zone_of_no_length_is_refused() -> None:

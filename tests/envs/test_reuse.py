@@ -136,6 +136,43 @@ def test_memory_is_bounded() -> None:
     assert memory.recall(range(5)) == {1: "a", 3: "c"}
 
 
+def test_a_release_that_struck_is_not_one_without(site: Site) -> None:
+    """A wall that was moved uphill is struck where it did not stand."""
+    layout = (GravityWall(15.0, 1.0, 0.8),)
+    hit = replace(cases.outcome("small", 0.0, False), reach=(0.0, 5.0))
+    assert hit.barriers[0].hits == 0
+    struck = replace(hit, barriers=(replace(hit.barriers[0], hits=2),))
+    key = reuse.Key(fingerprint(site), layout, 1, "small")
+    for outcome, kept in ((struck, 0), (hit, 1)):
+        reuse._remember({key: outcome}, {key: (site, layout, 1, "small")})
+        assert len(reuse.free.recall([key._replace(layout=())])) == kept
+
+
+def test_blocks_that_stop_short_by_less_than_a_step_may_have_touched(site: Site) -> None:
+    layout = (Fence(15.0, 2.0, energy_class=250),)
+    near, far = (replace(cases.outcome("small"), reach=(0.0, 15.0 - d)) for d in (0.25, 0.5))
+    assert not untouched.misses(site, fingerprint(site), layout, near)
+    assert untouched.misses(site, fingerprint(site), layout, far)
+
+
+def test_what_a_fence_holds_is_of_its_height() -> None:
+    """It is lower by what it took, in a higher class by less."""
+    weak, strong = (Fence(15.0, 2.0, energy_class=k) for k in (100, 250))
+    outcome = cases.outcome("small", 0.0, False, width=1.0)
+    took = replace(outcome.barriers[0], absorbed_energy=4e3, thrust=0.0)
+
+    def of(fence: Fence, held: float, slope: float) -> Outcome:
+        built = fence.for_width(1.0)
+        left = replace(took, left_height=built.left_height(took.absorbed_energy))
+        return replace(outcome, barriers=(left,), held_fraction=held, slope_fraction=slope)
+
+    assert reuse._of_class(strong, of(weak, 0.0, 1.0)) is None  # so high it may hold it
+    assert reuse._of_class(weak, of(strong, 1.0, 0.0)) is None  # so low it may not
+    found, wanted = reuse._of_class(strong, of(weak, 1.0, 0.0)), of(strong, 1.0, 0.0)
+    assert found is not None and found.barriers[0].left_height == wanted.barriers[0].left_height
+    assert reuse._of_class(weak, of(strong, 0.0, 1.0)) is not None
+
+
 def test_outcomes_without_barriers_have_nothing_held(site: Site) -> None:
     held = replace(cases.outcome("small", 0.0, False, held=0.5), reach=(0.0, 5.0))
     key = reuse.Key(fingerprint(site), (Fence(15.0, 2.0, energy_class=100),), 1, "small")

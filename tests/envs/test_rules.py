@@ -6,10 +6,22 @@ import math
 
 import cases
 import msgspec
+import numpy as np
 import pytest
 
 from envs.problem import DesignProblem
-from rigdda import BadInput, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Site, Wall
+from rigdda import (
+    BadInput,
+    Ditch,
+    Embankment,
+    Fence,
+    GravityWall,
+    Layout,
+    Mesh,
+    Site,
+    Wall,
+    release,
+)
 
 KINDS = ("fence", "ditch", "embankment", "gravity_wall", "wall", "mesh")
 
@@ -154,6 +166,20 @@ def test_a_machine_needs_room_beside_works() -> None:
         with pytest.raises(BadInput, match="3 m beside it are left to a machine"):
             bench.check((works,))
     assert bench.fits((GravityWall(31.0, 1.0, 0.5),))
+
+
+def test_all_of_a_gravity_wall_stands_on_ground_that_holds_it() -> None:
+    """At 29.55 m its uphill corner is on the cliff of quick: it would slide down before any rock
+    comes, though its ends are 20 deg from one another."""
+    quick = DesignProblem("quick")
+    with pytest.raises(BadInput, match=r"the ground is at most 28 deg steep, not 64\.5"):
+        quick.check((GravityWall(29.55, 4.0, 1.9),))
+    at = GravityWall(29.8, 4.0, 1.9)
+    assert quick.fits((at,))
+    run, _ = release(quick.site, (at,), 0, "block")
+    assert np.hypot(*(run.outline(0, 0) - run.outline(0, 20)).T).max() < 0.01
+    for vector in np.random.default_rng(3).uniform(-1.0, 1.0, (300, quick.size)):
+        assert quick.fits(quick.decode(vector))
 
 
 def test_a_gravity_wall_is_put_as_thick_as_it_needs() -> None:

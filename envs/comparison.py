@@ -1,16 +1,21 @@
-"""What one layout costs more than another, from releases that both meet."""
+"""What one layout costs more than another, from releases that both meet.
+
+Most releases cost the same with both. What the first one costs more, and what it costs less, are
+two means of costs that few releases have, with the intervals of such, see `envs.intervals`.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from envs.accounts import Account, account
+from envs.evaluation import Facts
+from envs.intervals import Known, Mean, cost
 from rigdda import BadInput, Layout, Outcome, Site
 
 LEAST = 2
@@ -26,9 +31,8 @@ class Difference:
     value : float
         Below 0 the first one costs less.
     ci : (low, high)
-        95 % interval, Student's with Welch's freedom. Releases are paired: the same rock comes down
-        with both, and what both let past, or both keep off, does not widen it. It is too short
-        where few releases of an event differ: look at `differ`.
+        95 % interval. Releases are paired: the same rock comes down with both, and what both let
+        past, or both keep off, does not widen it.
     releases, differ : int
         How many both met, and in how many of these they did not cost the same.
     """
@@ -43,6 +47,7 @@ def difference(
     site: Site,
     layouts: tuple[Layout, Layout],
     outcomes: tuple[Sequence[Outcome], Sequence[Outcome]],
+    facts: Mapping[str, Facts],
 ) -> Difference:
     """Return what the first layout costs more than the second.
 
@@ -50,6 +55,8 @@ def difference(
     ----------
     outcomes : two sequences of Outcome
         Of each layout, of the same releases in the same order.
+    facts : mapping of str to Facts
+        What is known of each event: what a release may differ by, where none was seen to.
 
     Raises
     ------
@@ -58,7 +65,7 @@ def difference(
     """
     one, two = (account(site, a, b) for a, b in zip(layouts, outcomes, strict=True))
     value = site.annual(layouts[0]) - site.annual(layouts[1])
-    spread, freedom, differ = 0.0, 0.0, 0
+    below, above, differ = 0.0, 0.0, 0
     for name in site.event_names:
         rates = [site.rate(name, layout) for layout in layouts]
         if not any(rates):
@@ -70,13 +77,23 @@ def difference(
         more = rates[0] * _spent(one)[own] - rates[1] * _spent(two)[own]
         differ += int(np.count_nonzero(more))
         value += float(more.mean())
-        square = float(more.var(ddof=1)) / len(more)
-        spread += square
-        freedom += square**2 / (len(more) - 1)
-    half = 0.0
-    if spread > 0.0:
-        half = float(stdtrit(spread**2 / freedom, 0.975)) * math.sqrt(spread)
-    return Difference(value, (value - half, value + half), len(one.event), differ)
+        if layouts[0] == layouts[1]:
+            continue
+        dear = facts[name].harm
+        known = Known(max(rates) * dear.mean, dear.variation)
+        up, down = (cost(np.maximum(part, 0.0), part > 0.0, known) for part in (more, -more))
+        below += _below(up) ** 2 + _above(down) ** 2
+        above += _above(up) ** 2 + _below(down) ** 2
+    ends = value - math.sqrt(below), value + math.sqrt(above)
+    return Difference(value, ends, len(one.event), differ)
+
+
+def _below(mean: Mean) -> float:
+    return mean.value - mean.low
+
+
+def _above(mean: Mean) -> float:
+    return mean.high - mean.value
 
 
 def _spent(found: Account) -> NDArray[np.float64]:

@@ -198,7 +198,8 @@ class DesignProblem:
         events = list(zip(drawn, self.plan(drawn), strict=True))
         jobs = [(self.site, layout, seed, event) for layout in pair for seed, event in events]
         found = reuse.outcomes(jobs, executor)
-        return difference(self.site, pair, (found[: len(events)], found[len(events) :]))
+        outcomes = found[: len(events)], found[len(events) :]
+        return difference(self.site, pair, outcomes, self._known.facts)
 
     def sample(
         self,

@@ -66,8 +66,8 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "field", "mend"),
     [
-        ("rate = 2.0", "rate = true", "site file", "float"),
-        ("rate = 2.0", "rate = [2.0]", "site file", "float"),
+        ("rate = 2.0", "rate = true", "events[0].rate", "a number"),
+        ("rate = 2.0", "rate = [2.0]", "events[0].rate", "a number"),
         ("rate = 2.0", "rate = -1.0", "events.small, face.rate", "at least 0"),
         ("rate = 2.0", "rate = 36500.0", "events.small, face.rate", "at most 1000"),
         ("friction_deg = 30.0", "friction_deg = 0.577", "surfaces.rock.friction_deg", "degrees"),
@@ -263,3 +263,11 @@ def test_mesh_is_no_part_of_a_scene():
     assert QUICK.realise((Mesh(5.0, "face"),), 1, "block").barriers == ()
     with pytest.raises(BadInput, match="choose one of face"):
         QUICK.realise((Mesh(5.0, "net"),), 1, "block")
+
+
+def test_releases_that_take_minutes_are_doubted() -> None:
+    text = sites.text("quick")
+    with pytest.warns(DoubtfulInput, match=r"motion\.dt: give more.* 1e\+06 steps"):
+        Site.parse(text.replace("duration = 10.0", "duration = 10.0\ndt = 1e-5"), "site")
+    with pytest.warns(DoubtfulInput, match=r"sources\.mass\.block_area: give more.* 4\d{3} blocks"):
+        Site.parse(text.replace("block_area = ", "block_area = 0.01 # "), "site")

@@ -28,6 +28,9 @@ end of the ground before they count as beyond."""
 HIGHEST, LONGEST = 5_000.0, 20_000.0
 """Height and length of a slope [m] above which millimetres were meant."""
 
+MANY_STEPS, MANY_BLOCKS = 2e5, 3e3
+"""Steps and blocks of a release above which it takes minutes, which may not be meant."""
+
 CHEAPEST = 100.0
 """Closure of a day [EUR] below which thousands of EUR may have been meant."""
 
@@ -53,6 +56,13 @@ def check_site(site: Site) -> None:
             "motion.damping_when",
             "put 'contact': with 'always' energies at a barrier are four to ten times too low",
         )
+    steps = motion.duration / motion.dt
+    if steps > MANY_STEPS:
+        _doubt("motion.dt", f"give more, or a shorter duration: a release takes {steps:g} steps")
+    for source in site.sources:
+        blocks = source.area / source.mean_block_area if source.band is None else 0.0
+        if blocks > MANY_BLOCKS:
+            _doubt(f"{source.words}.block_area", f"give more: releases are of {blocks:.0f} blocks")
     if 0.0 < site.consequences.closure < CHEAPEST:
         _doubt("consequences.closure", "give EUR a day, not thousands")
     Settings(dt=motion.dt)

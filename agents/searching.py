@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from agents.protocol import DesignResult, Ledger, Proposals
 from agents.ranking import final_score, ranked
 from envs import DesignProblem, Evaluation
+from rigdda import Layout
 
 Choose = Callable[[DesignProblem, Sequence[Evaluation], int], list[Evaluation]]
 """Returns at most so many of some evaluations."""
@@ -114,8 +115,10 @@ def finish(ledger: Ledger, plan: Plan, choose: Choose = best) -> DesignResult:
         n = plan.semifinal_releases
         left = [ledger.evaluate(e.layout, "semifinal", n) for e in chosen]
     if plan.finalists > 0:
-        layouts = [(), *ledger.known, *(e.layout for e in choose(problem, left, plan.finalists))]
-        layouts = list(dict.fromkeys(layouts))[: plan.finalists]
+        known: list[Layout] = [(), *ledger.known]
+        chosen = [e.layout for e in choose(problem, left, plan.finalists)]
+        found = [layout for layout in chosen if layout not in known]
+        layouts = [*found[: max(1, plan.finalists - len(known))], *known][: plan.finalists]
         left = [ledger.evaluate(layout, "final", plan.final_releases) for layout in layouts]
         winner = min(left, key=lambda e: final_score(problem, e))
     else:

@@ -116,8 +116,8 @@ def finish(ledger: Ledger, plan: Plan, choose: Choose = best) -> DesignResult:
         left = [ledger.evaluate(e.layout, "semifinal", n) for e in chosen]
     if plan.finalists > 0:
         known: list[Layout] = [(), *ledger.known]
-        chosen = [e.layout for e in choose(problem, left, plan.finalists)]
-        found = [layout for layout in chosen if layout not in known]
+        searched = [e.layout for e in choose(problem, left, plan.finalists)]
+        found = [layout for layout in searched if layout not in known]
         layouts = [*found[: max(1, plan.finalists - len(known))], *known][: plan.finalists]
         left = [ledger.evaluate(layout, "final", plan.final_releases) for layout in layouts]
         winner = min(left, key=lambda e: final_score(problem, e))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from envs.comparison import Difference
+from envs.comparison import Difference, compare
 from envs.evaluation import Evaluation
 from envs.problem import DesignProblem
 from envs.registration import register
@@ -17,7 +17,7 @@ from envs.targets import Targets
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
-__all__ = ["DesignProblem", "Difference", "Evaluation", "Targets", "sb3_vec_env"]
+__all__ = ["DesignProblem", "Difference", "Evaluation", "Targets", "compare", "sb3_vec_env"]
 
 
 def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from envs import ensemble
 from envs.accounts import Account, account
 from envs.evaluation import Facts
 from envs.intervals import Known, Mean, cost
-from rigdda import BadInput, Layout, Outcome, Site
+from envs.problem import DesignProblem
+from rigdda import BadInput, Barrier, Layout, Outcome, Site
 
 LEAST = 2
 """Releases of an event that tell how much they differ."""
@@ -41,6 +44,27 @@ class Difference:
     ci: tuple[float, float]
     releases: int
     differ: int
+
+
+def compare(
+    problem: DesignProblem,
+    one: Sequence[Barrier] | ArrayLike,
+    two: Sequence[Barrier] | ArrayLike,
+    seeds: Sequence[int],
+    executor: Executor | None = None,
+) -> Difference:
+    """Return what one layout costs more than another in the same releases.
+
+    Layouts, seeds and executor as of `DesignProblem.evaluate`; at least two seeds for each event.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `DesignProblem.evaluate` does.
+    """
+    a, b = (problem.evaluate(layout, seeds, executor) for layout in (one, two))
+    facts = ensemble.of(problem.site, problem.key).facts
+    return difference(problem.site, (a.layout, b.layout), (a.outcomes, b.outcomes), facts)
 
 
 def difference(

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from envs import encoding, ensemble, estimator, plan, posing, reuse
 from envs.building import Room
-from envs.comparison import Difference, difference
 from envs.evaluation import Evaluation
 from envs.memory import fingerprint
 from envs.samples import Sample
@@ -140,9 +139,8 @@ class DesignProblem:
         With at least two releases an event each has two or more; with fewer it is by chance, which
         `seed` decides.
         """
-        first = check.integer("seed", seed, 0)
-        seeds = range(first, first + check.integer("releases", releases, 1))
-        count = Counter(self.plan(seeds))
+        first, n = check.integer("seed", seed, 0), check.integer("releases", releases, 1)
+        count = Counter(self.plan(range(first, first + n)))
         return {name: count[name] for name in self.site.event_names}
 
     def plan(self, seeds: Sequence[int]) -> tuple[str, ...]:
@@ -180,26 +178,6 @@ class DesignProblem:
         pairs = zip(drawn, self.plan(drawn), strict=True)
         jobs = [(self.site, standing, seed, event) for seed, event in pairs]
         return self.judge(standing, reuse.outcomes(jobs, executor), drawn)
-
-    def compare(
-        self,
-        one: Sequence[Barrier] | ArrayLike,
-        two: Sequence[Barrier] | ArrayLike,
-        seeds: Sequence[int],
-        executor: Executor | None = None,
-    ) -> Difference:
-        """Return what one layout costs more than another in the same releases.
-
-        Layouts, seeds and executor as of `evaluate`; at least two seeds for each event.
-
-        Raises as `evaluate`.
-        """
-        pair, drawn = (self._standing(one), self._standing(two)), posing.seeds("seeds", seeds)
-        events = list(zip(drawn, self.plan(drawn), strict=True))
-        jobs = [(self.site, layout, seed, event) for layout in pair for seed, event in events]
-        found = reuse.outcomes(jobs, executor)
-        outcomes = found[: len(events)], found[len(events) :]
-        return difference(self.site, pair, outcomes, self._known.facts)
 
     def sample(
         self,

@@ -31,11 +31,9 @@ from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
 
-MOST_STEPS = 1e9
-"""Most steps of a run: a day or more of computing for a single block."""
-
-PIECE = 10_000
-"""Most steps between which nothing interrupts a simulation."""
+MOST_STEPS, PIECE = 1e9, 10_000
+"""Most steps of a run, a day or more of computing for a single block, and most of them between
+which nothing interrupts it."""
 
 
 class Simulation:
@@ -85,10 +83,7 @@ class Simulation:
             raise BadInput("settings", settings, "give rigdda.Settings or None")
         self.scene = scene
         self.settings = settings or Settings()
-        if template is None:
-            arrays = self._packed(stations, watch, leave)
-        else:
-            arrays = template.write(scene)
+        arrays = template.write(scene) if template else self._packed(stations, watch, leave)
         self.loop = Loop(scene, arrays, self.settings.dt, self.settings.timing)
         self._no_frames = no_frames(arrays.bodies)
         self._elastic_at_start = elastic_energy(arrays, self.loop.contacts)
@@ -173,10 +168,8 @@ class Simulation:
         Diverged
             If a block's velocity is no longer finite or beyond any rockfall.
         """
-        left = check.integer("n", n, 0, int(MOST_STEPS))
-        while left > 0:
-            self.loop.advance(min(left, PIECE), self._no_frames)
-            left -= PIECE
+        for done in range(0, check.integer("n", n, 0, int(MOST_STEPS)), PIECE):
+            self.loop.advance(min(n - done, PIECE), self._no_frames)
 
     def run(self, duration: float, every: float = 0.05, progress: bool = False) -> Run:
         """Simulate `duration` seconds and record a frame `every` so often, the start included.

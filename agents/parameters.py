@@ -20,7 +20,7 @@ RANGES = {
     "normal": (0.0, 0.8),
     "tangential": (0.4, 1.0),
 }
-"""Where to look for a field, or for a path, that comes without limits."""
+"""Limits of a parameter that comes without, by its path or by the last name of that."""
 
 
 class Parameter(NamedTuple):

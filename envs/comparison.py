@@ -34,8 +34,8 @@ class Difference:
     value : float
         Below 0 the first one costs less.
     ci : (low, high)
-        95 % interval. Releases are paired: the same rock comes down with both, and what both let
-        past, or both keep off, does not widen it.
+        95 % interval. Releases are paired: the same rock comes down with both, so that it is
+        shorter than that of two Z taken apart, the more so the more alike the layouts are.
     releases, differ : int
         How many both met, and in how many of these they did not cost the same.
     """

@@ -41,9 +41,6 @@ Floats = NDArray[np.float64]
 NUMBERS = 4
 """Numbers in a slot, without scores."""
 
-DECIMALS = 11
-"""Of the numbers of a barrier [m]: their last digits are lost between a vector and a layout."""
-
 CLASSES = tuple(FENCE_CLASSES)
 """Energy classes of fences, ascending [kJ]."""
 
@@ -124,16 +121,9 @@ def decode(place: Room, values: Floats, kinds: Sequence[str]) -> Layout:
             continue
         found = place.nearest(make(place.zone, kind, station, height, size), taken)
         if found is not None:
-            built.append(_rounded(found[0]))
+            built.append(found[0])
             taken.append(found[1])
     return tuple(sorted(built, key=lambda barrier: barrier.x))
-
-
-def _rounded(barrier: Barrier) -> Barrier:
-    """Return a barrier whose numbers a vector gives back to the last digit."""
-    numbers = {name: getattr(barrier, name) for name in barrier.__struct_fields__}
-    short = {k: round(v, DECIMALS) for k, v in numbers.items() if isinstance(v, float)}
-    return msgspec.structs.replace(barrier, **short)
 
 
 def make(zone: BarrierZone, kind: str, station: float, height: float, size: float) -> Barrier:

@@ -175,7 +175,7 @@ class DesignProblem:
             If a simulation diverges.
         """
         standing, drawn = self._standing(layout), posing.seeds("seeds", seeds)
-        pairs = zip(drawn, self.plan(drawn), strict=True)
+        pairs = zip(drawn, plan.events(self._known.shares, drawn), strict=True)
         jobs = [(self.site, standing, seed, event) for seed, event in pairs]
         return self.judge(standing, reuse.outcomes(jobs, executor), drawn)
 

@@ -120,7 +120,8 @@ def _remember(fresh: Mapping[Key, Outcome], jobs: Mapping[Key, Job]) -> None:
     bare, stood = {}, {}
     for key, outcome in fresh.items():
         site = jobs[key][0]
-        struck = any(barrier.hits for barrier in outcome.barriers)  # of a moved wall elsewhere
+        # a wall that moved before may be struck where it did not stand
+        struck = any(barrier.hits for barrier in outcome.barriers)
         if not struck and untouched.misses(site, key.site, key.layout, outcome):
             lies = outcome.slope_fraction + outcome.held_fraction
             alone = replace(outcome, barriers=(), held_fraction=0.0, slope_fraction=lies)

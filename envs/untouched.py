@@ -34,7 +34,8 @@ class Standing:
     Parameters
     ----------
     start, end : float
-        Chainages between which it changes something [m].
+        Chainages between which blocks may touch it that do so within a step and go back [m]: the
+        reach of a release is taken at the ends of steps.
     face, top : float
         Where the line begins below which it holds what lies uphill [m]; -inf of what holds nothing
         there.
@@ -65,22 +66,9 @@ def misses(site: Site, key: bytes, layout: tuple[Built, ...], outcome: Outcome) 
     outcome : Outcome
         Of the release, with or without the layout.
     """
-    if not layout:
-        return True
     low, high = outcome.reach
-    low, high = low - _margin(site), high + _margin(site)
-    return all(high < b.start or low > b.end for b in _standing(site, key, layout))
-
-
-def _margin(site: Site) -> float:
-    """Return how far from a barrier the reach of blocks ends that are sure not to touch it [m].
-
-    Reach is taken at the ends of steps. A block that falls from the top of the slope may come so
-    much nearer within a step, and go back: half of what a corner moves that has all of its energy,
-    twice the speed of a fall.
-    """
-    drop = float(np.ptp(site.profile.points[:, 1]))
-    return MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop)
+    stands = _standing(site, key, layout) if layout else ()
+    return all(high < b.start or low > b.end for b in stands)
 
 
 def outcome(site: Site, key: bytes, layout: tuple[Built, ...], without: Outcome) -> Outcome | None:
@@ -157,7 +145,12 @@ def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) 
     face = start
     if isinstance(barrier, Embankment):
         face += barrier.side_slope * barrier.height
-    return Standing(start, end, -math.inf if isinstance(barrier, Ditch) else face, top, bears)
+    face = -math.inf if isinstance(barrier, Ditch) else face
+    # half of what a corner moves in a step that has all the energy of a fall from the top: its
+    # speed is at most twice that of the fall
+    drop = float(np.ptp(site.profile.points[:, 1]))
+    near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop)
+    return Standing(start - near, end + near, face, top, bears)
 
 
 def _idle(built: Built, barrier: Built, there: Standing, holds: bool) -> BarrierOutcome:

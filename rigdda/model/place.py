@@ -8,7 +8,7 @@ from rigdda import check
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
 
 DURATION = (1.0, 3600.0)
-"""Least and greatest `motion.duration` [s]: in less nothing has begun to fall."""
+"""Least and greatest `motion.duration` [s]: in less than a second hardly a block reaches a road."""
 
 
 class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

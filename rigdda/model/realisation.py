@@ -22,6 +22,9 @@ from rigdda.model.surface import Surface
 if TYPE_CHECKING:
     from rigdda.model.site import Site
 
+ROUNDING = 1e-9
+"""Length by which a barrier may reach into loose rock [m]: vectors lose last digits of its edge."""
+
 STEEPEST_DEG = 85.0
 """Friction angle up to which scatter may raise that of a surface [deg]."""
 
@@ -60,7 +63,7 @@ def built(site: Site, layout: Sequence[Barrier], width: float) -> tuple[Built, .
             site.mesh(barrier)
             continue
         for low, high in taken:
-            if barrier.x < high and barrier.x + barrier.extent > low:
+            if barrier.x < high - ROUNDING and barrier.x + barrier.extent > low + ROUNDING:
                 mend = f"put it outside x = {low:.2f} to {high:.2f}, where loose rock lies"
                 raise BadInput(f"barriers[{i}].x", barrier.x, mend)
         standing.append(barrier.for_width(width))

@@ -29,7 +29,8 @@ HIGHEST, LONGEST = 5_000.0, 20_000.0
 """Height and length of a slope [m] above which millimetres were meant."""
 
 MANY_STEPS, MANY_BLOCKS = 2e5, 3e3
-"""Steps and blocks of a release above which it takes minutes, which may not be meant."""
+"""Steps and blocks of a release above which they may not be meant: those of built-in sites take
+some thousand steps and have up to some hundred blocks."""
 
 CHEAPEST = 100.0
 """Closure of a day [EUR] below which thousands of EUR may have been meant."""

@@ -168,6 +168,14 @@ def test_a_machine_needs_room_beside_works() -> None:
     assert bench.fits((GravityWall(31.0, 1.0, 0.5),))
 
 
+def test_what_fits_beside_loose_rock_can_be_realised() -> None:
+    """Both forgive rounding of the edge of a band."""
+    verge = DesignProblem("verge")
+    at = (Fence(verge.place.parts[0][0] - 5e-10, 3.0, energy_class=250),)
+    assert verge.fits(at)
+    assert verge.site.realise(at, 0, verge.site.event_names[0]).barriers
+
+
 def test_all_of_a_gravity_wall_stands_on_ground_that_holds_it() -> None:
     """At 29.55 m its uphill corner is on the cliff of quick: it would slide down before any rock
     comes, though its ends are 20 deg from one another."""

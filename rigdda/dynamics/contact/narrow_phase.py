@@ -83,6 +83,53 @@ def clip_contacts(
     return k
 
 
+@kernel
+def edges_in_line(outlines: Outlines, i: int, edge: int, way: int) -> int:
+    """Return how many edges of polygon i next to `edge` are in one line with it.
+
+    Those after it where `way` is 1, those before it where `way` is -1. An edge with corners within
+    it is a line of several edges.
+    """
+    n, own = outlines.polygon[i].count, outlines.corner[i, edge]
+    for number in range(1, n):
+        other = outlines.corner[i, (edge + way * number + n) % n]
+        dot = own.normal_x * other.normal_x + own.normal_y * other.normal_y
+        if other.inner or dot < SAME_FACE:
+            return number - 1
+    return 0
+
+
+@inlined
+def clip_lines(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
+    edge: int, j: int, other: int, shift_x: float, shift_y: float, reach: float, margin: float,
+    beside: float,
+) -> int:  # fmt: skip
+    """Add the contacts of the line of the face of contact with that of the incident edge.
+
+    Each edge in line with the face is clipped against each edge in line with the incident one, so
+    that two bodies bear on each other over all of the length that they share. Takes and returns
+    what `clip_contacts` does, but -1 if the contacts do not fit.
+    """
+    first, n, m = k, outlines.polygon[i].count, outlines.polygon[j].count
+    face_low, face_high = edges_in_line(outlines, i, edge, -1), edges_in_line(outlines, i, edge, 1)
+    low, high = edges_in_line(outlines, j, other, -1), edges_in_line(outlines, j, other, 1)
+    alone = face_low + face_high + low + high == 0
+    for at in range(edge - face_low, edge + face_high + 1):
+        for against in range(other - low, other + high + 1):
+            if k + 2 > len(contacts):
+                return -1
+            found = clip_contacts(
+                bodies, outlines, contacts, k, a, b, i, (at + n) % n, j, (against + m) % m, shift_x,
+                shift_y, reach, margin, beside,
+            )  # fmt: skip
+            if alone:
+                return found
+            for new in range(k, found):
+                k = keep_nearest(contacts, first, k, new)
+    return k
+
+
 @inlined
 def add_corner(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, owner: int,
@@ -157,6 +204,8 @@ def collide_all_parts(
                 bodies, outlines, contacts, k, a, b, i, j, dx, dy, px, py, turn, spread, margin,
                 sunk, beside,
             )  # fmt: skip
+            if found < 0:
+                return -1
             for new in range(k, found):
                 k = keep_nearest(contacts, first, k, new)
     return k
@@ -219,11 +268,11 @@ def collide_parts(
         if outlines.corner[face, edge].inner or outlines.corner[other, facing].inner:
             return k
         shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
-        found = clip_contacts(
+        found = clip_lines(
             bodies, outlines, contacts, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
             reach, margin, beside,
         )  # fmt: skip
-        if found > k or (shift == 0.0 and not touching):
+        if found != k or (shift == 0.0 and not touching):
             return found
         if touching:
             of_j = not of_j

@@ -27,13 +27,11 @@ def over_segment(ground: Ground, s: int, x: float, y: float, depth: float) -> bo
     """Return whether a point lies over segment s, lengthened by what `depth` needs at its ends."""
     along, one = along_segment(ground, s, x, y), ground.segment[s]
     turn_end = ground.segment[s + 1].turn
-    # in a concave corner: what is deeper under this segment than beyond it, or under both
+    # beyond a concave corner, as far as what is so deep is nearer to this segment than to the next
     if along < 0.0 and one.turn > 0.0:
-        near = -along <= depth * math.tan(0.5 * one.turn)
-        return near or below_segment(ground, s - 1, x, y) <= 0.0
+        return -along <= depth * math.tan(0.5 * one.turn)
     if along > one.length and turn_end > 0.0:
-        near = along - one.length <= depth * math.tan(0.5 * turn_end)
-        return near or below_segment(ground, s + 1, x, y) <= 0.0
+        return along - one.length <= depth * math.tan(0.5 * turn_end)
     return -1e-9 <= along <= one.length + 1e-9
 
 

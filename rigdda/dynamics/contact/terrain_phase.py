@@ -8,10 +8,11 @@ fall through there.
 from __future__ import annotations
 
 from rigdda.dynamics.arrays import Ground, Outlines
-from rigdda.dynamics.constants import SAME_FACE, TERRAIN
+from rigdda.dynamics.constants import IMPACT_STEPS, SAME_FACE, TERRAIN
 from rigdda.dynamics.contact.narrow_phase import add_contact, keep_nearest
 from rigdda.dynamics.contact.segments import (
     along_neighbour,
+    along_segment,
     below_segment,
     crosses_segment,
     over_segment,
@@ -59,14 +60,17 @@ def place_of_hit(
 ) -> tuple[float, float]:
     """Return where in the step a corner of block a meets the line of segment s.
 
-    Or (x, y) if it never does, or touches already. It may slide there along a neighbour, into a
-    concave corner.
+    Or (x, y) if it never does, or is in the ground already, or touches it and does not strike it.
+    It may slide there along a neighbour, into a concave corner.
     """
-    if gap <= p.margin:
+    if gap <= 0.0:
         return x, y
     one, block = ground.segment[s], bodies[a]
     dx = (block.vx - block.omega * (y - block.y)) * p.dt
     dy = (block.vy + block.omega * (x - block.x)) * p.dt
+    least = IMPACT_STEPS * p.gravity * p.dt * p.dt  # an impact closes more than this in a step
+    if gap <= p.penetration and -(one.normal_x * dx + one.normal_y * dy) <= least:
+        return x, y
     if one.turn > 0.0:
         dx, dy = along_neighbour(ground, s - 1, x, y, dx, dy)
     if ground.segment[s + 1].turn > 0.0:
@@ -74,6 +78,39 @@ def place_of_hit(
     approach = -(one.normal_x * dx + one.normal_y * dy)
     time = min(gap / approach, 1.0) if approach > 0.0 else 0.0
     return x + time * dx, y + time * dy
+
+
+@kernel
+def leaves_over_end(
+    ground: Ground, s: int, x: float, y: float, hit_x: float, hit_y: float, margin: float
+) -> bool:
+    """Return whether a corner at (x, y) slides off a convex end of segment s.
+
+    It meets the line of the segment at (hit_x, hit_y), within `margin` [m] of that end or beyond.
+    An edge of the block rests on the end then and slides over it, so that the corner is aimed at
+    the end: rounding alone would decide whether it strikes the segment that it leaves.
+    """
+    along, hit = along_segment(ground, s, x, y), along_segment(ground, s, hit_x, hit_y)
+    one = ground.segment[s]
+    over_start = one.turn < 0.0 and hit < along and hit < margin
+    over_end = ground.segment[s + 1].turn < 0.0 and hit > along and hit > one.length - margin
+    return over_start or over_end
+
+
+@kernel
+def meets_segment(
+    ground: Ground, s: int, x: float, y: float, hit_x: float, hit_y: float, gap: float,
+    reach: float, margin: float,
+) -> bool:  # fmt: skip
+    """Return whether a corner at (x, y) meets segment s; its line it meets at (hit_x, hit_y).
+
+    `gap` is that of the corner now, `reach` how far it may come in the step [m].
+    """
+    if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0) + reach):
+        return False
+    if shadowed(ground, s, hit_x, hit_y, gap):
+        return False
+    return not leaves_over_end(ground, s, x, y, hit_x, hit_y, margin)
 
 
 @inlined
@@ -99,9 +136,7 @@ def corners_on_segment(
         if concave and corner.reentrant:
             continue
         hit_x, hit_y = place_of_hit(bodies, ground, s, a, x, y, gap, p)
-        if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0) + reach):
-            continue
-        if shadowed(ground, s, hit_x, hit_y, gap):
+        if not meets_segment(ground, s, x, y, hit_x, hit_y, gap, reach, p.margin):
             continue
         if gap < -p.margin and beneath_roof(bodies, outlines, ground, a, vertex, s, gap):
             continue

@@ -56,8 +56,8 @@ class Batch:
         self._site, self._layout = as_site(site), as_layout(layout)
         self._standing = [b for b in self._layout if not isinstance(b, Mesh)]
         self._watch = watch(site)
-        self._base: tuple[Scene, float] | None = None
-        self._templates: dict[tuple[int, int, float], Template] = {}
+        self._base: tuple[Scene, Drawn] | None = None
+        self._templates: dict[tuple[int, int, float, int], Template] = {}
 
     def outcome(self, seed: int, event: str | None = None) -> Outcome:
         """Return the outcome of one release. Raises as `rigdda.release` does."""
@@ -72,21 +72,22 @@ class Batch:
         """Return the scene of what was drawn, on the ground and with the barriers of the first."""
         if self._base is None:
             scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
-            self._base = scene, drawn.friction_deg
+            self._base = scene, drawn
             return scene
-        base, shift = self._base
+        base, first = self._base
         surfaces, interfaces = base.surfaces, base.interfaces
-        if drawn.friction_deg != shift:
-            surfaces, interfaces = self._site.strength(drawn.friction_deg)
+        if (drawn.friction_deg, drawn.strengths) != (first.friction_deg, first.strengths):
+            surfaces, interfaces = self._site.strength(drawn)
         barriers = [b.for_width(drawn.width) for b in self._standing]
-        return base.with_rock(drawn.blocks, surfaces, interfaces, barriers)
+        return base.with_rock(drawn.blocks, surfaces, interfaces, barriers, drawn.roughness)
 
     def simulation(self, scene: Scene) -> Simulation:
         """Return the simulation of such a scene; that of the one before is of no more use."""
         if len(scene.blocks) > MOST_BLOCKS:
             return simulation(self._site, scene)
         settings = self._site.settings(scene)
-        key = len(scene.blocks), max(len(b.vertices) for b in scene.blocks), settings.dt
+        corners = max(len(b.vertices) for b in scene.blocks)
+        key = len(scene.blocks), corners, settings.dt, len(scene.ground.points)
         template = self._templates.get(key)
         if template is None or not template.fits(scene):
             lines = chainages(stations(self._site, scene.barriers))

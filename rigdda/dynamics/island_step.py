@@ -29,19 +29,27 @@ from rigdda.dynamics.records import (
     MOTION,
     OPEN_CLOSE,
     Bodies,
+    Body,
     Contacts,
     Interfaces,
     Parameters,
 )
 from rigdda.dynamics.recovery import push_out
 from rigdda.dynamics.thrust import press
-from rigdda.kernel import stage
+from rigdda.kernel import inlined, stage
+
+
+@inlined
+def note_touch(body: Body, damping: float) -> None:
+    """Let a block be damped by what it touches in this step, of several the most [1/s]."""
+    body.damping = max(body.damping, damping) if body.apart == 0.0 else damping
+    body.apart = 0.0
 
 
 @stage
 def move_island(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, motion: Motion, islands: Islands,
-    island: int, monitors: Monitors, p: Parameters, ledger: NDArray,
+    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts, motion: Motion,
+    islands: Islands, island: int, monitors: Monitors, p: Parameters, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
@@ -58,9 +66,10 @@ def move_island(
         account_contact(c, motion.d, islands, ledger, monitors)
         if len(monitors.target) > 0:
             press(c, monitors, p.dt)
-        bodies[c.a].apart = 0.0
+        damping = interfaces[bodies[c.a].surface, c.other].damping
+        note_touch(bodies[c.a], damping)
         if c.b >= 0:
-            bodies[c.b].apart = 0.0
+            note_touch(bodies[c.b], damping)
     for s in range(b1 - b0):
         i = islands.block_item[b0 + s]
         block = bodies[i]
@@ -121,7 +130,9 @@ def step_island(
         for item in range(c0, c1):
             accumulate_forces(contacts[islands.contact_item[item]], struck, in_substeps)
         push_out(bodies, contacts, motion, islands, rows, s, struck, now)
-        bad = move_island(bodies, outlines, contacts, motion, islands, s, monitors, now, ledger)
+        bad = move_island(
+            bodies, outlines, interfaces, contacts, motion, islands, s, monitors, now, ledger
+        )
         left -= now.dt
         parts += 1 if parts > 0 else 0
     lap(counters, MOTION, since, p.timing)

@@ -43,6 +43,7 @@ BODY = _record(
     status=int,  # AWAKE, ASLEEP, FIXED, RETIRED
     island=int,  # island in which a sleeping body fell asleep
     apart=float,  # time since a contact of it was closed, 0 if one was in the last step [s]
+    damping=float,  # that of what it touched last, see assembly.island.damping_of [1/s]
     wait=int,  # steps until its island is solved as a whole again
     force_x=float,  # dead load [N]
     force_y=float,
@@ -181,6 +182,7 @@ INTERFACE = _record(
     cohesion=float,  # [Pa]
     tension=float,  # [Pa]
     restitution=float,  # PLAIN_CONTACT: the paper's penalty contact
+    damping=float,  # mass-proportional, of blocks that touch [1/s]
 )
 """How two surfaces meet."""
 
@@ -192,8 +194,7 @@ PARAMETERS = _record(
     gravity=float,  # its magnitude
     field_x=float,  # acceleration of free blocks in this step, of gravity and the ground [m/s2]
     field_y=float,
-    damping=float,
-    damping_in_contact_only=bool,
+    damping_in_flight=float,  # mass-proportional, of blocks that touch nothing [1/s]
     block_weight=float,  # mean of the free blocks [N]
     penetration=float,  # wanted [m]
     margin=float,  # of contact [m], see constants.MARGIN_RATIO

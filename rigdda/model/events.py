@@ -10,6 +10,7 @@ import msgspec
 from rigdda import check
 from rigdda.errors import BadInput
 from rigdda.model.block import Block
+from rigdda.model.roughness import Roughness
 from rigdda.model.source import Source
 
 MASS_WIDTH = 10.0
@@ -104,6 +105,14 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             mend = "give the width along the road of an event of several blocks [m]"
             raise BadInput(f"{self.words}.width", None, mend)
 
+    def block_size(self, source: Source) -> float:
+        """Return the typical size of its blocks, which come from `source` [m]."""
+        if source.edges is not None:
+            return math.prod(source.edges) ** (1.0 / 3.0)
+        if self.area is not None:
+            return math.prod(self.area) ** 0.25
+        return math.sqrt(source.mean_block_area)
+
     def width_of(self, areas: list[float]) -> float:
         """Return the width of a release with blocks of these areas [m]."""
         if self.width is not None:
@@ -112,13 +121,17 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Drawn(NamedTuple):
-    """What a seed draws of an event, the same for every layout.
-
-    `event`: its name. `width` [m] along the road. `friction_deg`: shift of all friction angles
-    [deg].
-    """
+    """What a seed draws of an event, the same for every layout."""
 
     event: str
+    """Its name."""
     blocks: tuple[Block, ...]
     width: float
+    """Along the road [m]."""
     friction_deg: float
+    """Shift of all friction angles [deg]."""
+    strengths: tuple[tuple[float, float, float], ...] = ()
+    """Standard normal numbers of friction, restitution and damping, for each surface of the site in
+    turn; empty where no surface varies."""
+    roughness: Roughness | None = None
+    """Pits in the ground; None where it is smooth."""

@@ -80,8 +80,9 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Parameters
     ----------
-    damping : float
-        Mass-proportional damping [1/s].
+    damping : float or None
+        Mass-proportional damping [1/s], of surfaces that have none of their own. None: the typical
+        value of their ground.
     damping_when : str
         "contact": of blocks that touch something, or did within 0.1 s; "always": the paper's, in
         flight, too, with which energies at a barrier are four to ten times too low.
@@ -96,13 +97,14 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         If a value is outside its range.
     """
 
-    damping: float = 0.0
+    damping: float | None = None
     damping_when: str = "contact"
     duration: float = 25.0
     dt: float = USUAL_DT
 
     def __post_init__(self) -> None:
-        check.number("motion.damping", self.damping, 0.0, 100.0)
+        if self.damping is not None:
+            check.number("motion.damping", self.damping, 0.0, 100.0)
         check.one_of("motion.damping_when", self.damping_when, ("always", "contact"))
         check.number("motion.duration", self.duration, *DURATION)
         check.number("motion.dt", self.dt, SHORTEST_DT, LARGEST_DT)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from rigdda.errors import BadInput
 from rigdda.model import boulders
 from rigdda.model.block import Block
 from rigdda.model.events import Drawn
+from rigdda.model.roughness import Roughness
 from rigdda.model.scene import Scene
 from rigdda.model.source import Source
 from rigdda.model.surface import Surface
@@ -24,6 +25,12 @@ if TYPE_CHECKING:
 
 ROUNDING = 1e-9
 """Length by which a barrier may reach into loose rock [m]: vectors lose last digits of its edge."""
+
+STRENGTHS, PITS = 1, 2
+"""Ends of the seeds of what is drawn of the ground beside the blocks."""
+
+FARTHEST = 2.5
+"""Standard deviations at which normal numbers of the ground are cut off."""
 
 STEEPEST_DEG = 85.0
 """Friction angle up to which scatter may raise that of a surface [deg]."""
@@ -51,7 +58,28 @@ def draw(site: Site, seed: int, event: str | None) -> Drawn:
         normal = rng.standard_normal()
         areas, drawn = boulders.draw(rng, rock, what, boulders.line(site.slope.points))
         blocks = tuple(drawn)
-    return Drawn(name, blocks, what.width_of(areas), normal * site.scatter.friction_deg)
+    shift = normal * site.scatter.friction_deg
+    return Drawn(name, blocks, what.width_of(areas), shift, *_ground(site, seed, index))
+
+
+def _ground(
+    site: Site, seed: int, index: int
+) -> tuple[tuple[tuple[float, float, float], ...], Roughness | None]:
+    """Return what a seed draws of the ground: see `Drawn.strengths` and `Drawn.roughness`.
+
+    By random numbers of their own, so that blocks do not depend on how the ground varies.
+    """
+    strengths: tuple[tuple[float, float, float], ...] = ()
+    if any(surface.varies for surface in site.surfaces.values()):
+        rng = np.random.Generator(np.random.PCG64([seed, index, STRENGTHS]))
+        drawn = np.clip(rng.standard_normal((len(site.surfaces), 3)), -FARTHEST, FARTHEST)
+        strengths = tuple(map(tuple, drawn.tolist()))
+    amplitude = {name: s.roughness for name, s in site.surfaces.items() if s.roughness > 0.0}
+    if not amplitude:
+        return strengths, None
+    event = site.events[index]
+    spacing = event.block_size(site.source(event.source))
+    return strengths, Roughness(spacing, amplitude, (seed, index, PITS))
 
 
 def built(site: Site, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
@@ -70,37 +98,45 @@ def built(site: Site, layout: Sequence[Barrier], width: float) -> tuple[Built, .
     return tuple(standing)
 
 
-def strength(site: Site, shift: float) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
-    """Return the surfaces and how pairs meet, with friction shifted, see `Site.strength`."""
-    surfaces = {name: _shifted(s, shift) for name, s in site.surfaces.items()}
-    return surfaces, {pair: _shifted(s, shift) for pair, s in pairs(site).items()}
+def strength(
+    site: Site, drawn: Drawn
+) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+    """Return the surfaces and how pairs meet in a release, see `Site.strength`."""
+    surfaces, normals = site.surfaces, drawn.strengths
+    if normals:
+        each = zip(surfaces.items(), normals, strict=True)
+        surfaces = {name: _varied(surface, *normal) for (name, surface), normal in each}
+    if drawn.friction_deg != 0.0:
+        surfaces = {name: _shifted(s, drawn.friction_deg) for name, s in surfaces.items()}
+    found = pairs(site, surfaces)
+    for pair in site.interfaces:
+        found.pop((pair.second, pair.first), None)
+        found[pair.first, pair.second] = _shifted(pair.surface, drawn.friction_deg)
+    return surfaces, found
 
 
 def scene(site: Site, drawn: Drawn, barriers: Sequence[Built]) -> Scene:
     """Return the scene of what was drawn, see `Site.scene`."""
-    surfaces, interfaces = strength(site, drawn.friction_deg)
+    surfaces, interfaces = strength(site, drawn)
     return Scene(
         terrain=site.profile,
         blocks=drawn.blocks,
         surfaces=surfaces,
         interfaces=interfaces,
         barriers=tuple(barriers),
-        damping=site.motion.damping,
+        damping=site.motion.damping or 0.0,
         damping_when=site.motion.damping_when,
+        roughness=drawn.roughness,
     )
 
 
-def pairs(site: Site) -> dict[tuple[str, str], Surface]:
-    """Return the surfaces of contacts: of rock with the ground the ground's, unless said."""
+def pairs(site: Site, surfaces: Mapping[str, Surface]) -> dict[tuple[str, str], Surface]:
+    """Return the surfaces of contacts: of rock with the ground the ground's."""
     grounds = {site.slope.surface, *(s.surface for s in site.slope.surfaces)}
     if "soil" in site.surfaces:
         grounds.add("soil")  # embankments are ground
     rocks = {source.surface for source in site.sources}
-    found = {(r, g): site.surfaces[g] for r in sorted(rocks) for g in sorted(grounds) if r != g}
-    for pair in site.interfaces:
-        found.pop((pair.second, pair.first), None)
-        found[pair.first, pair.second] = pair.surface
-    return found
+    return {(r, g): surfaces[g] for r in sorted(rocks) for g in sorted(grounds) if r != g}
 
 
 def rooms(site: Site) -> tuple[tuple[float, float], ...]:
@@ -139,6 +175,22 @@ def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]
     return normal, tuple(
         Block(corners, rock.density, rock.surface, velocity)
         for corners, velocity in zip(outlines, starts, strict=True)
+    )
+
+
+def _varied(surface: Surface, friction: float, restitution: float, damping: float) -> Surface:
+    """Return a surface whose values are off by so many of their standard deviations."""
+    if not surface.varies:
+        return surface
+    rebound, loss = surface.restitution, surface.damping
+    angle = surface.friction_deg + friction * surface.friction_sd_deg
+    return msgspec.structs.replace(
+        surface,
+        friction_deg=min(max(angle, 0.0), max(surface.friction_deg, STEEPEST_DEG)),
+        restitution=None
+        if rebound is None
+        else min(max(rebound + restitution * surface.restitution_sd, 0.0), 1.0),
+        damping=None if loss is None else max(loss + damping * surface.damping_sd, 0.0),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -24,6 +24,7 @@ from rigdda.model.composition import (
     set_members,
 )
 from rigdda.model.loads import Load
+from rigdda.model.roughness import Roughness
 from rigdda.model.supports import Support
 from rigdda.model.surface import Surface, smaller
 from rigdda.model.terrain import Terrain
@@ -64,6 +65,8 @@ class Scene:
         Time [s] and acceleration of the ground, x and y [m/s2]; linear in between, a repeated time
         makes a jump; before and after it the ground does not accelerate. Motion is computed
         relative to the ground.
+    roughness : Roughness, optional
+        Pits in the ground, where no barrier stands.
 
     Raises
     ------
@@ -87,7 +90,9 @@ class Scene:
     damping: float = 0.0
     damping_when: str = "always"
     base_motion: NDArray[np.float64] | None = None
+    roughness: Roughness | None = None
     ground: Terrain | None = field(init=False, repr=False)
+    _smooth: Terrain | None = field(init=False, repr=False)
     _moved: Mapping[Barrier, NDArray[np.float64]] = field(init=False, repr=False)
     _outlines: dict[int, NDArray[np.float64]] = field(init=False, repr=False)
 
@@ -107,10 +112,12 @@ class Scene:
         object.__setattr__(self, "ground", self.terrain)
         object.__setattr__(self, "_moved", {})
         object.__setattr__(self, "_outlines", {})
+        object.__setattr__(self, "_smooth", self.terrain)
         if self.barriers:
             self._build()
-        if self.ground is not None:
-            check_clear(self, self.ground)
+        if self._smooth is not None:
+            check_clear(self, self._smooth)
+        object.__setattr__(self, "ground", self._with_pits(self._smooth, self.barriers))
 
     def with_rock(
         self,
@@ -118,8 +125,9 @@ class Scene:
         surfaces: Mapping[str, Surface],
         interfaces: Mapping[tuple[str, str], Surface],
         barriers: Sequence[Built],
+        roughness: Roughness | None = None,
     ) -> Scene:
-        """Return the scene with other blocks and other properties of the surfaces of that name.
+        """Return the scene with other blocks, surfaces of the same names and pits in the ground.
 
         The ground and what stands on it are not built and checked again; `barriers` are those of
         the scene but for what they resist.
@@ -134,7 +142,12 @@ class Scene:
         other = object.__new__(Scene)
         for name in Scene.__slots__:
             object.__setattr__(other, name, getattr(self, name))
-        changed = {"blocks": blocks, "surfaces": surfaces, "interfaces": interfaces}
+        changed = {
+            "blocks": blocks,
+            "surfaces": surfaces,
+            "interfaces": interfaces,
+            "roughness": roughness,
+        }
         for name, value in changed.items():
             object.__setattr__(other, name, value)
         if barriers:
@@ -145,22 +158,33 @@ class Scene:
         check_blocks(blocks)
         for i, block in enumerate(blocks):
             check_known(surfaces, f"block {i}: surface", block.surface)
-        if other.ground is not None:
-            check_clear(other, other.ground)
+        if other._smooth is not None:
+            check_clear(other, other._smooth)
+        if roughness is not self.roughness:
+            ground = other._with_pits(other._smooth, other.barriers)
+            object.__setattr__(other, "ground", ground)
         return other
 
     def _build(self) -> None:
-        """Set the ground with its earthworks and check that every barrier stands on it."""
+        """Set the smooth ground with its earthworks; check that every barrier stands on it."""
         if self.terrain is None:
             raise BadInput("barriers", self.barriers, "give the scene a terrain to stand on")
         check_known(self.surfaces, "barrier surface", self.barrier_surface)
         check_capacities(self.barriers)
         ground, moved = earthworks(self.terrain, self.barriers, self.fill)
         object.__setattr__(self, "ground", ground)
+        object.__setattr__(self, "_smooth", ground)
         object.__setattr__(self, "_moved", moved)
         for i in range(len(self.barriers)):
             self.outline(i)
         check_order(self)
+
+    def _with_pits(self, ground: Terrain | None, barriers: Iterable[Barrier]) -> Terrain | None:
+        """Return a smooth ground with pits where none of the barriers stands."""
+        if ground is None or self.roughness is None:
+            return ground
+        even = [(b.x, b.x + b.extent) for b in barriers if not isinstance(b, Mesh)]
+        return self.roughness.applied(ground, even)
 
     def outline(self, barrier: int) -> NDArray[np.float64]:
         """Return the (n, 2) corners of a barrier at the start [m].
@@ -175,9 +199,9 @@ class Scene:
         what = self.barriers[barrier]
         if isinstance(what, Earthwork):
             return self._moved[what]
-        assert self.ground is not None and not isinstance(what, Mesh)
+        assert self._smooth is not None and not isinstance(what, Mesh)
         if barrier not in self._outlines:
-            corners = what.outline(self.ground)
+            corners = what.outline(self._smooth)
             corners.setflags(write=False)
             self._outlines[barrier] = corners
         return self._outlines[barrier]
@@ -207,7 +231,7 @@ class Scene:
         if self.terrain is None or len(gone) == 0:
             return self.ground
         left = [b for i, b in enumerate(self.barriers) if i not in gone]
-        return earthworks(self.terrain, left, self.fill)[0]
+        return self._with_pits(earthworks(self.terrain, left, self.fill)[0], left)
 
     @property
     def fill(self) -> str:

@@ -7,6 +7,7 @@ import msgspec
 from rigdda.barriers import from_table, to_tables
 from rigdda.model.block import Block
 from rigdda.model.loads import BodyForce, LineLoad, PointLoad
+from rigdda.model.roughness import Roughness
 from rigdda.model.scene import Scene
 from rigdda.model.supports import Bolt, FixedPoint
 from rigdda.model.surface import Surface
@@ -44,6 +45,7 @@ def scene_to_json(scene: Scene) -> bytes:
             "gravity": scene.gravity,
             "damping": scene.damping,
             "damping_when": scene.damping_when,
+            "roughness": scene.roughness,
         }
     )
 
@@ -57,7 +59,7 @@ def scene_from_json(text: bytes) -> Scene:
         If a value in it is not sound.
     """
     data = msgspec.json.decode(text)
-    terrain = data.pop("terrain")
+    terrain, roughness = data.pop("terrain"), data.pop("roughness")
     return Scene(
         terrain=terrain and Terrain(**terrain),
         blocks=tuple(Block(**b) for b in data.pop("blocks")),
@@ -69,5 +71,6 @@ def scene_from_json(text: bytes) -> Scene:
         loads=tuple(LOADS[name](**load) for name, load in data.pop("loads")),
         supports=tuple(SUPPORTS[name](**support) for name, support in data.pop("supports")),
         base_motion=data.pop("base_motion") or None,
+        roughness=roughness and msgspec.convert(roughness, Roughness),
         **data,
     )

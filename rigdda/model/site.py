@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import tomllib
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,13 +16,14 @@ import tomli_w
 
 from rigdda import sites
 from rigdda.barriers import Barrier, Built, as_layout
-from rigdda.errors import BadInput
+from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, read
 from rigdda.geometry import polygon_properties
 from rigdda.mistyped import mistyped
 from rigdda.model import economy, realisation
 from rigdda.model.economy import Bill
 from rigdda.model.events import Drawn, Event
+from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.place import Rebound
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
@@ -50,6 +52,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             if not usual:
                 raise BadInput("events", (), "give at least one: what comes down, and how often")
             msgspec.structs.force_setattr(self, "events", usual)
+        if self.motion.damping is None:
+            msgspec.structs.force_setattr(self, "surfaces", _with_damping(self.surfaces))
         check_site(self)
 
     @classmethod
@@ -98,12 +102,14 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             If a surface has the plain contact of restitution None, for which TOML has no word.
         """
         data = msgspec.to_builtins(self)
-        for table in (*data["sources"], *data["events"]):  # TOML has no null
+        for table in (*data["sources"], *data["events"], data["motion"]):  # TOML has no null
             for name in [name for name, value in table.items() if value is None]:
                 del table[name]
         laws = {f"surfaces.{name}": table for name, table in data["surfaces"].items()}
         laws |= {f"interfaces[{i}]": table for i, table in enumerate(data["interfaces"])}
         for where, table in laws.items():
+            if table["damping"] is None:
+                del table["damping"]
             if table["restitution"] is None:
                 mend = "give a number: a site file has no plain contact, only Python has"
                 raise BadInput(f"{where}.restitution", None, mend)
@@ -172,9 +178,11 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         drawn = self.draw(seed, event)
         return self.scene(drawn, self.built(layout, drawn.width))
 
-    def strength(self, shift: float) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
-        """Return the surfaces and how pairs meet, with all friction angles shifted [deg]."""
-        return realisation.strength(self, shift)
+    def strength(
+        self, drawn: Drawn
+    ) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+        """Return the surfaces and how pairs meet in a release, with what was drawn of them."""
+        return realisation.strength(self, drawn)
 
     def access(self, x: float) -> float:
         """Return the factor on prices at a chainage: dearer the higher above the road [-]."""
@@ -220,6 +228,29 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         A reference: nothing reaches the road below it.
         """
         return self.prices.shed * self.prices.annual("shed")
+
+
+def _with_damping(surfaces: dict[str, Surface]) -> dict[str, Surface]:
+    """Return surfaces of which those without a damping have that of their usual ground.
+
+    Warns
+    -----
+    DoubtfulInput
+        For each of these.
+    """
+    found = dict(surfaces)
+    for name, surface in surfaces.items():
+        if surface.damping is None:
+            ground = USUAL.get(name, OTHER)
+            value = GROUNDS[ground].damping.typical
+            warnings.warn(
+                f"surfaces.{name}.damping is not given, and neither is motion.damping: "
+                f"{value:g} 1/s of the ground {ground!r} is taken; name the ground of the surface",
+                DoubtfulInput,
+                stacklevel=4,
+            )
+            found[name] = msgspec.structs.replace(surface, damping=value)
+    return found
 
 
 def _placed(bad: BadInput, told: str, text: str) -> BadInput:

@@ -59,6 +59,14 @@ class Terrain:
         object.__setattr__(self, "points", chain)
         object.__setattr__(self, "surfaces", names)
 
+    @classmethod
+    def sound(cls, points: NDArray[np.float64], surfaces: tuple[str, ...]) -> Terrain:
+        """Return a terrain of sound points and surfaces, which are not checked."""
+        terrain = object.__new__(cls)
+        object.__setattr__(terrain, "points", points)
+        object.__setattr__(terrain, "surfaces", surfaces)
+        return terrain
+
     @property
     def solid(self) -> shapely.Polygon:
         """The ground as a polygon, as far out as the chain is long; empty where it has no inside.

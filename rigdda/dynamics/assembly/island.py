@@ -16,11 +16,10 @@ from rigdda.kernel import inlined, kernel
 def damping_of(body: Body, p: Parameters) -> float:
     """Return the damping coefficient of a block in this step [1/s].
 
-    In contact it lasts for `APART` after the last touch, however long the steps are: middles count.
+    That of the surface that it touched last, for `APART` after the touch, however long the steps
+    are: middles count.
     """
-    if p.damping_in_contact_only and body.apart + 0.5 * p.dt > APART:
-        return 0.0
-    return p.damping
+    return p.damping_in_flight if body.apart + 0.5 * p.dt > APART else body.damping
 
 
 @kernel

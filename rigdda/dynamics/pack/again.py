@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from rigdda.barriers import GravityWall
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.dynamics.pack.bodies import barrier_trait, block_traits, write_polygons
+from rigdda.dynamics.pack.ground import pack_ground
 from rigdda.dynamics.pack.monitors import start_rock, start_targets
-from rigdda.dynamics.pack.parameters import frictions, rock_numbers
+from rigdda.dynamics.pack.parameters import pack_interfaces, rock_numbers
 from rigdda.geometry import is_convex
-from rigdda.model.scene import Scene
+from rigdda.model.scene import Scene, Terrain
 from rigdda.model.settings import Settings
 
 
@@ -63,7 +64,7 @@ class Template:
         """Return whether a scene of `with_rock` can be written into these arrays."""
         mine, blocks = self.scene.blocks, scene.blocks
         return (
-            scene.ground is self.scene.ground
+            _alike(scene.ground, self.scene.ground)
             and len(blocks) == len(mine)
             and self._most_corners(scene) == self._corners
             and not any(b.fixed for b in mine)
@@ -95,15 +96,27 @@ class Template:
                 polygons.append(scene.outline(i))
                 traits.append(barrier_trait(scene, i, self._names))
         write_polygons(polygons, traits, arrays.bodies, outlines)
-        other_friction = scene.surfaces is not self.scene.surfaces
-        if other_friction or scene.barriers != self.scene.barriers:
+        if scene.ground is not self.scene.ground and scene.ground is not None:
+            ground = pack_ground(scene.ground, self._names)
+            for mine, its in zip(arrays.ground[:3], ground[:3], strict=True):
+                mine[...] = its
+        other_surfaces = scene.surfaces is not self.scene.surfaces
+        if other_surfaces or scene.barriers != self.scene.barriers:
             start_targets(arrays.monitors.target, scene)  # of embankments friction is the strength
-        if other_friction:
-            arrays.interfaces["friction"] = frictions(scene, len(arrays.interfaces))
+        if other_surfaces:
+            arrays.interfaces[...] = pack_interfaces(scene, self._names)
         start_rock(self._rock, bodies, self._stations)
         for name, value in rock_numbers(scene, self._settings, bodies).items():
             self._parameters[name] = value
         return arrays
+
+
+def _alike(ground: Terrain | None, other: Terrain | None) -> bool:
+    """Return whether grounds differ by elevations alone, if at all."""
+    if ground is other or ground is None or other is None:
+        return ground is other
+    same = ground.surfaces == other.surfaces
+    return same and np.array_equal(ground.points[:, 0], other.points[:, 0])
 
 
 def together(arrays: Arrays) -> tuple[NDArray[np.uint8], Arrays]:

@@ -44,6 +44,7 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
     """Return how each two surfaces meet.
 
     Fences, which come last, are of the surface of barriers, but plastic and without strength.
+    Damping that a surface leaves open is that of the scene.
     """
     fences = any(isinstance(b, Fence) for b in scene.barriers)
     every = [*names, scene.barrier_surface] if fences else names
@@ -55,6 +56,7 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
             plain = surface.restitution is None
             found["restitution"][i, j] = PLAIN_CONTACT if plain else surface.restitution
             found["cohesion"][i, j], found["tension"][i, j] = surface.cohesion, surface.tension
+    found["damping"] = dampings(scene, len(every))
     return found.view(np.recarray)
 
 
@@ -63,6 +65,14 @@ def frictions(scene: Scene, size: int) -> list[list[float]]:
     every = list(scene.surfaces)
     every += [scene.barrier_surface] * (size - len(every))
     return [[math.tan(math.radians(scene.friction_deg(a, b))) for b in every] for a in every]
+
+
+def dampings(scene: Scene, size: int) -> list[list[float]]:
+    """Return the damping of each two of `size` surfaces [1/s], see `pack_interfaces`."""
+    every = list(scene.surfaces)
+    every += [scene.barrier_surface] * (size - len(every))
+    pairs = [[scene.interface(a, b).damping for b in every] for a in every]
+    return [[scene.damping if d is None else d for d in row] for row in pairs]
 
 
 def rock_numbers(scene: Scene, settings: Settings, bodies: Bodies) -> dict[str, float]:
@@ -98,8 +108,7 @@ def pack_parameters(
         "gravity": math.hypot(gx, gy),
         "field_x": gx,
         "field_y": gy,
-        "damping": scene.damping,
-        "damping_in_contact_only": scene.damping_when == "contact",
+        "damping_in_flight": scene.damping if scene.damping_when == "always" else 0.0,
         "tolerance": settings.tolerance,
         "sweep_tolerance": settings.sweep_tolerance,
         "iterations": settings.open_close_iterations,

@@ -16,7 +16,11 @@ RANGES = {
     "scatter.friction_deg": (0.0, 10.0),
     "friction_deg": (15.0, 65.0),
     "restitution": (0.0, 0.8),
-    "damping": (0.0, 2.0),
+    "damping": (0.0, 3.0),
+    "friction_sd_deg": (0.0, 10.0),
+    "restitution_sd": (0.0, 0.2),
+    "damping_sd": (0.0, 1.0),
+    "roughness": (0.0, 0.2),
     "normal": (0.0, 0.8),
     "tangential": (0.4, 1.0),
 }

@@ -82,7 +82,7 @@ def outcome(site: Site, key: bytes, layout: tuple[Built, ...], without: Outcome)
         return None
     stands = _standing(site, key, layout)
     holds = [_holds(site, barrier, without) for barrier in stands]
-    if None in holds or (site.scatter.friction_deg > 0.0 and not _known_to_bear(layout)):
+    if None in holds or (site.friction_varies and not _known_to_bear(layout)):
         return None
     share = 1.0 if any(holds) else 0.0
     return replace(
@@ -107,10 +107,10 @@ def _holds(site: Site, barrier: Standing, without: Outcome) -> bool | None:
     inner = points[(points[:, 0] > low) & (points[:, 0] < high), 0]
     x = np.array([at[0]] if alone else [low, *inner, high])
     over = barrier.top + rise * (barrier.face - x) - np.interp(x, *points.T)
-    if site.scatter.friction_deg == 0.0 and (over <= 0.0).all():
+    if not site.friction_varies and (over <= 0.0).all():
         return False
     radius = LARGEST * math.sqrt(without.released_volume / without.width)
-    if site.scatter.friction_deg == 0.0 and alone and over[0] > 2.0 * radius:
+    if not site.friction_varies and alone and over[0] > 2.0 * radius:
         return True
     return None
 
@@ -126,7 +126,10 @@ def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[Standi
     if known is None:
         drawn = site.draw(0, site.event_names[0])
         built = site.built(layout, UNIT)
-        scene = site.scene(drawn._replace(blocks=drawn.blocks[:1], friction_deg=0.0), built)
+        usual = drawn._replace(
+            blocks=drawn.blocks[:1], friction_deg=0.0, strengths=(), roughness=None
+        )
+        scene = site.scene(usual, built)
         _, moved = earthworks(site.profile, layout, site.soil)
         known = tuple(
             _stands(site, barrier, moved.get(barrier), scene.resistance(i))
@@ -149,7 +152,7 @@ def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) 
     # half of what a corner moves in a step that has all the energy of a fall from the top: its
     # speed is at most twice that of the fall
     drop = float(np.ptp(site.profile.points[:, 1]))
-    near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop)
+    near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop) + site.pit_spacing
     return Standing(start - near, end + near, face, top, bears)
 
 

@@ -98,9 +98,7 @@ def built(site: Site, layout: Sequence[Barrier], width: float) -> tuple[Built, .
     return tuple(standing)
 
 
-def strength(
-    site: Site, drawn: Drawn
-) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+def strength(site: Site, drawn: Drawn) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
     """Return the surfaces and how pairs meet in a release, see `Site.strength`."""
     surfaces, normals = site.surfaces, drawn.strengths
     if normals:

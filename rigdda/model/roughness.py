@@ -70,4 +70,3 @@ class Roughness(msgspec.Struct, frozen=True):
         low, high = math.ceil((ax + clear) / self.spacing), math.floor((bx - clear) / self.spacing)
         found = [k * self.spacing for k in range(low, high + 1)]
         return [x for x in found if not any(a <= x <= b for a, b in even)]
-

@@ -178,9 +178,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         drawn = self.draw(seed, event)
         return self.scene(drawn, self.built(layout, drawn.width))
 
-    def strength(
-        self, drawn: Drawn
-    ) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
+    def strength(self, drawn: Drawn) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
         """Return the surfaces and how pairs meet in a release, with what was drawn of them."""
         return realisation.strength(self, drawn)
 

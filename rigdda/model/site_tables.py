@@ -44,7 +44,7 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     barrier_zone : table
         Where barriers may stand.
     surfaces : tables
-        The surfaces, by name: friction_deg, cohesion, tension, restitution. "soil" is that of
+        The surfaces, by name. "soil" is that of
         embankments, "concrete" that of walls and fences, and of embankments where "soil" is
         missing; "rock" where they are missing.
     interfaces : tables
@@ -84,6 +84,19 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     def profile(self) -> Terrain:
         """The ground as a terrain, with a corner wherever its surface changes."""
         return _ground(self.slope.points, self.slope.surface, self.slope.surfaces)
+
+    @property
+    def friction_varies(self) -> bool:
+        """Whether friction is drawn for each release."""
+        own = any(surface.friction_sd_deg > 0.0 for surface in self.surfaces.values())
+        return own or self.scatter.friction_deg > 0.0
+
+    @property
+    def pit_spacing(self) -> float:
+        """Greatest spacing of pits in the ground in any event [m], 0 where the ground is smooth."""
+        if all(surface.roughness == 0.0 for surface in self.surfaces.values()):
+            return 0.0
+        return max(event.block_size(self.source(event.source)) for event in self.events)
 
     @property
     def event_names(self) -> tuple[str, ...]:

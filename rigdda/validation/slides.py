@@ -7,12 +7,15 @@ import math
 import numpy as np
 
 from rigdda.model.loads import PointLoad
-from rigdda.model.scene import Scene, Terrain
+from rigdda.model.scene import Scene, Surface, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured, Metered
 from rigdda.validation.scenes import FLAT, GRAVITY, box, incline, masses, rock, shifts
 
 LOW = 0.4
 """Height of a block 1 m wide that slides at 45 degrees without toppling [m]."""
+
+DAMPING = 1.0
+"""Of a ground [1/s]."""
 
 PULSE, YIELD, PULSE_TIME = 0.5, 0.2, 0.3
 """Newmark's pulse: base acceleration and friction coefficient [g], duration [s]."""
@@ -23,6 +26,15 @@ def slide(slope_deg: float, friction_deg: float, time: float) -> float:
     slope, friction = math.radians(slope_deg), math.radians(friction_deg)
     pull = GRAVITY * (math.sin(slope) - math.cos(slope) * math.tan(friction))
     return 0.5 * pull * time**2
+
+
+def damped_slide(slope_deg: float, friction_deg: float, damping: float, time: float) -> float:
+    """Return the way [m] from rest on a ground that damps: s = a/c (t - (1 - exp(-c t))/c).
+
+    With a = g (sin th - cos th tan phi) and c the damping of the ground, from v' = a - c v.
+    """
+    pull = 2.0 * slide(slope_deg, friction_deg, 1.0)
+    return pull / damping * (time - (1.0 - math.exp(-damping * time)) / damping)
 
 
 def newmark(pulse: float, limit: float, time: float) -> float:
@@ -44,6 +56,19 @@ def measure_slide(
     sim.step(lab.steps(time))
     way = shifts(start, sim.poses, down)
     return (Measured(way, slide(slope_deg, friction_deg, time)),)
+
+
+def measure_damped(lab: Lab) -> tuple[Measured]:
+    """Let a block slide from rest on a ground that damps, in a scene that does not."""
+    plain, down = incline(30.0, 20.0)
+    surfaces = rock(20.0) | {"ground": Surface(20.0, damping=DAMPING)}
+    assert plain.terrain is not None
+    terrain = Terrain(plain.terrain.points, ["ground"] * len(plain.terrain.surfaces))
+    sim = lab.simulate(Scene(terrain, plain.blocks, surfaces, damping_when="contact"))
+    start = sim.poses
+    sim.step(lab.steps(2.0))
+    way = shifts(start, sim.poses, down)
+    return (Measured(way, damped_slide(30.0, 20.0, DAMPING, 2.0)),)
 
 
 def measure_creep(lab: Lab, sim: Metered) -> tuple[Measured, Measured]:
@@ -121,6 +146,12 @@ CASES = (
     slide_case("slide-35-34-2s", 35.0, 34.0, 1.0, 2.0, 2e-3),
     slide_case("slide-35-34-10s", 35.0, 34.0, 1.0, 10.0, 1e-4),
     slide_case("slide-30.2-30", 30.2, 30.0, 1.0, 5.0, 1e-4),
+    Case(
+        "slide-damped",
+        (Check("way", "a/c (t - (1 - exp(-c t))/c)", "m", 5e-3, "relative"),),
+        measure_damped,
+        smooth=True,
+    ),
     Case("hold-30-30.5", HOLDS, lambda lab: measure_hold(lab, 30.5)),
     Case("hold-30-35", HOLDS, lambda lab: measure_hold(lab, 35.0)),
     Case("hold-pressed", HOLDS, measure_pressed),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rigdda.validation import (
     arches,
     collisions,
+    crests,
     energy,
     fences,
     flight,
@@ -35,6 +36,7 @@ CASES: tuple[Case, ...] = (
     *rocking.CASES,
     *impacts.CASES,
     *collisions.CASES,
+    *crests.CASES,
     *invariance.CASES,
     *rotation.CASES,
     *walls.CASES,

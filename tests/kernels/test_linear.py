@@ -132,3 +132,24 @@ def test_solve_two_blocks(seed, touching, swapped):
     exact = np.linalg.solve(dense, m.rhs.ravel())
     solve_two_blocks(m, scratch(m).dense)
     assert np.abs(m.d[:2].ravel() - exact).max() < 1e-9 * max(np.abs(exact).max(), 1.0)
+
+
+@given(seeds, st.floats(3.0, 10.0))
+def test_a_stiff_contact_of_a_lone_block_bears_what_it_should(seed, orders):
+    """A contact is `10**orders` times as stiff as inertia and slips; its force is wanted, not d.
+
+    With a + k n m^t d = a + k n (m . d), where n holds the friction of the contact, that force is
+    k m . d, and Sherman and Morrison give it without cancellation.
+    """
+    rng = np.random.default_rng(seed)
+    inertia, stiff = rng.uniform(0.1, 10.0, 3), 10.0**orders
+    m, n, f = rng.normal(size=(3, 3))
+    n = m + 0.5 * n * np.linalg.norm(m)
+    compliance = (m * n / inertia).sum()
+    if compliance < 0.1 * (m * m / inertia).sum():
+        return
+    matrix, d = np.diag(inertia) + stiff * np.outer(n, m), np.empty(3)
+    solve_block(matrix, f, d)
+    exact = stiff * (m * f / inertia).sum() / (1.0 + stiff * compliance)
+    force = ((f - inertia * d) * n).sum() / (n * n).sum()
+    assert abs(force - exact) < 1e-5 * max(abs(exact), np.abs(f).max())

@@ -16,6 +16,10 @@ CLEARLY = 1e-6
 FLAT = 1e-9
 """Turn at a corner over the square of the perimeter that counts as none [-]: rounding."""
 
+STRAIGHT = 1e-7
+"""Distance of a corner from the line through its neighbours over the perimeter up to which it lies
+within an edge [-]: above rounding where coordinates are kilometres, below any shape of rock."""
+
 GRID = 1e-9
 """Grid of overlaps [m]: far finer than blocks, far coarser than rounding."""
 
@@ -118,6 +122,35 @@ def is_convex(vertices: NDArray[np.float64]) -> bool:
         return True
     perimeter = np.hypot(*edges(vertices).T).sum()
     return bool(turns(vertices).min() >= -FLAT * perimeter**2)
+
+
+def without_straight_corners(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a polygon without the corners that lie within an edge.
+
+    `shapely.simplify` leaves some of them: it never reduces a ring below four corners, and it drops
+    none from the first parts of a ring that it comes to, because the ring does not yet have four.
+
+    Parameters
+    ----------
+    vertices : (n, 2) array
+        Corners of a simple polygon in either winding [m].
+
+    Returns
+    -------
+    (m, 2) array
+        The corners that are more than `STRAIGHT` times the perimeter from the line through their
+        neighbours, in the same order [m]; at least three.
+    """
+    near = STRAIGHT * np.hypot(*edges(vertices).T).sum()
+    while len(vertices) > 3:  # one at a time: of two corners that nearly coincide one must stay
+        across = np.roll(vertices, -1, axis=0) - np.roll(vertices, 1, axis=0)
+        width = np.hypot(across[:, 0], across[:, 1])
+        distance = np.abs(turns(vertices)) / np.where(width > 0.0, width, np.inf)
+        flattest = int(distance.argmin())
+        if distance[flattest] > near:
+            break
+        vertices = np.delete(vertices, flattest, axis=0)
+    return vertices
 
 
 def convex_parts(vertices: NDArray[np.float64]) -> list[list[int]]:

@@ -2,20 +2,28 @@
 
 numba's own cache looks only at the file of the function that is called: edit a constant or a
 callee in another module and the cached caller keeps the old value. So the cache directory carries
-a hash of every source that kernels are made of.
+a hash of every source that kernels are made of. What cannot be written or read there costs the time
+to compile again, and stops nothing.
 """
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import hashlib
 import os
+import pickle
 import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba.core import config
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from rigdda.errors import Error
 
 
 def sources() -> list[bytes]:
@@ -37,15 +45,112 @@ def source_hash() -> str:
 
 
 def cache_directory() -> Path:
-    """Return the folder of compiled kernels, in the user's cache or else the temporary folder."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = home / "rigdda" / f"kernels-{source_hash()}"
+    """Return the folder of compiled kernels, in the user's cache or else the temporary folder.
+
+    Raises
+    ------
+    Error
+        If nothing can be written in either.
+    """
+    name = f"kernels-{source_hash()}"
+    for find in (_cache_home, _temporary_home, _process_home):
+        home = find()
+        if home is not None and _is_writable(home / name):
+            return home / name
+    mend = "set XDG_CACHE_HOME or TMPDIR to a folder that can be written"
+    raise Error(f"there is no place for compiled kernels: {mend}")
+
+
+def _cache_home() -> Path | None:
+    """Return the folder of this package in the user's caches, None without a home folder."""
+    named = os.environ.get("XDG_CACHE_HOME")
+    try:
+        caches = Path(named) if named else Path.home() / ".cache"
+    except RuntimeError:  # the user has no entry in the password database
+        return None
+    return caches / "rigdda"
+
+
+def _temporary_home() -> Path | None:
+    """Return a folder of this user in the temporary folder, None if it cannot be had."""
+    user = os.getuid() if hasattr(os, "getuid") else None  # none on Windows
+    try:
+        own = Path(tempfile.gettempdir()) / ("rigdda" if user is None else f"rigdda-{user}")
+        own.mkdir(mode=0o700, exist_ok=True)
+        owner = own.lstat().st_uid
+    except OSError:
+        return None
+    # numba runs what it reads, so a folder that another user has put there is not taken
+    return own if user is None or owner == user else None
+
+
+@functools.cache
+def _process_home() -> Path | None:
+    """Return a new temporary folder, the same throughout the process, None if none can be made."""
+    try:
+        return Path(tempfile.mkdtemp(prefix="rigdda-"))
+    except OSError:
+        return None
+
+
+def _is_writable(folder: Path) -> bool:
+    """Make a folder if it is not there; return whether files can be made in it and its folders.
+
+    Permissions do not tell: file systems may be read-only, and root may write all the same.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        for place in (folder, *(path for path in folder.iterdir() if path.is_dir())):
+            tempfile.TemporaryFile(dir=place).close()
     except OSError:
-        folder = Path(tempfile.gettempdir()) / f"rigdda-{os.getuid()}" / folder.name
-        folder.mkdir(parents=True, exist_ok=True)
-    return folder
+        return False
+    return True
+
+
+class CheckedFile(IndexDataCacheFile):
+    """Files of a cache whose machine code carries its hash.
+
+    After a crash of the machine a file may be whole in length and partly zeros. Code from such a
+    file would end the process, or compute nonsense.
+    """
+
+    def _save_data(self, name: str, data: Any) -> None:
+        code = self._dump(data)
+        super()._save_data(name, (hashlib.sha256(code).digest(), code))
+
+    def _load_data(self, name: str) -> Any:
+        digest, code = super()._load_data(name)
+        if hashlib.sha256(code).digest() != digest:
+            raise ValueError("the machine code is not what was written")
+        return pickle.loads(code)
+
+
+class KernelCache(FunctionCache):
+    """numba's cache of a function, but for files that cannot be read or written.
+
+    numba raises whatever unpickling them does. Here they are dropped and compiled again.
+    """
+
+    def __init__(self, function: Callable[..., Any]):
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = CheckedFile(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function of a signature, None if it is not there or not sound."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # of any kind: the bytes may be anything
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled function; warn if that fails, as on a full disk."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            warnings.warn(f"compiled kernels are not kept: {error}", RuntimeWarning, stacklevel=2)
 
 
 INSIDE = {
@@ -95,13 +200,16 @@ def stage(function: Callable[..., Any]) -> Any:
 
 def entry_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls, and keep the machine code on disk."""
+    compiled = numba.njit(**{**INSIDE, "no_cpython_wrapper": False})(function)
+    if config.DISABLE_JIT:
+        return compiled
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_directory())
     try:
-        options = {**INSIDE, "no_cpython_wrapper": False, "cache": True}
-        return numba.njit(**options)(function)
+        compiled._cache = KernelCache(function)  # numba has no other way to give it one
     finally:
         config.CACHE_DIR = before
+    return compiled
 
 
 class Direct:

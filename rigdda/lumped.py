@@ -1,12 +1,19 @@
-"""Releases by the lumped-mass model: a quick look, and the baseline of the block model."""
+"""Releases by the lumped-mass model: a quick look, and the baseline of the block model.
+
+A point would be stopped by a notch of a millimetre, whose face is a wall to it. A block is not, so
+each point moves on ground without the features that are far smaller than the block that it stands
+for, see `felt`.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from rigdda.barriers import Barrier, Earthwork, Mesh, as_layout, earthworks
@@ -26,11 +33,20 @@ from rigdda.model.composition import check_known
 from rigdda.model.place import Rebound
 from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
+from rigdda.model.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
 STEEPEST_DEG = 80.0
 """Friction angle up to which scatter may raise that of a surface [deg]."""
+
+UNFELT = 0.1
+"""Depth of the features of the ground that a block passes over as if they were not there, over its
+size [-]: it rolls over a step of a tenth of its size. Features are made of segments shorter than
+the block; a bend between two longer ones is none, however gentle."""
+
+ROUNDING = 1e-9
+"""Height above a line up to which a corner counts as being on it [m]."""
 
 
 class Points(NamedTuple):
@@ -66,9 +82,10 @@ def lumped(
 ) -> Points:
     """Return what becomes of releases of an event, or of those that seeds draw, as points.
 
-    Blocks start where `Site.draw` puts them. They rebound by `site.lumped`; of a surface that is
-    not listed there normal restitution and friction are those of `site.surfaces`. The scatter of
-    friction is that of the site.
+    Blocks start where `Site.draw` puts them, each on the ground that a block of its size feels, see
+    `felt`; the size is the side of a square of its area. They rebound by `site.lumped`; of a
+    surface that is not listed there normal restitution and friction are those of `site.surfaces`.
+    The scatter of friction is that of the site.
 
     Raises
     ------
@@ -87,28 +104,108 @@ def lumped(
     if not own:
         raise BadInput("seeds", seeds, "give at least one seed")
     ground, _ = earthworks(site.profile, layout, site.soil)
-    corners = np.ascontiguousarray(ground.points)
-    if (np.diff(corners[:, 0]) <= 0.0).any():
+    if (np.diff(ground.points[:, 0]) <= 0.0).any():
         mend = "use the block model: points need ground without overhangs or vertical faces"
         raise BadInput("slope.points", "an overhang", mend)
-    laws = np.array([law(site, name) for name in ground.surfaces])
-    starts, masses, release, shifts = [], [], [], []
+    starts, areas, densities, release, shifts = [], [], [], [], []
     for k, seed in enumerate(own):
         drawn = site.draw(seed, event)
         for block in drawn.blocks:
             area, centroid, _ = polygon_properties(block.vertices)
             starts.append((*centroid, *block.velocity[:2]))
-            masses.append(abs(area) * block.density)
+            areas.append(abs(area))
+            densities.append(block.density)
             release.append(k)
             shifts.append(drawn.friction_deg)
-    each = np.repeat(laws[None], len(starts), axis=0)
-    angles = np.clip(each[:, :, FRICTION] + np.array(shifts)[:, None], 0.0, STEEPEST_DEG)
-    each[:, :, FRICTION] = np.tan(np.radians(angles))
-    found = np.zeros((len(starts), 3))
-    trajectories(corners, each, np.array(starts), EARTH, site.road.start, found)
+    found = _follow(site, ground, np.array(starts), np.sqrt(areas), np.array(shifts))
     return Points(
-        np.array(release), np.array(masses), found[:, RUN_OUT], found[:, SPEED], found[:, HEIGHT]
+        np.array(release),
+        np.multiply(areas, densities),
+        found[:, RUN_OUT],
+        found[:, SPEED],
+        found[:, HEIGHT],
     )
+
+
+def felt(ground: Terrain, size: float) -> tuple[Floats, tuple[str, ...]]:
+    """Return the ground without features far smaller than a block.
+
+    Corners between segments that are both as long as the block are kept. Between them the ground is
+    simplified (Douglas and Peucker 1973) to `UNFELT` times the size of the block.
+
+    Parameters
+    ----------
+    ground : Terrain
+        Ground whose chainages ascend.
+    size : float
+        Size of the block [m].
+
+    Returns
+    -------
+    corners : (m, 2) array
+        Corners that are kept, and points on the lines between them where the surface changes [m].
+    surfaces : tuple of str
+        Surface of each of the m - 1 segments.
+    """
+    points, names = ground.points, np.array(ground.surfaces)
+    long = np.hypot(*np.diff(points, axis=0).T) >= size
+    if long.all():
+        return points, ground.surfaces
+    kept = np.concatenate([[True], long[:-1] & long[1:], [True]])
+    for low, high in pairwise(np.flatnonzero(kept).tolist()):
+        if high > low + 1:
+            piece = shapely.LineString(points[low : high + 1])
+            left = shapely.simplify(piece, UNFELT * size, preserve_topology=False)
+            x = shapely.get_coordinates(left)[:, 0]
+            kept[low : high + 1] = np.isin(points[low : high + 1, 0], x)
+    level = np.interp(points[:, 0], *points[kept].T)
+    level = np.where(np.abs(level - points[:, 1]) <= ROUNDING, points[:, 1], level)
+    kept[1:-1] |= names[1:] != names[:-1]
+    return np.column_stack([points[:, 0], level])[kept], tuple(names[kept[:-1]].tolist())
+
+
+def _follow(
+    site: Site, ground: Terrain, starts: Floats, sizes: Floats, shifts: Floats
+) -> NDArray[np.float64]:
+    """Follow points, each on the ground that a block of its size feels.
+
+    Parameters
+    ----------
+    site : Site
+        Its road and its laws of rebound.
+    ground : Terrain
+        The ground with its earthworks.
+    starts : (n, 4) array
+        Place [m] and velocity [m/s] of each point.
+    sizes : (n,) array
+        Size of the block that each point stands for [m].
+    shifts : (n,) array
+        Shift of the friction angles for each point [deg].
+
+    Returns
+    -------
+    (n, 3) array
+        What `rigdda.dynamics.lumped.trajectories` finds.
+    """
+    grounds: dict[bytes, tuple[Floats, tuple[str, ...]]] = {}
+    members: dict[bytes, list[int]] = {}
+    for i, size in enumerate(sizes.tolist()):
+        corners, surfaces = felt(ground, size)
+        key = corners.tobytes()
+        grounds[key] = corners, surfaces
+        members.setdefault(key, []).append(i)
+    found = np.zeros((len(starts), 3))
+    for key, (corners, surfaces) in grounds.items():
+        own, laws = members[key], np.array([law(site, name) for name in surfaces])
+        each = np.repeat(laws[None], len(own), axis=0)
+        angles = np.clip(each[:, :, FRICTION] + shifts[own, None], 0.0, STEEPEST_DEG)
+        each[:, :, FRICTION] = np.tan(np.radians(angles))
+        moved, results = starts[own], np.zeros((len(own), 3))
+        level = np.interp(moved[:, 0], *corners.T)
+        moved[:, 1] = np.maximum(moved[:, 1], level)  # a thin slab may lie within a feature
+        trajectories(np.array(corners), each, moved, EARTH, site.road.start, results)
+        found[own] = results
+    return found
 
 
 def law(site: Site, name: str) -> tuple[float, float, float]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.errors import BadInput
+from rigdda.geometry import FLAT, without_straight_corners
 
 SLIVER = 0.35
 """Blocks below this share of the wanted area are joined to a neighbour if that stays convex."""
@@ -25,6 +26,9 @@ AREA_TOLERANCE = 0.05
 until it is met."""
 
 DRAWS = 200
+
+NEAR = 1e-7
+"""Distance over the perimeter of a cell up to which a corner lies on an edge [-]: rounding."""
 
 
 class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -94,8 +98,8 @@ def cut(
         cells = _join_bridges(_cells(source, joints, scale, rng), joints, block_area, rng)
         mean = source.area / len(cells)
         if abs(mean / block_area - 1.0) <= AREA_TOLERANCE:
-            plain = shapely.simplify(cells, 1e-9 * source.length)  # no corners within an edge
-            return [np.array(c.exterior.coords)[:-1] for c in plain]
+            outlines = [shapely.get_coordinates(cell)[:-1] for cell in cells]
+            return [without_straight_corners(outline) for outline in outlines]
         scale *= math.sqrt(block_area / mean)
     raise BadInput(
         "source: block_area",
@@ -166,10 +170,14 @@ class Bridges(NamedTuple):
     bridged: list[bool]
 
     def across(self, edges: NDArray[np.object_]) -> NDArray[np.bool_]:
-        """Return which common edges of blocks are of a set across which blocks stay joined."""
+        """Return which common edges of blocks are of a set across which blocks stay joined.
+
+        An edge may be in several pieces, in any order, so its ends are its first and its last point
+        from left to right.
+        """
         dips = np.array([joint.dip_deg for joint in self.joints])
-        ends = [shapely.get_coordinates(edge)[[0, -1]] for edge in edges]
-        x, y = np.diff(ends, axis=1)[:, 0].T
+        points = [shapely.get_coordinates(edge).tolist() for edge in edges]
+        x, y = np.subtract([max(p) for p in points], [min(p) for p in points]).T
         off = (np.degrees(np.arctan2(-y, x))[:, None] - dips) % 180.0
         return np.array(self.bridged)[np.minimum(off, 180.0 - off).argmin(axis=1)]
 
@@ -192,7 +200,9 @@ def _join(
         return
     shapes = np.array([parts[j] for j in others])
     if not convex:  # where cells were joined, an edge may have lost the node that they share
-        shapes = shapely.snap(shapes, cell, 1e-7 * cell.length)
+        near = NEAR * cell.length
+        cell = shapely.snap(cell, shapely.multipolygons(shapes), near)
+        shapes = shapely.snap(shapes, cell, near)
     common = shapely.intersection(cell, shapes)
     edges = shapely.length(common).round(9)
     shared = edges > 0.0
@@ -201,14 +211,29 @@ def _join(
     for place in np.argsort(-edges, kind="stable"):
         if edges[place] == 0.0:
             return
-        joined, best = shapely.union(cell, shapes[place]), others[place]
-        hollow = joined.convex_hull.area - joined.area
-        simple = joined.geom_type == "Polygon" and not joined.interiors
-        if simple and (hollow < 1e-9 * joined.area or not convex):
+        joined, best = _union(cell, shapes[place]), others[place]
+        if joined is None:
+            continue
+        if not convex or joined.convex_hull.area - joined.area < 1e-9 * joined.area:
             break
     else:
         return
-    parts[best], parts[i] = joined.simplify(1e-7 * cell.length), None
+    parts[best], parts[i] = joined.simplify(NEAR * cell.length), None
     beside[best] = sorted({*beside[best], *beside[i]} - {best, i})
     for j in beside[i]:
         beside[j] = sorted({*beside[j], best} - {i, j})
+
+
+def _union(cell: shapely.Polygon, other: shapely.Polygon) -> shapely.Polygon | None:
+    """Return the union of two cells that share an edge, None if it is no simple polygon.
+
+    Where a cell has lost a node of that edge, the edges nearly coincide, and GEOS 3.14 may return
+    only one of the two cells. It does not once the nodes are put back.
+    """
+    area, near = cell.area + other.area, NEAR * cell.length
+    for _ in range(2):
+        joined = shapely.union(cell, other)
+        if abs(joined.area - area) <= FLAT * area:
+            return joined if joined.geom_type == "Polygon" and not joined.interiors else None
+        cell, other = shapely.snap(cell, other, near), shapely.snap(other, cell, near)
+    return None

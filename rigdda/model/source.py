@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.errors import BadInput
-from rigdda.geometry import overlap
+from rigdda.geometry import overlap, without_straight_corners
 from rigdda.model.joints import JointSet, cut
 from rigdda.model.polygon import convex_polygon, simple_polygon
 
@@ -173,10 +173,11 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def cut(self, rng: np.random.Generator) -> list[Floats]:
         """Return the corners of the blocks of a mass [m], or those given; `rng` draws the joints.
 
+        Corners that lie within an edge, as surveys have them, are left out.
         Not of a band, whose blocks lie on the ground of a site: see `rigdda.model.boulders`.
         """
         if self.blocks:
-            return [np.array(block) for block in self.blocks]
+            return [without_straight_corners(np.array(block)) for block in self.blocks]
         return cut(shapely.Polygon(self.polygon), self.joints, self.block_area, rng)
 
     def disturbed(self, rng: np.random.Generator, count: int) -> list[tuple[float, float, float]]:

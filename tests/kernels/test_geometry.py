@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from physics.helpers import ngon, polygon, rough
 from shapely.ops import triangulate
 
-from rigdda.geometry import polygon_properties
+from rigdda.geometry import polygon_properties, without_straight_corners
 
 
 def second_moment(corners: np.ndarray) -> float:
@@ -58,3 +58,22 @@ def test_regular_polygon(n):
     assert area == pytest.approx(2.0 * n * math.sin(turn), rel=1e-12)
     assert centre == pytest.approx([7.0, -3.0], abs=1e-12)
     assert second == pytest.approx(area * 4.0 * (2.0 + math.cos(turn)) / 6.0, rel=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(3, 9), st.floats(0.1, 100.0), st.integers(0, 20))
+def test_corners_within_edges_are_left_out_and_all_others_kept(seed, n, size, shift):
+    rng = np.random.default_rng(seed)
+    corners = polygon(ngon(n, size), (1e3 * rng.random(), 1e4 * rng.random()))
+    more = []
+    for k in range(n):
+        shares = np.sort(rng.random(rng.integers(0, 4)))[:, None]
+        more += [corners[k], *(corners[k] + shares * (corners[(k + 1) % n] - corners[k]))]
+    found = without_straight_corners(np.roll(more, shift, axis=0))
+    assert sorted(map(tuple, found)) == sorted(map(tuple, corners))
+    np.testing.assert_array_equal(without_straight_corners(corners[::-1]), corners[::-1])
+
+
+def test_of_corners_that_nearly_coincide_one_stays():
+    square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1e-12), (1.0, 1.0), (1.0 - 1e-12, 1.0), (0.0, 1.0)]
+    found = without_straight_corners(np.array(square))
+    np.testing.assert_allclose(found, [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], atol=1e-11)

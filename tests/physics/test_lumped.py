@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigdda import BadInput, Ditch, Embankment, GravityWall, Site, lumped
+from rigdda import BadInput, Ditch, Embankment, GravityWall, Site, Terrain, lumped
 from rigdda.dynamics.lumped import trajectories
+from rigdda.lumped import felt
 
 G = 9.81
 
@@ -79,6 +81,85 @@ def test_releases_of_a_site_are_points():
     np.testing.assert_array_equal(points.run_out, again.run_out)
     ditch = lumped(site, (Ditch(6.0, 1.5, 4.0),), range(200), "group")
     assert ditch.reached.mean() < points.reached.mean()
+
+
+def on_slope(points):
+    """Return what becomes of blocks of 0.3 to 1.1 m on another slope of a built-in site."""
+    site = Site.load("ritchie-60")
+    slope = msgspec.structs.replace(site.slope, points=tuple(map(tuple, points)))
+    return lumped(msgspec.structs.replace(site, slope=slope), (), range(10))
+
+
+def with_features(points, depth, width, places):
+    """Return the ground with a notch, or a bump of negative depth, at each of some chainages."""
+    x, y = np.transpose(points)
+    more = np.add.outer(places, width * np.array([0.0, 0.1, 0.9, 1.0])).ravel()
+    new = np.interp(more, x, y) - depth * np.tile([0.0, 1.0, 1.0, 0.0], len(places))
+    return sorted([*map(tuple, points), *zip(more.tolist(), new.tolist(), strict=True)])
+
+
+FACE = (Site.load("ritchie-60").slope.points[1], Site.load("ritchie-60").slope.points[2])
+"""Crest and toe of a face at 60 deg."""
+
+
+@pytest.mark.parametrize("depth", [1e-3, 1e-2, -1e-3, -1e-2])
+@pytest.mark.parametrize("width", [1e-3, 1e-2, 0.1])
+def test_features_far_smaller_than_a_block_do_not_stop_it(depth, width):
+    """On the face, where points slide and bounce, and where they run out."""
+    points = Site.load("ritchie-60").slope.points
+    plain = on_slope(points)
+    assert 0.5 < plain.reached.mean() < 1.0
+    (start, _), (toe, _) = FACE
+    places = np.array([start + 3.0, 0.5 * (start + toe), toe - 2.0, toe + 3.0])
+    rough = on_slope(with_features(points, depth, width, places))
+    np.testing.assert_array_equal(rough.reached, plain.reached)
+    np.testing.assert_allclose(rough.run_out, plain.run_out, rtol=1e-9)
+
+
+def test_a_step_far_smaller_than_a_block_does_not_stop_it():
+    """A step of 1 cm up, without an end, where points slide out on level ground."""
+    points, x = list(Site.load("ritchie-60").slope.points), FACE[1][0] + 2.0
+    after = [(x + 1e-3, 0.01), *((at, y + 0.01) for at, y in points if at > x)]
+    stepped, plain = (
+        on_slope([*(p for p in points if p[0] < x), (x, 0.0), *after]),
+        on_slope(points),
+    )
+    assert stepped.reached.mean() == pytest.approx(plain.reached.mean(), abs=0.02)
+    assert stepped.run_out.mean() == pytest.approx(plain.run_out.mean(), rel=0.01)
+
+
+def test_a_ditch_larger_than_a_block_stops_it():
+    points, toe = Site.load("ritchie-60").slope.points, FACE[1][0]
+    ditched = on_slope(with_features(points, 1.0, 4.0, np.array([toe + 0.5])))
+    assert ditched.reached.mean() < 0.5 * on_slope(points).reached.mean()
+
+
+@pytest.mark.parametrize("count", [3, 30, 3_000])
+def test_straight_slopes_may_be_divided_finely(count):
+    points = np.array(Site.load("ritchie-60").slope.points)
+    x = np.union1d(points[:, 0], np.linspace(*np.array(FACE)[:, 0], count))
+    divided = on_slope(np.column_stack([x, np.interp(x, *points.T)]))
+    np.testing.assert_allclose(divided.run_out, on_slope(points).run_out, rtol=1e-9)
+
+
+def test_ground_that_a_block_feels():
+    """A notch of 1 cm with a surface of its own goes, its surface and a step of 0.3 m stay."""
+    points = [
+        (0.0, 10.0),
+        (4.0, 6.0),
+        (4.001, 5.989),
+        (4.02, 5.98),
+        (6.0, 4.0),
+        (6.1, 3.6),
+        (9.0, 3),
+    ]
+    names = ["rock", "soil", "soil", "rock", "rock", "grass"]
+    corners, surfaces = felt(Terrain(points, names), 1.0)
+    exact = [(0.0, 10.0), (4.0, 6.0), (4.02, 5.98), (6.0, 4.0), (6.1, 3.6), (9.0, 3.0)]
+    np.testing.assert_allclose(corners, exact, atol=1e-12)
+    assert surfaces == ("rock", "soil", "rock", "rock", "grass")
+    everything, _ = felt(Terrain(points, names), 0.005)
+    np.testing.assert_array_equal(everything, points)
 
 
 def test_it_says_what_it_does_not_know():

@@ -191,6 +191,16 @@ def test_releases_of_a_surveyed_slope_are_an_ensemble():
     assert release_outcome(site, (), 3, "mass") == outcomes[3]
 
 
+def test_surveyed_blocks_lose_corners_within_an_edge():
+    (first, *others), rng = surveyed().sources[1].blocks, np.random.default_rng(0)
+    middle = tuple(np.mean(first[:2], axis=0))
+    source = msgspec.structs.replace(
+        surveyed().sources[1], blocks=((first[0], middle, *first[1:]), *others)
+    )
+    for block, exact in zip(source.cut(rng), (first, *others), strict=True):
+        np.testing.assert_array_equal(block, exact)
+
+
 def test_undisturbed_surveyed_blocks_are_the_same_in_every_release():
     one, other = (surveyed(disturbance=0.0).draw(seed, "mass").blocks for seed in (0, 1))
     assert all(a.velocity == b.velocity == (0.0, 0.0, 0.0) for a, b in zip(one, other, strict=True))

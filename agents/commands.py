@@ -65,8 +65,9 @@ def fit(
     """Fit numbers of SITE (a name or a TOML file) to run-outs in OBSERVED, a CSV file.
 
     Its columns are event and run_out_m, the chainage at which the block stopped. Prints the fitted
-    numbers with 95 % intervals, and what they predict of runs that were left out. Writes
-    site.toml (SITE with them), fit.csv and fit.png.
+    numbers with 95 % intervals, or "not identified" where the interval is nearly as long as the
+    range that was given, and what they predict of runs that were left out. Writes site.toml (SITE
+    with them), fit.csv and fit.png.
     """
     import rigdda
     from agents import fit as job

@@ -16,9 +16,20 @@ from agents.tables import write_rows
 Floats = NDArray[np.float64]
 
 
+NOT_IDENTIFIED = 0.7
+"""Length of a 95 % interval over the range that was given, from which on the observed run-outs tell
+nothing of a parameter [-]. An interval that they do not narrow is .95 of the range."""
+
+
+def identified(fitted: Fit) -> list[bool]:
+    """Return whether the observed run-outs tell each parameter from the others of its range."""
+    ends = zip(fitted.parameters, fitted.low, fitted.high, strict=True)
+    return [high - low < NOT_IDENTIFIED * (p.high - p.low) for p, low, high in ends]
+
+
 def rows(fitted: Fit, observed: Mapping[str, Floats]) -> list[dict[str, Any]]:
     """Return the parameters and what they give beside what was observed, a row each."""
-    ends = (fitted.parameters, fitted.best.values, fitted.low, fitted.high)
+    ends = (fitted.parameters, fitted.best.values, fitted.low, fitted.high, identified(fitted))
     out: list[dict[str, Any]] = [
         {
             "what": p.path,
@@ -28,14 +39,15 @@ def rows(fitted: Fit, observed: Mapping[str, Floats]) -> list[dict[str, Any]]:
             "high": b,
             "observed": "",
             "left_out": "",
+            "identified": "yes" if told else "no",
         }
-        for p, v, a, b in zip(*ends, strict=True)
+        for p, v, a, b, told in zip(*ends, strict=True)
     ]
     own, left, real = fitted.fitted, fitted.validated, seen(observed, fitted.site.slope.toe)
 
     def add(what: str, unit: str, pick: Callable[[Quality], float]) -> None:
         row = {"what": what, "unit": unit, "fitted": pick(own), "low": "", "high": ""}
-        out.append(row | {"observed": pick(real), "left_out": pick(left)})
+        out.append(row | {"observed": pick(real), "left_out": pick(left), "identified": ""})
 
     add("score", "m", lambda q: q.score)
     add("mean run-out", "m", lambda q: q.mean)

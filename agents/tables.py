@@ -223,6 +223,7 @@ def fit(rows: Sequence[dict[str, Any]]) -> Table:
     for row in rows:
         unit = f" [{row['unit']}]" if row["unit"] not in ("", "-") else ""
         ends = f"{row['low']:.3g} to {row['high']:.3g}" if row["low"] != "" else ""
+        ends = "not identified" if row["identified"] == "no" else ends
         cells = (number(row[name]) for name in ("left_out", "observed"))
         out.add_row(row["what"] + unit, number(row["fitted"]), ends, *cells)
     return out

@@ -30,6 +30,7 @@ from rigdda.dynamics.lumped import (
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
 from rigdda.model.composition import check_known
+from rigdda.model.events import Drawn
 from rigdda.model.place import Rebound
 from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
@@ -85,7 +86,7 @@ def lumped(
     Blocks start where `Site.draw` puts them, each on the ground that a block of its size feels, see
     `felt`; the size is the side of a square of its area. They rebound by `site.lumped`; of a
     surface that is not listed there normal restitution and friction are those of `site.surfaces`.
-    The scatter of friction is that of the site.
+    Friction and restitution vary as those of the site and its surfaces do; the ground is smooth.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def lumped(
             areas.append(abs(area))
             densities.append(block.density)
             release.append(k)
-            shifts.append(drawn.friction_deg)
+            shifts.append(_deviations(site, drawn))
     found = _follow(site, ground, np.array(starts), np.sqrt(areas), np.array(shifts))
     return Points(
         np.array(release),
@@ -125,6 +126,15 @@ def lumped(
         found[:, SPEED],
         found[:, HEIGHT],
     )
+
+
+def _deviations(site: Site, drawn: Drawn) -> list[tuple[float, float]]:
+    """Return how far friction [deg] and restitution [-] of each surface are off in a release."""
+    normals = drawn.strengths or ((0.0, 0.0, 0.0),) * len(site.surfaces)
+    return [
+        (drawn.friction_deg + normal[0] * s.friction_sd_deg, normal[1] * s.restitution_sd)
+        for s, normal in zip(site.surfaces.values(), normals, strict=True)
+    ]
 
 
 def felt(ground: Terrain, size: float) -> tuple[Floats, tuple[str, ...]]:
@@ -179,8 +189,8 @@ def _follow(
         Place [m] and velocity [m/s] of each point.
     sizes : (n,) array
         Size of the block that each point stands for [m].
-    shifts : (n,) array
-        Shift of the friction angles for each point [deg].
+    shifts : (n, surfaces, 2) array
+        See `_deviations`, for each point.
 
     Returns
     -------
@@ -194,12 +204,14 @@ def _follow(
         key = corners.tobytes()
         grounds[key] = corners, surfaces
         members.setdefault(key, []).append(i)
-    found = np.zeros((len(starts), 3))
+    found, every = np.zeros((len(starts), 3)), list(site.surfaces)
     for key, (corners, surfaces) in grounds.items():
         own, laws = members[key], np.array([law(site, name) for name in surfaces])
         each = np.repeat(laws[None], len(own), axis=0)
-        angles = np.clip(each[:, :, FRICTION] + shifts[own, None], 0.0, STEEPEST_DEG)
+        off = shifts[own][:, [every.index(name) for name in surfaces]]
+        angles = np.clip(each[:, :, FRICTION] + off[:, :, 0], 0.0, STEEPEST_DEG)
         each[:, :, FRICTION] = np.tan(np.radians(angles))
+        each[:, :, NORMAL] = np.clip(each[:, :, NORMAL] + off[:, :, 1], 0.0, 1.0)
         moved, results = starts[own], np.zeros((len(own), 3))
         level = np.interp(moved[:, 0], *corners.T)
         moved[:, 1] = np.maximum(moved[:, 1], level)  # a thin slab may lie within a feature

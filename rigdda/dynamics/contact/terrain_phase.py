@@ -205,7 +205,8 @@ def edge_on_ridge(
         # the normal out of the ground is opposite to that of the edge
         after_left = left.normal_x * -ny - left.normal_y * -nx <= lean
         before_right = -nx * right.normal_y + ny * right.normal_x <= lean
-        outward = nx * left.normal_x + ny * left.normal_y < 0.0
+        middle_x, middle_y = left.normal_x + right.normal_x, left.normal_y + right.normal_y
+        outward = nx * middle_x + ny * middle_y < 0.0
         fits = after_left and before_right and outward and not inner
         if fits and (time > best_time or (time == best_time and gap > best_gap)):
             best, best_time, best_gap = edge, time, gap

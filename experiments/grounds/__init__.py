@@ -1,0 +1,1 @@
+"""Grounds of the library against three field cases."""

@@ -1,0 +1,202 @@
+"""Chant Sura: what a contact with alpine soil leaves of the translational energy of a block.
+
+EOTA concrete blocks, a wheel of 210 and of 780 kg and an equant one of 250 kg, fell onto a slope of
+about 45 degrees of alpine meadow and scree (Caviezel et al. 2020, Induced Rockfall Dataset #2,
+EnviDat, doi 10.16904/envidat.174; derived contacts in `chant_sura_contacts.csv`). Six contacts of a
+block of 780 kg in mid-slope were measured as well (Caviezel et al. 2019, Earth Surface Dynamics 7,
+199-210, doi 10.5194/esurf-7-199-2019).
+
+The share that a contact keeps is that of the kinetic energy of translation just after it over that
+just before it, each from the parabola of the flight, as the data have it.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from agents.fit import Floats
+from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
+from rigdda.dynamics.constants import APART
+from rigdda.model.realisation import FARTHEST
+from rigdda.model.roughness import Roughness
+
+SEEN = Path(__file__).parent / "chant_sura_contacts.csv"
+
+SLOPE = math.radians(45.0)
+"""Mean slope where the contacts happened."""
+
+DENSITY = 2670.0
+"""Of the concrete [kg/m3]."""
+
+MASSES = {"W200": (210.0, 0.5), "W800": (780.0, 0.5), "e200": (250.0, 1.0)}
+"""Mass [kg] and thickness over diameter [-] of each block."""
+
+FILL = 17.0 / 27.0
+"""Volume over that of its box of a block whose edges are cut off at a third (EOTA)."""
+
+SPEEDS = (4.0, 10.0)
+"""Speeds of the contacts that are counted [m/s]."""
+
+MID_SPEEDS = (16.0, 29.0)
+"""The same in mid-slope [m/s]."""
+
+MID_SLOPE = np.array([0.22, 1.11, 0.55, 0.42, 0.50, 0.47])
+"""Shares kept in the six contacts in mid-slope [-]."""
+
+SPIN = 2.0
+"""Greatest rate of rotation of a block that tips off its platform, either way [rad/s]; assumed."""
+
+DT = 5e-3
+"""Step [s]."""
+
+LONGEST = 2.0
+"""Time after which a block that does not fly again has rolled or stopped [s]."""
+
+
+class Contact(NamedTuple):
+    """A contact between two flights."""
+
+    speed: float
+    """Just before [m/s]."""
+    kept: float
+    """Share of the translational energy that is left just after [-]."""
+
+
+def observed() -> Floats:
+    """Return speed before [m/s], vertical speed before [m/s] and share kept, (11, 3)."""
+    with SEEN.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    names = ("speed_in_m_s", "vertical_in_m_s", "kinetic_in_J", "kinetic_out_J")
+    speed, vertical, before, after = np.array([[float(r[n]) for n in names] for r in rows]).T
+    return np.column_stack([speed, vertical, after / before])
+
+
+def section(name: str, rng: np.random.Generator) -> tuple[Floats, float]:
+    """Return the corners of one of the three faces of a block at random [m], and its size [m].
+
+    Of a wheel one face is round and two are flat. Corners are cut off at a third of the edges.
+    """
+    mass, flatness = MASSES[name]
+    size = (mass / DENSITY / (FILL * flatness)) ** (1.0 / 3.0)
+    width = size if rng.integers(3) == 0 else flatness * size
+    sixth = np.array([(-1, -3), (1, -3), (3, -1), (3, 1), (1, 3), (-1, 3), (-3, 1), (-3, -1)]) / 6.0
+    return sixth * (size, width), size
+
+
+def drawn(surface: Surface, rng: np.random.Generator) -> Surface:
+    """Return a surface with friction, restitution and damping as a release may find them."""
+    normal = np.clip(rng.standard_normal(3), -FARTHEST, FARTHEST)
+    spread = (surface.friction_sd_deg, surface.restitution_sd, surface.damping_sd)
+    friction, restitution, damping = normal * spread
+    return msgspec.structs.replace(
+        surface,
+        friction_deg=float(np.clip(surface.friction_deg + friction, 0.0, 85.0)),
+        restitution=float(np.clip((surface.restitution or 0.0) + restitution, 0.0, 1.0)),
+        damping=float(max((surface.damping or 0.0) + damping, 0.0)),
+    )
+
+
+def scene(
+    surface: Surface, name: str, velocity: Floats, slope: float, rng: np.random.Generator
+) -> Scene:
+    """Return a block that is about to touch a slope [rad] at this velocity [m/s, m/s, rad/s]."""
+    corners, size = section(name, rng)
+    angle = rng.uniform(0.0, 2.0 * math.pi)
+    cos, sin = math.cos(angle), math.sin(angle)
+    turned = corners @ np.array([[cos, sin], [-sin, cos]])
+    down = np.array([math.cos(slope), -math.sin(slope)])
+    out = np.array([math.sin(slope), math.cos(slope)])
+    turned += (1e-3 - (turned @ out).min()) * out
+    seed = (int(rng.integers(2**31)),)
+    pits = Roughness(size, {"ground": surface.roughness}, seed) if surface.roughness else None
+    return Scene(
+        Terrain([-30.0 * down, 300.0 * down], ["ground"]),
+        (Block(turned, DENSITY, velocity=tuple(velocity.tolist())),),
+        {"rock": surface, "ground": surface},
+        damping_when="contact",
+        roughness=pits,
+    )
+
+
+def contacts(scene: Scene, duration: float, lowest: float = -math.inf) -> list[Contact]:
+    """Return the contacts of a block, each between two flights of at least `APART`.
+
+    A contact without a flight within `LONGEST` after it is one, too: the block rolls or stops.
+    """
+    sim = Simulation(scene, Settings(dt=DT))
+    body, gravity = sim.loop.arrays.bodies, scene.gravity_vector[1]
+    found: list[Contact] = []
+    before = velocity = sim.velocities[0, :2].copy()
+    began = touched = -1
+    for step in range(round(duration / DT)):
+        sim.step()
+        last, velocity = velocity, sim.velocities[0, :2].copy()
+        if body["apart"][0] < DT:
+            if began < 0:
+                began, before = step, last
+            touched = step
+        elif began >= 0 and (step - touched) * DT > APART + DT:
+            after = velocity - (0.0, gravity * DT * (step - touched))  # as it left the ground
+            found.append(_contact(before, after))
+            began = -1
+        if began >= 0 and (step - began) * DT > LONGEST:
+            found.append(_contact(before, velocity))
+            break
+        if sim.poses[0, 1] < lowest:
+            break
+    return found
+
+
+def _contact(before: Floats, after: Floats) -> Contact:
+    return Contact(float(np.hypot(*before)), float((after @ after) / (before @ before)))
+
+
+def first_contacts(surface: Surface, name: str, count: int, seed: int) -> list[Contact]:
+    """Return the contacts at `SPEEDS` among the first three of so many releases of a block.
+
+    Speeds at the first one are uniform within these, directions those that were observed.
+    """
+    seen, found = observed(), []
+    for k in range(count):
+        rng = np.random.default_rng([seed, k])
+        speed, row = rng.uniform(*SPEEDS), seen[rng.integers(len(seen))]
+        steep = row[1] / row[0]
+        velocity = speed * np.array([math.sqrt(1.0 - steep**2), steep, 0.0])
+        velocity[2] = rng.uniform(-SPIN, SPIN)
+        release = scene(drawn(surface, rng), name, velocity, SLOPE, rng)
+        found += [c for c in contacts(release, 4.0)[:3] if SPEEDS[0] <= c.speed <= SPEEDS[1]]
+    return found
+
+
+def mid_slope(surface: Surface, count: int, seed: int) -> list[Contact]:
+    """Return the contacts at `MID_SPEEDS` of so many releases of the block of 780 kg.
+
+    Of each the last one at which the block is as fast: they go down 200 m of the slope.
+    """
+    found = []
+    for k in range(count):
+        rng = np.random.default_rng([seed, k, 1])
+        velocity = np.array([8.0, -6.0, rng.uniform(-SPIN, SPIN)])
+        release = scene(drawn(surface, rng), "W800", velocity, SLOPE, rng)
+        every = contacts(release, 20.0, -200.0 * math.sin(SLOPE))
+        found += [c for c in every if MID_SPEEDS[0] <= c.speed <= MID_SPEEDS[1]]
+    return found
+
+
+def lumped_share(normal: float, tangential: float) -> Floats:
+    """Return the shares that a point mass would keep in the observed first contacts, (11,) [-].
+
+    Parameters
+    ----------
+    normal, tangential : float
+        Its coefficients of restitution [-].
+    """
+    speed, vertical, _ = observed().T
+    steep = np.arcsin(-vertical / speed) - SLOPE  # off the slope downhill; 90 degrees is square
+    return (tangential * np.cos(steep)) ** 2 + (normal * np.sin(steep)) ** 2

@@ -162,12 +162,13 @@ def _zone(base: Site, slope: Slope, sources: tuple[Source, ...], ground: Ground)
 
 
 def _surfaces(base: Site, rng: np.random.Generator) -> dict[str, Surface]:
-    shift, factor = rng.uniform(-2.0, 2.0), rng.uniform(0.75, 1.25)
+    shift, factor, loss = rng.uniform(-2.0, 2.0), *rng.uniform(0.75, 1.25, 2)
     return {
         name: replace(
             surface,
             friction_deg=round(surface.friction_deg + shift, 2),
             restitution=round((surface.restitution or 0.0) * factor, 3),
+            damping=round((surface.damping or 0.0) * loss, 3),
         )
         for name, surface in base.surfaces.items()
     }

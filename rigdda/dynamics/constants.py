@@ -1,5 +1,10 @@
 """Tolerances and limits of the mechanics: unit, reason and consequence of each."""
 
+SOLVED = 1e-250
+"""Residual below which a system counts as solved whatever its forces, in the norm of its inverse
+diagonal [J]. Forces that balance leave a right-hand side of zero, of which no share is a limit;
+squares of less would underflow."""
+
 PENETRATION_RATIO = 1e-4
 """Wanted penetration over block size [-]. Smaller: stiffer contacts, taller stacks stand, more
 solver iterations."""

@@ -88,7 +88,7 @@ def test_pcg_without_load():
 @pytest.mark.parametrize("solver", ["pcg", "block-pcg", "sor"])
 def test_what_moves_without_load_comes_to_rest(solver, size):
     """No share of a right-hand side of zero is a limit, and squares of small numbers underflow."""
-    m, dense, pairs = system(4, 5, spread=0.3)
+    m, _, pairs = system(4, 5, spread=0.3)
     m.rhs[:] = 0.0
     m.d[:] = size * np.random.default_rng(0).normal(size=m.d.shape)
     if solver == "sor":

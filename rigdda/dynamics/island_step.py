@@ -103,7 +103,9 @@ def step_island(
     while left > 0.0 and bad < 0:
         in_substeps = False
         if parts > 0:
-            begin_part(bodies, contacts, interfaces, islands, s, motion, left, parts, part)
+            begin_part(
+                bodies, contacts, interfaces, islands, s, motion, left, p.dt, parts, part
+            )  # fmt: skip
             now = part
         if c1 > c0:
             since = lap(counters, MOTION, since, p.timing)

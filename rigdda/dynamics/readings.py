@@ -227,4 +227,6 @@ def divergence(arrays: Arrays, contacts: NDArray[np.void], block: int, when: str
         other = c["block_b"] if c["block_a"] == block else c["block_a"]
         told += f", pressed with {c['normal_force']:g} N at ({c['x']:g}, {c['y']:g})"
         told += f" by {'the terrain' if other < 0 else f'block {other}'}"
+    if not np.isfinite([body["vx"], body["vy"], body["omega"]]).all():
+        return f"{told}; its solution failed, which no step mends: try another solver"
     return f"{told}; use a smaller dt"

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.assembly.springs import relative_displacement
-from rigdda.dynamics.constants import BOLT, IMPACT, PIN, STICK
+from rigdda.dynamics.constants import BOLT, IMPACT, PIN, SAME_NORMAL, STICK
 from rigdda.dynamics.records import Contacts
 from rigdda.kernel import kernel
 
@@ -41,10 +41,12 @@ def set_rebound(contacts: Contacts, islands: Islands, low: int, high: int, share
 def impact_work(contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int) -> float:
     """Return the work of the contact forces of an island in this step [J], supports left out.
 
-    Friction that gives energy counts twice: to rebound out of a wedge a block would be pressed
-    against its sides with any force, which friction there would have to yield.
+    Where contacts press in different directions, friction that gives energy counts twice: to
+    rebound out of a wedge a block would be pressed against its sides with any force, which friction
+    there would have to yield.
     """
-    total = 0.0
+    total = given = nx = ny = 0.0
+    wedged = False
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         if c.kind == BOLT or c.kind == PIN:
@@ -52,5 +54,9 @@ def impact_work(contacts: Contacts, d: NDArray, islands: Islands, low: int, high
         i = islands.slot[c.a]
         j = islands.slot[c.b] if c.pair >= 0 else -1
         dn, ds = relative_displacement(c, d, i, j)
-        total += c.normal * dn + c.shear * ds + max(c.shear * ds, 0.0)
-    return total
+        total += c.normal * dn + c.shear * ds
+        given += max(c.shear * ds, 0.0)
+        if c.normal > 0.0:
+            wedged = wedged or nx * c.nx + ny * c.ny < SAME_NORMAL * (nx * nx + ny * ny)
+            nx, ny = c.nx, c.ny
+    return total + given if wedged else total

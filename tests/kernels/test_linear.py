@@ -84,6 +84,21 @@ def test_pcg_without_load():
     assert (m.d == 0.0).all()
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-60, 1e-120, 1e-150, 1e-160])
+@pytest.mark.parametrize("solver", ["pcg", "block-pcg", "sor"])
+def test_what_moves_without_load_comes_to_rest(solver, size):
+    """No share of a right-hand side of zero is a limit, and squares of small numbers underflow."""
+    m, _, pairs = system(4, 5, spread=0.3)
+    m.rhs[:] = 0.0
+    m.d[:] = size * np.random.default_rng(0).normal(size=m.d.shape)
+    if solver == "sor":
+        solve_sor(m, scratch(m), 5, pairs, 1e-9, 1.0)
+    else:
+        solve_pcg(m, scratch(m), 5, pairs, 1e-9, solver == "block-pcg")
+    assert np.isfinite(m.d).all()
+    assert np.abs(m.d[:5]).max() < max(1e-12 * size, 1e-110)
+
+
 @pytest.mark.parametrize("symmetric", [True, False])
 @given(seed=seeds)
 def test_solve_block(symmetric, seed):

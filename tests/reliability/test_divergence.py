@@ -45,6 +45,14 @@ def test_the_error_names_the_contact_that_did_it():
         Simulation(scene).run(1.0)
 
 
+def test_what_is_not_a_number_asks_for_no_smaller_step():
+    sim = Simulation(Scene(Terrain(FLAT), (box(0.0, 0.5),), rock()))
+    sim.step()
+    sim.loop.arrays.bodies["vx"][0] = np.nan
+    with pytest.raises(Diverged, match="another solver"):
+        sim.step()
+
+
 def test_contacts_too_soft_for_their_load_are_told():
     scene = Scene(Terrain(FLAT), tuple(box(0.0, 0.5 + i) for i in range(5)), rock())
     with pytest.warns(SoftContacts, match="smaller penetration"):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Matrix, Scratch
+from rigdda.dynamics.constants import SOLVED
 from rigdda.dynamics.linear.direct import solve_block
 from rigdda.kernel import kernel
 
@@ -58,7 +59,7 @@ def solve_pcg(
     """Solve K d = rhs from the start value in m.d, in place.
 
     Stops when the residual, in the norm of the preconditioner, is below `tolerance` times the
-    forces.
+    forces, or below `SOLVED`.
 
     Returns
     -------
@@ -75,7 +76,7 @@ def solve_pcg(
     for i in range(n):
         for j in range(3):
             scratch.direction[i, j] = scratch.scaled[i, j]
-    limit = tolerance * tolerance * scale
+    limit = max(tolerance * tolerance * scale, SOLVED)
     iterations = 0
     while rho > limit and iterations < 10 * n + 30:
         multiply(m, n, pairs, scratch.direction, scratch.product)

@@ -22,6 +22,9 @@ from rigdda.dynamics.contact.separating_axes import following
 from rigdda.dynamics.records import Bodies, Box, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
+SHARP = 1e-9
+"""Cosine of the angle between normals beyond which a ridge turns by more than 90 degrees [-]."""
+
 NEVER = 2.0
 """Time of entry, over the step, of what does not come nearer or not soon."""
 
@@ -187,6 +190,10 @@ def edge_on_ridge(
     concave = part != a
     lean = abs(block.omega) * dt
     reach = block.path + p.gravity * dt * dt + p.margin
+    # on a ridge that turns by more than 90 deg a normal between both is not always along the left
+    out_x, out_y = left.normal_x, left.normal_y
+    if left.normal_x * right.normal_x + left.normal_y * right.normal_y < -SHARP:
+        out_x, out_y = out_x + right.normal_x, out_y + right.normal_y
     best, best_time, best_gap = -1, -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
@@ -205,8 +212,7 @@ def edge_on_ridge(
         # the normal out of the ground is opposite to that of the edge
         after_left = left.normal_x * -ny - left.normal_y * -nx <= lean
         before_right = -nx * right.normal_y + ny * right.normal_x <= lean
-        middle_x, middle_y = left.normal_x + right.normal_x, left.normal_y + right.normal_y
-        outward = nx * middle_x + ny * middle_y < 0.0
+        outward = nx * out_x + ny * out_y < 0.0
         fits = after_left and before_right and outward and not inner
         if fits and (time > best_time or (time == best_time and gap > best_gap)):
             best, best_time, best_gap = edge, time, gap

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigdda import Block, Scene, Settings
-from rigdda.dynamics.contact.separating_axes import NEVER, face_of_contact
+from rigdda.dynamics.contact.separating_axes import NEVER, SQUARE, TOUCH, face_of_contact
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.kernel import from_python
@@ -53,8 +53,13 @@ def over_all_edges(
             return False, 0.0, 0.0, 0.0
         px, py, turn = turning if gap <= SLACK else np.zeros(3)
         approach = -(way + np.array([px - turn * y, py + turn * x])) @ normal
-        late = NEVER if approach <= 0.0 else min((gap + SLACK) / approach, NEVER)
-        ranks.append((late if gap >= -SLACK else 0.0, gap))
+        struck = gap > 2.0 * TOUCH * SLACK and approach > SQUARE * math.hypot(*way)
+        gone = gap - TOUCH * SLACK if struck else gap + SLACK
+        late = gap + SLACK >= NEVER * approach
+        if gap < -SLACK:
+            ranks.append((0.0, gap))
+        else:
+            ranks.append((NEVER if late else gone / approach, gap))
     return True, *max(ranks), max(gap for _, gap in ranks)
 
 
@@ -70,7 +75,17 @@ def test_the_face_of_contact_is_that_of_all_edges(seed: int) -> None:
             wanted = over_all_edges(arrays, i, j, way, turning, spread)
             count = arrays.outlines.polygon.count
             possible, time, depth, apart, _ = face(
-                arrays.outlines, i, count[i], j, count[j], *way, *turning, spread, SLACK, 0.0
+                arrays.outlines,
+                i,
+                count[i],
+                j,
+                count[j],
+                *way,
+                *turning,
+                spread,
+                SLACK,
+                0.0,
+                SQUARE * math.hypot(*way),
             )
             assert possible == wanted[0]
             if possible:

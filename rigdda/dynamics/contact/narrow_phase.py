@@ -8,13 +8,17 @@ leads through a neighbouring part, and that one has the contact.
 
 from __future__ import annotations
 
+import math
+
 from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import AWAKE, OTHER_FACE, SAME_FACE
 from rigdda.dynamics.contact.separating_axes import (
+    SQUARE,
     axis_gap,
     face_of_contact,
     following,
     incident_edge,
+    touch_time,
 )
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
@@ -242,13 +246,15 @@ def collide_parts(
     turning adds to it at (x, y), see `face_of_contact`, and `beside` half of how far both may turn.
     """
     ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
+    # what moves may be deflected by others before they meet
+    square = math.inf if bodies[b].status == AWAKE else SQUARE * math.sqrt(dx * dx + dy * dy)
     possible, time_i, gap_i, apart_i, edge_i = face_of_contact(
-        outlines, i, ni, j, nj, dx, dy, px, py, turn, spread, margin, sunk
+        outlines, i, ni, j, nj, dx, dy, px, py, turn, spread, margin, sunk, square
     )
     if not possible:
         return k
     possible, time_j, gap_j, apart_j, edge_j = face_of_contact(
-        outlines, j, nj, i, ni, -dx, -dy, -px, -py, -turn, spread, margin, sunk
+        outlines, j, nj, i, ni, -dx, -dy, -px, -py, -turn, spread, margin, sunk, square
     )
     if not possible:
         return k
@@ -257,8 +263,8 @@ def collide_parts(
     reach = (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(apart_i, apart_j) <= margin
     # where they touch, not where they are deeper than the margin
-    time_i *= gap_i / (gap_i + margin) if gap_i > margin else 0.0
-    time_j *= gap_j / (gap_j + margin) if gap_j > margin else 0.0
+    time_i = touch_time(gap_i, time_i, square, margin)
+    time_j = touch_time(gap_j, time_j, square, margin)
     beside = 0.0 if touching else beside
     # corner beside corner, the better face may miss the other body where the second one does not;
     # and what is beside it at the time of entry may be driven into it from where it is now

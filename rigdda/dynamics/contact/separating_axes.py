@@ -16,6 +16,14 @@ from rigdda.dynamics.constants import SAME_FACE
 from rigdda.dynamics.records import Corners
 from rigdda.kernel import inlined, kernel
 
+TOUCH = 2e-3
+"""Distance over the margin at which a face that is struck is entered [-]. It is the sooner reached
+the more oblique the face is: of an edge and the corner at its end the edge is struck."""
+
+SQUARE = 0.2
+"""Approach of a face over the whole relative displacement from which on the face is struck, not
+grazed [-]."""
+
 NEVER = 1e3
 """Time of entry, over the step, of what comes nearer no faster than what is at rest may."""
 
@@ -62,7 +70,7 @@ def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
 @inlined
 def face_of_contact(
     outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
-    px: float, py: float, turn: float, spread: float, margin: float, sunk: float,
+    px: float, py: float, turn: float, spread: float, margin: float, sunk: float, square: float,
 ) -> tuple[bool, float, float, float, int]:  # fmt: skip
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
@@ -75,9 +83,11 @@ def face_of_contact(
     points may come nearer, whatever does. Edges inside the body count as deeper by `sunk`, so that
     on a tie the real one is best.
 
-    A face is entered when the nearest corner is deeper than the margin: of two that it touches the
-    one that is approached more slowly is the best. By the velocity of that corner then: the middle
-    of a block that rolls comes down, where it rests does not.
+    A face that is struck, approached by more than `square` [m], is entered when the nearest corner
+    meets it. One that it touches, or that is grazed, is entered when the corner is deeper than the
+    margin: of two of these the one that is approached more slowly is the best. By the velocity of
+    the corner that touches then: the middle of a block that rolls comes down, where it rests does
+    not.
 
     The edge that the middle of j is farthest over comes first: most often it is the best one, or
     one that separates them. Others are looked at only as far as the circle in j may be over them.
@@ -106,11 +116,23 @@ def face_of_contact(
                 uy += turn * outlines.corner[j, corner].x + py
             approach = -(nx * ux + ny * uy)
             late = gap + margin >= NEVER * approach
-            entry = NEVER if late else (gap + margin) / approach
+            struck = gap > 2.0 * TOUCH * margin and approach > square
+            entry = NEVER if late else (gap + (-TOUCH if struck else 1.0) * margin) / approach
         later = entry > time or (entry == time and gap > depth)
         if later or (entry == time and gap == depth and edge < best):
             time, depth, best, nearest = entry, gap, edge, corner
     return True, time, depth, apart, edge_over_corner(outlines, i, best, edges, j, nearest)
+
+
+@kernel
+def touch_time(gap: float, time: float, square: float, margin: float) -> float:
+    """Return when a face that is entered at a time is touched, over the step; 0 if it is now."""
+    near = TOUCH * margin
+    if gap <= 2.0 * near or time <= 0.0:
+        return 0.0
+    if gap - near > square * time:  # it is struck
+        return time * gap / (gap - near)
+    return time * gap / (gap + margin) if gap > margin else 0.0
 
 
 @kernel

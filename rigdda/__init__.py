@@ -18,6 +18,7 @@ from rigdda.dynamics.run import Run
 from rigdda.dynamics.simulation import Simulation
 from rigdda.errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from rigdda.lumped import Points, lumped
+from rigdda.model import grounds
 from rigdda.model.block import Block
 from rigdda.model.economy import Bill, Consequences, Prices
 from rigdda.model.events import Drawn, Event
@@ -72,6 +73,7 @@ __all__ = [
     "Surface",
     "Terrain",
     "Wall",
+    "grounds",
     "limit_equilibrium",
     "load_layout",
     "lumped",

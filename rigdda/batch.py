@@ -87,7 +87,8 @@ class Batch:
             return simulation(self._site, scene)
         settings = self._site.settings(scene)
         corners = max(len(b.vertices) for b in scene.blocks)
-        key = len(scene.blocks), corners, settings.dt, len(scene.ground.points)
+        ground = len(scene.ground.points) if scene.ground is not None else 0
+        key = len(scene.blocks), corners, settings.dt, ground
         template = self._templates.get(key)
         if template is None or not template.fits(scene):
             lines = chainages(stations(self._site, scene.barriers))

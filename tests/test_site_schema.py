@@ -53,7 +53,7 @@ def refused(folder, name: str, old: str, new: str) -> BadInput:
         ("friction_deg = 30.0", "friction_deg = 30.0\nnonsense = 1"),
         ("embankment = 110.0", "nonsense = 110.0"),
         ("price = 80.0", "price = 80.0\nnonsense = 1"),
-        ("damping = 0.3", "nonsense = 0.3"),
+        ("duration = 20.0", "nonsense = 0.3"),
         ("[motion]", "[consequences]\nnonsense = 1\n\n[motion]"),
         ("[motion]", "[scatter]\nnonsense = 1\n\n[motion]"),
         ("[motion]", '[[interfaces]]\nfirst="rock"\nsecond="soil"\nnonsense=1\n[motion]'),
@@ -78,7 +78,7 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
             "sources.face.density",
             "kg/m3",
         ),
-        ("[61.0, -3.0]", "[45.0, -3.0]", "slope.surfaces[1].end", "at most 45"),
+        ("[61.0, -3.0]", "[45.0, -3.0]", "slope.surfaces[2].end", "at most 45"),
         ("area = [0.05, 0.3]", "", "events.small, face.area", "band face"),
         ("width = 4.0", "", "events.group.width", "several blocks"),
         ('source = "face"', 'source = "fall"', "events.small, face.source", "crest, face"),
@@ -152,7 +152,7 @@ def test_without_events_a_band_alone_brings_nothing_down():
     [
         ("restitution = 0.2", "restitution = 3.0", "surfaces.rock.restitution"),
         ("[motion]", "[lumped.rock]\nnormal = 3.0\n\n[motion]", "lumped.rock.normal"),
-        ("damping = 0.3", "dt = 5.0", "motion.dt"),
+        ("duration = 10.0", "dt = 5.0", "motion.dt"),
     ],
 )
 def test_fields_are_told_with_their_table(old, new, field, tmp_path):
@@ -160,7 +160,7 @@ def test_fields_are_told_with_their_table(old, new, field, tmp_path):
 
 
 def test_the_plain_contact_has_no_word_in_a_file(tmp_path):
-    site = replace(QUICK, surfaces={"rock": Surface(28.0, restitution=None)})
+    site = replace(QUICK, surfaces={"rock": Surface(28.0, restitution=None, damping=0.3)})
     with pytest.raises(BadInput, match=r"surfaces\.rock\.restitution = None"):
         site.save(tmp_path / "site.toml")
     assert not list(tmp_path.iterdir())
@@ -176,13 +176,17 @@ def test_a_stretch_of_the_slope_has_its_own_surface():
 
 
 def test_the_surface_of_the_ground_decides():
-    scene = VERGE.realise((), 1, "block")
-    assert scene.interface("rock", "soil") == VERGE.surfaces["soil"]
+    soil = replace(VERGE.surfaces["soil"], friction_sd_deg=0.0, restitution_sd=0.0, damping_sd=0.0)
+    even = replace(VERGE, surfaces={**VERGE.surfaces, "soil": soil})
+    scene = even.realise((), 1, "block")
+    assert scene.interface("rock", "soil") == soil
     assert scene.interface("soil", "rock").restitution == 0.25
     pair = Interface("soil", "rock", 12.0, restitution=0.01)
     other = replace(VERGE, interfaces=(pair,)).realise((), 1, "block")
     assert other.interface("rock", "soil") == pair.surface
-    stiff = replace(VERGE, surfaces={**VERGE.surfaces, "soil": Surface(40.0, restitution=0.9)})
+    stiff = replace(
+        VERGE, surfaces={**VERGE.surfaces, "soil": Surface(40.0, restitution=0.9, damping=0.3)}
+    )
     assert stiff.realise((), 1, "block").interface("rock", "soil").restitution == 0.9
 
 

@@ -124,8 +124,10 @@ def scene(
     )
 
 
-def contacts(scene: Scene, duration: float, lowest: float = -math.inf) -> list[Contact]:
-    """Return the contacts of a block, each between two flights of at least `APART`.
+def contacts(
+    scene: Scene, duration: float, most: int = 10**6, lowest: float = -math.inf
+) -> list[Contact]:
+    """Return up to so many contacts of a block, each between two flights of at least `APART`.
 
     A contact without a flight within `LONGEST` after it is one, too: the block rolls or stops.
     """
@@ -148,7 +150,7 @@ def contacts(scene: Scene, duration: float, lowest: float = -math.inf) -> list[C
         if began >= 0 and (step - began) * DT > LONGEST:
             found.append(_contact(before, velocity))
             break
-        if sim.poses[0, 1] < lowest:
+        if len(found) >= most or sim.poses[0, 1] < lowest:
             break
     return found
 
@@ -157,10 +159,23 @@ def _contact(before: Floats, after: Floats) -> Contact:
     return Contact(float(np.hypot(*before)), float((after @ after) / (before @ before)))
 
 
-def first_contacts(surface: Surface, name: str, count: int, seed: int) -> list[Contact]:
-    """Return the contacts at `SPEEDS` among the first three of so many releases of a block.
+def early_contacts(
+    surface: Surface, name: str, count: int, seed: int, number: int = 1
+) -> list[Contact]:
+    """Return the contacts at `SPEEDS` that are the first, or a later one, of releases of a block.
 
     Speeds at the first one are uniform within these, directions those that were observed.
+
+    Parameters
+    ----------
+    surface : Surface
+        The ground.
+    name : str
+        The block.
+    count, seed : int
+        How many releases, and the seed of their random numbers.
+    number : int
+        Which contact of each release counts, from 1.
     """
     seen, found = observed(), []
     for k in range(count):
@@ -170,7 +185,8 @@ def first_contacts(surface: Surface, name: str, count: int, seed: int) -> list[C
         velocity = speed * np.array([math.sqrt(1.0 - steep**2), steep, 0.0])
         velocity[2] = rng.uniform(-SPIN, SPIN)
         release = scene(drawn(surface, rng), name, velocity, SLOPE, rng)
-        found += [c for c in contacts(release, 4.0)[:3] if SPEEDS[0] <= c.speed <= SPEEDS[1]]
+        every = contacts(release, 4.0, number)[number - 1 :]
+        found += [c for c in every if SPEEDS[0] <= c.speed <= SPEEDS[1]]
     return found
 
 
@@ -184,7 +200,7 @@ def mid_slope(surface: Surface, count: int, seed: int) -> list[Contact]:
         rng = np.random.default_rng([seed, k, 1])
         velocity = np.array([8.0, -6.0, rng.uniform(-SPIN, SPIN)])
         release = scene(drawn(surface, rng), "W800", velocity, SLOPE, rng)
-        every = contacts(release, 20.0, -200.0 * math.sin(SLOPE))
+        every = contacts(release, 20.0, lowest=-200.0 * math.sin(SLOPE))
         found += [c for c in every if MID_SPEEDS[0] <= c.speed <= MID_SPEEDS[1]]
     return found
 

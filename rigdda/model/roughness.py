@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -38,7 +38,7 @@ class Roughness(msgspec.Struct, frozen=True):
     amplitude: Mapping[str, float]
     seed: tuple[int, ...]
 
-    def applied(self, ground: Terrain, even: Iterable[tuple[float, float]] = ()) -> Terrain:
+    def applied(self, ground: Terrain, even: Sequence[tuple[float, float]] = ()) -> Terrain:
         """Return a ground with pits, but for the intervals of x that are to stay even [m]."""
         chain, names = ground.points, ground.surfaces
         first = math.floor(chain[:, 0].min() / self.spacing)
@@ -46,27 +46,29 @@ class Roughness(msgspec.Struct, frozen=True):
         depth = np.abs(np.random.default_rng(self.seed).standard_normal(last - first + 1))
         points, surfaces = [tuple(chain[0])], []
         for (ax, ay), (bx, by), name in zip(chain, chain[1:], names, strict=False):
-            for x in self._inner(ax, ay, bx, by, self.amplitude.get(name, 0.0), even):
-                pit = self.amplitude[name] * depth[round(x / self.spacing) - first]
-                points.append((x, ay + (by - ay) * (x - ax) / (bx - ax) - pit))
-                surfaces.append(name)
+            amplitude = self.amplitude.get(name, 0.0)
+            if amplitude > 0.0 and abs(by - ay) <= STEEPEST * (bx - ax):
+                rise = (by - ay) / (bx - ax)
+                for x, place in self._corners(ax, bx, even):
+                    pit = amplitude * depth[place - first] if place is not None else 0.0
+                    points.append((x, ay + rise * (x - ax) - pit))
+                    surfaces.append(name)
             points.append((bx, by))
             surfaces.append(name)
         return Terrain.sound(np.array(points), tuple(surfaces))
 
-    def _inner(
-        self,
-        ax: float,
-        ay: float,
-        bx: float,
-        by: float,
-        amplitude: float,
-        even: Iterable[tuple[float, float]],
-    ) -> list[float]:
-        """Return the chainages of the pits within a piece of the ground, in its order [m]."""
-        if amplitude == 0.0 or abs(by - ay) > STEEPEST * (bx - ax):
-            return []
+    def _corners(
+        self, ax: float, bx: float, even: Sequence[tuple[float, float]]
+    ) -> list[tuple[float, int | None]]:
+        """Return the new corners of a piece of the ground from left to right.
+
+        The chainage of each [m], and the number of its pit, None for an end of an even interval.
+        """
         clear = 0.25 * self.spacing  # from corners that are there, so that no piece is short
         low, high = math.ceil((ax + clear) / self.spacing), math.floor((bx - clear) / self.spacing)
-        found = [k * self.spacing for k in range(low, high + 1)]
-        return [x for x in found if not any(a <= x <= b for a, b in even)]
+        pits = [(k * self.spacing, k) for k in range(low, high + 1)]
+        found: list[tuple[float, int | None]] = [
+            (x, k) for x, k in pits if not any(a <= x <= b for a, b in even)
+        ]
+        found += [(x, None) for ends in even for x in ends if ax < x < bx]
+        return sorted(found, key=lambda corner: corner[0])

@@ -17,6 +17,7 @@ from rigdda.barriers import KINDS, MeshOption
 from rigdda.files import atomic
 from rigdda.model.economy import Consequences, Prices
 from rigdda.model.events import Event
+from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
 from rigdda.model.place import BarrierZone, Motion, Rebound, Road, Scatter
 from rigdda.model.site_tables import SiteTables
@@ -45,6 +46,17 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[lumped.NAME]`", Rebound),
 )
 """Every table of a site file and the class that reads it."""
+
+GROUND_TEXT = """\
+## Grounds
+
+The library that `ground` of a surface refers to: typical values and, in brackets, plausible ranges.
+A surface takes the typical values and overrides what is known of it. The values are those of rigid
+blocks with corners, not those of a point mass, whose normal restitution also depends on how the
+block turns. Damping acts while a block touches the ground, and for 0.1 s after; it is the loss that
+friction and restitution leave out, and it is the least known of the four. Where nothing is known,
+design with both ends of its range.
+"""
 
 LAYOUT = """\
 ## Layout files
@@ -87,11 +99,31 @@ def document() -> str:
     parts = [HEAD.format(names=names)]
     for title, table in TABLES:
         parts.append(f"## {title}\n\n{summary(table)}\n\n{_fields(table)}")
+    parts.append(f"{GROUND_TEXT}\n{grounds()}")
     parts.append(LAYOUT)
     for name, kind in KINDS.items():
         parts.append(f'### `kind = "{name}"`\n\n{summary(kind)}\n\n{_fields(kind)}')
     parts.append(f"## An example\n\n```toml\n{sites.text('narrow')}```\n")
     return "\n".join(parts)
+
+
+def grounds() -> str:
+    """Return the library of grounds as a Markdown table and a list of its sources."""
+    rows = [
+        "| ground | friction_deg | restitution | damping [1/s] | roughness [m] | "
+        "friction_sd_deg, restitution_sd, damping_sd |",
+        "|---|---|---|---|---|---|",
+    ]
+    sources = []
+    for name, ground in GROUNDS.items():
+        spans = (ground.friction_deg, ground.restitution, ground.damping, ground.roughness)
+        cells = [f"{s.typical:g} ({s.low:g} to {s.high:g})" for s in spans]
+        spread = f"{ground.friction_sd_deg:g}, {ground.restitution_sd:g}, {ground.damping_sd:g}"
+        rows.append(f"| `{name}`: {ground.words} | {' | '.join(cells)} | {spread} |")
+        fields = ("friction", "restitution", "damping", "roughness")
+        told = "; ".join(f"{f}: {s.source}" for f, s in zip(fields, spans, strict=True))
+        sources.append(f"- `{name}`: {told}.")
+    return "\n".join([*rows, "", *sources]) + "\n"
 
 
 def summary(table: type) -> str:
@@ -130,6 +162,8 @@ def _default(field: Any) -> str:
         value = field.default_factory()
     if value is msgspec.NODEFAULT:
         return "needed"
+    if value is msgspec.UNSET:
+        return "its ground's"
     if isinstance(value, msgspec.Struct):
         return "see below"
     if value is None or value == () or value == "":

@@ -95,7 +95,8 @@ def ground(bench_deg: float, pieces: int) -> tuple[Terrain, list[Block]]:
     down = np.array([math.cos(bench), -math.sin(bench)])
     top = -12.0 * down
     if pieces == 0:
-        return Terrain([top, (0.0, 0.0), (1e-6, -DROP), (80.0, -DROP)]), []
+        chain = np.array([(top[0], top[1]), (0.0, 0.0), (1e-6, -DROP), (80.0, -DROP)])
+        return Terrain(chain), []
     ends = [top + way * down for way in np.linspace(0.0, 12.0, pieces + 1)]
     blocks = [Block([a, (a[0], -40.0), (b[0], -40.0), b], fixed=True) for a, b in pairwise(ends)]
     return Terrain([(1e-3, -DROP), (80.0, -DROP)]), blocks
@@ -107,7 +108,8 @@ def fall(lab: Lab, slide: Slide, pieces: int) -> tuple[float, float]:
     bench = math.radians(slide.bench_deg)
     down = np.array([math.cos(bench), -math.sin(bench)])
     centre = 0.5 * HEIGHT * np.array([math.sin(bench), math.cos(bench)]) - 0.5 * WIDTH * down
-    rock_block = box(*centre, WIDTH, HEIGHT, -bench, velocity=(*(slide.speed * down), 0.0))
+    velocity = (slide.speed * down[0], slide.speed * down[1], 0.0)
+    rock_block = box(centre[0], centre[1], WIDTH, HEIGHT, -bench, velocity=velocity)
     sim = lab.simulate(Scene(terrain, (rock_block, *fixed), rock(slide.friction_deg)))
     while True:
         sim.step()

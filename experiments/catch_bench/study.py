@@ -63,11 +63,11 @@ class Variant(NamedTuple):
 
 
 VARIANTS = {
-    "damping": Variant("blocks", Parameter("motion.damping", 0.2, 6.0)),
+    "damping": Variant("blocks", Parameter("surfaces.rock.damping", 0.2, 6.0)),
     "restitution": Variant(
         "blocks",
         Parameter("surfaces.rock.restitution", 0.0, 0.6),
-        (("motion.damping", 1.5),),
+        (("surfaces.rock.damping", 1.5),),
     ),
     "lumped": Variant(
         "lumped",
@@ -186,7 +186,7 @@ def run(quick: bool, out: Path) -> Number:
             rows.append(row(name, face, value, found, releases))
     write(out / "catch_bench.csv", rows)
     draw(out / "catch_bench.png", (12.0, 4.0), lambda figure: picture(figure, every))
-    shares = [r["within_9.4_m"] for r in rows if r["fitted"] == "motion.damping"]
+    shares = [r["within_9.4_m"] for r in rows if r["fitted"] == "surfaces.rock.damping"]
     off = np.abs(np.array(shares) - PREDICTED[1])
     worst = shares[int(off.argmax())]  # the first that is not a number, if there is one
     bar = QUICK_BAR if quick else BAR

@@ -25,7 +25,7 @@ from agents.fit_trials import explore
 from agents.prediction import scores
 from experiments import tschamut
 from experiments.catch_bench.study import FITTED, PREDICTED, below, within
-from experiments.grounds import contacts
+from experiments.grounds import contacts, reach
 from experiments.grounds.contacts import MASSES, early_contacts, lumped_share, mid_slope, observed
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
 from rigdda import Site, Surface
@@ -310,6 +310,8 @@ def run(quick: bool, out: Path) -> Number:
     rows.append(seen_row(field))
     write(out / "grounds.csv", rows)
     predict(out / "chant_sura" / "predicted_contacts.csv", count)
+    say("grounds: what decides on a slope with talus")
+    write(out / "grounds_reach.csv", reach.rows(count))
     draw(out / "grounds.png", (13.0, 4.2), lambda figure: picture(figure, field, every))
     by_tschamut, real = rows[0]["contacts_mean"], rows[-1]["contacts_mean"]
     note = ", ".join(

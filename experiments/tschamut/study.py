@@ -37,8 +37,8 @@ MODELS: dict[run_outs.Model, tuple[str, ...]] = {
     "blocks": (
         "surfaces.soil.friction_deg=15:65",
         "surfaces.soil.restitution=0:0.8",
-        "motion.damping=0:1.5",
-        "scatter.friction_deg=0:10",
+        "surfaces.soil.damping=0:3",
+        "surfaces.soil.friction_sd_deg=0:10",
     ),
     "lumped": (
         "lumped.soil.normal=0:0.8",

@@ -31,7 +31,7 @@ def test_a_width_that_no_value_retains_is_told():
 
 def test_the_recorded_prediction_is_within_its_bar_at_every_face():
     rows = list(csv.DictReader((RECORDED / "catch_bench.csv").read_text().splitlines()))
-    shares = [float(r["within_9.4_m"]) for r in rows if r["fitted"] == "motion.damping"]
+    shares = [float(r["within_9.4_m"]) for r in rows if r["fitted"] == "surfaces.rock.damping"]
     assert len(shares) == len(study.FACES)
     assert all(share == pytest.approx(study.PREDICTED[1], abs=study.BAR) for share in shares)
 

@@ -1,0 +1,63 @@
+"""Which number of the ground decides whether rock reaches the road below a face and its talus."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from envs.intervals import mid_p
+from rigdda import Site, Surface, release_many
+from rigdda.model.grounds import GROUNDS
+
+SLOPE = Path(__file__).parent / "slope.toml"
+
+FALLBACK = (0.0, 0.5, 1.0, 1.7)
+"""Damping that the site gives to surfaces without one of their own [1/s]."""
+
+replace = msgspec.structs.replace
+
+
+def variants() -> dict[str, Site]:
+    """Return the slope with other grounds of the talus, and with other damping elsewhere."""
+    site, found = Site.load(SLOPE), dict[str, Site]()
+
+    def talus(surface: Surface) -> Site:
+        return replace(site, surfaces=site.surfaces | {"talus": surface})
+
+    ground = GROUNDS["coarse_talus"]
+    found["talus as it is"] = site
+    for field in ("damping", "friction_deg", "restitution"):
+        span = getattr(ground, field)
+        for value in (span.low, span.high):
+            named = Surface(ground="coarse_talus", **{field: value})
+            found[f"talus: {field} {value:g}"] = talus(named)
+    for name in ("hard_rock", "fine_scree", "hard_soil", "meadow"):
+        found[f"talus: {name}"] = talus(Surface(ground=name))
+    for value in FALLBACK:
+        motion = replace(site.motion, damping=value)
+        found[f"site: damping {value:g}"] = replace(site, motion=motion)
+    for value in FALLBACK:  # as it was before surfaces had damping of their own
+        motion = replace(site.motion, damping=value)
+        plain = Surface(ground.friction_deg.typical, restitution=ground.restitution.typical)
+        found[f"no ground named: damping {value:g}"] = replace(talus(plain), motion=motion)
+    return found
+
+
+def rows(releases: int) -> list[dict[str, Any]]:
+    """Return P(a boulder reaches the road) of each variant, with its 95 % interval."""
+    out = []
+    for what, site in variants().items():
+        outcomes = release_many([(site, (), seed, "boulder") for seed in range(releases)])
+        reached = int(np.sum([outcome.reached for outcome in outcomes]))
+        low, high = mid_p(reached, releases)
+        out.append({"variant": what, "reach": reached / releases, "low": low, "high": high})
+    return out
+
+
+def moved(table: list[dict[str, Any]], head: str) -> float:
+    """Return by how much the variants with such a name move the probability [-]."""
+    values = [row["reach"] for row in table if row["variant"].startswith(head)]
+    return max(values) - min(values)

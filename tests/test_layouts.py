@@ -123,8 +123,8 @@ def test_what_passes_a_wall_that_was_overturned_did_not_overtop_it():
 
 
 def test_a_wall_blocks_the_road_with_what_lies_on_it():
-    wall = GravityWall(21.0, 4.0, 0.6)
-    run, outcome = rigdda.release(QUICK, (wall,), 0, "mass")
+    wall = GravityWall(20.5, 4.0, 0.6)
+    run, outcome = rigdda.release(QUICK, (wall,), 3, "mass")
     found = outcome.barriers[0]
     assert wall.end + found.displacement > QUICK.road.start > run.outline(0)[:, 0].max()
     assert (found.state, found.road_area) == ("overturned", 0.0)

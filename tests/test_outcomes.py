@@ -76,7 +76,12 @@ def test_the_smaller_of_each_property_counts_where_two_surfaces_meet():
 
 
 def test_friction_scatters_as_it_is_asked_to():
-    site = msgspec.structs.replace(QUICK, scatter=Scatter(friction_deg=3.0))
+    even = msgspec.structs.replace(
+        QUICK.surfaces["rock"], friction_sd_deg=0.0, restitution_sd=0.0, damping_sd=0.0
+    )
+    site = msgspec.structs.replace(
+        QUICK, surfaces={"rock": even}, scatter=Scatter(friction_deg=3.0)
+    )
     shifts = np.array([site.draw(seed, "block").friction_deg for seed in range(400)])
     assert abs(shifts.mean()) < 4.0 * 3.0 / math.sqrt(400.0)
     assert shifts.std() == pytest.approx(3.0, rel=0.15)

@@ -108,9 +108,9 @@ GROUNDS: dict[str, Ground] = {
     ),
     "meadow": Ground(
         "meadow, soft soil",
-        Span(50.0, 33.0, 62.0, "fitted to Tschamut and Chant Sura"),
-        Span(0.52, 0.35, 0.65, "fitted to Tschamut and Chant Sura"),
-        Span(0.97, 0.7, 1.3, "fitted to Tschamut and Chant Sura"),
+        Span(50.0, 34.0, 60.0, "fitted to Tschamut and Chant Sura"),
+        Span(0.52, 0.24, 0.65, "fitted to Tschamut and Chant Sura"),
+        Span(0.97, 0.6, 1.3, "fitted to Tschamut and Chant Sura"),
         Span(0.0, 0.0, 0.06, "does not predict Tschamut better"),
         2.5,
         0.05,

@@ -28,6 +28,7 @@ from experiments.catch_bench.study import FITTED, PREDICTED, below, within
 from experiments.grounds import contacts, reach
 from experiments.grounds.contacts import MASSES, early_contacts, lumped_share, mid_slope, observed
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
+from experiments.tschamut.study import runs
 from rigdda import Site, Surface
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.place import Rebound, Scatter
@@ -112,7 +113,7 @@ class Field:
     def tschamut(self, values: Floats, seeds: range) -> dict[str, Floats]:
         """Return the run-outs at Tschamut by block [m]."""
         site = self.site(self.slope, "soil", values)
-        return run_outs.run_outs(site, self.model, list(self.seen), seeds)
+        return runs(site, self.model, list(self.seen), seeds)
 
     def contacts(self, values: Floats, seeds: range) -> Floats:
         """Return the shares of energy that contacts at Chant Sura keep [-]."""
@@ -270,8 +271,8 @@ def picture(figure: Figure, field: Field, every: dict[str, Found]) -> None:
     axes[0].set(title="Tschamut", xlabel="run-out [m]", ylabel="share of releases", xlim=(0, 200))
     axes[1].set(title="Chant Sura", xlabel="share of energy that a contact keeps", xlim=(0, 1.2))
     axes[2].set(title="catch bench", xlabel="width from the toe [m]", xlim=(0, 40))
-    axes[0].legend(fontsize=8, loc="upper left")
-    axes[2].legend(fontsize=8, loc="lower right")
+    for axis in axes:
+        axis.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18))
 
 
 def predict(path: Path, count: int) -> None:
@@ -312,7 +313,7 @@ def run(quick: bool, out: Path) -> Number:
     predict(out / "chant_sura" / "predicted_contacts.csv", count)
     say("grounds: what decides on a slope with talus")
     write(out / "grounds_reach.csv", reach.rows(count))
-    draw(out / "grounds.png", (13.0, 4.2), lambda figure: picture(figure, field, every))
+    draw(out / "grounds.png", (13.0, 5.0), lambda figure: picture(figure, field, every))
     by_tschamut, real = rows[0]["contacts_mean"], rows[-1]["contacts_mean"]
     note = ", ".join(
         f"{r['model']} fitted on {r['fitted_on']} {r['contacts_mean']:.2f}" for r in rows[1:-1]

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 from rigdda.dynamics.arrays import Islands, Monitors, Motion, Outlines, System, Work
 from rigdda.dynamics.clock import lap
 from rigdda.dynamics.constants import (
+    BOLT,
     OPEN,
+    PIN,
     SPEED_LIMIT,
 )
 from rigdda.dynamics.contact.law import strike_at_once
@@ -41,7 +43,7 @@ from rigdda.kernel import inlined, stage
 
 @inlined
 def note_touch(body: Body, damping: float) -> None:
-    """Let a block be damped by what it touches in this step, of several the most [1/s]."""
+    """Set the damping of a block to that of what it touches in this step; the greatest counts."""
     body.damping = max(body.damping, damping) if body.apart == 0.0 else damping
     body.apart = 0.0
 
@@ -66,7 +68,9 @@ def move_island(
         account_contact(c, motion.d, islands, ledger, monitors)
         if len(monitors.target) > 0:
             press(c, monitors, p.dt)
-        damping = interfaces[bodies[c.a].surface, c.other].damping
+        support = c.kind == BOLT or c.kind == PIN
+        interface = interfaces[bodies[c.a].surface, c.other]
+        damping = p.damping if support else interface.damping
         note_touch(bodies[c.a], damping)
         if c.b >= 0:
             note_touch(bodies[c.b], damping)

@@ -1,8 +1,8 @@
 """A lone block that is struck or turns fast takes its step in parts.
 
-A part ends just before an impact, just after it, or when the block has turned by `TURN`. What bears
-a block until an impact, such as the corner about which it rocks, lets go of it then: in one part
-with the impact it would not bear before it either, and the block would fall freely until then. An
+A part ends just before an impact, just after it, or once the block has turned by `TURN`. A contact
+that bears the block, such as the corner it rocks on, lets go at the impact; if both were solved in
+one part, it would not bear before the impact either, and the block would fall freely until then. An
 impact turns a block, and another corner of it may strike soon after, faster and from elsewhere than
 it would have without. Solved as one, both impacts would act at once, or what closes by the first
 one would be slowed down, and never bounce; how many do depends on the step. Without parts for turns

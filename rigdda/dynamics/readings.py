@@ -228,5 +228,5 @@ def divergence(arrays: Arrays, contacts: NDArray[np.void], block: int, when: str
         told += f", pressed with {c['normal_force']:g} N at ({c['x']:g}, {c['y']:g})"
         told += f" by {'the terrain' if other < 0 else f'block {other}'}"
     if not np.isfinite([body["vx"], body["vy"], body["omega"]]).all():
-        return f"{told}; its solution failed, which no step mends: try another solver"
+        return f"{told}; the solver failed, and a smaller dt will not help: try another solver"
     return f"{told}; use a smaller dt"

@@ -194,6 +194,7 @@ PARAMETERS = _record(
     gravity=float,  # its magnitude
     field_x=float,  # acceleration of free blocks in this step, of gravity and the ground [m/s2]
     field_y=float,
+    damping=float,  # mass-proportional, of what supports hold [1/s]
     damping_in_flight=float,  # mass-proportional, of blocks that touch nothing [1/s]
     block_weight=float,  # mean of the free blocks [N]
     penetration=float,  # wanted [m]

@@ -21,8 +21,8 @@ TOUCH = 2e-3
 the more oblique the face is: of an edge and the corner at its end the edge is struck."""
 
 SQUARE = 0.2
-"""Approach of a face over the whole relative displacement from which on the face is struck, not
-grazed [-]."""
+"""Ratio of the approach normal to a face to the whole relative displacement, above which the face
+counts as struck rather than grazed [-]."""
 
 NEVER = 1e3
 """Time of entry, over the step, of what comes nearer no faster than what is at rest may."""

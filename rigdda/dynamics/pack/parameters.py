@@ -108,6 +108,7 @@ def pack_parameters(
         "gravity": math.hypot(gx, gy),
         "field_x": gx,
         "field_y": gy,
+        "damping": scene.damping,
         "damping_in_flight": scene.damping if scene.damping_when == "always" else 0.0,
         "tolerance": settings.tolerance,
         "sweep_tolerance": settings.sweep_tolerance,

@@ -24,7 +24,7 @@ from agents.fit_trials import Candidate, Compute, Trials, explore
 from agents.parameters import Parameter, check_parameters, with_values
 from agents.prediction import Quality, quality
 from agents.run_outs import Model, run_outs
-from rigdda import Site
+from rigdda import BadInput, Site
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
@@ -95,6 +95,10 @@ def fit(
         If a simulation diverges.
     """
     check_parameters(parameters, model)
+    own = all(surface.damping is not None for surface in site.surfaces.values())
+    if own and any(parameter.path == "motion.damping" for parameter in parameters):
+        mend = "fit surfaces.NAME.damping: every surface of the site has a damping of its own"
+        raise BadInput("--parameters", "motion.damping", mend)
     low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
     with_values(site, parameters, list(low)), with_values(site, parameters, list(high))
     events = list(observed)
@@ -160,7 +164,12 @@ def search(
 
 
 def _intervals(table: Floats, values: Floats, seed: int) -> tuple[Floats, Floats]:
-    """Return the 95 % interval of each parameter, by resampling the observed runs."""
+    """Return the 95 % interval of each parameter, by resampling the observed runs.
+
+    All that was tried, where the runs tell nothing.
+    """
+    if (table == table[0]).all():
+        return values.min(axis=0), values.max(axis=0)
     rng = np.random.default_rng([seed, 1])
     runs = rng.integers(table.shape[1], size=(RESAMPLES, table.shape[1]))
     best = np.array([table[:, chosen].mean(axis=1).argmin() for chosen in runs])

@@ -15,6 +15,7 @@ import numpy as np
 from envs.memory import Memory
 from rigdda import BarrierOutcome, Ditch, Embankment, Fence, GravityWall, Outcome, Site
 from rigdda.barriers import Built, Earthwork, earthworks
+from rigdda.model.roughness import REACH
 from rigdda.model.settings import EARTH
 
 MARGIN = 0.1
@@ -107,6 +108,8 @@ def _holds(site: Site, barrier: Standing, without: Outcome) -> bool | None:
     inner = points[(points[:, 0] > low) & (points[:, 0] < high), 0]
     x = np.array([at[0]] if alone else [low, *inner, high])
     over = barrier.top + rise * (barrier.face - x) - np.interp(x, *points.T)
+    if site.pit_spacing > 0.0:
+        return None  # it may lie in a pit
     if not site.friction_varies and (over <= 0.0).all():
         return False
     radius = LARGEST * math.sqrt(without.released_volume / without.width)
@@ -152,7 +155,7 @@ def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) 
     # half of what a corner moves in a step that has all the energy of a fall from the top: its
     # speed is at most twice that of the fall
     drop = float(np.ptp(site.profile.points[:, 1]))
-    near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop) + site.pit_spacing
+    near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop) + REACH * site.pit_spacing
     return Standing(start - near, end + near, face, top, bears)
 
 

@@ -4,12 +4,27 @@ import msgspec
 import numpy as np
 import pytest
 
-from rigdda import BadInput, DoubtfulInput, Fence, Site, Surface, release, release_outcome
+from envs import DesignProblem
+from rigdda import (
+    BadInput,
+    DoubtfulInput,
+    Embankment,
+    Fence,
+    GravityWall,
+    Scene,
+    Site,
+    Surface,
+    release,
+    release_outcome,
+)
+from rigdda.batch import Batch
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.place import Motion
 from rigdda.model.realisation import FARTHEST
-from rigdda.model.roughness import Roughness
+from rigdda.model.roughness import REACH, Roughness
+from rigdda.model.surface import Interface
 from rigdda.model.terrain import Terrain
+from rigdda.validation.scenes import box
 
 replace = msgspec.structs.replace
 BENCH = Site.load("bench")
@@ -52,18 +67,46 @@ def test_unknown_grounds_are_refused_with_those_that_are_known():
 
 def test_a_site_that_states_no_damping_takes_that_of_its_ground_and_says_so():
     bare = {name: Surface(damping=None) for name in BENCH.surfaces}
-    with pytest.warns(DoubtfulInput, match=r"surfaces\.(rock|soil|asphalt)\.damping is not given"):
+    with pytest.warns(DoubtfulInput) as told:
         site = replace(BENCH, surfaces=bare)
     for name, surface in site.surfaces.items():
         assert surface.damping == GROUNDS[USUAL[name]].damping.typical
+        assert any(f"surfaces.{name}.damping" in str(warning.message) for warning in told)
     stated = replace(BENCH, surfaces=bare, motion=Motion(damping=0.4))  # warnings are errors here
     assert all(surface.damping is None for surface in stated.surfaces.values())
     assert stated.realise((), 1, "block").damping == 0.4
+    with pytest.raises(BadInput, match=r"damping_when = 'always': give motion\.damping"):
+        replace(BENCH, motion=Motion(damping_when="always"))
+
+
+def test_an_interface_has_the_damping_of_its_pair_unless_it_states_its_own():
+    for stated, wanted in ((None, EVEN.surfaces["soil"].damping), (0.2, 0.2)):
+        pair = Interface("rock", "soil", 20.0, damping=stated)
+        scene = replace(EVEN, interfaces=(pair,)).realise((), 1, "block")
+        assert scene.interface("soil", "rock").damping == wanted
+    with pytest.raises(BadInput, match=r"interfaces\[0\]\.damping = -1"):
+        replace(EVEN, interfaces=(Interface("rock", "soil", damping=-1.0),))
+
+
+def test_scatter_of_damping_is_about_that_of_the_site_where_a_surface_has_none():
+    bare = {name: Surface(damping_sd=0.1) for name in BENCH.surfaces}
+    site = replace(BENCH, surfaces=bare, motion=Motion(damping=0.5))
+    drawn = [site.realise((), s, "block").surfaces["rock"].damping for s in range(100)]
+    assert np.mean(drawn) == pytest.approx(0.5, abs=0.04)
+    assert np.std(drawn) == pytest.approx(0.1, rel=0.3)
+    wild = with_soil(BENCH, damping=99.0, damping_sd=50.0, friction_sd_deg=15.0)
+    for seed in range(20):
+        assert 0.0 <= wild.realise((), seed, "block").surfaces["rock"].damping <= 100.0
 
 
 def test_saved_sites_keep_their_grounds(tmp_path):
     BENCH.save(tmp_path / "bench.toml")
     assert Site.load(tmp_path / "bench.toml") == BENCH
+    text = (tmp_path / "bench.toml").read_text()
+    (tmp_path / "meadow.toml").write_text(text.replace("hard_soil", "meadow"))
+    meadow = Site.load(tmp_path / "meadow.toml").surfaces["soil"]
+    assert meadow.damping == GROUNDS["meadow"].damping.typical
+    assert meadow.restitution == BENCH.surfaces["soil"].restitution  # which the site states
 
 
 def test_strengths_scatter_as_they_are_asked_to():
@@ -104,35 +147,78 @@ def test_pits_are_below_the_ground_but_where_barriers_stand():
     depth = np.array([smooth.height(at) - y for at, y in pits])
     assert len(depth) > 40
     assert np.sqrt((depth**2).mean()) == pytest.approx(0.1, rel=0.3)
-    for corner in smooth.points:
-        assert (np.abs(bare.ground.points - corner).sum(axis=1) < 1e-12).any()
     fence = FENCE[0]
     stands = (x > fence.x) & (x < fence.x + fence.extent)
     other = np.array([built.ground.height(at) for at in x])
     assert np.allclose(other[stands], level[stands])
-    spacing = bare.roughness.spacing
-    away = (x < fence.x - spacing) | (x > fence.x + fence.extent + spacing)
-    assert np.array_equal(other[away], ground[away])
+    near = REACH * bare.roughness.spacing
+    away = (x < fence.x - near) | (x > fence.x + fence.extent + near)
+    assert np.allclose(other[away], ground[away], atol=1e-12)
+    assert not np.allclose(other[~away], ground[~away])
     again = rough.realise((), 3, "block").ground
     assert again.points.shape == bare.ground.points.shape
     assert not np.array_equal(again.points, bare.ground.points)
 
 
-def test_a_face_and_short_pieces_of_the_ground_have_no_pits():
-    ground = Terrain([(0.0, 10.0), (1.0, 0.0), (1.2, 0.0), (20.0, 0.0)])
+def test_a_face_has_no_pits():
+    ground = Terrain([(0.0, 10.0), (1.0, 0.0), (20.0, 0.0)])
     rough = Roughness(0.5, {"rock": 0.1}, (1,)).applied(ground)
-    inner = rough.points[(rough.points[:, 0] > 0.0) & (rough.points[:, 0] < 1.2)]
-    assert len(inner) == 1  # the corner at the foot of the face
+    face = rough.points[rough.points[:, 0] <= 1.0]
+    assert np.array_equal(face, ground.points[:2])
     assert len(rough.points) > 30
 
 
-@pytest.mark.parametrize("layout", [(), FENCE])
+@pytest.mark.parametrize("length", [0.05, 0.4, 1.0, 7.0])
+def test_pits_do_not_depend_on_how_finely_the_ground_was_surveyed(length):
+    x = np.arange(0.0, 60.0 + length, length)
+    slope = np.column_stack([x, -0.5 * x])
+    roughness = Roughness(0.8, {"rock": 0.1}, (7,))
+    rough, coarse = (roughness.applied(Terrain(p)) for p in (slope, slope[[0, -1]]))
+    at = np.linspace(1.0, 58.0, 500)
+    levels = [np.interp(at, *ground.points.T) for ground in (rough, coarse)]
+    assert np.abs(levels[0] - levels[1]).max() < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"spacing": 0.0}, r"roughness\.spacing = 0"),
+        ({"spacing": float("nan")}, r"roughness\.spacing = nan"),
+        ({"amplitude": 0.1}, r"roughness\.amplitude = 0\.1"),
+        ({"amplitude": {"rock": -1.0}}, r"roughness\.amplitude\['rock'\] = -1"),
+        ({"seed": 5}, r"roughness\.seed = 5"),
+        ({"seed": (-1,)}, r"roughness\.seed = -1"),
+    ],
+)
+def test_bad_roughness_is_refused(change, field):
+    sound = {"spacing": 1.0, "amplitude": {"rock": 0.1}, "seed": (1,)}
+    with pytest.raises(BadInput, match=field):
+        Roughness(**(sound | change))
+    with pytest.raises(BadInput, match="roughness = 'x'"):
+        Scene(Terrain([(-9, 0), (9, 0)]), [box(0.0, 0.5)], roughness="x")
+
+
+EMBANKMENT = (Embankment(27.0, 2.0, 1.0),)
+
+
+@pytest.mark.parametrize("layout", [(), FENCE, EMBANKMENT])
 def test_batches_give_what_single_releases_give(layout):
+    """A batch writes each release into the arrays of the one before, whatever the order."""
     site = with_soil(BENCH, roughness=0.08)
-    for seed in range(3):
-        for event in ("block", "group"):
+    for event in ("block", "small"):
+        batch = Batch(site, layout)
+        for seed in (3, 0, 7, 1, 9, 2, 8, 5):
             _, outcome = release(site, layout, seed, event)
-            assert release_outcome(site, layout, seed, event) == outcome
+            assert batch.outcome(seed, event) == outcome, (event, seed)
+
+
+def test_what_an_evaluation_remembers_is_what_it_computes_on_rough_ground():
+    site = with_soil(BENCH, roughness=0.3)
+    wall = (GravityWall(31.0, 2.0, 0.9),)
+    alone = DesignProblem(site).evaluate(wall, range(40)).objective
+    after = DesignProblem(replace(site, name="again"))  # remembered under another name
+    after.evaluate((), range(40))
+    assert after.evaluate(wall, range(40)).objective == alone
 
 
 def test_what_a_ground_takes_decides_how_far_rock_comes():

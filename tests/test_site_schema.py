@@ -48,7 +48,7 @@ def refused(folder, name: str, old: str, new: str) -> BadInput:
         ("toe = 5.0", "toe = 5.0\nnonsense = 1"),
         ("{ start = 5.0,", "{ nonsense = 1, start = 5.0,"),
         ("band = [1.0, 2.8]", "band = [1.0, 2.8]\nnonsense = 1"),
-        ("rate = 2.0", "rate = 2.0\nnonsense = 1"),
+        ("rate = 2.8", "rate = 2.8\nnonsense = 1"),
         ("max_height = 5.0", "max_height = 5.0\nnonsense = 1"),
         ("friction_deg = 30.0", "friction_deg = 30.0\nnonsense = 1"),
         ("embankment = 110.0", "nonsense = 110.0"),
@@ -66,10 +66,10 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "field", "mend"),
     [
-        ("rate = 2.0", "rate = true", "events[0].rate", "a number"),
-        ("rate = 2.0", "rate = [2.0]", "events[0].rate", "a number"),
-        ("rate = 2.0", "rate = -1.0", "events.small, face.rate", "at least 0"),
-        ("rate = 2.0", "rate = 36500.0", "events.small, face.rate", "at most 1000"),
+        ("rate = 2.8", "rate = true", "events[0].rate", "a number"),
+        ("rate = 2.8", "rate = [2.0]", "events[0].rate", "a number"),
+        ("rate = 2.8", "rate = -1.0", "events.small, face.rate", "at least 0"),
+        ("rate = 2.8", "rate = 36500.0", "events.small, face.rate", "at most 1000"),
         ("friction_deg = 30.0", "friction_deg = 0.577", "surfaces.rock.friction_deg", "degrees"),
         ("band = [1.0, 2.8]", "band = [2.8, 1.0]", "sources.face.band", "lesser number first"),
         (
@@ -183,7 +183,9 @@ def test_the_surface_of_the_ground_decides():
     assert scene.interface("soil", "rock").restitution == 0.25
     pair = Interface("soil", "rock", 12.0, restitution=0.01)
     other = replace(VERGE, interfaces=(pair,)).realise((), 1, "block")
-    assert other.interface("rock", "soil") == pair.surface
+    found = other.interface("rock", "soil")
+    assert replace(found, damping=None) == pair.surface
+    assert found.damping == VERGE.realise((), 1, "block").interface("rock", "soil").damping
     stiff = replace(
         VERGE, surfaces={**VERGE.surfaces, "soil": Surface(40.0, restitution=0.9, damping=0.3)}
     )

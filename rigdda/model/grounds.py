@@ -33,7 +33,7 @@ class Ground(NamedTuple):
     damping: Span
     """Mass-proportional damping of a block that touches it [1/s]."""
     roughness: Span
-    """Standard deviation of its height at the scale of a block [m]."""
+    """Root-mean-square depth of its pits at the scale of a block [m]."""
     friction_sd_deg: float
     """Standard deviation of friction from release to release [deg]."""
     restitution_sd: float
@@ -111,7 +111,7 @@ GROUNDS: dict[str, Ground] = {
         Span(50.0, 34.0, 60.0, "fitted to Tschamut and Chant Sura"),
         Span(0.52, 0.24, 0.65, "fitted to Tschamut and Chant Sura"),
         Span(0.97, 0.6, 1.3, "fitted to Tschamut and Chant Sura"),
-        Span(0.0, 0.0, 0.06, "does not predict Tschamut better"),
+        Span(0.0, 0.0, 0.06, "assumed; roughness did not improve the fit to Tschamut"),
         2.5,
         0.05,
         0.05,

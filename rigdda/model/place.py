@@ -81,8 +81,8 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Parameters
     ----------
     damping : float or None
-        Mass-proportional damping [1/s], of surfaces that have none of their own. None: the typical
-        value of their ground.
+        Mass-proportional damping [1/s] of surfaces that have none of their own. None: that of the
+        ground that the name of the surface suggests, with a notice.
     damping_when : str
         "contact": of blocks that touch something, or did within 0.1 s; "always": the paper's, in
         flight, too, with which energies at a barrier are four to ten times too low.

@@ -18,7 +18,7 @@ from rigdda.model.events import Drawn
 from rigdda.model.roughness import Roughness
 from rigdda.model.scene import Scene
 from rigdda.model.source import Source
-from rigdda.model.surface import Surface
+from rigdda.model.surface import MOST_DAMPING, Surface, smaller
 
 if TYPE_CHECKING:
     from rigdda.model.site import Site
@@ -103,13 +103,19 @@ def strength(site: Site, drawn: Drawn) -> tuple[dict[str, Surface], dict[tuple[s
     surfaces, normals = site.surfaces, drawn.strengths
     if normals:
         each = zip(surfaces.items(), normals, strict=True)
-        surfaces = {name: _varied(surface, *normal) for (name, surface), normal in each}
+        fallback = site.motion.damping
+        surfaces = {name: _varied(s, fallback, *normal) for (name, s), normal in each}
     if drawn.friction_deg != 0.0:
         surfaces = {name: _shifted(s, drawn.friction_deg) for name, s in surfaces.items()}
     found = pairs(site, surfaces)
     for pair in site.interfaces:
-        found.pop((pair.second, pair.first), None)
-        found[pair.first, pair.second] = _shifted(pair.surface, drawn.friction_deg)
+        ends = pair.first, pair.second
+        usual = found.pop(ends[::-1], None) or found.get(ends)
+        usual = usual or smaller(surfaces[pair.first], surfaces[pair.second])
+        meets = _shifted(pair.surface, drawn.friction_deg)
+        if meets.damping is None:
+            meets = msgspec.structs.replace(meets, damping=usual.damping)
+        found[ends] = meets
     return surfaces, found
 
 
@@ -176,11 +182,17 @@ def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]
     )
 
 
-def _varied(surface: Surface, friction: float, restitution: float, damping: float) -> Surface:
-    """Return a surface whose values are off by so many of their standard deviations."""
+def _varied(
+    surface: Surface, fallback: float | None, friction: float, restitution: float, damping: float
+) -> Surface:
+    """Return a surface whose values are off by so many of their standard deviations.
+
+    `fallback` is the damping of the site [1/s].
+    """
     if not surface.varies:
         return surface
-    rebound, loss = surface.restitution, surface.damping
+    rebound = surface.restitution
+    loss = fallback if surface.damping is None else surface.damping
     angle = surface.friction_deg + friction * surface.friction_sd_deg
     return msgspec.structs.replace(
         surface,
@@ -188,7 +200,9 @@ def _varied(surface: Surface, friction: float, restitution: float, damping: floa
         restitution=None
         if rebound is None
         else min(max(rebound + restitution * surface.restitution_sd, 0.0), 1.0),
-        damping=None if loss is None else max(loss + damping * surface.damping_sd, 0.0),
+        damping=None
+        if loss is None
+        else min(max(loss + damping * surface.damping_sd, 0.0), MOST_DAMPING),
     )
 
 

@@ -4,71 +4,113 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
+from rigdda import check
+from rigdda.errors import BadInput
 from rigdda.model.terrain import Terrain
 
 STEEPEST = 5.0
 """Rise over run beyond which a piece of the ground stays as it is [-]: pits go straight down, which
 on a face of 80 degrees would hardly change it."""
 
+CLEAR = 0.25
+"""Least distance of a pit from an even interval, over the spacing [-]: no step at its ends."""
+
+SAME = 1e-3
+"""Distance over the spacing within which a corner of the ground stands for a pit [-]."""
+
+REACH = 1.0 + CLEAR
+"""Distance from an even interval within which it changes the ground, over the spacing [-]."""
+
 
 class Roughness(msgspec.Struct, frozen=True):
     """Pits in the ground of a scene.
 
-    The ground gets a corner at each multiple of `spacing`, which lies below the mean surface by the
-    size of a normal number, with the `amplitude` of its surface as standard deviation. Pits depend
-    on chainage and seed alone, so that they are the same with every layout; where barriers stand
-    there are none. Corners that the ground has already stay where they are, so what starts clear of
-    the ground stays clear of it.
+    At each multiple of `spacing` the ground lies below the smooth surface by the absolute value of
+    a normal number times the `amplitude` of its surface, and in between by what is linear in x. So
+    pits do not depend on how finely the ground was surveyed, what starts clear of the smooth ground
+    stays clear of it, and pits are the same with every layout but within 1.25 spacings of a
+    barrier: where barriers stand the ground is even.
 
     Parameters
     ----------
     spacing : float
         Distance of the pits [m], about the size of a block.
     amplitude : mapping of str to float
-        Standard deviation by the name of the surface [m].
+        Root-mean-square depth of the pits by the name of the surface [m].
     seed : sequence of int
         Of the random numbers.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or outside its range.
     """
 
     spacing: float
     amplitude: Mapping[str, float]
     seed: tuple[int, ...]
 
+    def __post_init__(self) -> None:
+        spacing = check.number("roughness.spacing", self.spacing, 0.0, 1e3, open_low=True)
+        amplitude: Any = self.amplitude
+        if not isinstance(amplitude, Mapping):
+            raise BadInput("roughness.amplitude", amplitude, "give a depth for each surface")
+        depths = {
+            str(name): check.number(f"roughness.amplitude[{name!r}]", depth, 0.0, 1e2)
+            for name, depth in amplitude.items()
+        }
+        if not isinstance(self.seed, list | tuple):
+            raise BadInput("roughness.seed", self.seed, "give a sequence of whole numbers")
+        seed = tuple(check.integer("roughness.seed", number, 0) for number in self.seed)
+        for name, value in (("spacing", spacing), ("amplitude", depths), ("seed", seed)):
+            msgspec.structs.force_setattr(self, name, value)
+
     def applied(self, ground: Terrain, even: Sequence[tuple[float, float]] = ()) -> Terrain:
-        """Return a ground with pits, but for the intervals of x that are to stay even [m]."""
-        chain, names = ground.points, ground.surfaces
-        first = math.floor(chain[:, 0].min() / self.spacing)
-        last = math.ceil(chain[:, 0].max() / self.spacing)
-        depth = np.abs(np.random.default_rng(self.seed).standard_normal(last - first + 1))
-        points, surfaces = [tuple(chain[0])], []
-        for (ax, ay), (bx, by), name in zip(chain, chain[1:], names, strict=False):
-            amplitude = self.amplitude.get(name, 0.0)
-            if amplitude > 0.0 and abs(by - ay) <= STEEPEST * (bx - ax):
-                rise = (by - ay) / (bx - ax)
-                for x, place in self._corners(ax, bx, even):
-                    pit = amplitude * depth[place - first] if place is not None else 0.0
-                    points.append((x, ay + rise * (x - ax) - pit))
-                    surfaces.append(name)
-            points.append((bx, by))
-            surfaces.append(name)
-        return Terrain.sound(np.array(points), tuple(surfaces))
+        """Return a ground with pits, but for the intervals of x that are to stay even [m].
 
-    def _corners(
-        self, ax: float, bx: float, even: Sequence[tuple[float, float]]
-    ) -> list[tuple[float, int | None]]:
-        """Return the new corners of a piece of the ground from left to right.
-
-        The chainage of each [m], and the number of its pit, None for an end of an even interval.
+        Ground that overhangs stays as it is.
         """
-        clear = 0.25 * self.spacing  # from corners that are there, so that no piece is short
-        low, high = math.ceil((ax + clear) / self.spacing), math.floor((bx - clear) / self.spacing)
-        pits = [(k * self.spacing, k) for k in range(low, high + 1)]
-        found: list[tuple[float, int | None]] = [
-            (x, k) for x, k in pits if not any(a <= x <= b for a, b in even)
-        ]
-        found += [(x, None) for ends in even for x in ends if ax < x < bx]
-        return sorted(found, key=lambda corner: corner[0])
+        x, y = ground.points.T
+        if (np.diff(x) < 0.0).any():
+            return ground
+        nodes, depths = self._nodes(x[0], x[-1], even)
+        points, names = [], []
+        rise, run = np.abs(np.diff(y)), np.diff(x)
+        amplitude = np.array([self.amplitude.get(name, 0.0) for name in ground.surfaces])
+        amplitude[rise > STEEPEST * run] = 0.0
+        for i, name in enumerate(ground.surfaces):
+            inner = np.zeros(0)
+            if amplitude[i] > 0.0:
+                away = SAME * self.spacing
+                inner = nodes[(nodes > x[i] + away) & (nodes < x[i + 1] - away)]
+            at = np.concatenate([x[i : i + 1], inner])
+            level = np.concatenate([y[i : i + 1], np.interp(inner, x[i : i + 2], y[i : i + 2])])
+            deep = np.full(len(at), amplitude[i])
+            deep[0] = min(amplitude[max(i - 1, 0)], amplitude[i])  # surfaces meet without a step
+            points.append(np.column_stack([at, level - deep * np.interp(at, nodes, depths)]))
+            names += [name] * len(at)
+        points.append(ground.points[-1:])
+        return Terrain.sound(np.concatenate(points), tuple(names))
+
+    def _nodes(
+        self, left: float, right: float, even: Sequence[tuple[float, float]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where the depth of pits is given, ascending [m], and that depth over amplitude."""
+        first, last = math.floor(left / self.spacing), math.ceil(right / self.spacing)
+        nodes: NDArray[np.float64] = self.spacing * np.arange(first, last + 1, dtype=np.float64)
+        rng = np.random.Generator(np.random.PCG64(self.seed))
+        depths: NDArray[np.float64] = np.abs(rng.standard_normal(len(nodes)))
+        for low, high in even:
+            clear = CLEAR * self.spacing
+            kept = (nodes < low - clear) | (nodes > high + clear)
+            kept |= (depths == 0.0) & ((nodes < low) | (nodes > high))  # ends of another interval
+            nodes, depths = nodes[kept], depths[kept]
+            nodes, depths = np.append(nodes, (low, high)), np.append(depths, (0.0, 0.0))
+        order = np.unique(nodes, return_index=True)[1]
+        return nodes[order], depths[order]

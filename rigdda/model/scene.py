@@ -57,7 +57,8 @@ class Scene:
     gravity : float or (gx, gy)
         Gravity [m/s2], a number acts downwards.
     damping : float
-        Mass-proportional damping coefficient alpha [1/s] (Koo and Chern 1998, damping force).
+        Mass-proportional damping coefficient alpha [1/s] (Koo and Chern 1998, damping force) of
+        contacts whose surfaces state none, and in flight if `damping_when` is "always".
     damping_when : {"always", "contact"}
         "always" is the paper's: a fall is capped at g/alpha, 16 m/s for 0.6 1/s, so energies at a
         barrier stay low. "contact" damps only blocks that touch something, or did within 0.1 s.
@@ -98,6 +99,8 @@ class Scene:
 
     def __post_init__(self) -> None:
         set_members(self)
+        if not isinstance(self.roughness, Roughness | None):
+            raise BadInput("roughness", self.roughness, "give a Roughness or None")
         if isinstance(self.gravity, Sequence | np.ndarray):
             object.__setattr__(self, "gravity", check.vector("gravity", self.gravity))
         else:
@@ -183,8 +186,19 @@ class Scene:
         """Return a smooth ground with pits where none of the barriers stands."""
         if ground is None or self.roughness is None:
             return ground
-        even = [(b.x, b.x + b.extent) for b in barriers if not isinstance(b, Mesh)]
+        even = []
+        for barrier in barriers:
+            if isinstance(barrier, Earthwork):
+                x = self._moved[barrier][:, 0]
+                even.append((float(x.min()), float(x.max())))
+            elif not isinstance(barrier, Mesh):
+                even.append((barrier.x, barrier.x + barrier.extent))
         return self.roughness.applied(ground, even)
+
+    @property
+    def smooth_ground(self) -> Terrain | None:
+        """The ground with its earthworks and without pits."""
+        return self._smooth
 
     def outline(self, barrier: int) -> NDArray[np.float64]:
         """Return the (n, 2) corners of a barrier at the start [m].

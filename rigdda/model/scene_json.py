@@ -59,7 +59,7 @@ def scene_from_json(text: bytes) -> Scene:
         If a value in it is not sound.
     """
     data = msgspec.json.decode(text)
-    terrain, roughness = data.pop("terrain"), data.pop("roughness")
+    terrain, roughness = data.pop("terrain"), data.pop("roughness", None)
     return Scene(
         terrain=terrain and Terrain(**terrain),
         blocks=tuple(Block(**b) for b in data.pop("blocks")),

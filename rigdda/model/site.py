@@ -28,7 +28,7 @@ from rigdda.model.place import Rebound
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
 from rigdda.model.site_tables import SiteTables
-from rigdda.model.soundness import check_site
+from rigdda.model.soundness import check_damping, check_site
 from rigdda.model.surface import Surface
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                 raise BadInput("events", (), "give at least one: what comes down, and how often")
             msgspec.structs.force_setattr(self, "events", usual)
         if self.motion.damping is None:
+            check_damping(self.motion)
             msgspec.structs.force_setattr(self, "surfaces", _with_damping(self.surfaces))
         check_site(self)
 
@@ -110,7 +111,11 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         for where, table in laws.items():
             if table["damping"] is None:
                 del table["damping"]
-            if table["restitution"] is None:
+            if table.get("ground") in GROUNDS:
+                for name, value in GROUNDS[table["ground"]].values.items():
+                    if table.get(name) == value:
+                        del table[name]
+            if table.get("restitution", 0.0) is None:
                 mend = "give a number: a site file has no plain contact, only Python has"
                 raise BadInput(f"{where}.restitution", None, mend)
         with atomic(path) as part:
@@ -242,8 +247,8 @@ def _with_damping(surfaces: dict[str, Surface]) -> dict[str, Surface]:
             ground = USUAL.get(name, OTHER)
             value = GROUNDS[ground].damping.typical
             warnings.warn(
-                f"surfaces.{name}.damping is not given, and neither is motion.damping: "
-                f"{value:g} 1/s of the ground {ground!r} is taken; name the ground of the surface",
+                f"neither surfaces.{name}.damping nor motion.damping is given: {value:g} 1/s is "
+                f"used, typical of {ground!r}; set surfaces.{name}.ground or .damping",
                 DoubtfulInput,
                 stacklevel=4,
             )

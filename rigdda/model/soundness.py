@@ -14,6 +14,7 @@ from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
 from rigdda.model import boulders
 from rigdda.model.economy import DITCHES
+from rigdda.model.place import Motion
 from rigdda.model.settings import Settings
 from rigdda.model.source import NEAR, Point, Source
 from rigdda.model.surface import check_surface
@@ -69,6 +70,19 @@ def check_site(site: Site) -> None:
     Settings(dt=motion.dt)
 
 
+def check_damping(motion: Motion) -> None:
+    """Check that damping in flight is given where it is asked for.
+
+    Raises
+    ------
+    BadInput
+        If `motion.damping_when` is "always" and there is no `motion.damping`.
+    """
+    if motion.damping is None and motion.damping_when == "always":
+        mend = "give motion.damping, too: flight is damped by it"
+        raise BadInput("motion.damping_when", motion.damping_when, mend)
+
+
 def _doubt(field: str, mend: str) -> None:
     warnings.warn(f"{field}: {mend}", DoubtfulInput, stacklevel=6)
 
@@ -99,7 +113,11 @@ def _check_surfaces(site: Site) -> None:
     for i, pair in enumerate(site.interfaces):
         check.one_of(f"interfaces[{i}].first", pair.first, site.surfaces)
         check.one_of(f"interfaces[{i}].second", pair.second, site.surfaces)
-        check_surface(f"interfaces[{i}]", pair.surface)
+        try:
+            surface = pair.surface
+        except BadInput as bad:
+            raise BadInput(f"interfaces[{i}].{bad.field}", bad.value, bad.mend) from None
+        check_surface(f"interfaces[{i}]", surface)
     pairs = [frozenset((pair.first, pair.second)) for pair in site.interfaces]
     for i, names in enumerate(pairs):
         if names in pairs[:i]:

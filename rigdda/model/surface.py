@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from rigdda import check, fields
+from rigdda import fields
 from rigdda.errors import BadInput
 from rigdda.model.grounds import GROUNDS
 
@@ -48,17 +48,18 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Python only, site files have no word for it.
     damping : float or None
         Mass-proportional damping [1/s] of a block that touches the surface, or did within 0.1 s.
-        None: the damping of the scene or of the site. Of several surfaces that a block touches the
-        greatest counts.
+        None, the default without a ground: the damping of the scene or of the site. If a block
+        touches several surfaces, the greatest damping counts.
     friction_sd_deg, restitution_sd, damping_sd : float
         Standard deviations of friction [deg], restitution [-] and damping [1/s] from release to
         release. Without a ground 0.
     roughness : float
-        Standard deviation of the depth of pits in the ground [m], one in each length of a block.
-        Without a ground 0.
+        Root-mean-square depth of pits in the ground [m], one in each length of a block. Without a
+        ground 0. Ground that overhangs, or is steeper than 79 degrees, has no pits.
     ground : str
         Name of its ground in the library (`rigdda.grounds`), whose typical values it takes where
-        the others are not given.
+        the others are not given. To change the ground of a surface, make a new one: a copy with
+        another ground keeps its values.
 
     Raises
     ------
@@ -78,8 +79,9 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ground: str = ""
 
     def __post_init__(self) -> None:
-        if self.ground:
-            check.one_of("ground", self.ground, GROUNDS)
+        if not isinstance(self.ground, str) or self.ground not in ("", *GROUNDS):
+            raise BadInput("ground", self.ground, f"choose one of {', '.join(GROUNDS)}")
+        msgspec.structs.force_setattr(self, "ground", str(self.ground))
         usual = GROUNDS[self.ground].values if self.ground else PLAIN
         for name, value in usual.items():
             if getattr(self, name) is msgspec.UNSET:
@@ -138,7 +140,8 @@ class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     restitution : float
         Coefficient of restitution [-].
     damping : float
-        Mass-proportional damping of blocks that touch [1/s]; by default that of the site.
+        Mass-proportional damping of blocks that touch [1/s]; by default that which the two would
+        have without this table.
     """
 
     first: str

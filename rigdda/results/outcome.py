@@ -112,7 +112,7 @@ def leave(site: Site, scene: Scene) -> float:
 
     Beyond the road, and from where on the ground does not rise, so that nothing rolls back.
     """
-    ground = scene.ground or site.profile
+    ground = scene.smooth_ground or site.profile
     x, y = ground.points[:, 0], ground.points[:, 1]
     rising = np.flatnonzero(np.diff(y) > 0.0)
     return max(site.road.end, float(x[rising[-1] + 1]) if len(rising) else -math.inf)

@@ -58,13 +58,13 @@ def test_blocks_are_fitted_from_the_command_line(tmp_path):
     seen = tmp_path / "seen.csv"
     seen.write_text('event,run_out_m\nblock,11.2\nblock,14.0\nblock,12.5\n"small, face",9.0\n')
     code = main(["fit", "verge", str(seen), "--parameters", "surfaces.soil.restitution",
-                 "--parameters", "motion.damping=0:1", "--budget", "8", "--releases", "10",
+                 "--parameters", "surfaces.soil.damping=0:1", "--budget", "8", "--releases", "10",
                  "--out", str(tmp_path / "out")])  # fmt: skip
     assert code == 0
     fitted = Site.load(tmp_path / "out" / "site.toml")
     rows = list(csv.DictReader((tmp_path / "out" / "fit.csv").read_text().splitlines()))
     values = {row["what"]: float(row["fitted"]) for row in rows}
-    assert fitted.motion.damping == pytest.approx(values["motion.damping"])
+    assert fitted.surfaces["soil"].damping == pytest.approx(values["surfaces.soil.damping"])
     assert fitted.surfaces["soil"].restitution == pytest.approx(values["surfaces.soil.restitution"])
     assert 5.0 < values["mean run-out"] < 25.0
     assert (tmp_path / "out" / "fit.png").stat().st_size > 5000

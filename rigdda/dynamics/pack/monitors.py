@@ -22,7 +22,7 @@ def pack_monitors(
     dt: float,
 ) -> Monitors:
     """Return the monitors, with no station passed that a block starts beyond; `dt` in s."""
-    blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.ground
+    blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.smooth_ground
     station = np.zeros(len(stations), dtype=STATION)
     station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
     rock = np.zeros(blocks, dtype=WATCHED)

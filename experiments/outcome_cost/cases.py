@@ -22,6 +22,9 @@ DAMPING = 0.15
 """Damping of `tschamut` here [1/s]: in flight, too, which is what the other engines know. The fit
 of `experiments.tschamut` damps in contact only."""
 
+OF_ALL = 0.3
+"""Damping of sites that leave it to their grounds [1/s], in flight, too."""
+
 ROAD = 80.0
 """Chainage beyond which blocks of `tschamut` count as debris [m]: two in three do."""
 
@@ -65,11 +68,17 @@ def everywhere(site: Site) -> Site:
     The road goes on to that end, so that a release ends when all of its blocks sleep.
     """
     toe, level = site.slope.toe, site.slope.points[-1][1]
+    plain = {
+        name: Surface(s.friction_deg, s.cohesion, s.tension, s.restitution)
+        for name, s in site.surfaces.items()
+    }  # the peers know neither damping of a surface nor scatter
+    damping = OF_ALL if site.motion.damping is None else site.motion.damping
     floor = (*site.slope.points, (RUN_OUT, level))
     return replace(
         site,
         family="paper",  # others may damp in contact only
-        motion=replace(site.motion, damping_when="always"),
+        surfaces=plain,
+        motion=replace(site.motion, damping=damping, damping_when="always"),
         slope=replace(site.slope, points=floor),
         road=replace(site.road, end=RUN_OUT - 50.0),
         barrier_zone=replace(site.barrier_zone, start=toe - 2.0, end=toe - 1.0),  # nothing stands

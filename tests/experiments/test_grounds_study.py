@@ -35,18 +35,18 @@ def test_a_flat_bounce_keeps_the_square_of_restitution(restitution, damping):
     assert found[0].speed == pytest.approx(speed, abs=0.06)
     kept = restitution**2
     if damping == 0.0:
-        assert found[0].kept == pytest.approx(kept, abs=0.005)
+        assert found[0].kept == pytest.approx(kept, abs=0.006)
     else:  # v' = -g - c v for 0.1 s, and back without damping
         lost = np.exp(-0.1)
         up = restitution * speed * lost - GRAVITY * (1.0 - lost) + 0.1 * GRAVITY
-        assert found[0].kept == pytest.approx((up / speed) ** 2, abs=0.005)
+        assert found[0].kept == pytest.approx((up / speed) ** 2, abs=0.006)
 
 
 def test_the_observed_contacts_are_those_of_the_data():
     seen = contacts.observed()
     assert seen.shape == (11, 3)
-    assert seen[:, 2].mean() == pytest.approx(0.31, abs=0.005)
-    assert np.median(seen[:, 2]) == pytest.approx(0.27, abs=0.005)
+    assert seen[:, 2].mean() == pytest.approx(0.31, abs=0.006)
+    assert np.median(seen[:, 2]) == pytest.approx(0.27, abs=0.006)
 
 
 def test_a_point_without_loss_keeps_its_energy():
@@ -81,8 +81,8 @@ def test_the_library_has_what_was_fitted_to_both_alpine_cases():
     )
     meadow = GROUNDS["meadow"]
     assert meadow.friction_deg.typical == pytest.approx(float(fitted["friction_deg"]), abs=0.05)
-    assert meadow.restitution.typical == pytest.approx(float(fitted["restitution"]), abs=0.005)
-    assert meadow.damping.typical == pytest.approx(float(fitted["damping"]), abs=0.005)
+    assert meadow.restitution.typical == pytest.approx(float(fitted["restitution"]), abs=0.006)
+    assert meadow.damping.typical == pytest.approx(float(fitted["damping"]), abs=0.006)
     assert meadow.friction_sd_deg == pytest.approx(float(fitted["friction_sd_deg"]), abs=0.05)
 
 

@@ -85,16 +85,20 @@ def place_of_hit(
 
 @kernel
 def leaves_over_end(
-    ground: Ground, s: int, x: float, y: float, hit_x: float, hit_y: float, margin: float
-) -> bool:
+    ground: Ground, s: int, x: float, y: float, hit_x: float, hit_y: float, gap: float,
+    margin: float,
+) -> bool:  # fmt: skip
     """Return whether a corner at (x, y) slides off a convex end of segment s.
 
     It meets the line of the segment at (hit_x, hit_y), within `margin` [m] of that end or beyond.
     An edge of the block rests on the end then and slides over it, so that the corner is aimed at
-    the end: rounding alone would decide whether it strikes the segment that it leaves.
+    the end: rounding alone would decide whether it strikes the segment that it leaves. What comes
+    down more than along does not slide, but strikes.
     """
     along, hit = along_segment(ground, s, x, y), along_segment(ground, s, hit_x, hit_y)
     one = ground.segment[s]
+    if abs(hit - along) <= max(gap, 0.0):
+        return False
     over_start = one.turn < 0.0 and hit < along and hit < margin
     over_end = ground.segment[s + 1].turn < 0.0 and hit > along and hit > one.length - margin
     return over_start or over_end
@@ -113,7 +117,7 @@ def meets_segment(
         return False
     if shadowed(ground, s, hit_x, hit_y, gap):
         return False
-    return not leaves_over_end(ground, s, x, y, hit_x, hit_y, margin)
+    return not leaves_over_end(ground, s, x, y, hit_x, hit_y, gap, margin)
 
 
 @inlined

@@ -41,8 +41,9 @@ def as_site(site: Site) -> Site:
 class Batch:
     """Releases of a site with a layout, one after the other.
 
-    The ground and what stands on it are built and packed once; for a release its blocks are checked
-    and written into the arrays of the last one. Outcomes are those of `rigdda.release`.
+    The ground and what stands on it are built once. For a release its blocks are checked and
+    written into the arrays of the last one, with what it draws of the ground. Outcomes are those of
+    `rigdda.release`, whatever the order.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rigdda import Scene, Settings, Simulation, Terrain
+from rigdda import Bolt, FixedPoint, Scene, Settings, Simulation, Surface, Terrain
 from tests.physics.helpers import FLAT, GRAVITY, box, rock
 
 ALPHA, SPEED = 0.5, 3.0
@@ -48,3 +48,28 @@ def test_a_slide_is_damped_all_along(dt):
     assert sim.velocities[0, 0] == pytest.approx(
         SPEED * math.exp(-ALPHA * 2.0), rel=ALPHA * 1.5 * dt
     )
+
+
+def test_the_greatest_damping_of_what_is_touched_counts():
+    """A block that slides from one ground onto another loses what each takes in its time."""
+    surfaces = rock(0.0) | {"soft": Surface(0.0, damping=2.0), "hard": Surface(0.0, damping=0.2)}
+    ground = Terrain([(-50.0, 0.0), (0.0, 0.0), (50.0, 0.0)], ["hard", "soft"])
+    block = box(0.0, 0.5, velocity=(1e-3, 0.0, 0.0))  # over the seam: it touches both
+    sim = Simulation(Scene(ground, (block,), surfaces, damping_when="contact"))
+    sim.run(0.2)
+    assert sim.velocities[0, 0] == pytest.approx(1e-3 * math.exp(-0.4), rel=0.03)
+
+
+@pytest.mark.parametrize("names", [("soft", "rock"), ("rock", "soft")])
+@pytest.mark.parametrize(
+    "support", [FixedPoint(0, (0.5, 5.5)), Bolt(0, (0.0, 5.0), None, (0.0, 9.0), 1e5)]
+)
+def test_supports_damp_as_the_scene_does_whatever_the_order_of_surfaces(names, support):
+    every = {"soft": Surface(damping=5.0), "rock": Surface()}
+    block = box(0.0, 5.0, velocity=(0.0, 0.0, 1.0))
+    surfaces = {name: every[name] for name in names}
+    sim = Simulation(Scene(None, (block,), surfaces, supports=(support,), damping=0.0))
+    sim.run(0.3)
+    free = Simulation(Scene(None, (block,), rock(), supports=(support,), damping=0.0))
+    free.run(0.3)
+    assert sim.velocities == pytest.approx(free.velocities, rel=1e-9)

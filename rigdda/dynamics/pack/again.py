@@ -1,4 +1,4 @@
-"""Arrays of a scene that serve others, of which only the rock differs."""
+"""Arrays of a scene that serve others, which differ in rock, strength and elevations alone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from rigdda.model.settings import Settings
 class Template:
     """The arrays of a scene before its first step, and what it takes to set them back.
 
-    Ground, barriers and space are packed once. A scene of `Scene.with_rock` with as many blocks,
+    Barriers and space are packed once; the ground is packed again only where it has other pits, and
+    surfaces where they have other properties. A scene of `Scene.with_rock` with as many blocks,
     all convex, is written into the same arrays: they are to the bit what `pack` gives, as far as
     they are read. One simulation at a time uses them.
 

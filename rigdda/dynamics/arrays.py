@@ -38,15 +38,13 @@ class Matrix(NamedTuple):
     off: Floats  # (pairs, 3, 3) row block pair_i, column block pair_j
     pair_i: Ints
     pair_j: Ints
-    lower: Floats  # (3, 3) block below the diagonal of two blocks with friction, unsymmetric
     rhs: Floats  # (G, 3)
-    d: Floats  # (G + 1, 3) displacements u0, v0 [m], r0 [rad]; the last of what cannot move
+    d: Floats  # (G, 3) displacements u0, v0 [m], r0 [rad]
 
 
 class Scratch(NamedTuple):
     """What the solvers of the equations work on."""
 
-    dense: Floats  # (6, 7) matrix and forces of two blocks
     residual: Floats  # (G, 3) vectors of the iterations
     direction: Floats
     product: Floats
@@ -57,21 +55,11 @@ class Scratch(NamedTuple):
     next: Ints  # (2 pairs,) next entry in a chain of neighbours, -1 at its end
 
 
-class Motion(NamedTuple):
-    """Displacements of the blocks of one island in a step, by slot."""
-
-    d: Floats  # (G + 1, 3) Matrix.d itself: by forces that are constant over the step
-    correction: Floats  # (G, 3) position correction in a step; first the contact forces
-    relaxed: Floats  # (G, 3) the same, as relaxation in substeps has found it
-    share: Floats  # (G,) of the step that remains at the first impact on the block, 0 without one
-
-
 class System(NamedTuple):
     """An island in work."""
 
     matrix: Matrix
     scratch: Scratch
-    motion: Motion
 
 
 class Boxes(NamedTuple):
@@ -96,19 +84,20 @@ class Islands(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Contacts of one island and the motion of its blocks, in linear.relaxation and recovery."""
+    """Contacts of one island and the motion of its bodies, see `rows`."""
 
-    row: Floats  # (C, columns)
+    row: Floats  # (C, COLUMNS)
+    form: Ints  # (C,) OF_A, OF_B, BETWEEN
     row_i: Ints  # (C,) slots of their bodies
     row_j: Ints
     idle: Ints  # (C,) substep until which a contact cannot close
     visit: Ints  # (C,) contacts that a sweep visits
     place: Ints  # (C,) row of each contact
-    height: Floats  # (C,) of each contact [m]; in `recovery` its excess gap
+    height: Floats  # (C,) of each contact [m]; in `recovery` the excess gap of each row
     layer: Ints  # (LAYERS + 1,) contacts below a height
     moved_in: Ints  # (G + 1,) last sweep in which a slot moved
-    scale: Floats  # (G + 1, 3) displacement per unit of `motion`: h / sqrt(M), or 1 / sqrt(M)
-    motion: Floats  # (G + 1, 9) displacements in substeps
+    scale: Floats  # (G + 1, 3) inverse roots of the inertia of each slot
+    slot: Floats  # (G + 1, SLOT_COLUMNS); the last of what does not move
 
 
 class Work(NamedTuple):

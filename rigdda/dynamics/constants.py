@@ -76,6 +76,9 @@ each, and what the sweeps leave of it is as much smaller as they are shorter. Wi
 the rock of the highway case reach the road in steps of 20 ms, and a pile in a silo that settles
 rises by three to four times the energy; with three, 60 layers do not come to rest in 10 ms."""
 
+MOST_SUBSTEPS = 60
+"""Substeps of a lone body from which on they do not end where it is struck."""
+
 MOST_SWEEPS = 100
 """Most sweeps over the contacts of an island in a substep. Sweeps end once none changes a normal
 displacement by more than the tolerance times the substep. That tolerance [m/s] is

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.arrays import Motion, Outlines
+from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.contact.separating_axes import following, over_edge
 from rigdda.dynamics.records import Bodies, Body
 from rigdda.kernel import inlined, kernel
@@ -104,20 +104,22 @@ def place_edges(outlines: Outlines, row: int) -> None:
 
 
 @kernel
-def move_corners(bodies: Bodies, outlines: Outlines, i: int, motion: Motion, s: int) -> None:
+def move_corners(
+    bodies: Bodies, outlines: Outlines, i: int, before: tuple[float, float, float]
+) -> None:
     """Move the corners of body i by the linear displacement function (equation 2) alone.
 
-    What the post-correction replaces: body i expands as it turns.
+    What the post-correction replaces: body i expands as it turns. `before` is where the body was:
+    angle, x and y.
     """
-    d, correction = motion.d[s], motion.correction[s]
-    u, v, r = d[0] + correction[0], d[1] + correction[1], d[2] + correction[2]
     body = bodies[i]
+    u, v, r = body.x - before[1], body.y - before[2], body.theta - before[0]
     body.radius = 0.0
     for place in range(polygons(body)):
         row = polygon_row(body, i, place)
         for k in range(outlines.polygon[row].count):
             own = outlines.corner[row, k]
-            x, y = own.x - body.x + u, own.y - body.y + v
+            x, y = own.x - before[1], own.y - before[2]
             own.x += u - y * r
             own.y += v + x * r
             body.radius = max(body.radius, math.hypot(x - y * r, y + x * r))

@@ -12,14 +12,14 @@ import math
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Ground, Islands, Matrix, Monitors, Motion, Outlines
-from rigdda.dynamics.constants import ASLEEP, AWAKE, LONGEST_FLIGHT, RETIRED, SPEED_LIMIT
+from rigdda.dynamics.arrays import Ground, Islands, Monitors, Outlines
+from rigdda.dynamics.constants import ASLEEP, AWAKE, LONGEST_FLIGHT, RETIRED
 from rigdda.dynamics.correction import place_corners
-from rigdda.dynamics.forces import account_block, apply_forces, move_block
+from rigdda.dynamics.island_step import end_body, fall
 from rigdda.dynamics.monitors import barrier_contact
-from rigdda.dynamics.motion import retire, top_speed
+from rigdda.dynamics.motion import top_speed
 from rigdda.dynamics.records import Bodies, Body, Contacts, Ints, Parameters, Polygons
-from rigdda.kernel import kernel, stage
+from rigdda.kernel import kernel
 
 
 @kernel
@@ -145,27 +145,13 @@ def keep_touch(
                 monitors.last_touch[block, barrier] = time
 
 
-@stage
-def fly(
-    bodies: Bodies, i: int, contacts: Contacts, m: Matrix, motion: Motion, islands: Islands,
-    p: Parameters, ledger: NDArray,
-) -> int:  # fmt: skip
-    """Take a step of body i, the only one of island 0 and without contacts; its corners stay.
-
-    Returns i if it went bad, else -1.
-    """
-    body = bodies[i]
-    apply_forces(bodies, contacts, m, motion, islands, 0, False, p)
-    account_block(body, motion, 0, p, ledger)
-    body.apart += p.dt
-    body.wait = max(body.wait - 1, 0)
-    move_block(body, motion, 0, p.dt)
-    body.quiet = 0.0
-    if not top_speed(body) < SPEED_LIMIT:
-        return i
-    if body.y < p.floor:
-        ledger[1] -= retire(body)
-    return -1
+@kernel
+def fly(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
+    """Take a step of body i, which touches nothing; its corners stay. Returns i if it went bad."""
+    bodies[i].apart += p.dt
+    fall(bodies[i], p, ledger)
+    bodies[i].quiet = 0.0
+    return end_body(bodies, i, p, ledger)
 
 
 @kernel

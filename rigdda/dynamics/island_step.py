@@ -1,44 +1,175 @@
-"""The step of one island: settle its contacts, note its hits, move its blocks."""
+"""The step of one island: solve or relax it, note its hits, push out, move its bodies."""
 
 from __future__ import annotations
 
+import math
+
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Islands, Monitors, Motion, Outlines, System, Work
-from rigdda.dynamics.clock import lap
+from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, System, Work
+from rigdda.dynamics.assembly.island import damping_of, load_moment
+from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.dynamics.constants import (
     BOLT,
+    LATELY,
     OPEN,
     PIN,
+    PLAIN,
+    QUIET_SPEED,
+    REST,
+    SLIP,
     SPEED_LIMIT,
+    STICK,
 )
-from rigdda.dynamics.contact.law import strike_at_once
+from rigdda.dynamics.contact.joint import joint_breaks
 from rigdda.dynamics.correction import move_corners, place_corners
-from rigdda.dynamics.fence import charge_fences
-from rigdda.dynamics.forces import (
-    account_block,
-    account_contact,
-    accumulate_forces,
-    apply_forces,
-    move_block,
-)
-from rigdda.dynamics.lone_block import begin_part, recall_all, takes_parts
-from rigdda.dynamics.monitors import note_hits
+from rigdda.dynamics.islands import pair_blocks
+from rigdda.dynamics.monitors import barrier_contact, note_hits
 from rigdda.dynamics.motion import retire, top_speed
-from rigdda.dynamics.open_close import open_close
+from rigdda.dynamics.open_close import solve_states, take_solution
 from rigdda.dynamics.records import (
     EVENTS,
-    MOTION,
-    OPEN_CLOSE,
+    RELAXED,
+    SWEEPS,
     Bodies,
     Body,
     Contacts,
+    Floats,
     Interfaces,
     Parameters,
 )
 from rigdda.dynamics.recovery import push_out
+from rigdda.dynamics.relaxation import relax, start_slots
+from rigdda.dynamics.rows import (
+    COS,
+    FIELD,
+    IMPULSE,
+    NOW,
+    SIN,
+    STRUCK,
+    SUM,
+    TURN,
+    WORK,
+    WORK_ON_A,
+    X,
+    Y,
+    pack_rows,
+)
 from rigdda.dynamics.thrust import press
-from rigdda.kernel import inlined, stage
+from rigdda.kernel import inlined, kernel, stage
+
+
+@inlined
+def fall(body: Body, p: Parameters, ledger: NDArray) -> None:
+    """Move a body that touches nothing: weight, loads and damping are constant over the step."""
+    alpha, dt = damping_of(body, p), p.dt
+    mass, inertia = (
+        inertia_stiffness(body.mass, alpha, dt),
+        inertia_stiffness(body.inertia, alpha, dt),
+    )
+    moment = load_moment(body)
+    fx, fy = body.mass * p.field_x + body.force_x, body.mass * p.field_y + body.force_y
+    dx = (inertia_force(body.mass, body.vx, dt) + fx) / mass
+    dy = (inertia_force(body.mass, body.vy, dt) + fy) / mass
+    turn = (inertia_force(body.inertia, body.omega, dt) + moment) / inertia
+    slow = body.mass * (dx * dx + dy * dy) + body.inertia * turn * turn
+    ledger[2] -= alpha * slow / dt
+    ledger[3] += (fx - body.mass * p.gravity_x) * dx + (fy - body.mass * p.gravity_y) * dy
+    ledger[3] += moment * turn
+    body.lately = LATELY * max(top_speed(body), body.lately)
+    body.vx, body.vy = 2.0 * dx / dt - body.vx, 2.0 * dy / dt - body.vy
+    body.omega = 2.0 * turn / dt - body.omega
+    body.x += dx
+    body.y += dy
+    body.theta += turn
+
+
+@inlined
+def take_slot(body: Body, slot: Floats, scale: Floats, p: Parameters, ledger: NDArray) -> None:
+    """Move a body to where its slot is, and account for weight and loads.
+
+    What contacts that act at one time in the step, and position correction, lift or lower against
+    them counts as impact.
+    """
+    dx, dy, turn = slot[X] - body.x, slot[Y] - body.y, slot[TURN]
+    fx, fy = body.mass * p.field_x + body.force_x, body.mass * p.field_y + body.force_y
+    moment = load_moment(body)
+    ledger[1] += slot[FIELD] - (fx * dx + fy * dy + moment * turn)
+    ledger[3] += (fx - body.mass * p.gravity_x) * dx + (fy - body.mass * p.gravity_y) * dy
+    ledger[3] += moment * turn
+    body.lately = LATELY * max(top_speed(body), body.lately)
+    body.vx, body.vy = slot[NOW] * scale[0], slot[NOW + 1] * scale[1]
+    body.omega = slot[NOW + 2] * scale[2]
+    body.x, body.y = slot[X], slot[Y]
+    body.theta += turn
+
+
+@kernel
+def island_speed(bodies: Bodies, islands: Islands, low: int, high: int) -> float:
+    """Return the greatest speed of the blocks low:high [m/s]."""
+    speed = 0.0
+    for place in range(low, high):
+        speed = max(speed, top_speed(bodies[islands.block_item[place]]))
+    return speed
+
+
+@kernel
+def is_solved_whole(
+    contacts: Contacts, islands: Islands, low: int, high: int, speed: float, p: Parameters
+) -> bool:
+    """Return whether open-close iteration is tried on an island.
+
+    It is in static mode, without post-correction, with pins and with the paper's contacts, however
+    fast the island moves; else where it is slow.
+    """
+    if p.static or not p.post_correction:
+        return True
+    quiet = speed <= QUIET_SPEED
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.kind == PLAIN or c.kind == PIN:
+            return True
+    return quiet
+
+
+@kernel
+def take_impulses(
+    contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int, dt: float
+) -> None:
+    """Set force and state of each contact of a relaxed island from the impulses of its row.
+
+    Normal and shear force are means over the step; the accumulated ones are those at its end.
+    """
+    for item in range(low, high):
+        c, row = contacts[islands.contact_item[item]], rows.row[rows.place[item]]
+        c.normal, c.shear = row[SUM] / dt, row[SUM + 1] / dt
+        c.accumulated_normal, c.accumulated_shear = row[IMPULSE], row[IMPULSE + 1]
+        c.struck = int(row[STRUCK])
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        if c.bond > 0.0:
+            if not joint_breaks(contacts, islands, low, high, item):
+                c.state, c.kind, c.kappa = STICK, REST, c.stiffness
+                continue
+        if c.kind == BOLT or c.kind == PIN:
+            c.state = SLIP if c.normal == -c.tension else STICK
+            continue
+        within = c.cohesion + c.friction * max(c.normal, 0.0) > abs(c.shear)
+        c.state = OPEN if c.normal == 0.0 else (STICK if within else SLIP)
+
+
+@kernel
+def accumulate_forces(contacts: Contacts, islands: Islands, low: int, high: int) -> None:
+    """Carry the forces of a solved island to the next step."""
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        c.struck = 0
+        if c.state == OPEN:
+            c.accumulated_normal = c.accumulated_shear = 0.0
+        else:
+            elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
+            c.accumulated_normal += elastic * (c.normal - c.accumulated_normal)
+            c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)
 
 
 @inlined
@@ -48,98 +179,111 @@ def note_touch(body: Body, damping: float) -> None:
     body.apart = 0.0
 
 
-@stage
-def move_island(
-    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts, motion: Motion,
-    islands: Islands, island: int, monitors: Monitors, p: Parameters, ledger: NDArray,
-) -> int:  # fmt: skip
-    """Move the blocks of an island whose forces are applied; returns one that went bad, or -1."""
-    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
-    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
-    bad = -1
-    for s in range(b1 - b0):
-        block = bodies[islands.block_item[b0 + s]]
-        account_block(block, motion, s, p, ledger)
-        block.apart += p.dt
-    for item in range(c0, c1):
-        c = contacts[islands.contact_item[item]]
+@inlined
+def account_contacts(
+    bodies: Bodies, interfaces: Interfaces, contacts: Contacts, islands: Islands, rows: Rows,
+    low: int, high: int, monitors: Monitors, p: Parameters, ledger: NDArray,
+) -> None:  # fmt: skip
+    """Add the work of contacts to the ledger, what barriers take, and whom they damp."""
+    for item in range(low, high):
+        c, row = contacts[islands.contact_item[item]], rows.row[rows.place[item]]
         if c.state == OPEN:
             continue
-        account_contact(c, motion.d, islands, ledger, monitors)
+        support = c.kind == BOLT or c.kind == PIN
+        block, barrier = barrier_contact(monitors, c.a, c.b)
+        if barrier >= 0:
+            own = row[WORK_ON_A]
+            work = own if block == c.a else row[WORK] + row[WORK + 1] - own
+            monitors.target[barrier].absorbed -= work
+        if support:
+            ledger[4] += row[WORK] + row[WORK + 1]
+        else:
+            ledger[0] += row[WORK + 1]
+            ledger[1] += row[WORK]
         if len(monitors.target) > 0:
             press(c, monitors, p.dt)
-        support = c.kind == BOLT or c.kind == PIN
-        interface = interfaces[bodies[c.a].surface, c.other]
-        damping = p.damping if support else interface.damping
+        damping = p.damping if support else interfaces[bodies[c.a].surface, c.other].damping
         note_touch(bodies[c.a], damping)
         if c.b >= 0:
             note_touch(bodies[c.b], damping)
-    for s in range(b1 - b0):
-        i = islands.block_item[b0 + s]
-        block = bodies[i]
-        block.wait = max(block.wait - 1, 0)
-        move_block(block, motion, s, p.dt)
-        if not top_speed(block) < SPEED_LIMIT:
-            bad = i
-        elif block.y < p.floor:
-            ledger[1] -= retire(block)
-        if p.post_correction:
-            place_corners(bodies, outlines, i)
-        else:
-            move_corners(bodies, outlines, i, motion, s)
+
+
+@inlined
+def end_body(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
+    """Retire a body that has left the site; returns it if it went bad, else -1."""
+    body = bodies[i]
+    bad = -1
+    if not top_speed(body) < SPEED_LIMIT:
+        bad = i
+    elif body.y < p.floor:
+        ledger[1] -= retire(body)
     return bad
 
 
 @stage
 def step_island(
     bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
-    before: Contacts, system: System, work: Work, monitors: Monitors, time: float, s: int,
-    p: Parameters, part: Parameters, counters: NDArray, ledger: NDArray,
+    system: System, work: Work, monitors: Monitors, time: float, s: int, p: Parameters,
+    counters: NDArray, ledger: NDArray,
 ) -> int:  # fmt: skip
-    """Settle island s, note its hits, and move its blocks, in one or in parts: see `lone_block`.
-
-    Returns a block that went bad, or -1.
-    """
-    islands, rows, m, motion = work.islands, work.rows, system.matrix, system.motion
+    """Settle island s, note its hits, and move its bodies; returns one that went bad, or -1."""
+    islands, rows, m = work.islands, work.rows, system.matrix
     c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
-    now, left, parts, bad = p, p.dt, 0, -1
-    since = lap(counters, MOTION, 0, p.timing)
-    while left > 0.0 and bad < 0:
-        in_substeps = False
-        if parts > 0:
-            begin_part(
-                bodies, contacts, interfaces, islands, s, motion, left, p.dt, parts, part
-            )  # fmt: skip
-            now = part
-        if c1 > c0:
-            since = lap(counters, MOTION, since, p.timing)
-            strike_at_once(bodies, contacts, islands, s, now)
-            in_substeps = open_close(bodies, contacts, system, islands, rows, s, now, counters)
-            since = lap(counters, OPEN_CLOSE, since, p.timing)
-        struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
-        if c1 > c0 and parts == 0 and takes_parts(bodies, contacts, islands, s, monitors, p):
-            recall_all(contacts, islands, s, before, work.first, p)
-            part.field_x, part.field_y = p.field_x, p.field_y
-            parts = 1
-            continue
-        if c1 > c0:
-            broke, in_substeps = charge_fences(
-                bodies, contacts, system, islands, rows, s, monitors, time, in_substeps, now,
-                counters,
-            )  # fmt: skip
-            if broke:
-                struck = apply_forces(bodies, contacts, m, motion, islands, s, in_substeps, now)
-            if len(monitors.target) > 0:
-                counters[EVENTS] = note_hits(
-                    bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time
-                )
-        for item in range(c0, c1):
-            accumulate_forces(contacts[islands.contact_item[item]], struck, in_substeps)
-        push_out(bodies, contacts, motion, islands, rows, s, struck, now)
-        bad = move_island(
-            bodies, outlines, interfaces, contacts, motion, islands, s, monitors, now, ledger
+    b0, b1 = islands.block_start[s], islands.block_start[s + 1]
+    bad, n = -1, b1 - b0
+    for q in range(b0, b1):
+        bodies[islands.block_item[q]].apart += p.dt
+    if c1 == c0:
+        for q in range(b0, b1):
+            i = islands.block_item[q]
+            before = bodies[i].theta, bodies[i].x, bodies[i].y
+            fall(bodies[i], p, ledger)
+            finish_body(bodies, outlines, i, before, p)
+            bad = max(bad, end_body(bodies, i, p, ledger))
+        return bad
+    speed = island_speed(bodies, islands, b0, b1)
+    start_slots(bodies, islands, rows, s, p)
+    pairs = pair_blocks(bodies, contacts, m, islands, c0, c1)
+    count, settled, struck = pack_rows(contacts, islands, rows, s), False, False
+    if is_solved_whole(contacts, islands, c0, c1, speed, p):
+        settled = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
+        settled = settled or p.static or not p.post_correction
+    if settled:
+        take_solution(bodies, contacts, m, islands, rows, s, p, ledger)
+        accumulate_forces(contacts, islands, c0, c1)
+    else:
+        counters[RELAXED] += 1
+        sweeps, struck = relax(rows, n, count, speed, p, ledger)
+        counters[SWEEPS] += sweeps
+        take_impulses(contacts, islands, rows, c0, c1, p.dt)
+    if len(monitors.target) > 0:
+        counters[EVENTS] = note_hits(
+            bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time
         )
-        left -= now.dt
-        parts += 1 if parts > 0 else 0
-    lap(counters, MOTION, since, p.timing)
+    account_contacts(
+        bodies, interfaces, contacts, islands, rows, c0, c1, monitors, p, ledger
+    )
+    for q in range(n):
+        rows.slot[q, COS], rows.slot[q, SIN] = (
+            math.cos(rows.slot[q, TURN]),
+            math.sin(rows.slot[q, TURN]),
+        )
+    push_out(contacts, islands, rows, s, struck, p)
+    for q in range(n):
+        i = islands.block_item[b0 + q]
+        before = bodies[i].theta, bodies[i].x, bodies[i].y
+        take_slot(bodies[i], rows.slot[q], rows.scale[q], p, ledger)
+        finish_body(bodies, outlines, i, before, p)
+        bad = max(bad, end_body(bodies, i, p, ledger))
     return bad
+
+
+@inlined
+def finish_body(
+    bodies: Bodies, outlines: Outlines, i: int, before: tuple[float, float, float], p: Parameters
+) -> None:
+    """Place the corners of a body that has moved."""
+    if p.post_correction:
+        place_corners(bodies, outlines, i)
+    else:
+        move_corners(bodies, outlines, i, before)

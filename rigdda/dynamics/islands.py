@@ -116,26 +116,20 @@ def _fill(bodies: Bodies, begin: Ints, islands: Islands, blocks: int, count: int
 @kernel
 def pair_blocks(
     bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int
-) -> tuple[int, bool]:
-    """Assign the off-diagonal blocks of an island; contacts of a pair follow one another.
+) -> int:
+    """Assign the off-diagonal blocks of an island; returns the number of pairs of bodies.
 
-    Returns
-    -------
-    pairs : int
-        Number of pairs.
-    grounded : bool
-        Whether a block touches what has no unknowns.
+    Contacts of a pair follow one another.
     """
-    pairs, last_a, last_b, grounded = 0, -1, -1, False
+    pairs, last_a, last_b = 0, -1, -1
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         c.pair = -1
         if not joins(bodies, c):
-            grounded = True
             continue
         if c.a != last_a or c.b != last_b:
             last_a, last_b = c.a, c.b
             m.pair_i[pairs], m.pair_j[pairs] = islands.slot[last_a], islands.slot[last_b]
             pairs += 1
         c.pair = pairs - 1
-    return pairs, grounded
+    return pairs

@@ -44,7 +44,6 @@ BODY = _record(
     island=int,  # island in which a sleeping body fell asleep
     apart=float,  # time since a contact of it was closed, 0 if one was in the last step [s]
     damping=float,  # that of what it touched last, see assembly.island.damping_of [1/s]
-    wait=int,  # steps until its island is solved as a whole again
     force_x=float,  # dead load [N]
     force_y=float,
     moment_cos=float,  # its moment is moment_cos cos(theta) + moment_sin sin(theta) [N m]
@@ -59,8 +58,8 @@ CONTACT = _record(
     owner=np.int32,  # 1: the vertex belongs to a, 0: to b
     other=np.int32,  # surface of b
     state=np.int32,  # OPEN, STICK, SLIP
-    kind=np.int32,  # REST, NEW, IMPACT, PLASTIC, PLAIN, BOLT, PIN
-    met=np.int32,  # 1 if it met a fence that breaks in this step
+    kind=np.int32,  # REST, NEW, PLAIN, BOLT, PIN
+    struck=np.int32,  # 1 if it was struck in this step
     pair=np.int32,  # off-diagonal block of the pair of bodies, -1: no coupling
     x=float,  # the vertex [m]
     y=float,
@@ -76,18 +75,13 @@ CONTACT = _record(
     friction=float,  # tan phi
     restitution=float,
     bond=float,  # length of joint that the contact stands for and that is not broken [m]
-    free=float,  # closing velocity if that fence were not there [m/s]
     cohesion=float,  # shear force that it bears without normal force [N]
     tension=float,  # tension that it, or a bolt before it yields, bears [N]
     stiffness=float,  # of the contact at rest [N/m]
     kappa=float,  # in this step [N/m]
     bias=float,  # displacement at which the spring is free [m], see contact.law
-    rebound=float,  # that of an impact as restitution asks [m]
-    share=float,  # share of the step that remains when an impact acts
-    accumulated_normal=float,  # forces that last, carried over from the last step [N]
+    accumulated_normal=float,  # forces carried over from the last step [N]
     accumulated_shear=float,
-    start_normal=float,  # all of its forces, impulses included: where relaxation starts [N]
-    start_shear=float,
     normal=float,  # force of this step [N], on a
     shear=float,
     lag=float,  # friction force assumed in this iteration; its sign is the direction of slip [N]
@@ -233,7 +227,7 @@ Interfaces = NDArray[np.void]
 Box = Any
 """One BOX."""
 Parameters = Any
-"""One PARAMETERS: of a step, or of the part of it that a lone block takes."""
+"""One PARAMETERS."""
 
 POLYGON = _record(
     count=int,  # corners

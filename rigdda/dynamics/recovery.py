@@ -2,7 +2,7 @@
 
 What contacts have sunk too far, while a pile came to rest or as they turned within a step, is no
 elastic compression. To push it out by forces would lift the pile against the friction of its
-walls, and drive what cannot give way. So blocks are displaced by lambda M^-1 e^t along the normals
+walls, and drive what cannot give way. So bodies are displaced by lambda M^-1 e^t along the normals
 alone at the end of a step, and get no velocity from it: projected Gauss-Seidel sweeps, lambda >= 0.
 """
 
@@ -10,126 +10,100 @@ from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.arrays import Islands, Motion, Rows
-from rigdda.dynamics.assembly.springs import normal_row, relative_displacement
-from rigdda.dynamics.constants import IMPACT, RECOVERY_SWEEPS
-from rigdda.dynamics.linear.rows import (
+from rigdda.dynamics.arrays import Islands, Rows
+from rigdda.dynamics.constants import RECOVERY_SWEEPS, SUBSTEPS
+from rigdda.dynamics.records import Contacts, Parameters
+from rigdda.dynamics.rows import (
     AIM,
-    FORCE,
+    FREE,
     GAIN,
+    GAP,
     NORMAL,
-    NOW,
+    TURN,
+    X,
+    Y,
     along_six,
     is_elastic,
-    product,
-    write_row,
+    place_row,
+    push,
 )
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
 
 @inlined
-def excess_gap(c: Contact, motion: Motion, i: int, j: int, most: float) -> float:
-    """Return the gap after the step plus the compression that accumulated force explains [m].
+def find_deepest(contacts: Contacts, islands: Islands, rows: Rows, island: int, most: float) -> float:
+    """Set rows.height to the gaps after the step that the load does not explain; returns the deepest.
 
-    Negative: too deep. The compression counts up to `most` [m].
-    """
-    dn, _ = relative_displacement(c, motion.d, i, j)
-    correction, _ = relative_displacement(c, motion.correction, i, j)
-    explained = min(max(c.accumulated_normal, 0.0) / c.stiffness, most)
-    return c.gap + dn + correction + explained
-
-
-@kernel
-def part_bodies(rows: Rows, count: int) -> None:
-    """Sweep once over the listed contacts: part their bodies as far as they are to."""
-    for place in range(count):
-        r, i, j = rows.row[place], rows.row_i[place], rows.row_j[place]
-        a, b = rows.motion[i], rows.motion[j]
-        parted = along_six(r[NORMAL : NORMAL + 6], a, b, NOW)
-        before = r[FORCE]
-        r[FORCE] = max(before + (r[AIM] - parted) * r[GAIN], 0.0)
-        change = r[FORCE] - before
-        for q in range(3):
-            a[NOW + q] += change * r[NORMAL + q]
-            b[NOW + q] += change * r[NORMAL + 3 + q]
-
-
-@inlined
-def find_deepest(
-    contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, low: int, high: int,
-    most: float,
-) -> float:  # fmt: skip
-    """Set rows.height to the excess gaps of the contacts low:high; returns the deepest [m].
-
-    Springs whose stiffness is given are as deep as they are to be, and what comes through a fence
-    as it will. A cluster in flight is left as it is: to displace its blocks would change its
-    angular momentum.
+    The compression that the load explains counts up to `most` [m]. Springs whose stiffness is given
+    are as deep as they are to be. A cluster in flight is left as it is: to displace its bodies would
+    change its angular momentum.
     """
     deepest, grounded = 0.0, False
-    for q in range(low, high):
-        c = contacts[islands.contact_item[q]]
+    for q in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        c, k = contacts[islands.contact_item[q]], rows.place[q]
         grounded = grounded or c.pair < 0
-        j = islands.slot[c.b] if c.pair >= 0 else -1
-        rows.height[q] = math.inf
-        if not is_elastic(c) and not (c.kind == IMPACT and c.bias < 0.0):
-            rows.height[q] = excess_gap(c, motion, islands.slot[c.a], j, most)
-        deepest = max(deepest, -rows.height[q])
+        rows.height[k] = math.inf
+        if is_elastic(c) or rows.idle[k] > SUBSTEPS:
+            continue
+        i, j = rows.row_i[k], rows.row_j[k]
+        row = rows.row[k]
+        place_row(row, rows.form[k], rows.slot[i], rows.slot[j], rows.scale[i], rows.scale[j])
+        explained = min(max(c.accumulated_normal, 0.0) / c.stiffness, most)
+        rows.height[k] = row[GAP] + explained
+        deepest = max(deepest, -rows.height[k])
     return deepest if grounded else 0.0
 
 
-@inlined
-def list_rows(
-    contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int, n: int, reach: float
-) -> int:
-    """Write the rows of those of the contacts low:high that may be closed; returns how many.
+@kernel
+def list_rows(rows: Rows, count: int, reach: float) -> int:
+    """List the rows that are closed, or may be once others are pushed out; returns how many."""
+    listed = 0
+    for k in range(count):
+        if rows.height[k] <= reach:
+            row, flexible = rows.row[k], 0.0
+            for q in range(6):
+                flexible += row[NORMAL + q] * row[NORMAL + q]
+            row[GAIN], row[AIM] = 1.0 / flexible, 0.0
+            rows.visit[listed] = k
+            listed += 1
+    return listed
 
-    What is not too deep may close until it is; what is open by more than `reach` [m] will not.
-    """
-    count = 0
-    for q in range(low, high):
-        if rows.height[q] > reach:
-            continue
-        c, r = contacts[islands.contact_item[q]], rows.row[count]
-        i = islands.slot[c.a]
-        j = islands.slot[c.b] if c.pair >= 0 else n
-        write_row(r, NORMAL, normal_row(c, True), rows.scale[i])
-        write_row(r, NORMAL + 3, normal_row(c, False), rows.scale[j])
-        r[GAIN], r[FORCE] = 1.0 / product(r, NORMAL, NORMAL), 0.0
-        r[AIM] = -rows.height[q]
-        rows.row_i[count], rows.row_j[count] = i, j
-        count += 1
-    return count
+
+@kernel
+def part_bodies(rows: Rows, listed: int) -> None:
+    """Sweep once over the listed rows: part their bodies as far as they are to."""
+    for place in range(listed):
+        k = rows.visit[place]
+        row, a, b = rows.row[k], rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
+        parted = along_six(row[NORMAL : NORMAL + 6], a, b, FREE)
+        before = row[AIM]
+        row[AIM] = max(before - (rows.height[k] + parted) * row[GAIN], 0.0)
+        push(row, NORMAL, a, b, FREE, row[AIM] - before)
 
 
 @inlined
 def push_out(
-    bodies: Bodies, contacts: Contacts, motion: Motion, islands: Islands, rows: Rows, island: int,
-    struck: bool, p: Parameters,
-) -> None:  # fmt: skip
-    """Add to `motion.correction` what pushes out the penetration of an island in this step.
+    contacts: Contacts, islands: Islands, rows: Rows, island: int, struck: bool, p: Parameters
+) -> None:
+    """Displace the slots of an island, at the end of its step, by what pushes out penetration.
 
     In an island that was struck a force may be an impulse, which explains no lasting penetration
     beyond the wanted one.
     """
-    low, high = islands.contact_start[island], islands.contact_start[island + 1]
-    first = islands.block_start[island]
-    n = islands.block_start[island + 1] - first
-    deepest = find_deepest(
-        contacts, motion, islands, rows, low, high, p.penetration if struck else math.inf
-    )
+    count = islands.contact_start[island + 1] - islands.contact_start[island]
+    n = islands.block_start[island + 1] - islands.block_start[island]
+    most = p.penetration if struck else math.inf
+    deepest = find_deepest(contacts, islands, rows, island, most)
     if deepest <= 0.0:
         return
     for s in range(n + 1):
         for q in range(3):
-            rows.scale[s, q] = rows.motion[s, NOW + q] = 0.0
-    for s in range(n):
-        body = bodies[islands.block_item[first + s]]
-        rows.scale[s, 0] = rows.scale[s, 1] = 1.0 / math.sqrt(body.mass)
-        rows.scale[s, 2] = 1.0 / math.sqrt(body.inertia)
-    count = list_rows(contacts, islands, rows, low, high, n, 2.0 * deepest)
+            rows.slot[s, FREE + q] = 0.0
+    listed = list_rows(rows, count, 2.0 * deepest)
     for _ in range(RECOVERY_SWEEPS):
-        part_bodies(rows, count)
+        part_bodies(rows, listed)
     for s in range(n):
-        for q in range(3):
-            motion.correction[s, q] += rows.motion[s, NOW + q] * rows.scale[s, q]
+        slot = rows.slot[s]
+        slot[X] += slot[FREE] * rows.scale[s, 0]
+        slot[Y] += slot[FREE + 1] * rows.scale[s, 1]
+        slot[TURN] += slot[FREE + 2] * rows.scale[s, 2]

@@ -18,7 +18,6 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.contact.links import mend_links
 from rigdda.dynamics.detection import copy_index, detect
-from rigdda.dynamics.fence import lower_fences, wake_behind
 from rigdda.dynamics.flight import fly, keep_touch, land, take_off
 from rigdda.dynamics.frames import keep_frame
 from rigdda.dynamics.island_step import step_island
@@ -45,28 +44,24 @@ from rigdda.kernel import entry_kernel, kernel, stage
 
 @stage
 def solve_and_move(
-    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts, count: int,
-    before: Contacts, system: System, work: Work, monitors: Monitors, time: float, p: Parameters,
-    part: Parameters, counters: NDArray, ledger: NDArray,
+    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
+    system: System, work: Work, monitors: Monitors, time: float, p: Parameters,
+    counters: NDArray, ledger: NDArray,
 ) -> int:  # fmt: skip
-    """Take the step of every island; `part` is for parts of the step of a lone block.
-
-    Returns a block that went bad, or -1.
-    """
+    """Take the step of every island; returns a block that went bad, or -1."""
     since = lap(counters, MOTION, 0, p.timing)
     found = find_islands(bodies, contacts, work.begin, work.islands, p.blocks, p.islands)
     since = lap(counters, MOTION, since, p.timing)
     bad = -1
     for s in range(found):
         worse = step_island(
-            bodies, outlines, interfaces, contacts, before, system, work, monitors, time, s, p,
-            part, counters, ledger,
+            bodies, outlines, interfaces, contacts, system, work, monitors, time, s, p, counters,
+            ledger,
         )  # fmt: skip
         bad = max(bad, worse)
     if p.sleeping:
         since = lap(counters, MOTION, 0, p.timing)
         watch_quiet(bodies, work.islands, found, p)
-        wake_behind(bodies, contacts, count, monitors, p)
         lap(counters, MOTION, since, p.timing)
     return bad
 
@@ -100,7 +95,6 @@ def end_step(
     counters[EVENTS], pushed = watch_thrust(
         bodies, contacts, count, monitors, work.islands, counters[EVENTS], counters[STEPS], time, p
     )
-    lower_fences(bodies, outlines, monitors, p)
     if pushed:
         return GROUND_MOVED
     return ENDED if is_over(bodies, monitors, counters, p) else DONE
@@ -117,8 +111,8 @@ def advance(
 
     Parameters
     ----------
-    parameters : array of PARAMETERS
-        Of the step, and of the part of it that a lone block takes.
+    parameters : (1,) array of PARAMETERS
+        Numbers of the scene and the settings.
     counters, ledger, deepest : arrays
         See `records.COUNTERS`, `records.LEDGER`; deepest[0] is the greatest penetration [m].
     frames : (F, M, 6) array
@@ -151,7 +145,7 @@ def advance(
             flown += 1
             count = counters[CONTACTS]
             keep_touch(bodies, now, count, monitors, time)
-            bad = fly(bodies, flyer, now, system.matrix, system.motion, work.islands, p, ledger)
+            bad = fly(bodies, flyer, p, ledger)
             flight = flight if bodies[flyer].status == AWAKE else flown
         else:
             set_out(bodies, shaking, counters[STEPS] * p.dt, time, p)
@@ -167,9 +161,8 @@ def advance(
             now, before = before, now
             swapped = not swapped
             bad = solve_and_move(
-                bodies, outlines, interfaces, now, count, before, system, work, monitors, time, p,
-                parameters[1], counters, ledger,
-            )  # fmt: skip
+                bodies, outlines, interfaces, now, system, work, monitors, time, p, counters, ledger
+            )
             ledger[4] += mend_links(bodies, outlines, links, p)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count

@@ -19,10 +19,8 @@ from rigdda.dynamics.constants import (
     ASLEEP,
     BOLT,
     FIXED,
-    IMPACT,
     OPEN,
     PIN,
-    PLASTIC,
     RETIRED,
     TERRAIN,
 )
@@ -54,9 +52,7 @@ def press(c: Contact, monitors: Monitors, dt: float) -> None:
     barrier = pressed(monitors, c)
     if barrier < 0:
         return
-    target, hit = monitors.target[barrier], c.kind == IMPACT or c.kind == PLASTIC
-    if hit and target.capacity < math.inf:
-        return
+    target, hit = monitors.target[barrier], c.struck == 1
     thrust = c.shear * c.ny - c.normal * c.nx  # on body b
     if c.b != TERRAIN and barrier_contact(monitors, c.a, c.b)[0] != c.a:
         thrust = -thrust

@@ -7,7 +7,7 @@ import math
 from rigdda.dynamics.arrays import Islands, Matrix
 from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.dynamics.assembly.springs import add_block, add_force, normal_row, shear_row
-from rigdda.dynamics.constants import APART, BOLT, OPEN, SLIP, SMALL_ISLAND, STICK
+from rigdda.dynamics.constants import APART, BOLT, OPEN, SLIP, STICK
 from rigdda.dynamics.records import Bodies, Body, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
@@ -55,13 +55,12 @@ def assemble_blocks(
 
 
 @inlined
-def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float, coupled: bool) -> None:
+def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float) -> None:
     """Add the springs of a closed contact between slots i and j (-1: no unknowns).
 
     On the displacement d of the step the spring N = kappa (b - dt w_1) has stiffness 2 kappa and
-    force kappa (b + dt w_0). The friction of a slipping contact is a force; `coupled` takes it
-    from the unknown normal force, which makes the matrix of one or two blocks unsymmetric. A bolt
-    has no shear; one that yields is a force.
+    force kappa (b + dt w_0). The friction of a slipping contact is a force, that of the last
+    iteration. A bolt has no shear; one that yields is a force.
     """
     stiffness = 2.0 * c.kappa
     normal = c.kappa * (c.bias + dt * c.un)
@@ -73,15 +72,11 @@ def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float, coupled: 
     add_block(m.diagonal[i], stiffness, en, en)
     add_force(m.rhs[i], normal, en)
     stick = c.state == STICK
-    ratio = math.copysign(c.friction, c.lag) if coupled and not (stick or bolt) else 0.0
     if bolt:
         pass
     elif stick:
         add_block(m.diagonal[i], stiffness, es, es)
         add_force(m.rhs[i], shear, es)
-    elif coupled:
-        add_block(m.diagonal[i], stiffness * ratio, es, en)
-        add_force(m.rhs[i], normal * ratio, es)
     else:
         add_force(m.rhs[i], c.lag, es)
     if j < 0:
@@ -90,21 +85,12 @@ def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float, coupled: 
     add_block(m.diagonal[j], stiffness, fn, fn)
     add_block(m.off[c.pair], stiffness, en, fn)
     add_force(m.rhs[j], normal, fn)
-    if coupled:
-        add_block(m.lower, stiffness, fn, en)
     if bolt:
         return
     if stick:
         add_block(m.diagonal[j], stiffness, fs, fs)
         add_block(m.off[c.pair], stiffness, es, fs)
         add_force(m.rhs[j], shear, fs)
-        if coupled:
-            add_block(m.lower, stiffness, fs, es)
-    elif coupled:
-        add_block(m.diagonal[j], stiffness * ratio, fs, fn)
-        add_block(m.off[c.pair], stiffness * ratio, es, fn)
-        add_block(m.lower, stiffness * ratio, fs, en)
-        add_force(m.rhs[j], normal * ratio, fs)
     else:
         add_force(m.rhs[j], c.lag, fs)
 
@@ -124,8 +110,7 @@ def assemble_island(
     assemble_blocks(bodies, m, islands, b0, b1, p)
     for a in range(3):
         for b in range(3):
-            m.lower[a, b] = 0.0
-            for q in range(max(pairs, 1)):
+            for q in range(pairs):
                 m.off[q, a, b] = 0.0
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
@@ -133,4 +118,4 @@ def assemble_island(
             c.normal = c.shear = 0.0
         else:
             j = islands.slot[c.b] if c.pair >= 0 else -1
-            assemble_contact(c, m, islands.slot[c.a], j, p.dt, b1 - b0 <= SMALL_ISLAND)
+            assemble_contact(c, m, islands.slot[c.a], j, p.dt)

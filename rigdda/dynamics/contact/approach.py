@@ -5,8 +5,8 @@ from __future__ import annotations
 from rigdda.dynamics.constants import (
     AWAKE,
 )
-from rigdda.dynamics.records import Bodies, Contact, Parameters
-from rigdda.kernel import inlined, kernel
+from rigdda.dynamics.records import Bodies, Contact
+from rigdda.kernel import kernel
 
 
 @kernel
@@ -43,26 +43,20 @@ def set_arms(bodies: Bodies, c: Contact, time: float) -> None:
 
 
 @kernel
-def set_velocities(bodies: Bodies, c: Contact) -> None:
-    """Set the normal and shear relative velocities, at the arms, of bodies as they move now."""
+def set_velocities(bodies: Bodies, c: Contact, dt: float) -> None:
+    """Set the relative velocities from where the bodies are at the start of the step.
+
+    A point of a turning body does not go straight, and a face that turns comes nearer to what
+    slides along it. With both counted the law gives the true velocity at the end, to second order:
+    a block that rocks on a corner neither rises nor sinks. But w_0 is at most that of mid-step:
+    greater, it would let the contact give energy.
+    """
     a, b = bodies[c.a], bodies[c.b]
     vx, vy = a.vx - a.omega * c.ra_y, a.vy + a.omega * c.ra_x
     if c.b >= 0 and b.status == AWAKE:
         vx -= b.vx - b.omega * c.rb_y
         vy -= b.vy + b.omega * c.rb_x
-    c.un = c.nx * vx + c.ny * vy
-    c.us = -c.ny * vx + c.nx * vy
-
-
-@kernel
-def set_velocities_at_start(bodies: Bodies, c: Contact, dt: float) -> None:
-    """Set w_0 and the shear velocity from where the bodies are at the start of the step.
-
-    `strike` has set them at mid-step before. A point of a turning body does not go straight, and a
-    face that turns comes nearer to what slides along it. With both counted the law gives the true
-    velocity at the end, to second order: a block that rocks on a corner neither rises nor sinks.
-    But w_0 is at most that of mid-step: greater, it would let the contact give energy.
-    """
+    middle = c.nx * vx + c.ny * vy
     ax, ay = point_velocity(bodies, c.a, c.x, c.y)
     bx, by = point_velocity(bodies, c.b, c.x, c.y)
     opening = c.nx * (ax - bx) + c.ny * (ay - by)
@@ -71,21 +65,4 @@ def set_velocities_at_start(bodies: Bodies, c: Contact, dt: float) -> None:
     face = bodies[i]
     if i >= 0 and face.status == AWAKE:
         opening -= face.omega * c.us * dt
-    c.un = min(c.un, opening)
-
-
-@inlined
-def strike(bodies: Bodies, c: Contact, time: float, pull: float, p: Parameters) -> float:
-    """Set arms and velocities of a contact at `time` in the step; returns the closing speed."""
-    set_arms(bodies, c, time)
-    set_velocities(bodies, c)
-    c.share = 1.0 - time / p.dt
-    return -c.un + pull * time
-
-
-@kernel
-def pull_on(bodies: Bodies, c: Contact, p: Parameters) -> float:
-    """Return the free relative acceleration that closes a contact [m/s2]: that of gravity."""
-    if c.b >= 0 and bodies[c.b].status == AWAKE:
-        return 0.0
-    return -(p.field_x * c.nx + p.field_y * c.ny)
+    c.un = min(middle, opening)

@@ -1,4 +1,4 @@
-r"""The law that a contact follows over one step.
+r"""The law that a contact follows over one step in an island that is solved as a whole.
 
 Every closed contact is a penalty spring on the *end* velocity of the step,
 
@@ -12,57 +12,36 @@ What differs is the bias b:
 =======  ====================================================================================
 at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
          shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
-         on, the rest viscous (Kelvin and Voigt's solid). w_0 is that of the points that touch at
-         the start of the step, see `set_velocities_at_start`. An open gap gives b = -g: what would
+         on, the rest viscous (Kelvin and Voigt's solid). An open gap gives b = -g: what would
          close within the step is slowed down to the speed that closes it in one more.
-impact   b = dt e w_c, so that w_1 = e w_c for closing speed w_c; the spring is stiff and the
-         impulse acts from the time at which the bodies touch.
 new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
-         blocks, and carries on with it as if they had always touched.
-plastic  b = 0: a closed contact that the rest of its island drives together, a plastic impact.
+         bodies, and carries on with it as if they had always touched.
 plain    b = -2 g and w_0 taken as 0: a penalty spring on the gap, the paper's contact.
 =======  ====================================================================================
 
-Restitution is that of Newton, of normal velocities at the point of contact. It comes out as
-prescribed, at any step, where one block strikes what does not move: blow by blow, also of several
-within a step, since its step is taken in parts (`lone_block`). It is less where it would give
-energy (`rebound`). Where several blocks move in one island, what is struck across a gap within the
-same step takes part in the blow as if it touched: in a row of three that part again with e of 0.5
-or more velocities differ by up to half of the first from those of one blow after the other.
-
 The shear spring is the same on the shear velocity, from the shear force of the last step, limited
-by Coulomb friction: a return mapping.
+by Coulomb friction: a return mapping. Islands that move faster are relaxed, see
+`rigdda.dynamics.relaxation`, where contacts are rigid.
 """
 
 from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.constants import (
     AWAKE,
-    BLOW_SPEED,
-    BOLT,
-    IMPACT,
-    IMPACT_STEPS,
     IMPACT_STIFFNESS,
     NEW,
     OPEN,
     PLAIN,
     PLAIN_CONTACT,
-    PLASTIC,
     REST,
     RETARDATION_TIME,
     START_STIFFNESS,
     STICK,
 )
-from rigdda.dynamics.contact.approach import (
-    effective_mass,
-    pull_on,
-    set_velocities_at_start,
-    strike,
-)
-from rigdda.dynamics.records import Bodies, Contact, Contacts, Interfaces, Parameters
+from rigdda.dynamics.contact.approach import effective_mass, set_arms, set_velocities
+from rigdda.dynamics.records import Bodies, Contact, Interfaces, Parameters
 from rigdda.kernel import inlined, kernel
 
 
@@ -89,29 +68,12 @@ def impact_stiffness(mass: float, dt: float) -> float:
 
 
 @kernel
-def set_impact(c: Contact, closing: float, mass: float, p: Parameters) -> None:
-    """Make a contact an impact with closing speed `closing` [m/s]."""
-    c.kind = IMPACT
-    c.kappa = impact_stiffness(mass, p.dt)
-    c.bias = c.rebound = p.dt * c.restitution * closing
-    c.accumulated_normal = c.accumulated_shear = c.start_normal = c.start_shear = 0.0
-
-
-@kernel
-def set_plastic(bodies: Bodies, c: Contact, p: Parameters) -> None:
-    """Make a closed contact a plastic impact within the step."""
-    c.kind = PLASTIC
-    c.kappa = max(impact_stiffness(effective_mass(bodies, c), p.dt), c.kappa)
-    c.bias = 0.0
-
-
-@kernel
 def set_rest(c: Contact, p: Parameters) -> None:
     """Make a contact a spring that carries on with the force of the last step."""
     c.kind = REST
     c.kappa = c.stiffness * max(1.0, RETARDATION_TIME / p.dt)
     if c.gap > p.penetration and c.bond == 0.0:
-        c.accumulated_normal = c.start_normal = 0.0
+        c.accumulated_normal = 0.0
         c.bias = -c.gap
     else:
         c.bias = c.accumulated_normal / c.kappa
@@ -119,7 +81,7 @@ def set_rest(c: Contact, p: Parameters) -> None:
 
 @kernel
 def set_new(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
-    """Make a contact one that closes now, or may close, without an impact."""
+    """Make a contact one that closes now, or may close."""
     c.kind = NEW
     stiffness = impact_stiffness(effective_mass(bodies, c), p.dt)
     c.kappa = max(START_STIFFNESS * stiffness if start else stiffness, c.stiffness)
@@ -143,94 +105,33 @@ def set_plain(c: Contact, p: Parameters) -> None:
 
 
 @inlined
-def strike_at_once(
-    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, p: Parameters
-) -> None:
-    """Let all contacts of a cluster in flight act at the time of its first impact.
-
-    Impulses at different times would act on arms that the earlier ones have changed, and angular
-    momentum would not be kept. What may touch the ground, or a fixed body, has none to keep.
-    """
-    share = 0.0
-    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        c = contacts[islands.contact_item[item]]
-        if c.b < 0 or bodies[c.b].status != AWAKE:
-            return
-        if c.kind == IMPACT:
-            share = max(share, c.share)
-    if share == 0.0:
-        return
-    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        c = contacts[islands.contact_item[item]]
-        if c.kind == BOLT or c.kind == PLAIN:  # what they ask for does not depend on velocities
-            continue
-        closing = strike(bodies, c, (1.0 - share) * p.dt, 0.0, p)
-        if c.kind == IMPACT:
-            set_impact(c, max(closing, 0.0), effective_mass(bodies, c), p)
-
-
-@inlined
-def time_of_impact(
-    bodies: Bodies, c: Contact, pull: float, threshold: float, p: Parameters
-) -> float:
-    """Return when in the step a contact begins an impact [s], or -1.0 if it does not.
-
-    On entry arms and velocities are those of mid-step; on return those of the impact, or of
-    mid-step if there is none. An open contact begins an impact if it closes faster than
-    `threshold` [m/s], a closed one if faster than BLOW_SPEED, too, and if it is not deeper than the
-    contact margin.
-    """
-    gap = max(c.gap, 0.0)
-    mean = -c.un + 0.5 * pull * p.dt
-    # what was foreseen may still come fast when it is closed already; but bodies that are in one
-    # another are held apart by the force of the last step, from which an impact would not start
-    least = threshold if c.state == OPEN else max(threshold, BLOW_SPEED)
-    sunk = c.state != OPEN and c.gap < -p.margin
-    if sunk or mean <= least or gap >= mean * p.dt:
-        return -1.0
-    time = gap / mean
-    if strike(bodies, c, time, pull, p) > threshold:
-        return time
-    strike(bodies, c, 0.5 * p.dt, pull, p)
-    return -1.0
-
-
-@inlined
 def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: Parameters) -> None:
     """Set the law of a contact from its geometry and accumulated forces.
 
     `start` tells whether this is the very first step.
     """
     a, b = bodies[c.a], bodies[c.b]
-    pull = pull_on(bodies, c, p)
     mass_b = b.mass if c.b >= 0 and b.status == AWAKE else 0.0
     weight = carried_weight(a.mass, mass_b, p)
     c.stiffness = max(c.stiffness, rest_stiffness(weight, c, p))
     interface = interfaces[a.surface, c.other]
     c.friction, c.restitution = interface.friction, interface.restitution
-    c.lag = c.start_shear
+    c.lag = c.accumulated_shear
     c.cohesion = c.bond * interface.cohesion
     c.tension = c.bond * interface.tension
     if c.cohesion == 0.0 and c.tension == 0.0:
         c.bond = 0.0
-    strike(bodies, c, 0.5 * p.dt, pull, p)
+    set_arms(bodies, c, 0.5 * p.dt)
+    set_velocities(bodies, c, p.dt)
     if c.lag == 0.0:
         c.lag = math.copysign(0.0, -c.us)  # the direction of friction once it slips
     if c.restitution == PLAIN_CONTACT:
         set_plain(c, p)
-        return
-    time = time_of_impact(bodies, c, pull, IMPACT_STEPS * p.gravity * p.dt, p)
-    if time >= 0.0:
-        set_impact(c, -c.un + pull * time, effective_mass(bodies, c), p)
-        c.state = STICK
-        return
-    gap, mean = max(c.gap, 0.0), 0.5 * pull * p.dt - c.un
-    set_velocities_at_start(bodies, c, p.dt)
-    if c.state != OPEN:
+    elif c.state != OPEN:
         set_rest(c, p)
-        return
-    set_new(bodies, c, start, p)
-    # what touches starts closed: in a stack no block moves before those below it are held, and
-    # what hangs on a joint is held by it
-    if c.bond > 0.0 or (gap < p.margin and gap - mean * p.dt < p.penetration):
-        c.state = STICK
+    else:
+        set_new(bodies, c, start, p)
+        # what touches starts closed: in a stack no block moves before those below it are held, and
+        # what hangs on a joint is held by it
+        if c.bond > 0.0 or (c.gap < p.margin and c.gap + c.un * p.dt < p.penetration):
+            c.state = STICK

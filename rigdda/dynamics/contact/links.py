@@ -71,15 +71,15 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) ->
     bx, by = anchor(bodies, b, link.bx, link.by)
     c.a, c.b, c.key, c.owner, c.kind = a, b, -1 - q, 1, link.kind
     c.other, c.gap = 0, 0.0
-    c.x, c.y, c.share, c.state = ax, ay, 0.5, STICK
-    c.accumulated_normal = c.accumulated_shear = c.start_normal = c.start_shear = 0.0
+    c.x, c.y, c.state = ax, ay, STICK
+    c.accumulated_normal = c.accumulated_shear = 0.0
     c.friction = c.restitution = c.bond = c.cohesion = 0.0
     c.ra_x, c.ra_y = arm(bodies[a], link.ax, link.ay, p.dt)
     if b >= 0:
         c.rb_x, c.rb_y = arm(bodies[b], link.bx, link.by, p.dt)
     if link.kind == BOLT:
         length = math.hypot(ax - bx, ay - by)
-        c.nx, c.ny = (ax - bx) / length, (ay - by) / length
+        c.nx, c.ny, c.gap = (ax - bx) / length, (ay - by) / length, length
         c.un = c.us = 0.0
         c.stiffness, c.kappa = link.stiffness, 0.25 * link.stiffness
         c.bias = -tension(link, length) / c.kappa

@@ -46,7 +46,6 @@ def recall_from(
             continue
         c.state = was.state
         c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
-        c.start_normal, c.start_shear = was.start_normal, was.start_shear
         c.stiffness, c.bond = was.stiffness, was.bond
         return True
     return False
@@ -67,7 +66,7 @@ def recall(
         c = contacts[k]
         c.state = OPEN
         c.accumulated_normal = c.accumulated_shear = c.stiffness = 0.0
-        c.start_normal = c.start_shear = c.bond = 0.0
+        c.bond = 0.0
         if c.gap > margin:
             continue
         a, b = c.a, c.b
@@ -83,6 +82,5 @@ def copy_contact(c: Contact, was: Contact) -> None:
     c.x, c.y, c.nx, c.ny, c.gap = was.x, was.y, was.nx, was.ny, was.gap
     c.state, c.kind = was.state, was.kind
     c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
-    c.start_normal, c.start_shear = was.start_normal, was.start_shear
     c.stiffness, c.normal, c.shear = was.stiffness, was.normal, was.shear
-    c.bond = was.bond
+    c.bond, c.struck = was.bond, was.struck

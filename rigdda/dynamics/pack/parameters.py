@@ -123,7 +123,7 @@ def pack_parameters(
         "floor": floor,
         "bonded": (interfaces["cohesion"] + interfaces["tension"]).any(),
     }
-    parameters = np.zeros(2, dtype=PARAMETERS)
+    parameters = np.zeros(1, dtype=PARAMETERS)
     for name, value in (numbers | rock_numbers(scene, settings, bodies)).items():
         parameters[name] = value
     return parameters.view(np.recarray)

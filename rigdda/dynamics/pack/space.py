@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Boxes, Islands, Matrix, Motion, Rows, Scratch, System, Work
+from rigdda.dynamics.arrays import Boxes, Islands, Matrix, Rows, Scratch, System, Work
 from rigdda.dynamics.constants import (
     LAYERS,
 )
-from rigdda.dynamics.linear.rows import COLUMNS
 from rigdda.dynamics.records import BOX, CONTACT, Contacts
+from rigdda.dynamics.rows import COLUMNS, SLOT_COLUMNS
 
 MOST_BANDWIDTH = 64
 """Blocks to the left of the diagonal, on average, up to which a skyline is kept room for."""
@@ -28,16 +28,14 @@ def empty_matrix(blocks: int, room: int) -> Matrix:
         np.zeros((room, 3, 3)),
         np.zeros(room, dtype=np.int64),
         np.zeros(room, dtype=np.int64),
-        np.zeros((3, 3)),
         np.zeros((blocks, 3)),
-        np.zeros((blocks + 1, 3)),
+        np.zeros((blocks, 3)),
     )
 
 
 def empty_scratch(blocks: int, room: int) -> Scratch:
     """Return space for the solvers of these equations."""
     return Scratch(
-        np.zeros((6, 7)),
         np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
@@ -51,9 +49,7 @@ def empty_scratch(blocks: int, room: int) -> Scratch:
 
 def empty_system(blocks: int, room: int) -> System:
     """Return space for an island of all blocks."""
-    matrix = empty_matrix(blocks, room)
-    motion = Motion(matrix.d, np.zeros((blocks, 3)), np.zeros((blocks, 3)), np.zeros(blocks))
-    return System(matrix, empty_scratch(blocks, room), motion)
+    return System(empty_matrix(blocks, room), empty_scratch(blocks, room))
 
 
 def profile_room(blocks: int) -> int:
@@ -87,6 +83,7 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
         ),
         Rows(
             row=np.zeros((room, COLUMNS)),
+            form=whole(room),
             row_i=whole(room),
             row_j=whole(room),
             idle=whole(room),
@@ -96,7 +93,7 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
             layer=whole(LAYERS + 1),
             moved_in=whole(blocks + 1),
             scale=np.zeros((blocks + 1, 3)),
-            motion=np.zeros((blocks + 1, 9)),
+            slot=np.zeros((blocks + 1, SLOT_COLUMNS)),
         ),
         first=whole(bodies + 1),
         begin=whole(bodies + 1),

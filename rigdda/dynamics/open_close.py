@@ -9,8 +9,13 @@ from __future__ import annotations
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands, Matrix, Rows, Scratch, System
-from rigdda.dynamics.assembly.island import assemble_island, damping_of, load_moment
-from rigdda.dynamics.assembly.springs import along, normal_row, shear_row
+from rigdda.dynamics.assembly.island import (
+    assemble_blocks,
+    assemble_island,
+    damping_of,
+    load_moment,
+)
+from rigdda.dynamics.assembly.springs import add_force, along, normal_row, shear_row
 from rigdda.dynamics.constants import BLOCK_PCG, DIRECT, OPEN, SOR
 from rigdda.dynamics.linear.direct import solve_block
 from rigdda.dynamics.linear.pcg import solve_pcg
@@ -76,8 +81,26 @@ def take_solution(
     bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, rows: Rows, island: int,
     p: Parameters, ledger: NDArray,
 ) -> None:  # fmt: skip
-    """Move the slots of an island by its displacements; set the work of contacts and of damping."""
+    """Move the slots of an island by its forces; set the work of contacts and of damping.
+
+    Forces are applied equal and opposite here, once more and exactly, so that momentum is kept to
+    rounding whatever the residual of the solver.
+    """
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    assemble_blocks(bodies, m, islands, b0, b1, p)
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
+        c = contacts[islands.contact_item[item]]
+        if c.state != OPEN:
+            i = islands.slot[c.a]
+            add_force(m.rhs[i], c.normal, normal_row(c, True))
+            add_force(m.rhs[i], c.shear, shear_row(c, True))
+            if c.pair >= 0:
+                j = islands.slot[c.b]
+                add_force(m.rhs[j], c.normal, normal_row(c, False))
+                add_force(m.rhs[j], c.shear, shear_row(c, False))
+    for s in range(b1 - b0):
+        for q in range(3):
+            m.d[s, q] = m.rhs[s, q] / m.diagonal[s, q, q]
     for s in range(b1 - b0):
         body, d, slot = bodies[islands.block_item[b0 + s]], m.d[s], rows.slot[s]
         slow = body.mass * (d[0] ** 2 + d[1] ** 2) + body.inertia * d[2] ** 2

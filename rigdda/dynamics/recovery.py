@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Islands, Rows
-from rigdda.dynamics.constants import RECOVERY_SWEEPS, SUBSTEPS
+from rigdda.dynamics.constants import OPEN, RECOVERY_SWEEPS, SUBSTEPS
 from rigdda.dynamics.records import Contacts, Parameters
 from rigdda.dynamics.rows import (
     AIM,
@@ -48,7 +48,8 @@ def find_deepest(contacts: Contacts, islands: Islands, rows: Rows, island: int, 
         i, j = rows.row_i[k], rows.row_j[k]
         row = rows.row[k]
         place_row(row, rows.form[k], rows.slot[i], rows.slot[j], rows.scale[i], rows.scale[j])
-        explained = min(max(c.accumulated_normal, 0.0) / c.stiffness, most)
+        load = max(min(c.normal, c.accumulated_normal), 0.0) if c.state != OPEN else 0.0
+        explained = min(load / c.stiffness, most)
         rows.height[k] = row[GAP] + explained
         deepest = max(deepest, -rows.height[k])
     return deepest if grounded else 0.0

@@ -46,6 +46,7 @@ from rigdda.dynamics.records import Bodies, Body, Floats, Ints, Parameters
 from rigdda.dynamics.rows import (
     AIM,
     AIM_SHEAR,
+    BEFORE,
     BEND,
     BOUNCE,
     CARRIED,
@@ -128,19 +129,31 @@ def start_slots(
 
 
 @kernel
-def kick(slots: Floats, n: int, time: float) -> float:
-    """Let weight, loads and damping act for a time; returns the work of damping [J]."""
-    lost = 0.0
+def kick(slots: Floats, n: int, time: float) -> None:
+    """Let weight, loads and damping act for a time."""
     for s in range(n):
         slot = slots[s]
         half = 0.5 * time * slot[DAMPING]
         for q in range(3):
-            before, pull = slot[NOW + q], slot[PULL + q]
-            after = ((1.0 - half) * before + time * pull) / (1.0 + half)
-            mean = 0.5 * (before + after)
-            slot[FIELD] += time * pull * mean
-            lost -= time * slot[DAMPING] * mean * mean
+            slot[BEFORE + q] = slot[NOW + q]
+            after = ((1.0 - half) * slot[NOW + q] + time * slot[PULL + q]) / (1.0 + half)
             slot[NOW + q] = slot[FREE + q] = after
+
+
+@kernel
+def account_kick(slots: Floats, n: int, time: float) -> float:
+    """Add up the work of weight and loads in a kick; returns that of damping [J].
+
+    Each impulse, of contacts too, works along the mean of the velocities before and after all of
+    them.
+    """
+    lost = 0.0
+    for s in range(n):
+        slot = slots[s]
+        for q in range(3):
+            mean = 0.5 * (slot[BEFORE + q] + slot[NOW + q])
+            slot[FIELD] += time * slot[PULL + q] * mean
+            lost -= 0.5 * time * slot[DAMPING] * (slot[BEFORE + q] + slot[FREE + q]) * mean
     return lost
 
 
@@ -228,9 +241,8 @@ def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
 
 
 @kernel
-def start_impulses(rows: Rows, count: int, number: int, time: float, last: float) -> None:
-    """Let contacts act for `time` as they did for the time `last`; what was struck goes on."""
-    ratio = time / last
+def start_impulses(rows: Rows, count: int, number: int, ratio: float) -> None:
+    """Let contacts act as before, `ratio` times as long; what was struck goes on."""
     for place in range(count):
         k = np.uintp(place)
         row = rows.row[k]
@@ -330,7 +342,7 @@ def end_row(row: Floats, a: Floats, b: Floats, least: float) -> bool:
     row[SUM + 1] += shear
     own = normal_work = shear_work = 0.0
     for q in range(3):
-        mean, mean_b = 0.5 * (a[NOW + q] + a[FREE + q]), 0.5 * (b[NOW + q] + b[FREE + q])
+        mean, mean_b = 0.5 * (a[NOW + q] + a[BEFORE + q]), 0.5 * (b[NOW + q] + b[BEFORE + q])
         normal_work += row[NORMAL + q] * mean + row[NORMAL + 3 + q] * mean_b
         shear_work += row[SHEAR + q] * mean + row[SHEAR + 3 + q] * mean_b
         own += (normal * row[NORMAL + q] + shear * row[SHEAR + q]) * mean
@@ -447,7 +459,7 @@ def relax(
     alone, shortest, reach = n == 1, usual, speed
     if alone:
         shortest, reach = AT_ONCE * p.dt, math.inf
-    parts, taken = 0, 0.0
+    parts, taken, hit = 0, 0.0, False
     while True:
         place_rows(rows, count, number)
         h = min(usual, left)
@@ -460,8 +472,9 @@ def relax(
             if rows.idle[k] <= number:
                 a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
                 aim_row(rows.row[k], a, b, before, h)
-        ledger[2] += kick(rows.slot, n, time)
-        start_impulses(rows, count, number, time, last)
+        kick(rows.slot, n, time)
+        ratio = time / last
+        start_impulses(rows, count, number, min(ratio, 1.0) if hit else ratio)
         sweeps += settle(rows, n, count, number, reach, tolerance)
         work, bouncing = work_of_contacts(rows, count, number)
         if bouncing and taken + work > 0.0:
@@ -473,7 +486,9 @@ def relax(
                 sweeps += settle(rows, n, count, number, reach, tolerance)
                 work, bouncing = work_of_contacts(rows, count, number)
         taken = min(work, 0.0)
-        struck = end_rows(rows, count, number, least) or struck
+        ledger[2] += account_kick(rows.slot, n, time)
+        hit = end_rows(rows, count, number, least)
+        struck = struck or hit
         last, before = time, h
         if left <= 0.0:
             break

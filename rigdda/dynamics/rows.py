@@ -50,13 +50,14 @@ CARRIED, BEND, SUM, WORK, WORK_ON_A = 42, 44, 46, 48, 50
 
 COLUMNS = 51
 
-# columns of rows.slot, one slot a body. NOW, FREE: scaled velocities now, and those that the body
-# would have in this substep without contacts [kg^1/2 m/s]. PULL: scaled acceleration of weight and
+# columns of rows.slot, one slot a body. NOW, FREE, BEFORE: scaled velocities now, those that the
+# body would have in this substep without contacts, and in the substep before [kg^1/2 m/s]. PULL: scaled acceleration of weight and
 # loads. X, Y: centroid [m]; TURN since the start of the step [rad], with its COS and SIN. DAMPING
 # [1/s]. FIELD: work of weight and loads since the start of the step [J].
 NOW, FREE, PULL, X, Y, TURN, COS, SIN, DAMPING, FIELD = 0, 3, 6, 9, 10, 11, 12, 13, 14, 15
+BEFORE = 16
 
-SLOT_COLUMNS = 16
+SLOT_COLUMNS = 19
 
 # rows.form: which body owns the vertex, or that it is a bolt
 OF_A, OF_B, BETWEEN = 0, 1, 2

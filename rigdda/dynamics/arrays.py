@@ -87,6 +87,7 @@ class Rows(NamedTuple):
     """Contacts of one island and the motion of its bodies, see `rows`."""
 
     row: Floats  # (C, COLUMNS)
+    fact: Floats  # (C, FACTS)
     form: Ints  # (C,) OF_A, OF_B, BETWEEN
     row_i: Ints  # (C,) slots of their bodies
     row_j: Ints

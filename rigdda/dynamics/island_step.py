@@ -141,10 +141,13 @@ def take_impulses(
     Normal and shear force are means over the step; the accumulated ones are those at its end.
     """
     for item in range(low, high):
-        c, row = contacts[islands.contact_item[item]], rows.row[rows.place[item]]
-        c.normal, c.shear = row[SUM] / dt, row[SUM + 1] / dt
-        c.accumulated_normal, c.accumulated_shear = row[IMPULSE], row[IMPULSE + 1]
-        c.struck = int(row[STRUCK])
+        c, k = contacts[islands.contact_item[item]], rows.place[item]
+        row, fact = rows.row[k], rows.fact[k]
+        c.normal, c.shear = fact[SUM] / dt, fact[SUM + 1] / dt
+        c.accumulated_normal, c.accumulated_shear = c.normal, c.shear
+        if fact[STRUCK] > 0.0:  # an impulse does not last
+            c.accumulated_normal, c.accumulated_shear = row[IMPULSE], row[IMPULSE + 1]
+        c.struck = int(fact[STRUCK])
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         if c.bond > 0.0:
@@ -186,7 +189,7 @@ def account_contacts(
 ) -> None:  # fmt: skip
     """Add the work of contacts to the ledger, what barriers take, and whom they damp."""
     for item in range(low, high):
-        c, row = contacts[islands.contact_item[item]], rows.row[rows.place[item]]
+        c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
         if c.state == OPEN:
             continue
         support = c.kind == BOLT or c.kind == PIN

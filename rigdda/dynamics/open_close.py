@@ -113,7 +113,7 @@ def take_solution(
         slot[Y] += d[1]
         slot[TURN] += d[2]
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
-        c, row = contacts[islands.contact_item[item]], rows.row[rows.place[item]]
+        c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
         if c.state == OPEN:
             continue
         dn = along(normal_row(c, True), m.d[islands.slot[c.a]])

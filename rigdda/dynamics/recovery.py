@@ -47,7 +47,8 @@ def find_deepest(contacts: Contacts, islands: Islands, rows: Rows, island: int, 
             continue
         i, j = rows.row_i[k], rows.row_j[k]
         row = rows.row[k]
-        place_row(row, rows.form[k], rows.slot[i], rows.slot[j], rows.scale[i], rows.scale[j])
+        a, b = rows.slot[i], rows.slot[j]
+        place_row(row, rows.fact[k], rows.form[k], a, b, rows.scale[i], rows.scale[j])
         load = max(min(c.normal, c.accumulated_normal), 0.0) if c.state != OPEN else 0.0
         explained = min(load / c.stiffness, most)
         rows.height[k] = row[GAP] + explained

@@ -1,14 +1,13 @@
 r"""Relaxation: the motion of an island whose contacts open, close, stick, slip and are struck.
 
-The step is taken in `SUBSTEPS` substeps of length h, each with the geometry of its start. Bodies
-move by the leapfrog scheme: contacts, weight and loads act as impulses at the ends of substeps, at
-both ends of the step with half of the time, and between them bodies move straight,
+The step is taken in `SUBSTEPS` substeps of length h. In each, weight, loads and contacts act as
+impulses, with the geometry of its start, and the bodies then move with their new velocities,
 
-.. math:: v \leftarrow v + \frac{k}{M} F + \frac{1}{M} \sum_c p_c e_c^t, \qquad x \leftarrow x + h v,
+.. math:: v \leftarrow v + \frac{h}{M} F + \frac{1}{M} \sum_c p_c e_c^t, \qquad x \leftarrow x + h v,
 
-with k = h, or h / 2 at the ends of the step, F weight and loads, p_c the impulse of a contact and
-e_c its row. So a body that touches nothing moves exactly as under a constant force, and momentum
-and angular momentum are kept whatever the impulses are.
+with F weight and loads, p_c the impulse of a contact and e_c its row (a body that no contact acts
+on moves with the mean of its velocities, as it would under a constant force). Momentum and angular
+momentum are kept whatever the impulses are.
 
 Impulses are found by projected Gauss-Seidel sweeps, which decide the state of each contact as they
 visit it. The normal impulse does not pull. It leaves an open contact at most the velocity with
@@ -16,12 +15,13 @@ which its gap closes within the substep, a closed one none. The shear impulse st
 slipping, within the friction limit. Many short substeps of few sweeps find where a blow goes better
 than one step of many (Macklin et al. 2019, Small steps in physics simulation).
 
-A contact that closes faster than gravity would make it close in `IMPACT_STEPS` substeps is struck.
-In the substep in which that happens it is plastic; in the next one it opens with the velocity that
-its restitution asks for, together with all others that were struck in the same substep.
+A contact that closes faster than gravity would make it in `IMPACT_STEPS` steps is struck. Its
+substep is plastic. At the end of it, all contacts that were struck open with the velocities that
+their restitution asks for; together the two impulses of each obey the law of friction. If the blow
+would give energy, restitution is lessened.
 
 Contacts close a little more than they should: sweeps end at a tolerance, and bodies turn in a
-substep. What is too deep is pushed out at the end of the step, see `correction`.
+substep. What is too deep is pushed out at the end of the step, see `recovery`.
 """
 
 from __future__ import annotations
@@ -49,7 +49,6 @@ from rigdda.dynamics.rows import (
     BEFORE,
     BEND,
     BOUNCE,
-    CARRIED,
     COHESION,
     COS,
     CROSS,
@@ -63,9 +62,11 @@ from rigdda.dynamics.rows import (
     GAIN,
     GAIN_SHEAR,
     GAP,
+    HELD,
     IMPULSE,
     KEEP,
     KEEP_SHEAR,
+    LOAD,
     MOST,
     NORMAL,
     NOW,
@@ -93,7 +94,6 @@ from rigdda.kernel import arithmetic_kernel, inlined, kernel
 @kernel
 def start_slot(body: Body, slot: Floats, scale: Floats, p: Parameters) -> None:
     """Set a slot from its body: where it is, how it moves, and what pulls it."""
-    damping = damping_of(body, p)
     for q in range(3):
         inertia = body.inertia if q == 2 else body.mass
         scale[q] = 1.0 / math.sqrt(inertia)
@@ -103,156 +103,106 @@ def start_slot(body: Body, slot: Floats, scale: Floats, p: Parameters) -> None:
     slot[PULL + 1] = p.field_y / scale[1] + body.force_y * scale[1]
     slot[PULL + 2] = load_moment(body) * scale[2]
     slot[X], slot[Y], slot[TURN], slot[COS], slot[SIN] = body.x, body.y, 0.0, 1.0, 0.0
-    slot[DAMPING], slot[FIELD] = damping, 0.0
-
-
-@kernel
-def rest_slot(slot: Floats, scale: Floats) -> None:
-    """Set the slot that stands for what does not move, with the origin as its place."""
-    for q in range(len(slot)):
-        slot[q] = 0.0
-    slot[COS] = 1.0
-    for q in range(3):
-        scale[q] = 0.0
+    slot[DAMPING], slot[FIELD] = damping_of(body, p), 0.0
 
 
 @inlined
-def start_slots(
-    bodies: Bodies, islands: Islands, rows: Rows, island: int, p: Parameters
-) -> None:
+def start_slots(bodies: Bodies, islands: Islands, rows: Rows, island: int, p: Parameters) -> None:
     """Set the slots of an island from its bodies, and the one for what does not move."""
     first = islands.block_start[island]
     n = islands.block_start[island + 1] - first
     for s in range(n):
         start_slot(bodies[islands.block_item[first + s]], rows.slot[s], rows.scale[s], p)
-    rest_slot(rows.slot[n], rows.scale[n])
+    for q in range(rows.slot.shape[1]):
+        rows.slot[n, q] = 0.0
+    rows.slot[n, COS] = 1.0
+    for q in range(3):
+        rows.scale[n, q] = 0.0
 
 
 @kernel
-def kick(slots: Floats, n: int, time: float) -> None:
-    """Let weight, loads and damping act for a time."""
+def pull(slots: Floats, n: int, h: float) -> None:
+    """Let weight, loads and damping act for a substep."""
     for s in range(n):
         slot = slots[s]
-        half = 0.5 * time * slot[DAMPING]
+        half = 0.5 * h * slot[DAMPING]
         for q in range(3):
             slot[BEFORE + q] = slot[NOW + q]
-            after = ((1.0 - half) * slot[NOW + q] + time * slot[PULL + q]) / (1.0 + half)
+            after = ((1.0 - half) * slot[NOW + q] + h * slot[PULL + q]) / (1.0 + half)
             slot[NOW + q] = slot[FREE + q] = after
+        slot[HELD] = 0.0
 
 
 @kernel
-def account_kick(slots: Floats, n: int, time: float) -> float:
-    """Add up the work of weight and loads in a kick; returns that of damping [J].
+def drift(slots: Floats, scale: Floats, n: int, h: float) -> float:
+    """Move the bodies for a substep, and add up the work of weight and loads.
 
-    Each impulse, of contacts too, works along the mean of the velocities before and after all of
-    them.
+    Every impulse, of contacts too, works along the mean of the velocities before and after all of
+    them. Returns the work of damping [J].
     """
     lost = 0.0
     for s in range(n):
         slot = slots[s]
+        new = 0.5 + 0.5 * slot[HELD]
         for q in range(3):
             mean = 0.5 * (slot[BEFORE + q] + slot[NOW + q])
-            slot[FIELD] += time * slot[PULL + q] * mean
-            lost -= 0.5 * time * slot[DAMPING] * (slot[BEFORE + q] + slot[FREE + q]) * mean
+            slot[FIELD] += h * slot[PULL + q] * mean
+            lost -= 0.5 * h * slot[DAMPING] * (slot[BEFORE + q] + slot[FREE + q]) * mean
+            way = h * (new * slot[NOW + q] + (1.0 - new) * slot[BEFORE + q])
+            slot[X + q] += way * scale[s, q]
+        slot[COS], slot[SIN] = math.cos(slot[TURN]), math.sin(slot[TURN])
     return lost
 
 
-@kernel
-def drift(slots: Floats, scale: Floats, n: int, h: float) -> None:
-    """Move the bodies straight for a substep."""
-    for s in range(n):
-        slot = slots[s]
-        slot[X] += h * slot[NOW] * scale[s, 0]
-        slot[Y] += h * slot[NOW + 1] * scale[s, 1]
-        slot[TURN] += h * slot[NOW + 2] * scale[s, 2]
-        slot[COS], slot[SIN] = math.cos(slot[TURN]), math.sin(slot[TURN])
-
-
 @arithmetic_kernel
-def aim_row(row: Floats, a: Floats, b: Floats, before: float, h: float) -> None:
-    """Set what a visit needs of a row whose impulse acts between two substeps, `before` and h [s].
+def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float) -> None:
+    """Set what a visit needs of a row in a substep h.
 
     An open contact may close by its gap, less what it opens by itself as the bodies turn. A spring
-    acts with its forces in the middle of both substeps (the implicit midpoint rule), so that it
-    keeps energy at any step.
+    acts with its force in the middle of the substep, so that it keeps energy at any step.
     """
-    time = 0.5 * (before + h)
     flexible = rolling = cross = 0.0
     for q in range(6):
         flexible += row[NORMAL + q] * row[NORMAL + q]
         rolling += row[SHEAR + q] * row[SHEAR + q]
         cross += row[NORMAL + q] * row[SHEAR + q]
     row[FLEXIBLE] = flexible
-    row[COHESION], row[TENSION] = time * row[STRENGTH], time * row[STRENGTH + 1]
-    row[MOST] = time * row[STRENGTH + 2]
+    row[COHESION], row[TENSION] = h * fact[STRENGTH], h * fact[STRENGTH + 1]
+    row[MOST] = h * fact[STRENGTH + 2]
     if row[STIFFNESS] == 0.0:
         row[KEEP] = row[KEEP_SHEAR] = 1.0
         row[GAIN], row[GAIN_SHEAR] = 1.0 / flexible, 1.0 / rolling
         row[AIM], row[AIM_SHEAR] = -0.5 * h * row[BEND], 0.0
-        if row[STRENGTH] == math.inf:  # a pin, which `mend_links` puts in its place
+        if fact[STRENGTH] == math.inf:  # a pin, which `mend_links` puts in its place
             row[AIM_SHEAR] = -0.5 * h * row[BEND + 1]
-        elif row[BOUNCE] > 0.0:
-            row[AIM], row[TENSION] = row[BOUNCE], -row[IMPULSE]  # it does not pull
-        elif h == 0.0 and row[IMPULSE] == 0.0:  # what strikes now does so in the next step
-            row[AIM] = -math.inf
         elif row[GAP] > 0.0:
-            row[AIM] -= row[GAP] / (h if h > 0.0 else time)
+            row[AIM] -= row[GAP] / h
     else:
-        give = 0.25 * row[STIFFNESS] * (h * h + 1e-12 * time * time)
+        give = 0.25 * row[STIFFNESS] * h * h
         row[KEEP] = give * flexible / (1.0 + give * flexible)
         row[KEEP_SHEAR] = give * rolling / (1.0 + give * rolling)
         row[GAIN], row[GAIN_SHEAR] = give / (1.0 + give * flexible), give / (1.0 + give * rolling)
-        stretch = time * (row[GAP] - row[FREE_GAP])
-        stretch -= 0.25 * before * before * along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
-        row[AIM] = -row[STIFFNESS] * stretch / give
-        slip = -time * row[FREE_SHEAR]
-        slip -= 0.25 * before * before * along_six(row[SHEAR : SHEAR + 6], a, b, NOW)
-        row[AIM_SHEAR] = -row[STIFFNESS] * slip / give
+        stretch = row[GAP] - fact[FREE_GAP]
+        row[AIM] = -4.0 * stretch / h - along_six(row[NORMAL : NORMAL + 6], a, b, BEFORE)
+        slip = -fact[FREE_SHEAR]
+        row[AIM_SHEAR] = -4.0 * slip / h - along_six(row[SHEAR : SHEAR + 6], a, b, BEFORE)
     row[CROSS] = row[GAIN_SHEAR] * cross
 
 
 @kernel
-def place_rows(rows: Rows, count: int, number: int) -> None:
-    """Write gap and directions of all contacts that may close before substep `number` ends."""
-    for place in range(count):
-        k = np.uintp(place)
-        if rows.idle[k] <= number:
-            i, j = np.uintp(rows.row_i[k]), np.uintp(rows.row_j[k])
-            a, b = rows.slot[i], rows.slot[j]
-            place_row(rows.row[k], rows.form[k], a, b, rows.scale[i], rows.scale[j])
+def start_rows(rows: Rows, count: int, number: int, h: float, ratio: float) -> None:
+    """Start a substep for all contacts that may close in it: they act as in the one before.
 
-
-@kernel
-def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
-    """Return in what time, at most `most`, an open contact closes faster than `least` [m/s].
-
-    It is 0 where one that is closed does so, or has to open after a blow.
+    `ratio` is the length of this substep over that of the last one.
     """
-    for k in range(count):
-        row, a, b = rows.row[k], rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
-        if row[BOUNCE] > 0.0:
-            return 0.0
-        closing = -along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
-        pull = -along_six(row[NORMAL : NORMAL + 6], a, b, PULL)
-        root = math.sqrt(max(closing * closing + 2.0 * pull * max(row[GAP], 0.0), 0.0))
-        if root > least and closing + root > 0.0 and row[STIFFNESS] == 0.0:
-            most = min(most, 2.0 * max(row[GAP], 0.0) / (closing + root))
-    return most
-
-
-@kernel
-def start_impulses(rows: Rows, count: int, number: int, ratio: float) -> None:
-    """Let contacts act as before, `ratio` times as long; what was struck goes on."""
     for place in range(count):
         k = np.uintp(place)
-        row = rows.row[k]
         if rows.idle[k] > number:
             continue
-        a, b = rows.slot[np.uintp(rows.row_i[k])], rows.slot[np.uintp(rows.row_j[k])]
-        if row[BOUNCE] > 0.0:
-            row[CARRIED], row[CARRIED + 1] = row[IMPULSE], row[IMPULSE + 1]
-            continue
-        row[CARRIED] = row[CARRIED + 1] = 0.0
+        i, j = np.uintp(rows.row_i[k]), np.uintp(rows.row_j[k])
+        row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
+        place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
+        aim_row(row, fact, a, b, h)
         if row[IMPULSE] != 0.0 or row[IMPULSE + 1] != 0.0:
             row[IMPULSE] *= ratio
             row[IMPULSE + 1] *= ratio
@@ -330,56 +280,147 @@ def sweep(
 
 
 @arithmetic_kernel
-def end_row(row: Floats, a: Floats, b: Floats, least: float) -> bool:
-    """Count the impulses of a row and their work, and note whether it was struck.
-
-    It was if it closed faster than `least` [m/s] before its bodies touched others. What it was
-    struck with goes on into the next substep, so that both are one blow; no other impulse of a blow
-    starts the next substep.
-    """
-    normal, shear = row[IMPULSE] - row[CARRIED], row[IMPULSE + 1] - row[CARRIED + 1]
-    row[SUM] += normal
-    row[SUM + 1] += shear
-    own = normal_work = shear_work = 0.0
+def count_row(row: Floats, fact: Floats, a: Floats, b: Floats, normal: float, shear: float) -> None:
+    """Add impulses of a contact to its sums, and their work."""
+    fact[SUM] += normal
+    fact[SUM + 1] += shear
+    own = along = other = across = 0.0
     for q in range(3):
         mean, mean_b = 0.5 * (a[NOW + q] + a[BEFORE + q]), 0.5 * (b[NOW + q] + b[BEFORE + q])
-        normal_work += row[NORMAL + q] * mean + row[NORMAL + 3 + q] * mean_b
-        shear_work += row[SHEAR + q] * mean + row[SHEAR + 3 + q] * mean_b
-        own += (normal * row[NORMAL + q] + shear * row[SHEAR + q]) * mean
-    row[WORK] += normal * normal_work
-    row[WORK + 1] += shear * shear_work
-    row[WORK_ON_A] += own
-    if row[STIFFNESS] > 0.0:
-        return False
-    if row[BOUNCE] > 0.0:
-        row[BOUNCE] = row[IMPULSE] = row[IMPULSE + 1] = 0.0
-        return True
-    closing = -along_six(row[NORMAL : NORMAL + 6], a, b, FREE)
-    if row[IMPULSE] <= 0.0 or closing <= least:
-        return False
-    row[STRUCK], row[BOUNCE] = 1.0, row[RESTITUTION] * closing
-    return True
+        own += row[NORMAL + q] * mean
+        along += row[SHEAR + q] * mean
+        other += row[NORMAL + 3 + q] * mean_b
+        across += row[SHEAR + 3 + q] * mean_b
+    fact[WORK] += normal * (own + other)
+    fact[WORK + 1] += shear * (along + across)
+    fact[WORK_ON_A] += normal * own + shear * along
 
 
 @kernel
-def end_rows(rows: Rows, count: int, number: int, least: float) -> bool:
-    """End a substep for its contacts; returns whether one was struck."""
-    struck = False
+def end_rows(rows: Rows, count: int, number: int, least: float) -> tuple[float, bool, bool]:
+    """End a substep for its contacts: count their impulses, and note which were struck.
+
+    A contact was if it closed faster than `least` [m/s] before its bodies touched others.
+
+    Returns
+    -------
+    work : float
+        Of the contacts that are no springs, on the velocities without contacts [J].
+    struck, bouncing : bool
+        Whether a contact was struck, and whether one is to open again.
+    """
+    work, struck, bouncing = 0.0, False, False
     for place in range(count):
         k = np.uintp(place)
-        row = rows.row[k]
-        if rows.idle[k] > number or (row[IMPULSE] == 0.0 and row[IMPULSE + 1] == 0.0):
-            row[BOUNCE] = 0.0
+        row, fact = rows.row[k], rows.fact[k]
+        normal, shear = row[IMPULSE], row[IMPULSE + 1]
+        if rows.idle[k] > number or (normal == 0.0 and shear == 0.0):
             continue
         a, b = rows.slot[np.uintp(rows.row_i[k])], rows.slot[np.uintp(rows.row_j[k])]
-        struck = end_row(row, a, b, least) or struck
-    return struck
+        count_row(row, fact, a, b, normal, shear)
+        if row[STIFFNESS] > 0.0:
+            continue
+        a[HELD] = b[HELD] = 1.0
+        opening = along_six(row[NORMAL : NORMAL + 6], a, b, FREE)
+        slip = along_six(row[SHEAR : SHEAR + 6], a, b, FREE)
+        after = along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
+        slip += along_six(row[SHEAR : SHEAR + 6], a, b, NOW)
+        work += 0.5 * (normal * (opening + after) + shear * slip)
+        if normal > 0.0 and -opening > least:
+            struck, fact[STRUCK], fact[BOUNCE] = True, 1.0, -fact[RESTITUTION] * opening
+            bouncing = bouncing or fact[BOUNCE] > 0.0
+    return work, struck, bouncing
+
+
+@kernel
+def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> None:
+    """Set an island to the end of a substep, before contacts open with a share of restitution.
+
+    What was struck goes on with its impulses, so that friction is limited by the whole blow.
+    """
+    for s in range(n):
+        for q in range(3):
+            rows.slot[s, NOW + q] = rows.slot[s, BEFORE + q]
+    for k in range(count):
+        row, fact = rows.row[k], rows.fact[k]
+        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+            continue
+        if fact[BOUNCE] > 0.0:
+            row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
+            row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # it does not pull
+        else:
+            row[IMPULSE] = row[IMPULSE + 1] = 0.0
+
+
+@kernel
+def end_rebound(rows: Rows, count: int, number: int) -> float:
+    """Return the work of contacts in a rebound [J]; the bodies stand still meanwhile."""
+    work = 0.0
+    for k in range(count):
+        row, fact = rows.row[k], rows.fact[k]
+        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+            continue
+        normal, shear = row[IMPULSE], row[IMPULSE + 1]
+        if fact[BOUNCE] > 0.0:
+            normal, shear = normal - fact[LOAD], shear - fact[LOAD + 1]
+        a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
+        opening = along_six(row[NORMAL : NORMAL + 6], a, b, BEFORE)
+        slip = along_six(row[SHEAR : SHEAR + 6], a, b, BEFORE)
+        opening += along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
+        slip += along_six(row[SHEAR : SHEAR + 6], a, b, NOW)
+        work += 0.5 * (normal * opening + shear * slip)
+    return work
+
+
+@kernel
+def rebound(
+    rows: Rows, n: int, count: int, number: int, h: float, lost: float, reach: float,
+    tolerance: float,
+) -> int:  # fmt: skip
+    """Let all contacts that were struck in a substep open again, at its end; returns the sweeps.
+
+    Restitution with friction can raise the kinetic energy of an eccentric impact. A plastic impact,
+    which has worked `lost` < 0 [J], cannot. Energy is quadratic in the velocities, so the gain is
+    convex in the share of restitution. Where the chord from plastic to full restitution is zero,
+    the gain is zero at most.
+    """
+    for s in range(n):
+        for q in range(3):
+            rows.slot[s, BEFORE + q] = rows.slot[s, NOW + q]
+    for k in range(count):
+        if rows.idle[k] <= number:
+            i, j = rows.row_i[k], rows.row_j[k]
+            row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
+            place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
+            aim_row(row, fact, a, b, h)
+            fact[LOAD], fact[LOAD + 1] = row[IMPULSE], row[IMPULSE + 1]
+    sweeps, share = 0, 1.0
+    for attempt in range(3):
+        aim_rebound(rows, n, count, number, share)
+        sweeps += settle(rows, n, count, number, reach, tolerance)
+        work = end_rebound(rows, count, number)
+        if lost + work <= 0.0:
+            break
+        share = min(max(-lost / work, 0.0), 1.0) if attempt == 0 else 0.0
+    for k in range(count):
+        row, fact = rows.row[k], rows.fact[k]
+        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+            continue
+        a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
+        if fact[BOUNCE] > 0.0:
+            normal, shear = row[IMPULSE] - fact[LOAD], row[IMPULSE + 1] - fact[LOAD + 1]
+            count_row(row, fact, a, b, normal, shear)
+            fact[BOUNCE] = row[IMPULSE] = row[IMPULSE + 1] = 0.0
+        else:
+            count_row(row, fact, a, b, row[IMPULSE], row[IMPULSE + 1])
+            row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
+    return sweeps
 
 
 @kernel
 def settle(
     rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float
-) -> int:  # fmt: skip
+) -> int:
     """Sweep until no normal velocity changes by more than a tolerance; returns how often."""
     for s in range(n + 1):
         rows.moved_in[s] = -1
@@ -395,38 +436,19 @@ def settle(
 
 
 @kernel
-def work_of_contacts(rows: Rows, count: int, number: int) -> tuple[float, bool]:
-    """Return the work of all contacts in this substep [J], and whether one opens after a blow."""
-    total, bouncing = 0.0, False
-    for place in range(count):
-        k = np.uintp(place)
-        row = rows.row[k]
-        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
-            continue
-        bouncing = bouncing or row[BOUNCE] > 0.0
-        normal, shear = row[IMPULSE] - row[CARRIED], row[IMPULSE + 1] - row[CARRIED + 1]
-        if normal == 0.0 and shear == 0.0:
-            continue
-        a, b = rows.slot[np.uintp(rows.row_i[k])], rows.slot[np.uintp(rows.row_j[k])]
-        for q in range(3):
-            mean, mean_b = 0.5 * (a[NOW + q] + a[FREE + q]), 0.5 * (b[NOW + q] + b[FREE + q])
-            total += (normal * row[NORMAL + q] + shear * row[SHEAR + q]) * mean
-            total += (normal * row[NORMAL + 3 + q] + shear * row[SHEAR + 3 + q]) * mean_b
-    return total, bouncing
-
-
-@kernel
-def lessen_bounce(rows: Rows, n: int, count: int, number: int, share: float) -> None:
-    """Set an island back to the start of its substep, with a share of the restitution."""
-    for s in range(n):
-        for q in range(3):
-            rows.slot[s, NOW + q] = rows.slot[s, FREE + q]
+def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
+    """Return in what time, at most `most`, a contact closes faster than `least` [m/s]."""
     for k in range(count):
-        row = rows.row[k]
-        if rows.idle[k] <= number:
-            row[IMPULSE], row[IMPULSE + 1] = row[CARRIED], row[CARRIED + 1]
-            if row[BOUNCE] > 0.0:
-                row[AIM] = share * row[BOUNCE]
+        i, j = rows.row_i[k], rows.row_j[k]
+        row, a, b = rows.row[k], rows.slot[i], rows.slot[j]
+        place_row(row, rows.fact[k], rows.form[k], a, b, rows.scale[i], rows.scale[j])
+        closing = -along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
+        pulling = -along_six(row[NORMAL : NORMAL + 6], a, b, PULL)
+        gap = max(row[GAP], 0.0)
+        root = math.sqrt(max(closing * closing + 2.0 * pulling * gap, 0.0))
+        if root > least and closing + root > 0.0 and row[STIFFNESS] == 0.0:
+            most = min(most, 2.0 * gap / (closing + root))
+    return most
 
 
 @kernel
@@ -454,46 +476,24 @@ def relax(
     usual = p.dt / SUBSTEPS
     most = p.sweep_tolerance * min((n - 1) / LARGE_ISLAND, 1.0) + 1e-7 * speed
     tolerance = min(RELAXATION_SHARE * speed, most)
-    least = IMPACT_STEPS * p.gravity * (usual if n == 1 else p.dt)
-    sweeps, struck, last, before, left, number = 0, False, 1.0, 0.0, p.dt, 0
-    alone, shortest, reach = n == 1, usual, speed
+    alone, reach, least = n == 1, speed, IMPACT_STEPS * p.gravity * p.dt
     if alone:
-        shortest, reach = AT_ONCE * p.dt, math.inf
-    parts, taken, hit = 0, 0.0, False
-    while True:
-        place_rows(rows, count, number)
+        reach, least = math.inf, IMPACT_STEPS * p.gravity * usual
+    sweeps, struck, last, left, number, parts = 0, False, 1.0, p.dt, 0, 0
+    while left > 0.0:
         h = min(usual, left)
         if alone and parts < MOST_SUBSTEPS:
-            h = min(h, max(time_to_blow(rows, count, h, least), shortest))
-        if left - h < 0.5 * shortest:
+            h = min(h, max(time_to_blow(rows, count, h, least), AT_ONCE * p.dt))
+        if left - h < 0.5 * AT_ONCE * p.dt:
             h = left
-        time = 0.5 * (before + h)
-        for k in range(count):
-            if rows.idle[k] <= number:
-                a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
-                aim_row(rows.row[k], a, b, before, h)
-        kick(rows.slot, n, time)
-        ratio = time / last
-        start_impulses(rows, count, number, min(ratio, 1.0) if hit else ratio)
+        pull(rows.slot, n, h)
+        start_rows(rows, count, number, h, h / last)
         sweeps += settle(rows, n, count, number, reach, tolerance)
-        work, bouncing = work_of_contacts(rows, count, number)
-        if bouncing and taken + work > 0.0:
-            lessen_bounce(rows, n, count, number, -taken / work)
-            sweeps += settle(rows, n, count, number, reach, tolerance)
-            work, bouncing = work_of_contacts(rows, count, number)
-            if taken + work > 0.0:
-                lessen_bounce(rows, n, count, number, 0.0)
-                sweeps += settle(rows, n, count, number, reach, tolerance)
-                work, bouncing = work_of_contacts(rows, count, number)
-        taken = min(work, 0.0)
-        ledger[2] += account_kick(rows.slot, n, time)
-        hit = end_rows(rows, count, number, least)
-        struck = struck or hit
-        last, before = time, h
-        if left <= 0.0:
-            break
-        drift(rows.slot, rows.scale, n, h)
-        left = left - h if h < left else 0.0
+        lost, hit, bouncing = end_rows(rows, count, number, least)
+        ledger[2] += drift(rows.slot, rows.scale, n, h)
+        if bouncing:
+            sweeps += rebound(rows, n, count, number, h, lost, reach, tolerance)
+        struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1
         parts += 1
     for place in range(count):  # a force again

@@ -16,9 +16,8 @@ from rigdda.dynamics.constants import BOLT, PIN, PLAIN
 from rigdda.dynamics.records import Contact, Contacts, Floats
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
-# columns of rows.row. NORMAL to + 5: e_n of a and b [kg^-1/2]. IMPULSE and + 1: normal and shear
-# impulse in this substep [N s]. AIM: normal velocity to reach at least [m/s]. What a visit to an
-# open contact reads comes first.
+# columns of rows.row, what a sweep reads. NORMAL to + 5: e_n of a and b [kg^-1/2]. IMPULSE and + 1:
+# normal and shear impulse in this substep [N s]. AIM: normal velocity to reach at least [m/s].
 NORMAL, IMPULSE, AIM = 0, 6, 8
 
 # p = KEEP p + GAIN (AIM - v), see relaxation.sweep [-], [kg]. COHESION, TENSION, MOST: shear
@@ -26,38 +25,41 @@ NORMAL, IMPULSE, AIM = 0, 6, 8
 KEEP, GAIN, COHESION, TENSION, MOST = 9, 10, 11, 12, 13
 
 # SHEAR to + 5, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR: the same for shear. CROSS: shear impulse that a
-# change of the normal impulse takes [-]. FLEXIBLE: normal velocity per impulse [1/kg].
+# change of the normal impulse takes [-]. FLEXIBLE: normal velocity per impulse [1/kg]. FRICTION:
+# tan phi. STIFFNESS of a spring [N/m], 0: it is rigid.
 SHEAR, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR, CROSS, FLEXIBLE = 14, 20, 21, 22, 23, 24
+FRICTION, STIFFNESS = 25, 26
 
-# FRICTION: tan phi. RESTITUTION [-]. BOUNCE: velocity with which a contact that was struck has
-# still to open [m/s], 0: none. STRUCK: 1 if it was struck in this step, else 0.
-FRICTION, RESTITUTION, BOUNCE, STRUCK = 25, 26, 27, 28
+# GAP now [m]; BEND: its second time derivative as the bodies turn [m/s2], and + 1 along shear.
+GAP, BEND = 27, 28
 
-# GAP now [m]. VERTEX, FACE, DIRECTION, each with + 1: place of the vertex and of the point of the
-# face, and normal, in body coordinates [m].
-GAP, VERTEX, FACE, DIRECTION = 29, 30, 32, 34
+COLUMNS = 32
 
-# STIFFNESS of a spring [N/m], 0: it is rigid; FREE_GAP and FREE_SHEAR at which it is free [m].
-# STRENGTH, + 1, + 2: the forces of which COHESION, TENSION and MOST are impulses [N].
-STIFFNESS, FREE_GAP, FREE_SHEAR, STRENGTH = 36, 37, 38, 39
+# columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: place of the vertex and of the point
+# of the face, and normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR at which a spring is free
+# [m]. STRENGTH, + 1, + 2: the forces of which COHESION, TENSION and MOST are impulses [N].
+VERTEX, FACE, DIRECTION, FREE_GAP, FREE_SHEAR, STRENGTH = 0, 2, 4, 6, 7, 8
 
-# CARRIED and + 1: impulses of the last substep, with which the blow began [N s]. BEND: second time
-# derivative of the gap as the bodies turn [m/s2]; BEND + 1: the same along shear.
+# RESTITUTION [-]. BOUNCE: velocity with which a contact that was struck in this substep is to open
+# [m/s], 0: it was not. STRUCK: 1 if it was in this step, else 0. LOAD and + 1: impulses before a
+# rebound [N s].
+RESTITUTION, BOUNCE, STRUCK, LOAD = 11, 12, 13, 14
 
 # SUM and + 1: impulses since the start of the step [N s]. WORK and + 1: work of normal and shear
 # force [J]; WORK_ON_A: of both on body a.
-CARRIED, BEND, SUM, WORK, WORK_ON_A = 42, 44, 46, 48, 50
+SUM, WORK, WORK_ON_A = 16, 18, 20
 
-COLUMNS = 51
+FACTS = 21
 
 # columns of rows.slot, one slot a body. NOW, FREE, BEFORE: scaled velocities now, those that the
-# body would have in this substep without contacts, and in the substep before [kg^1/2 m/s]. PULL: scaled acceleration of weight and
-# loads. X, Y: centroid [m]; TURN since the start of the step [rad], with its COS and SIN. DAMPING
-# [1/s]. FIELD: work of weight and loads since the start of the step [J].
-NOW, FREE, PULL, X, Y, TURN, COS, SIN, DAMPING, FIELD = 0, 3, 6, 9, 10, 11, 12, 13, 14, 15
-BEFORE = 16
+# body would have in this substep without contacts, and in the substep before [kg^1/2 m/s]. X, Y:
+# centroid [m]; TURN since the start of the step [rad], with its COS and SIN. PULL: scaled
+# acceleration of weight and loads. DAMPING [1/s]. FIELD: work of weight and loads since the start
+# of the step [J]. HELD: 1 if a rigid contact acts on it in this substep, else 0.
+NOW, FREE, BEFORE, X, Y, TURN, COS, SIN = 0, 3, 6, 9, 10, 11, 12, 13
+PULL, DAMPING, FIELD, HELD = 14, 17, 18, 19
 
-SLOT_COLUMNS = 19
+SLOT_COLUMNS = 20
 
 # rows.form: which body owns the vertex, or that it is a bolt
 OF_A, OF_B, BETWEEN = 0, 1, 2
@@ -87,33 +89,36 @@ def is_elastic(c: Contact) -> bool:
 @inlined
 def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, still: int) -> None:
     """Write a contact as row `place`; slot `still` stands for bodies without unknowns."""
-    row, slot = rows.row[place], rows.slot
+    row, fact, slot = rows.row[place], rows.fact[place], rows.slot
     i = islands.slot[c.a]
     j = islands.slot[c.b] if c.pair >= 0 else still
     rows.row_i[place], rows.row_j[place], rows.idle[place] = i, j, 0
     of_a = c.owner == 1
     owner, face, side = (i, j, 1.0) if of_a else (j, i, -1.0)
     rows.form[place] = BETWEEN if c.kind == BOLT else (OF_A if of_a else OF_B)
-    row[VERTEX], row[VERTEX + 1] = c.x - slot[owner, X], c.y - slot[owner, Y]
-    row[FACE] = c.x - side * c.gap * c.nx - slot[face, X]
-    row[FACE + 1] = c.y - side * c.gap * c.ny - slot[face, Y]
-    row[DIRECTION], row[DIRECTION + 1] = c.nx, c.ny
-    row[FRICTION], row[RESTITUTION], row[BOUNCE] = c.friction, max(c.restitution, 0.0), 0.0
+    fact[VERTEX], fact[VERTEX + 1] = c.x - slot[owner, X], c.y - slot[owner, Y]
+    fact[FACE] = c.x - side * c.gap * c.nx - slot[face, X]
+    fact[FACE + 1] = c.y - side * c.gap * c.ny - slot[face, Y]
+    fact[DIRECTION], fact[DIRECTION + 1] = c.nx, c.ny
+    row[FRICTION], fact[RESTITUTION] = c.friction, max(c.restitution, 0.0)
     row[IMPULSE], row[IMPULSE + 1] = c.accumulated_normal, c.accumulated_shear
-    row[STRENGTH] = math.inf if c.kind == PIN else c.cohesion
-    row[STRENGTH + 1], row[STRENGTH + 2] = c.tension, math.inf
-    row[STIFFNESS] = row[FREE_GAP] = row[FREE_SHEAR] = 0.0
+    fact[STRENGTH] = math.inf if c.kind == PIN else c.cohesion
+    fact[STRENGTH + 1], fact[STRENGTH + 2] = c.tension, math.inf
+    row[STIFFNESS] = fact[FREE_GAP] = fact[FREE_SHEAR] = 0.0
     if c.kind == BOLT:
         row[STIFFNESS] = c.stiffness
-        row[FREE_GAP] = c.gap + c.bias * c.kappa / c.stiffness
+        fact[FREE_GAP] = c.gap + c.bias * c.kappa / c.stiffness
     elif c.kind == PLAIN:
         row[STIFFNESS] = c.stiffness
-        row[FREE_SHEAR] = c.accumulated_shear / c.stiffness
-    row[STRUCK] = row[SUM] = row[SUM + 1] = row[WORK] = row[WORK + 1] = row[WORK_ON_A] = 0.0
+        fact[FREE_SHEAR] = c.accumulated_shear / c.stiffness
+    for q in range(BOUNCE, FACTS):
+        fact[q] = 0.0
 
 
 @arithmetic_kernel
-def place_row(row: Floats, form: int, a: Floats, b: Floats, one: Floats, two: Floats) -> None:
+def place_row(
+    row: Floats, fact: Floats, form: int, a: Floats, b: Floats, one: Floats, two: Floats
+) -> None:
     """Set the gap and the directions of a row from where its bodies a and b are now.
 
     `one` and `two` are the columns of `rows.scale`: the inverse roots of their inertia.
@@ -123,28 +128,17 @@ def place_row(row: Floats, form: int, a: Floats, b: Floats, one: Floats, two: Fl
     if form == OF_B:
         co, so, cf, sf = cf, sf, co, so
         xo, yo, xf, yf, side = xf, yf, xo, yo, -1.0
-    px = xo + co * row[VERTEX] - so * row[VERTEX + 1]
-    py = yo + so * row[VERTEX] + co * row[VERTEX + 1]
-    dx = px - (xf + cf * row[FACE] - sf * row[FACE + 1])
-    dy = py - (yf + sf * row[FACE] + cf * row[FACE + 1])
-    bx, by = px - b[X], py - b[Y]
+    px = xo + co * fact[VERTEX] - so * fact[VERTEX + 1]
+    py = yo + so * fact[VERTEX] + co * fact[VERTEX + 1]
+    dx = px - (xf + cf * fact[FACE] - sf * fact[FACE + 1])
+    dy = py - (yf + sf * fact[FACE] + cf * fact[FACE + 1])
+    ax, ay, bx, by = px - a[X], py - a[Y], px - b[X], py - b[Y]
     if form == BETWEEN:
         length = math.sqrt(dx * dx + dy * dy)
         nx, ny, bx, by = dx / length, dy / length, bx - dx, by - dy
     else:
-        nx = cf * row[DIRECTION] - sf * row[DIRECTION + 1]
-        ny = sf * row[DIRECTION] + cf * row[DIRECTION + 1]
-    ax, ay = px - a[X], py - a[Y]
-    spin, turn = a[NOW + 2] * one[2], b[NOW + 2] * two[2]
-    rx, ry, fx, fy = ax, ay, bx, by
-    if form == OF_B:
-        spin, turn, rx, ry, fx, fy = turn, spin, bx, by, ax, ay
-    # velocity of the vertex from the centroid of the face
-    ux = (a[NOW] * one[0] - b[NOW] * two[0]) * side - spin * ry
-    uy = (a[NOW + 1] * one[1] - b[NOW + 1] * two[1]) * side + spin * rx
-    over = 2.0 * turn * (nx * uy - ny * ux) - turn * turn * (nx * fx + ny * fy)
-    row[BEND] = side * (over - spin * spin * (nx * rx + ny * ry))
-    row[BEND + 1] = -spin * spin * (nx * ry - ny * rx)
+        nx = cf * fact[DIRECTION] - sf * fact[DIRECTION + 1]
+        ny = sf * fact[DIRECTION] + cf * fact[DIRECTION + 1]
     row[GAP] = side * (nx * dx + ny * dy)
     row[0], row[1], row[2] = nx * one[0], ny * one[1], (ax * ny - ay * nx) * one[2]
     row[3], row[4], row[5] = -nx * two[0], -ny * two[1], -(bx * ny - by * nx) * two[2]
@@ -152,6 +146,16 @@ def place_row(row: Floats, form: int, a: Floats, b: Floats, one: Floats, two: Fl
     row[SHEAR + 2] = (ax * nx + ay * ny) * one[2]
     row[SHEAR + 3], row[SHEAR + 4] = ny * two[0], -nx * two[1]
     row[SHEAR + 5] = -(bx * nx + by * ny) * two[2]
+    # velocity of the vertex from the centroid of the face, and how the gap bends as bodies turn
+    spin, turn = a[BEFORE + 2] * one[2], b[BEFORE + 2] * two[2]
+    rx, ry, fx, fy = ax, ay, bx, by
+    if form == OF_B:
+        spin, turn, rx, ry, fx, fy = turn, spin, bx, by, ax, ay
+    ux = (a[BEFORE] * one[0] - b[BEFORE] * two[0]) * side - spin * ry
+    uy = (a[BEFORE + 1] * one[1] - b[BEFORE + 1] * two[1]) * side + spin * rx
+    over = 2.0 * turn * (nx * uy - ny * ux) - turn * turn * (nx * fx + ny * fy)
+    row[BEND] = side * (over - spin * spin * (nx * rx + ny * ry))
+    row[BEND + 1] = -spin * spin * (nx * ry - ny * rx)
 
 
 @kernel

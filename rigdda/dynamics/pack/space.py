@@ -10,7 +10,7 @@ from rigdda.dynamics.constants import (
     LAYERS,
 )
 from rigdda.dynamics.records import BOX, CONTACT, Contacts
-from rigdda.dynamics.rows import COLUMNS, SLOT_COLUMNS
+from rigdda.dynamics.rows import COLUMNS, FACTS, SLOT_COLUMNS
 
 MOST_BANDWIDTH = 64
 """Blocks to the left of the diagonal, on average, up to which a skyline is kept room for."""
@@ -83,6 +83,7 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
         ),
         Rows(
             row=np.zeros((room, COLUMNS)),
+            fact=np.zeros((room, FACTS)),
             form=whole(room),
             row_i=whole(room),
             row_j=whole(room),

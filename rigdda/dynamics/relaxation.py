@@ -320,7 +320,6 @@ def end_rows(rows: Rows, count: int, number: int, least: float) -> tuple[float, 
         count_row(row, fact, a, b, normal, shear)
         if row[STIFFNESS] > 0.0:
             continue
-        a[HELD] = b[HELD] = 1.0
         opening = along_six(row[NORMAL : NORMAL + 6], a, b, FREE)
         slip = along_six(row[SHEAR : SHEAR + 6], a, b, FREE)
         after = along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
@@ -328,6 +327,7 @@ def end_rows(rows: Rows, count: int, number: int, least: float) -> tuple[float, 
         work += 0.5 * (normal * (opening + after) + shear * slip)
         if normal > 0.0 and -opening > least:
             struck, fact[STRUCK], fact[BOUNCE] = True, 1.0, -fact[RESTITUTION] * opening
+            a[HELD] = b[HELD] = 1.0
             bouncing = bouncing or fact[BOUNCE] > 0.0
     return work, struck, bouncing
 
@@ -378,6 +378,8 @@ def rebound(
     tolerance: float,
 ) -> int:  # fmt: skip
     """Let all contacts that were struck in a substep open again, at its end; returns the sweeps.
+
+    `h` is the least length of the next substep [s], within which open contacts may close.
 
     Restitution with friction can raise the kinetic energy of an eccentric impact. A plastic impact,
     which has worked `lost` < 0 [J], cannot. Energy is quadratic in the velocities, so the gain is
@@ -492,7 +494,8 @@ def relax(
         lost, hit, bouncing = end_rows(rows, count, number, least)
         ledger[2] += drift(rows.slot, rows.scale, n, h)
         if bouncing:
-            sweeps += rebound(rows, n, count, number, h, lost, reach, tolerance)
+            following = AT_ONCE * p.dt if alone else h
+            sweeps += rebound(rows, n, count, number, following, lost, reach, tolerance)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1
         parts += 1

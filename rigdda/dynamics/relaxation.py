@@ -297,7 +297,9 @@ def count_row(row: Floats, fact: Floats, a: Floats, b: Floats, normal: float, sh
 
 
 @kernel
-def end_rows(rows: Rows, count: int, number: int, least: float) -> tuple[float, bool, bool]:
+def end_rows(
+    rows: Rows, n: int, count: int, number: int, least: float
+) -> tuple[float, bool, bool]:
     """End a substep for its contacts: count their impulses, and note which were struck.
 
     A contact was if it closed faster than `least` [m/s] before its bodies touched others.
@@ -325,9 +327,12 @@ def end_rows(rows: Rows, count: int, number: int, least: float) -> tuple[float, 
         after = along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
         slip += along_six(row[SHEAR : SHEAR + 6], a, b, NOW)
         work += 0.5 * (normal * (opening + after) + shear * slip)
-        if normal > 0.0 and -opening > least:
-            struck, fact[STRUCK], fact[BOUNCE] = True, 1.0, -fact[RESTITUTION] * opening
+        # between two bodies, or at a blow, impulses act at the start of the substep
+        sudden = normal > 0.0 and -opening > least
+        if sudden or rows.row_j[k] < n:
             a[HELD] = b[HELD] = 1.0
+        if sudden:
+            struck, fact[STRUCK], fact[BOUNCE] = True, 1.0, -fact[RESTITUTION] * opening
             bouncing = bouncing or fact[BOUNCE] > 0.0
     return work, struck, bouncing
 
@@ -491,7 +496,7 @@ def relax(
         pull(rows.slot, n, h)
         start_rows(rows, count, number, h, h / last)
         sweeps += settle(rows, n, count, number, reach, tolerance)
-        lost, hit, bouncing = end_rows(rows, count, number, least)
+        lost, hit, bouncing = end_rows(rows, n, count, number, least)
         ledger[2] += drift(rows.slot, rows.scale, n, h)
         if bouncing:
             following = AT_ONCE * p.dt if alone else h

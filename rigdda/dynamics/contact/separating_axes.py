@@ -121,7 +121,8 @@ def face_of_contact(
         later = entry > time or (entry == time and gap > depth)
         if later or (entry == time and gap == depth and edge < best):
             time, depth, best, nearest = entry, gap, edge, corner
-    return True, time, depth, apart, edge_over_corner(outlines, i, best, edges, j, nearest)
+    over = outlines.corner[j, nearest]
+    return True, time, depth, apart, edge_over_point(outlines, i, best, edges, over.x, over.y)
 
 
 @kernel
@@ -136,13 +137,14 @@ def touch_time(gap: float, time: float, square: float, margin: float) -> float:
 
 
 @kernel
-def edge_over_corner(outlines: Outlines, i: int, edge: int, edges: int, j: int, corner: int) -> int:
-    """Return the edge of i, nearly in line with `edge`, that lies over a corner of j.
+def edge_over_point(
+    outlines: Outlines, i: int, edge: int, edges: int, x: float, y: float
+) -> int:
+    """Return the edge of i, nearly in line with `edge`, that lies over a point.
 
     Of edges in one line rounding alone decides which is the best face.
     """
-    face, over = outlines.corner[i, edge], outlines.corner[j, corner]
-    nx, ny, x, y = face.normal_x, face.normal_y, over.x, over.y
+    nx, ny = outlines.corner[i, edge].normal_x, outlines.corner[i, edge].normal_y
     for _ in range(edges):
         start, end = outlines.corner[i, edge], outlines.corner[i, following(edge, edges)]
         beyond_end = ny * (end.x - x) > nx * (end.y - y)

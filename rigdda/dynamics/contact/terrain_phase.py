@@ -18,7 +18,7 @@ from rigdda.dynamics.contact.segments import (
     over_segment,
     shadowed,
 )
-from rigdda.dynamics.contact.separating_axes import following
+from rigdda.dynamics.contact.separating_axes import edge_over_point, following
 from rigdda.dynamics.records import Bodies, Box, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
@@ -229,14 +229,16 @@ def edge_on_ridge(
     alike = best_gap >= 2.0 * min(depth, 0.0) - p.margin
     if not alike and not bridges(outlines, ground, part, best, corner, 0.5 * best_gap):
         return k
+    time = min(best_time, 1.0) if 0.0 < best_time < NEVER else 0.0
+    hit_x, hit_y = x + time * dx, y + time * dy
+    best = edge_over_point(outlines, part, best, n, hit_x, hit_y)
     start, end = outlines.corner[part, best], outlines.corner[part, following(best, n)]
     nx, ny = start.normal_x, start.normal_y
     gap = nx * (x - start.x) + ny * (y - start.y)
-    time = min(best_time, 1.0) if 0.0 < best_time < NEVER else 0.0
     ex, ey = end.x - start.x, end.y - start.y
-    along = (x + time * dx - start.x) * ex + (y + time * dy - start.y) * ey
-    # a corner inside the block counts even where edges in one line make the choice of edge a tie
-    if gap > 0.0 and (along < 0.0 or along > ex * ex + ey * ey):
+    along = (hit_x - start.x) * ex + (hit_y - start.y) * ey
+    # beyond the end of the edge the corner is not in the block, unless it is deep
+    if gap > -p.penetration and (along < 0.0 or along > ex * ex + ey * ey):
         return k
     key = len(bodies) * outlines.corner.shape[1] + corner
     add_contact(contacts[k], a, TERRAIN, key, 0, right.surface, x, y, -nx, -ny, gap)

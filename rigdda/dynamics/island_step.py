@@ -6,7 +6,7 @@ import math
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, System, Work
+from rigdda.dynamics.arrays import Islands, Matrix, Monitors, Outlines, Rows, System, Work
 from rigdda.dynamics.assembly.island import damping_of, load_moment
 from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.dynamics.constants import (
@@ -115,21 +115,17 @@ def island_speed(bodies: Bodies, islands: Islands, low: int, high: int) -> float
 
 @kernel
 def is_solved_whole(
-    contacts: Contacts, islands: Islands, low: int, high: int, speed: float, p: Parameters
+    contacts: Contacts, islands: Islands, low: int, high: int, p: Parameters
 ) -> bool:
-    """Return whether open-close iteration is tried on an island.
+    """Return whether an island is solved as a whole, however fast it moves.
 
-    It is in static mode, without post-correction, with pins and with the paper's contacts, however
-    fast the island moves; else where it is slow.
+    It is in static mode, without post-correction, with pins and with the paper's contacts.
     """
-    if p.static or not p.post_correction:
-        return True
-    quiet = speed <= QUIET_SPEED
+    whole = p.static or not p.post_correction
     for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        if c.kind == PLAIN or c.kind == PIN:
-            return True
-    return quiet
+        kind = contacts[islands.contact_item[item]].kind
+        whole = whole or kind == PLAIN or kind == PIN
+    return whole
 
 
 @kernel
@@ -144,9 +140,7 @@ def take_impulses(
         c, k = contacts[islands.contact_item[item]], rows.place[item]
         row, fact = rows.row[k], rows.fact[k]
         c.normal, c.shear = fact[SUM] / dt, fact[SUM + 1] / dt
-        c.accumulated_normal, c.accumulated_shear = c.normal, c.shear
-        if fact[STRUCK] > 0.0:  # an impulse does not last
-            c.accumulated_normal, c.accumulated_shear = row[IMPULSE], row[IMPULSE + 1]
+        c.accumulated_normal, c.accumulated_shear = row[IMPULSE], row[IMPULSE + 1]
         c.struck = int(fact[STRUCK])
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
@@ -245,19 +239,24 @@ def step_island(
             bad = max(bad, end_body(bodies, i, p, ledger))
         return bad
     speed = island_speed(bodies, islands, b0, b1)
-    start_slots(bodies, islands, rows, s, p)
     pairs = pair_blocks(bodies, contacts, m, islands, c0, c1)
-    count, settled, struck = pack_rows(contacts, islands, rows, s), False, False
-    if is_solved_whole(contacts, islands, c0, c1, speed, p):
+    start_slots(bodies, islands, rows, s, p)
+    count = pack_rows(contacts, islands, rows, s)
+    whole, settled, struck = is_solved_whole(contacts, islands, c0, c1, p), False, False
+    if not whole:
+        counters[RELAXED] += 1
+        sweeps, struck, settled = relax(rows, n, count, speed, p, ledger)
+        counters[SWEEPS] += sweeps
+    if whole or (not settled and speed <= QUIET_SPEED):
         settled = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
-        settled = settled or p.static or not p.post_correction
-    if settled:
+        whole = whole or settled
+        struck = struck and not whole
+    if whole:
+        start_slots(bodies, islands, rows, s, p)
+        count = pack_rows(contacts, islands, rows, s)
         take_solution(bodies, contacts, m, islands, rows, s, p, ledger)
         accumulate_forces(contacts, islands, c0, c1)
     else:
-        counters[RELAXED] += 1
-        sweeps, struck = relax(rows, n, count, speed, p, ledger)
-        counters[SWEEPS] += sweeps
         take_impulses(contacts, islands, rows, c0, c1, p.dt)
     if len(monitors.target) > 0:
         counters[EVENTS] = note_hits(

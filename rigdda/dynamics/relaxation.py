@@ -461,7 +461,7 @@ def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
 @kernel
 def relax(
     rows: Rows, n: int, count: int, speed: float, p: Parameters, ledger: NDArray
-) -> tuple[int, bool]:
+) -> tuple[int, bool, bool]:
     """Move the slots of an island through the step, with the impulses of its contacts.
 
     The substeps of a lone body end where it is struck.
@@ -479,14 +479,16 @@ def relax(
         Number of sweeps.
     struck : bool
         Whether a contact was struck.
+    settled : bool
+        Whether the sweeps of the last substep came to their tolerance.
     """
     usual = p.dt / SUBSTEPS
     most = p.sweep_tolerance * min((n - 1) / LARGE_ISLAND, 1.0) + 1e-7 * speed
     tolerance = min(RELAXATION_SHARE * speed, most)
-    alone, reach, least = n == 1, speed, IMPACT_STEPS * p.gravity * p.dt
+    alone, reach, least = n == 1, speed + p.gravity * p.dt, IMPACT_STEPS * p.gravity * p.dt
     if alone:
         reach, least = math.inf, IMPACT_STEPS * p.gravity * usual
-    sweeps, struck, last, left, number, parts = 0, False, 1.0, p.dt, 0, 0
+    sweeps, struck, last, left, number, parts, swept = 0, False, 1.0, p.dt, 0, 0, 0
     while left > 0.0:
         h = min(usual, left)
         if alone and parts < MOST_SUBSTEPS:
@@ -495,7 +497,8 @@ def relax(
             h = left
         pull(rows.slot, n, h)
         start_rows(rows, count, number, h, h / last)
-        sweeps += settle(rows, n, count, number, reach, tolerance)
+        swept = settle(rows, n, count, number, reach, tolerance)
+        sweeps += swept
         lost, hit, bouncing = end_rows(rows, n, count, number, least)
         ledger[2] += drift(rows.slot, rows.scale, n, h)
         if bouncing:
@@ -507,4 +510,4 @@ def relax(
     for place in range(count):  # a force again
         rows.row[place, IMPULSE] /= last
         rows.row[place, IMPULSE + 1] /= last
-    return sweeps, struck
+    return sweeps, struck, swept < MOST_SWEEPS

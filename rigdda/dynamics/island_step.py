@@ -14,7 +14,6 @@ from rigdda.dynamics.constants import (
     LATELY,
     OPEN,
     PIN,
-    PLAIN,
     QUIET_SPEED,
     REST,
     SLIP,
@@ -53,6 +52,7 @@ from rigdda.dynamics.rows import (
     WORK_ON_A,
     X,
     Y,
+    is_elastic,
     pack_rows,
 )
 from rigdda.dynamics.thrust import press
@@ -114,18 +114,12 @@ def island_speed(bodies: Bodies, islands: Islands, low: int, high: int) -> float
 
 
 @kernel
-def is_solved_whole(
-    contacts: Contacts, islands: Islands, low: int, high: int, p: Parameters
-) -> bool:
-    """Return whether an island is solved as a whole, however fast it moves.
-
-    It is in static mode, without post-correction, with pins and with the paper's contacts.
-    """
-    whole = p.static or not p.post_correction
+def has_springs(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
+    """Return whether an island has supports or the paper's contacts, whose stiffness is given."""
+    found = False
     for item in range(low, high):
-        kind = contacts[islands.contact_item[item]].kind
-        whole = whole or kind == PLAIN or kind == PIN
-    return whole
+        found = found or is_elastic(contacts[islands.contact_item[item]])
+    return found
 
 
 @kernel
@@ -242,16 +236,25 @@ def step_island(
     pairs = pair_blocks(bodies, contacts, m, islands, c0, c1)
     start_slots(bodies, islands, rows, s, p)
     count = pack_rows(contacts, islands, rows, s)
-    whole, settled, struck = is_solved_whole(contacts, islands, c0, c1, p), False, False
+    always, settled, struck = p.static or not p.post_correction, False, False
+    first = always or has_springs(contacts, islands, c0, c1)
+    rested = speed <= QUIET_SPEED
+    for q in range(b0, b1):
+        rested = rested and bodies[islands.block_item[q]].whole
+    first = first or rested
+    if first:
+        settled = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
+    whole = first and (settled or always)
     if not whole:
         counters[RELAXED] += 1
         sweeps, struck, settled = relax(rows, n, count, speed, p, ledger)
         counters[SWEEPS] += sweeps
-    if whole or (not settled and speed <= QUIET_SPEED):
-        settled = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
-        whole = whole or settled
-        struck = struck and not whole
+        if not settled and not first and speed <= QUIET_SPEED:
+            whole = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
+    for q in range(b0, b1):
+        bodies[islands.block_item[q]].whole = whole
     if whole:
+        struck = False
         start_slots(bodies, islands, rows, s, p)
         count = pack_rows(contacts, islands, rows, s)
         take_solution(bodies, contacts, m, islands, rows, s, p, ledger)

@@ -44,6 +44,7 @@ BODY = _record(
     island=int,  # island in which a sleeping body fell asleep
     apart=float,  # time since a contact of it was closed, 0 if one was in the last step [s]
     damping=float,  # that of what it touched last, see assembly.island.damping_of [1/s]
+    whole=bool,  # whether its island was solved as a whole in the last step
     force_x=float,  # dead load [N]
     force_y=float,
     moment_cos=float,  # its moment is moment_cos cos(theta) + moment_sin sin(theta) [N m]

@@ -82,8 +82,8 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
         """Return where it holds rock, standing as `outline`, with a deposit that rises so."""
         return Reach(-math.inf, float(outline[:, 0].min()), float(outline[:, 1].max()), rise)
 
-    def left_height(self, absorbed: float) -> float:
-        """Return the height that is left after it has absorbed so much [m]."""
+    def left_height(self, displacement: float) -> float:
+        """Return the height that is left after it has moved so far [m]."""
         raise NotImplementedError
 
     def area_beyond(self, x: float, outline: Floats) -> float:

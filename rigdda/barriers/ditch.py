@@ -98,7 +98,7 @@ class Ditch(BarrierBase, frozen=True, tag="ditch"):
         dug = sum(v * prices.get(n, dearest) for v, n in zip(volume, names, strict=True))
         return site.prices.ditch_base + float(dug)
 
-    def left_height(self, absorbed: float) -> float:
+    def left_height(self, displacement: float) -> float:
         """Return 0: it has none [m]."""
         return 0.0
 

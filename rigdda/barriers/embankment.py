@@ -130,7 +130,7 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
         usual = super().holds(outline, ground, rise)
         return usual._replace(end=usual.end + self.side_slope * self.height)
 
-    def left_height(self, absorbed: float) -> float:
+    def left_height(self, displacement: float) -> float:
         """Return its height [m]."""
         return self.height
 

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 import msgspec
 
 from rigdda.barriers.base import Floats
-from rigdda.barriers.standing import Standing
+from rigdda.barriers.standing import FOUNDATION, Standing
 from rigdda.errors import BadInput, DoubtfulInput
+
+from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:
     from rigdda.model.scene import Scene
@@ -21,11 +23,19 @@ PANEL = 10.0
 """Length of a panel of a fence along the slope, which acts whole [m]."""
 
 LOST = 0.5
-"""Share of its height that a fence has lost when it has absorbed its capacity [-]."""
+"""Share of its height that a fence has lost when its elongation is spent [-]: after an impact of its
+class at least half is left (EAD 340059, class A)."""
+
+MASS = 6.0
+"""Mass of net and ropes, which move with the rock, per area of a fence [kg/m2], from memory."""
 
 LEAST_CAPACITY, WEAK = 1e3, 1e4
 """Capacities of a fence below which it is refused, and a warning is given [J/m]: a block of 50 kg
 at 6 m/s and one of 500 kg, 0.5 m wide, at 4.5 m/s."""
+
+
+SHORTEST = 0.05
+"""Least elongation of a fence [m]."""
 
 
 class FenceClass(NamedTuple):
@@ -55,16 +65,13 @@ kits; heights and elongations are orders of magnitude, from memory."""
 
 
 class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
-    """A flexible fence that absorbs energy up to its capacity, then fails.
+    """A flexible fence, which brakes rock with a constant force over its elongation.
 
-    Impacts on it are plastic whatever its surface. It takes their work, and of blows on blocks that
-    rest against it what these pass on, see `rigdda.dynamics.fence`. When this would exceed what is
-    left of the capacity, it fails: the blocks go on with the energy that is left, and the fence is
-    gone. It stays upright until then. In a scene of several blocks it is lower by what it took, at
-    the capacity by a half (EAD 340059, class A: at least half is left after an impact of its
-    energy).
-    Blocks at rest against it cost it no energy. But if their thrust, as a mean over a second,
-    exceeds the mean force with which it brakes an impact of its class, it fails, too.
+    It stands still until it is pushed with more than capacity / elongation, by a blow or by what
+    lies against it. Then it gives way against that force, and so takes that force times its path.
+    Its top sinks in proportion, by half when its elongation is spent. Then it fails, and what is
+    left of the energy goes on with the blocks. Impacts on it are plastic whatever its surface, and
+    the mass of its net moves with the rock.
 
     Parameters
     ----------
@@ -80,8 +87,8 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     thickness : float
         Extent downhill of `x` [m].
     elongation : float, optional
-        Distance over which it stops an impact of its capacity [m]; that of the class where there is
-        one. Without it no thrust breaks the fence.
+        Distance over which it takes its capacity [m]; that of the class where there is one, by
+        default that of the next class with a panel of 10 m.
 
     Raises
     ------
@@ -113,8 +120,12 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
                 warnings.warn(told, DoubtfulInput, stacklevel=3)
         else:
             self._check_class()
-        if self.elongation is not None:
-            self._check_number("elongation", 0.0)
+        if self.elongation is None:
+            energy = 1e-3 * self.capacity * PANEL
+            found = next((c for e, c in FENCE_CLASSES.items() if e >= energy), None)
+            longest = FENCE_CLASSES[max(FENCE_CLASSES)]
+            msgspec.structs.force_setattr(self, "elongation", (found or longest).elongation)
+        self._check_number("elongation", SHORTEST)
 
     def _check_class(self) -> None:
         """Check the class and the height, and set the elongation."""
@@ -142,25 +153,42 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         capacity = 1e3 * self.energy_class / min(width, PANEL)
         return msgspec.structs.replace(self, capacity=capacity, energy_class=None)
 
-    def left_height(self, absorbed: float) -> float:
-        """Return its height after it has absorbed so much [m]."""
-        return self.height - self.sag * absorbed
+    def outline(self, ground: Terrain) -> Floats:
+        """Return the (4, 2) corners, the foot below all ground over which it may give way.
+
+        Raises
+        ------
+        BadInput
+            If it does not stand on the ground.
+        """
+        corners = super().outline(ground)
+        assert self.elongation is not None  # set at the start
+        points = ground.points
+        reach = (points[:, 0] >= self.x) & (points[:, 0] <= self.end + self.elongation)
+        last = min(self.end + self.elongation, float(points[:, 0].max()))
+        lowest = min([ground.height(last), *points[reach, 1].tolist()])
+        corners[:2, 1] = min(corners[0, 1], lowest - FOUNDATION)
+        return corners
+
+    def left_height(self, displacement: float) -> float:
+        """Return its height after it has given way so far [m]."""
+        return self.height - self.sag * displacement
 
     @property
     def sag(self) -> float:
-        """Height that it loses by what it absorbs [m per J/m]."""
-        return LOST * self.height / self.capacity if self.capacity else 0.0
+        """Height that it loses by what it gives way [-]."""
+        assert self.elongation is not None  # set at the start
+        return LOST * self.height / self.elongation
 
     @property
-    def bears(self) -> float:
-        """Thrust of what rests against it that it bears [N/m], inf without elongation."""
-        if self.capacity is None or self.elongation is None:
-            return math.inf
-        return self.capacity / self.elongation
+    def braking_force(self) -> float:
+        """Force against which it gives way [N/m], inf for a class whose width is not known."""
+        assert self.elongation is not None  # set at the start
+        return self.capacity / self.elongation if self.capacity is not None else math.inf
 
     def resistance(self, scene: Scene, outline: Floats) -> float:
-        """Return the mean force with which it brakes an impact of its capacity [N/m]."""
-        return self.bears
+        """Return the force against which it gives way [N/m]."""
+        return self.braking_force
 
     def price(self, site: Site, outline: Floats | None) -> float:
         """Return the price at the height of the road [EUR/m], with its foundations.

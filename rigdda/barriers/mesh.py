@@ -53,7 +53,7 @@ class Mesh(BarrierBase, frozen=True, tag="mesh"):
         option = site.mesh(self)
         return option.area * option.price
 
-    def left_height(self, absorbed: float) -> float:
+    def left_height(self, displacement: float) -> float:
         """Return 0: it has none [m]."""
         return 0.0
 

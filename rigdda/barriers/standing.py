@@ -32,7 +32,7 @@ class Standing(BarrierBase, frozen=True):
         """Length that it takes up along the slope, on level ground [m]."""
         return self.thickness
 
-    def left_height(self, absorbed: float) -> float:
+    def left_height(self, displacement: float) -> float:
         """Return its height [m]."""
         return self.height
 

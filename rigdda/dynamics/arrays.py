@@ -118,7 +118,6 @@ class Monitors(NamedTuple):
     rock: NDArray[np.void]  # (N,) of WATCHED
     target: NDArray[np.void]  # (B,) of TARGET
     barrier: Ints  # (M,) barrier that a body is, -1: rock
-    fences: int  # their number
     push: Floats  # (B, 2) impulse downhill, in this step, of what leans and what strikes [N s]
     impulse: Floats  # (B, K, 2) that in the last K steps, which are a second [N s]
     mean: Floats  # (B, 2) thrust, mean over these [N]

@@ -79,7 +79,8 @@ def collide_block(
         The new number of contacts; -1 if they do not fit.
     """
     first, room, boxes = count, len(contacts) - outlines.corner.shape[1] - 4, work.boxes
-    count = collide_terrain(bodies, outlines, ground, boxes.swept[a], contacts, count, a, p)
+    if not bodies[a].guided:
+        count = collide_terrain(bodies, outlines, ground, boxes.swept[a], contacts, count, a, p)
     for q in range(boxes.partner_start[a], boxes.partner_start[a + 1]):
         if count < 0 or count > room:
             return -1

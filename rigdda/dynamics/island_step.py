@@ -11,6 +11,7 @@ from rigdda.dynamics.assembly.island import damping_of, load_moment
 from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.dynamics.constants import (
     BOLT,
+    BRAKE,
     LATELY,
     OPEN,
     PIN,
@@ -32,6 +33,7 @@ from rigdda.dynamics.records import (
     SWEEPS,
     Bodies,
     Body,
+    Contact,
     Contacts,
     Floats,
     Interfaces,
@@ -91,13 +93,16 @@ def take_slot(body: Body, slot: Floats, scale: Floats, p: Parameters, ledger: ND
     What contacts that act at one time in the step, and position correction, lift or lower against
     them counts as impact.
     """
+    body.lately = LATELY * max(top_speed(body), body.lately)
+    if body.guided:
+        body.vx, body.x = slot[NOW] * scale[0], slot[X]
+        return
     dx, dy, turn = slot[X] - body.x, slot[Y] - body.y, slot[TURN]
     fx, fy = body.mass * p.field_x + body.force_x, body.mass * p.field_y + body.force_y
     moment = load_moment(body)
     ledger[1] += slot[FIELD] - (fx * dx + fy * dy + moment * turn)
     ledger[3] += (fx - body.mass * p.gravity_x) * dx + (fy - body.mass * p.gravity_y) * dy
     ledger[3] += moment * turn
-    body.lately = LATELY * max(top_speed(body), body.lately)
     body.vx, body.vy = slot[NOW] * scale[0], slot[NOW + 1] * scale[1]
     body.omega = slot[NOW + 2] * scale[2]
     body.x, body.y = slot[X], slot[Y]
@@ -115,11 +120,16 @@ def island_speed(bodies: Bodies, islands: Islands, low: int, high: int) -> float
 
 @kernel
 def has_springs(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
-    """Return whether an island has supports or the paper's contacts, whose stiffness is given."""
-    found = False
+    """Return whether an island has supports or the paper's contacts, whose stiffness is given.
+
+    Not if it has a brake: a body that is guided has no entries in the system of equations.
+    """
+    found = braked = False
     for item in range(low, high):
-        found = found or is_elastic(contacts[islands.contact_item[item]])
-    return found
+        c = contacts[islands.contact_item[item]]
+        found = found or is_elastic(c)
+        braked = braked or c.kind == BRAKE
+    return found and not braked
 
 
 @kernel
@@ -142,8 +152,8 @@ def take_impulses(
             if not joint_breaks(contacts, islands, low, high, item):
                 c.state, c.kind, c.kappa = STICK, REST, c.stiffness
                 continue
-        if c.kind == BOLT or c.kind == PIN:
-            c.state = SLIP if c.normal == -c.tension else STICK
+        if is_support(c):
+            c.state = SLIP if abs(c.normal) == c.tension else STICK
             continue
         within = c.cohesion + c.friction * max(c.normal, 0.0) > abs(c.shear)
         c.state = OPEN if c.normal == 0.0 else (STICK if within else SLIP)
@@ -163,6 +173,12 @@ def accumulate_forces(contacts: Contacts, islands: Islands, low: int, high: int)
             c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)
 
 
+@kernel
+def is_support(c: Contact) -> bool:
+    """Return whether a contact stands for a support or a brake."""
+    return c.kind == BOLT or c.kind == PIN or c.kind == BRAKE
+
+
 @inlined
 def note_touch(body: Body, damping: float) -> None:
     """Set the damping of a block to that of what it touches in this step; the greatest counts."""
@@ -180,7 +196,7 @@ def account_contacts(
         c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
         if c.state == OPEN:
             continue
-        support = c.kind == BOLT or c.kind == PIN
+        support = is_support(c)
         block, barrier = barrier_contact(monitors, c.a, c.b)
         if barrier >= 0:
             own = row[WORK_ON_A]
@@ -238,9 +254,11 @@ def step_island(
     count = pack_rows(contacts, islands, rows, s)
     always, settled, struck = p.static or not p.post_correction, False, False
     first = always or has_springs(contacts, islands, c0, c1)
-    rested = speed <= QUIET_SPEED
+    quiet = rested = speed <= QUIET_SPEED
     for q in range(b0, b1):
-        rested = rested and bodies[islands.block_item[q]].whole
+        body = bodies[islands.block_item[q]]
+        quiet = quiet and not body.guided
+        rested = rested and body.whole
     first = first or rested
     if first:
         settled = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
@@ -249,7 +267,7 @@ def step_island(
         counters[RELAXED] += 1
         sweeps, struck, settled = relax(rows, n, count, speed, p, ledger)
         counters[SWEEPS] += sweeps
-        if not settled and not first and speed <= QUIET_SPEED:
+        if quiet and not settled and not first:
             whole = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
     for q in range(b0, b1):
         bodies[islands.block_item[q]].whole = whole

@@ -1,7 +1,7 @@
 """Records that the kernels work on, in structured arrays. `pack` fills them.
 
-M bodies: the N blocks of the scene, its gravity walls, then its walls and fences. G: those that may
-move, the blocks and the gravity walls. B: barriers. R: polygons, the M outlines of the bodies, then
+M bodies: the N blocks of the scene, its gravity walls and fences, then its walls. G: those that may
+move, all but the walls. B: barriers. R: polygons, the M outlines of the bodies, then
 the convex parts of those that are not convex. P: most corners of a polygon. S: terrain segments. C:
 room for contacts.
 """
@@ -41,6 +41,7 @@ BODY = _record(
     parts=int,  # number of them
     surface=int,  # index of the surface
     status=int,  # AWAKE, ASLEEP, FIXED, RETIRED
+    guided=bool,  # whether it moves along x alone, and nothing but contacts and brakes acts on it
     island=int,  # island in which a sleeping body fell asleep
     apart=float,  # time since a contact of it was closed, 0 if one was in the last step [s]
     damping=float,  # that of what it touched last, see assembly.island.damping_of [1/s]
@@ -59,7 +60,7 @@ CONTACT = _record(
     owner=np.int32,  # 1: the vertex belongs to a, 0: to b
     other=np.int32,  # surface of b
     state=np.int32,  # OPEN, STICK, SLIP
-    kind=np.int32,  # REST, NEW, PLAIN, BOLT, PIN
+    kind=np.int32,  # REST, NEW, PLAIN, BOLT, PIN, BRAKE
     struck=np.int32,  # 1 if it was struck in this step
     pair=np.int32,  # off-diagonal block of the pair of bodies, -1: no coupling
     x=float,  # the vertex [m]
@@ -77,7 +78,8 @@ CONTACT = _record(
     restitution=float,
     bond=float,  # length of joint that the contact stands for and that is not broken [m]
     cohesion=float,  # shear force that it bears without normal force [N]
-    tension=float,  # tension that it, or a bolt before it yields, bears [N]
+    tension=float,  # tension that it, or a bolt or brake before it yields, bears [N]
+    reach=float,  # elongation that is left of a brake [m]
     stiffness=float,  # of the contact at rest [N/m]
     kappa=float,  # in this step [N/m]
     bias=float,  # displacement at which the spring is free [m], see contact.law
@@ -92,8 +94,8 @@ CONTACT = _record(
 LINK = _record(
     a=int,  # block
     b=int,  # block or TERRAIN
-    kind=int,  # BOLT or PIN
-    number=int,  # index of the support in the scene
+    kind=int,  # BOLT, PIN or BRAKE
+    number=int,  # index of the support in the scene, or of the barrier that a brake holds
     sign=float,  # -1 where a is the second block of the support, else 1 [-]
     ax=float,  # anchors in body coordinates, in the ground where b is TERRAIN [m]
     ay=float,
@@ -101,10 +103,11 @@ LINK = _record(
     by=float,
     stiffness=float,  # [N/m]
     prestress=float,  # [N]
-    yielding=float,  # tension at which it yields [N]
-    length=float,  # at which the tension is `prestress`; grows as it yields [m]
+    yielding=float,  # tension at which it yields [N]; of a brake the force both ways
+    length=float,  # at which the tension is `prestress`; grows as it yields [m]; of a brake the
+    # elongation that is left
 )
-"""One support."""
+"""One support, or the brake of a fence."""
 
 BOX = _record(
     low_x=float,  # [m]
@@ -147,11 +150,9 @@ WATCHED = _record(
 """What is known of a block."""
 
 TARGET = _record(
-    capacity=float,  # energy that a fence absorbs before it fails [J], inf: it is no fence
     absorbed=float,  # [J]
     ground=float,  # elevation from which impact heights count [m]
-    top=float,  # of a fence at the start, above its centroid [m]
-    sag=float,  # height that it loses by what it absorbs [m/J]
+    sag=float,  # height that a fence loses by what it gives way [-]
     low=float,  # interval of an embankment [m], empty for what is not one
     high=float,
     most=float,  # greatest thrust of a contact in this step [N]
@@ -182,7 +183,7 @@ INTERFACE = _record(
 """How two surfaces meet."""
 
 PARAMETERS = _record(
-    blocks=int,  # bodies that may move: the blocks of the scene and its gravity walls
+    blocks=int,  # bodies that may move: the blocks of the scene, its gravity walls and fences
     dt=float,
     gravity_x=float,  # [m/s2]
     gravity_y=float,

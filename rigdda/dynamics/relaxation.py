@@ -94,16 +94,16 @@ from rigdda.kernel import arithmetic_kernel, inlined, kernel
 @kernel
 def start_slot(body: Body, slot: Floats, scale: Floats, p: Parameters) -> None:
     """Set a slot from its body: where it is, how it moves, and what pulls it."""
-    for q in range(3):
-        inertia = body.inertia if q == 2 else body.mass
-        scale[q] = 1.0 / math.sqrt(inertia)
-    slot[NOW], slot[NOW + 1] = body.vx / scale[0], body.vy / scale[1]
-    slot[NOW + 2] = body.omega / scale[2]
-    slot[PULL] = p.field_x / scale[0] + body.force_x * scale[0]
-    slot[PULL + 1] = p.field_y / scale[1] + body.force_y * scale[1]
-    slot[PULL + 2] = load_moment(body) * scale[2]
+    root, spin = math.sqrt(body.mass), math.sqrt(body.inertia)
+    scale[0], scale[1], scale[2] = 1.0 / root, 1.0 / root, 1.0 / spin
+    slot[NOW], slot[NOW + 1], slot[NOW + 2] = root * body.vx, root * body.vy, spin * body.omega
+    slot[PULL] = p.field_x * root + body.force_x / root
+    slot[PULL + 1] = p.field_y * root + body.force_y / root
+    slot[PULL + 2] = load_moment(body) / spin
     slot[X], slot[Y], slot[TURN], slot[COS], slot[SIN] = body.x, body.y, 0.0, 1.0, 0.0
     slot[DAMPING], slot[FIELD] = damping_of(body, p), 0.0
+    if body.guided:
+        scale[1] = scale[2] = slot[PULL] = slot[PULL + 1] = slot[DAMPING] = 0.0
 
 
 @inlined
@@ -169,11 +169,13 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float) -> None:
     row[FLEXIBLE] = flexible
     row[COHESION], row[TENSION] = h * fact[STRENGTH], h * fact[STRENGTH + 1]
     row[MOST] = h * fact[STRENGTH + 2]
+    if row[MOST] < math.inf and abs(row[GAP]) >= fact[FREE_GAP]:  # a brake that is spent
+        row[TENSION] = row[MOST] = 0.0
     if row[STIFFNESS] == 0.0:
         row[KEEP] = row[KEEP_SHEAR] = 1.0
-        row[GAIN], row[GAIN_SHEAR] = 1.0 / flexible, 1.0 / rolling
+        row[GAIN], row[GAIN_SHEAR] = 1.0 / flexible, 1.0 / rolling if rolling > 0.0 else 0.0
         row[AIM], row[AIM_SHEAR] = -0.5 * h * row[BEND], 0.0
-        if fact[STRENGTH] == math.inf:  # a pin, which `mend_links` puts in its place
+        if fact[STRENGTH] == math.inf:  # a pin, which `mend_links` puts in its place, or a brake
             row[AIM_SHEAR] = -0.5 * h * row[BEND + 1]
         elif row[GAP] > 0.0:
             row[AIM] -= row[GAP] / h

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Islands, Rows
-from rigdda.dynamics.constants import BOLT, PIN, PLAIN
+from rigdda.dynamics.constants import BOLT, BRAKE, PIN, PLAIN
 from rigdda.dynamics.records import Contact, Contacts, Floats
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
@@ -36,8 +36,8 @@ GAP, BEND = 27, 28
 COLUMNS = 32
 
 # columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: place of the vertex and of the point
-# of the face, and normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR at which a spring is free
-# [m]. STRENGTH, + 1, + 2: the forces of which COHESION, TENSION and MOST are impulses [N].
+# of the face, and normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR at which a spring is free,
+# FREE_GAP at which a brake is [m]. STRENGTH, + 1, + 2: the forces of which COHESION, TENSION and MOST are impulses [N].
 VERTEX, FACE, DIRECTION, FREE_GAP, FREE_SHEAR, STRENGTH = 0, 2, 4, 6, 7, 8
 
 # RESTITUTION [-]. BOUNCE: velocity with which a contact that was struck in this substep is to open
@@ -102,9 +102,12 @@ def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, still: int) -
     fact[DIRECTION], fact[DIRECTION + 1] = c.nx, c.ny
     row[FRICTION], fact[RESTITUTION] = c.friction, max(c.restitution, 0.0)
     row[IMPULSE], row[IMPULSE + 1] = c.accumulated_normal, c.accumulated_shear
-    fact[STRENGTH] = math.inf if c.kind == PIN else c.cohesion
+    support = c.kind == PIN or c.kind == BRAKE
+    fact[STRENGTH] = math.inf if support else c.cohesion
     fact[STRENGTH + 1], fact[STRENGTH + 2] = c.tension, math.inf
     row[STIFFNESS] = fact[FREE_GAP] = fact[FREE_SHEAR] = 0.0
+    if c.kind == BRAKE:
+        fact[STRENGTH + 2], fact[FREE_GAP] = c.tension, c.reach
     if c.kind == BOLT:
         row[STIFFNESS] = c.stiffness
         fact[FREE_GAP] = c.gap + c.bias * c.kappa / c.stiffness

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.barriers import GravityWall
+from rigdda.barriers import Fence, GravityWall
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.errors import BadInput
 from rigdda.files import atomic
@@ -66,7 +66,8 @@ class Run:
     extent : (N, 2) array
         Least and greatest chainage that the circle about each block came to [m].
     barrier_poses : (T, B, 3) array
-        x, y, theta of the centroid of each barrier's outline; only gravity walls move.
+        x, y, theta of the centroid of each barrier's outline at the start: gravity walls and fences
+        move.
     """
 
     scene: Scene
@@ -116,9 +117,13 @@ class Run:
     def outline(self, barrier: int, frame: int = -1) -> NDArray[np.float64]:
         """Return the (n, 2) corners of a barrier in a frame, see `Scene.outline` [m]."""
         corners = self.scene.outline(barrier)
-        if not isinstance(self.scene.barriers[barrier], GravityWall):
-            return corners
+        one = self.scene.barriers[barrier]
         start, (x, y, theta) = self.barrier_poses[0, barrier], self.barrier_poses[frame, barrier]
+        if isinstance(one, Fence):
+            path = abs(x - start[0])
+            return corners + [(x - start[0], 0.0)] * 2 + [(x - start[0], -one.sag * path)] * 2
+        if not isinstance(one, GravityWall):
+            return corners
         cos, sin = np.cos(theta), np.sin(theta)
         return (corners - start[:2]) @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
 

@@ -114,7 +114,7 @@ class Simulation:
     def barrier_poses(self) -> NDArray[np.float64]:
         """Copy of x, y, theta of the centroids of the barriers' outlines, (B, 3) [m, m, rad].
 
-        Only gravity walls move.
+        Gravity walls and fences move.
         """
         out = self._barrier_start.copy()
         b, n = self.loop.arrays.bodies, len(self.scene.blocks)

@@ -24,11 +24,16 @@ def wake_island(bodies: Bodies, island: int, blocks: int) -> int:
 
 @kernel
 def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int:
-    """Wake the islands of sleeping bodies paired with a moving one; returns how many bodies."""
+    """Wake the islands of sleeping bodies paired with a moving one; returns how many bodies.
+
+    What lies still and awake against a fence wakes it, too: it may be struck and push it on.
+    """
     woken = 0
     for q in range(count):
         i, j = pairs[2 * q], pairs[2 * q + 1]
-        if bodies[j].status != ASLEEP or top_speed(bodies[i]) < SLEEP_SPEED:
+        if bodies[j].status != ASLEEP:
+            continue
+        if top_speed(bodies[i]) < SLEEP_SPEED and not bodies[j].guided:
             continue
         woken += wake_island(bodies, bodies[j].island, blocks)
     return woken

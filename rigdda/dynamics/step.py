@@ -10,6 +10,7 @@ from rigdda.dynamics.clock import lap
 from rigdda.dynamics.constants import (
     AWAKE,
     BAD_STATE,
+    BRAKE,
     CONTACTS_FULL,
     DONE,
     ENDED,
@@ -18,6 +19,7 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.contact.links import mend_links
 from rigdda.dynamics.detection import copy_index, detect
+from rigdda.dynamics.fence import give_way
 from rigdda.dynamics.flight import fly, keep_touch, land, take_off
 from rigdda.dynamics.frames import keep_frame
 from rigdda.dynamics.island_step import step_island
@@ -129,7 +131,9 @@ def advance(
         Whether `now` and `before` have changed roles.
     """
     swapped, reason, bad, p = False, DONE, -1, parameters[0]
-    may_fly = len(links) == 0 and len(shaking) == 0 and not p.static and p.post_correction
+    may_fly = len(shaking) == 0 and not p.static and p.post_correction
+    for q in range(len(links)):
+        may_fly = may_fly and links[q].kind == BRAKE
     flyer, flown, flight = -1, 0, 0  # steps of a flight that are taken, and all of them
     while steps > 0 and reason == DONE:
         room = len(monitors.event) - counters[EVENTS]
@@ -164,6 +168,7 @@ def advance(
                 bodies, outlines, interfaces, now, system, work, monitors, time, p, counters, ledger
             )
             ledger[4] += mend_links(bodies, outlines, links, p)
+            give_way(bodies, outlines, links, now, count, monitors, counters, ledger, time)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         press_asleep(bodies, now, count, monitors, p.dt)

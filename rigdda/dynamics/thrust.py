@@ -2,8 +2,7 @@
 
 What lies against a barrier and what strikes it both press on it, in the ratio of chance in any one
 step. Over a second it is the momentum that the barrier takes, which does not depend on the step.
-Of a fence only contacts at rest count: blows cost it energy, see `fence`. A contact with the ground
-presses on the embankment on which it is.
+A contact with the ground presses on the embankment on which it is.
 
 Rock that is jammed between two rigid faces presses on both with any force, of which nothing is left
 once one of them gives way. So contacts at rest count for no more than the weight of what leans on
@@ -18,6 +17,7 @@ from rigdda.dynamics.arrays import Islands, Monitors
 from rigdda.dynamics.constants import (
     ASLEEP,
     BOLT,
+    BRAKE,
     FIXED,
     OPEN,
     PIN,
@@ -36,7 +36,7 @@ LEANING, STRIKING = 0, 1
 @kernel
 def pressed(monitors: Monitors, c: Contact) -> int:
     """Return the barrier that a contact presses on, -1 for none."""
-    if c.state == OPEN or c.kind == BOLT or c.kind == PIN:
+    if c.state == OPEN or c.kind == BOLT or c.kind == PIN or c.kind == BRAKE:
         return -1
     if c.b != TERRAIN:
         return barrier_contact(monitors, c.a, c.b)[1]

@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check, fields
-from rigdda.barriers import Barrier, Built, Earthwork, GravityWall, Mesh, Wall, earthworks
+from rigdda.barriers import (
+    Barrier,
+    Built,
+    Earthwork,
+    Fence,
+    GravityWall,
+    Mesh,
+    Wall,
+    earthworks,
+)
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
 from rigdda.model.base_motion import history
@@ -230,10 +239,12 @@ class Scene:
     def bodies(self) -> tuple[int, ...]:
         """Barriers that are bodies, in the order in which they follow the blocks.
 
-        Gravity walls first, which are free to move, then walls and fences.
+        Gravity walls first, which are free to move, then fences, which give way, then walls.
         """
         upright = [i for i, b in enumerate(self.barriers) if not isinstance(b, Earthwork)]
-        return tuple(sorted(upright, key=lambda i: not isinstance(self.barriers[i], GravityWall)))
+        order = (GravityWall, Fence)
+        ranks = [[isinstance(b, kind) for kind in order] for b in self.barriers]
+        return tuple(sorted(upright, key=lambda i: ranks[i], reverse=True))
 
     @property
     def gravity_vector(self) -> tuple[float, float]:

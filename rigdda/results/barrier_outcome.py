@@ -29,9 +29,8 @@ class BarrierOutcome:
         Largest and summed energy of the hits, of translation and rotation just before the first
         touch [J].
     absorbed_energy : float
-        Work that contact forces of the barrier took from the blocks [J]; of a fence that of
-        impacts, and what blocks that rest against it passed on of blows on them. One that failed
-        by energy took its capacity.
+        Work that contact forces of the barrier took from the blocks [J]: of a fence the force of
+        its brakes times its path, and what its own mass took.
     impact_heights : tuple of float
         Height of each hit above the ground at the barrier's uphill face at the start [m].
     overtopped : int
@@ -47,15 +46,16 @@ class BarrierOutcome:
         its place, and is overturned if it was turned beyond the angle of its diagonal; an
         embankment was pushed away.
     displacement : float
-        Distance of its centroid at the end from where it was at the start [m].
+        Distance of its centroid at the end from where it was at the start [m]; of a fence the
+        elongation that was used.
     road_area : float
         Its area that lies beyond the uphill edge of the road at the end [m2]: only a gravity wall
         comes there.
     thrust : float
-        Greatest mean over a second of the horizontal force on it, downhill [N/m]: of a fence that
-        of contacts at rest, of a ditch none.
+        Greatest mean over a second of the horizontal force on it, downhill [N/m], of a ditch none.
     resistance : float
-        Thrust that it bears [N/m], inf where none can move it, see `rigdda.Scene.resistance`.
+        Thrust that it bears [N/m], inf where none can move it, see `rigdda.Scene.resistance`; of
+        a fence the force against which it gives way.
     left_height : float
         Height that is left of it [m]: none of what failed, was overturned or pushed away, nor of a
         ditch.
@@ -85,6 +85,7 @@ def measure_barrier(
     `edge` is the uphill edge of the road [m].
     """
     barrier, hits, state = run.scene.barriers[index], log.hits[index], states[-1][1]
+    moved = math.dist(*run.barrier_poses[[0, -1], index, :2].tolist())
     gone = next((time for time, state in states if state in GONE), math.inf)
     passed = zip(run.poses[0, :, 0].tolist(), log.passed[barrier.end], strict=True)
     return BarrierOutcome(
@@ -97,11 +98,11 @@ def measure_barrier(
         failed=state != STANDS,
         caught=caught,
         state=state,
-        displacement=math.dist(*run.barrier_poses[[0, -1], index, :2].tolist()),
+        displacement=moved,
         road_area=barrier.area_beyond(edge, run.outline(index)),
         thrust=float(run.thrust[index]),
         resistance=run.scene.resistance(index),
-        left_height=0.0 if state in GONE else barrier.left_height(float(run.absorbed[index])),
+        left_height=0.0 if state in GONE else barrier.left_height(moved),
     )
 
 
@@ -112,6 +113,4 @@ def holding(run: Run, index: int, state: str, at: Sequence[tuple[float, float]])
         return [False] * len(at)
     rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
     reach = barrier.holds(run.outline(index), scene.ground, rise)
-    sag = barrier.left_height(0.0) - barrier.left_height(float(run.absorbed[index]))
-    reach = reach._replace(top=reach.top - sag)
     return [reach.includes(x, y) for x, y in at]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Ground, Monitors, Outlines, System, Work
-from rigdda.dynamics.pack.bodies import free_bodies, pack_bodies, pack_links
+from rigdda.dynamics.pack.bodies import free_bodies, guide_fences, pack_bodies, pack_links
 from rigdda.dynamics.pack.ground import pack_ground, pack_shaking
 from rigdda.dynamics.pack.monitors import pack_monitors
 from rigdda.dynamics.pack.parameters import pack_interfaces, pack_parameters
@@ -33,7 +33,7 @@ class Arrays(NamedTuple):
     system: System
     work: Work
     monitors: Monitors
-    parameters: NDArray[np.void]  # of PARAMETERS: of a step, and of the part of one
+    parameters: NDArray[np.void]  # (1,) of PARAMETERS
 
 
 def pack(
@@ -59,6 +59,8 @@ def pack(
     blocks = free_bodies(scene)
     room = 16 * blocks + 64
     interfaces = pack_interfaces(scene, names)
+    parameters = pack_parameters(scene, settings, bodies, interfaces)
+    guide_fences(scene, bodies, parameters)
     return Arrays(
         bodies,
         outlines,
@@ -71,5 +73,5 @@ def pack(
         empty_system(blocks, room),
         empty_work(len(bodies), blocks, room),
         pack_monitors(scene, bodies, stations, watch, leave, settings.dt),
-        pack_parameters(scene, settings, bodies, interfaces),
+        parameters,
     )

@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.barriers import Fence, GravityWall
+from rigdda.barriers.fence import MASS
 from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import (
+    ASLEEP,
     AWAKE,
     BOLT,
+    BRAKE,
     FIXED,
     PIN,
     TERRAIN,
@@ -28,7 +31,7 @@ from rigdda.model.supports import FixedPoint
 
 def free_bodies(scene: Scene) -> int:
     """Return how many bodies are not barriers that are fixed: these come first."""
-    return len(scene.blocks) + sum(isinstance(b, GravityWall) for b in scene.barriers)
+    return len(scene.blocks) + sum(isinstance(b, GravityWall | Fence) for b in scene.barriers)
 
 
 def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
@@ -70,10 +73,28 @@ def block_traits(blocks: Sequence[Block], names: list[str]) -> list[Trait]:
 def barrier_trait(scene: Scene, number: int, names: list[str]) -> Trait:
     """Return the same of a barrier that is a body."""
     barrier = scene.barriers[number]
-    surface = len(names) if isinstance(barrier, Fence) else names.index(scene.barrier_surface)
+    if isinstance(barrier, Fence):
+        area = polygon_properties(scene.outline(number))[0]
+        density = MASS * barrier.height / area
+        return density, 0.0, 0.0, 0.0, len(names), ASLEEP
+    surface = names.index(scene.barrier_surface)
     if isinstance(barrier, GravityWall):
         return barrier.density, 0.0, 0.0, 0.0, surface, AWAKE
     return 1.0, 0.0, 0.0, 0.0, surface, FIXED
+
+
+def guide_fences(scene: Scene, bodies: Bodies, parameters: NDArray[np.void]) -> None:
+    """Let the fences move along x alone; they sleep until something comes near.
+
+    Where nothing sleeps they are awake, and in static mode and without post-correction fixed.
+    """
+    p = parameters[0]
+    moves = p["post_correction"] and not p["static"]
+    for place, number in enumerate(scene.bodies, len(scene.blocks)):
+        if isinstance(scene.barriers[number], Fence):
+            body = bodies[place]
+            body["guided"], body["island"] = True, place
+            body["status"] = (ASLEEP if p["sleeping"] else AWAKE) if moves else FIXED
 
 
 def write_polygons(
@@ -158,7 +179,7 @@ def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
 
 
 def pack_links(scene: Scene, bodies: Bodies) -> Links:
-    """Return the supports in order of their block a.
+    """Return the supports, and the brakes of fences, in order of their body a.
 
     Block a is free unless both are not, and the first of two that are free, as of contacts.
     """
@@ -172,8 +193,19 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
         block = end[0]
         return block == TERRAIN or bodies["status"][block] == FIXED, block
 
-    links = np.zeros(len(scene.supports), dtype=LINK).view(np.recarray)
-    for number, (link, support) in enumerate(zip(links, scene.supports, strict=True)):
+    fences = [
+        (place, number)
+        for place, number in enumerate(scene.bodies, len(scene.blocks))
+        if isinstance(scene.barriers[number], Fence)
+    ]
+    links = np.zeros(len(scene.supports) + len(fences), dtype=LINK).view(np.recarray)
+    for link, (place, number) in zip(links[len(scene.supports) :], fences, strict=True):
+        link["kind"], link["a"], link["b"], link["number"] = BRAKE, place, TERRAIN, number
+        link["bx"], link["by"] = bodies["x"][place], bodies["y"][place]
+        link["yielding"] = scene.barriers[number].braking_force
+        link["length"] = scene.barriers[number].elongation
+    of_supports = links[: len(scene.supports)]
+    for number, (link, support) in enumerate(zip(of_supports, scene.supports, strict=True)):
         link["number"], link["yielding"], link["sign"] = number, math.inf, 1.0
         if isinstance(support, FixedPoint):
             link["kind"], link["a"], link["b"] = PIN, support.block, TERRAIN

@@ -36,7 +36,6 @@ def pack_monitors(
         rock.view(np.recarray),
         target.view(np.recarray),
         np.array([-1] * blocks + list(scene.bodies), dtype=np.int64),
-        sum(isinstance(b, Fence) for b in scene.barriers),
         np.zeros((barriers, 2)),
         np.zeros((barriers, max(1, round(1.0 / dt)), 2)),
         np.zeros((barriers, 2)),
@@ -49,25 +48,16 @@ def pack_monitors(
 
 
 def start_targets(target: NDArray[np.void], scene: Scene) -> None:
-    """Write what barriers resist, where they press on the ground, and how fences sag.
-
-    Fences sag in scenes of several blocks: a release of one block is the same for all capacities
-    that are not exceeded.
-    """
-    several = sum(not block.fixed for block in scene.blocks) > 1
-    target["capacity"] = target["low"] = target["limit"] = np.inf
+    """Write what embankments resist, where they press on the ground, and how fences sag."""
+    target["low"] = target["limit"] = np.inf
     target["high"] = -np.inf
     for i, barrier in enumerate(scene.barriers):
-        if not isinstance(barrier, Fence | Embankment):
-            continue
-        target["limit"][i] = scene.resistance(i)
-        corners = scene.outline(i)
         if isinstance(barrier, Embankment):
+            corners = scene.outline(i)
+            target["limit"][i] = scene.resistance(i)
             target["low"][i], target["high"][i] = corners[:, 0].min(), corners[:, 0].max()
-        else:
-            target["capacity"][i] = barrier.capacity
-            target["top"][i] = 0.5 * np.ptp(corners[:, 1])
-            target["sag"][i] = barrier.sag if several else 0.0
+        elif isinstance(barrier, Fence):
+            target["sag"][i] = barrier.sag
 
 
 def start_rock(rock: NDArray[np.void], bodies: Bodies, stations: NDArray[np.float64]) -> None:

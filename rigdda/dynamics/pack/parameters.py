@@ -43,13 +43,15 @@ def check_step(settings: Settings, areas: NDArray[np.float64], gravity: float) -
 def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
     """Return how each two surfaces meet.
 
-    Fences, which come last, are of the surface of barriers, but plastic and without strength.
+    Fences, which come last, are of the surface of barriers, but plastic, without strength and
+    without friction: a net moves along with what it holds.
     Damping that a surface leaves open is that of the scene.
     """
     fences = any(isinstance(b, Fence) for b in scene.barriers)
     every = [*names, scene.barrier_surface] if fences else names
     found = np.zeros((len(every), len(every)), dtype=INTERFACE)
     found["friction"] = frictions(scene, len(every))
+    found["friction"][len(names) :] = found["friction"][:, len(names) :] = 0.0
     for i, a in enumerate(names):
         for j, b in enumerate(names):
             surface = scene.interface(a, b)

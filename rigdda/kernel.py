@@ -200,7 +200,21 @@ def stage(function: Callable[..., Any]) -> Any:
 
 def entry_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls, and keep the machine code on disk."""
-    compiled = numba.njit(**{**INSIDE, "no_cpython_wrapper": False})(function)
+    return _kept(function, {**INSIDE, "no_cpython_wrapper": False})
+
+
+def short_kernel(function: Callable[..., Any]) -> Any:
+    """Compile an entry kernel that runs for microseconds, during which other threads wait.
+
+    An entry kernel lets other threads run Python meanwhile. To get its turn back a thread may have
+    to wait for another one, and changing threads takes longer than such a kernel.
+    """
+    return _kept(function, {**INSIDE, "no_cpython_wrapper": False, "nogil": False})
+
+
+def _kept(function: Callable[..., Any], options: dict[str, bool | str]) -> Any:
+    """Compile a kernel, and keep the machine code on disk."""
+    compiled = numba.njit(**options)(function)
     if config.DISABLE_JIT:
         return compiled
     before = config.CACHE_DIR

@@ -72,14 +72,19 @@ def _ground(
     strengths: tuple[tuple[float, float, float], ...] = ()
     if any(surface.varies for surface in site.surfaces.values()):
         rng = np.random.Generator(np.random.PCG64([seed, index, STRENGTHS]))
-        drawn = np.clip(rng.standard_normal((len(site.surfaces), 3)), -FARTHEST, FARTHEST)
-        strengths = tuple(map(tuple, drawn.tolist()))
+        drawn = rng.standard_normal((len(site.surfaces), 3)).tolist()
+        strengths = tuple((_cut_off(a), _cut_off(b), _cut_off(c)) for a, b, c in drawn)
     amplitude = {name: s.roughness for name, s in site.surfaces.items() if s.roughness > 0.0}
     if not amplitude:
         return strengths, None
     event = site.events[index]
     spacing = event.block_size(site.source(event.source))
     return strengths, Roughness(spacing, amplitude, (seed, index, PITS))
+
+
+def _cut_off(normal: float) -> float:
+    """Return a normal number, or the nearest one that is not farther than `FARTHEST` from 0."""
+    return min(max(normal, -FARTHEST), FARTHEST)
 
 
 def built(site: Site, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:

@@ -12,7 +12,9 @@ from rigdda.errors import BadInput, Error
 from rigdda.model.events import Drawn
 from rigdda.model.scene import Scene
 from rigdda.model.site import Site
-from rigdda.results.outcome import Outcome, leave, measure, stations, watch
+from rigdda.results.ending import Ending
+from rigdda.results.outcome import Outcome, judge, leave, measure, stations, watch
+from rigdda.single import SingleReleases, can_share
 
 EVERY = 0.05
 """Interval of the frames of a run from which states of barriers are judged [s]."""
@@ -58,16 +60,31 @@ class Batch:
         self._standing = [b for b in self._layout if not isinstance(b, Mesh)]
         self._watch = watch(site)
         self._base: tuple[Scene, Drawn] | None = None
+        self._single: SingleReleases | None = None
         self._templates: dict[tuple[int, int, float, int], Template] = {}
 
     def outcome(self, seed: int, event: str | None = None) -> Outcome:
         """Return the outcome of one release. Raises as `rigdda.release` does."""
         drawn = self._site.draw(seed, event)
+        ended = self._ending(drawn)
+        if ended is not None:
+            return judge(self._site, ended, drawn.event, drawn.width)
         duration = self._site.motion.duration
         # a wall that slid or overturned on the way may come to stand again
         moving = any(isinstance(barrier, GravityWall) for barrier in self._standing)
         run = self.simulation(self.scene(drawn)).run(duration, EVERY if moving else duration)
         return measure(self._site, run, drawn.event, drawn.width)
+
+    def _ending(self, drawn: Drawn) -> Ending | None:
+        """Return how a release of a single block ends, None where it takes a scene to tell."""
+        if len(drawn.blocks) > 1 or self._base is None:
+            return None
+        if self._single is None:
+            scene = self._base[0]
+            if not can_share(self._site, scene):
+                return None
+            self._single = SingleReleases(self._site, self._standing, scene)
+        return self._single.ending(drawn)
 
     def scene(self, drawn: Drawn) -> Scene:
         """Return the scene of what was drawn, on the ground and with the barriers of the first."""

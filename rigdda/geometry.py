@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rigdda.kernel import Direct, short_kernel, kernel
+from rigdda.kernel import Direct, kernel, short_kernel
 
 CLEARLY = 1e-6
 """Turn at a corner, or area, over the square of the perimeter that is more than rounding [-]."""

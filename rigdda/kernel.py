@@ -153,7 +153,7 @@ class KernelCache(FunctionCache):
             warnings.warn(f"compiled kernels are not kept: {error}", RuntimeWarning, stacklevel=2)
 
 
-INSIDE = {
+INSIDE: dict[str, Any] = {
     "nogil": True,
     "error_model": "numpy",
     "_nrt": False,
@@ -212,7 +212,7 @@ def short_kernel(function: Callable[..., Any]) -> Any:
     return _kept(function, {**INSIDE, "no_cpython_wrapper": False, "nogil": False})
 
 
-def _kept(function: Callable[..., Any], options: dict[str, bool | str]) -> Any:
+def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Compile a kernel, and keep the machine code on disk."""
     compiled = numba.njit(**options)(function)
     if config.DISABLE_JIT:

@@ -140,7 +140,7 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         if self.energy_class is None:
             return self
         capacity = 1e3 * self.energy_class / min(width, PANEL)
-        return msgspec.structs.replace(self, capacity=capacity, energy_class=None)
+        return self._with(capacity=capacity, energy_class=None)
 
     def left_height(self, absorbed: float) -> float:
         """Return its height after it has absorbed so much [m]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 import numpy as np
@@ -22,6 +22,8 @@ from rigdda.model.surface import MOST_DAMPING, Surface, smaller
 
 if TYPE_CHECKING:
     from rigdda.model.site import Site
+
+Value = TypeVar("Value")
 
 ROUNDING = 1e-9
 """Length by which a barrier may reach into loose rock [m]: vectors lose last digits of its edge."""
@@ -139,8 +141,8 @@ def scene(site: Site, drawn: Drawn, barriers: Sequence[Built]) -> Scene:
     )
 
 
-def pairs(site: Site, surfaces: Mapping[str, Surface]) -> dict[tuple[str, str], Surface]:
-    """Return the surfaces of contacts: of rock with the ground the ground's."""
+def pairs(site: Site, surfaces: Mapping[str, Value]) -> dict[tuple[str, str], Value]:
+    """Return what counts in contacts of rock with the ground: of the two surfaces the ground's."""
     grounds = {site.slope.surface, *(s.surface for s in site.slope.surfaces)}
     if "soil" in site.surfaces:
         grounds.add("soil")  # embankments are ground

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from rigdda.barriers.base import BarrierBase, Reach
+from rigdda.barriers import Barrier
+from rigdda.barriers.base import Reach
 from rigdda.dynamics.run import Run
 from rigdda.geometry import polygon_properties
 from rigdda.results.log import Log, log_of
@@ -16,7 +17,7 @@ from rigdda.results.states import states
 class BarrierEnding(NamedTuple):
     """A barrier at the end of a release."""
 
-    barrier: BarrierBase
+    barrier: Barrier
     states: Sequence[tuple[float, str]]
     """Its states, each with the time from which it was in it [s]; the first is "stands"."""
     reach: Reach

@@ -1,0 +1,284 @@
+"""A single convex block on a ground that stays the same, run in the same arrays again and again.
+
+To describe a block and its surroundings anew in Python takes as long as to compute how it comes
+down. Here kernels write the block, and how surfaces meet, into the arrays of a scene like it, and
+read what came of it. The arrays are to the bit what `rigdda.dynamics.pack.pack` gives for a scene
+of that block, as far as they are read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.dynamics.arrays import Outlines
+from rigdda.dynamics.constants import DONE, ENDED, MARGIN_RATIO, PENETRATION_RATIO
+from rigdda.dynamics.frames import no_frames
+from rigdda.dynamics.loop import advance_directly
+from rigdda.dynamics.pack import pack
+from rigdda.dynamics.pack.again import together
+from rigdda.dynamics.pack.bodies import write_bodies
+from rigdda.dynamics.records import (
+    COUNTERS,
+    EVENTS,
+    LEDGER,
+    STEPS,
+    TARGET,
+    Bodies,
+    Interfaces,
+)
+from rigdda.geometry import is_sound
+from rigdda.kernel import Direct, kernel, short_kernel
+from rigdda.model.apart import surely_on_ground
+from rigdda.model.block import Block
+from rigdda.model.meetings import Meetings
+from rigdda.model.scene import Scene
+from rigdda.model.settings import EARTH, Settings
+
+ABSORBED, THRUST = (TARGET.names.index(name) for name in ("absorbed", "thrust"))
+"""Places of these fields in a record of a barrier."""
+
+
+class Descent(NamedTuple):
+    """What came of a block."""
+
+    start: float
+    """Chainage of its centroid at the start [m]."""
+    place: tuple[float, float]
+    """Its centroid at the end [m]."""
+    velocity: tuple[float, float]
+    """Velocity of its centroid at the end [m/s]."""
+    extent: tuple[float, float]
+    """Least and greatest chainage that the circle about it came to [m]."""
+    energy: float
+    """Its largest kinetic energy in the watched interval [J]."""
+    time: float
+    """When it ended [s]."""
+    events: list[tuple[Any, ...]]
+    """What happened, in order of time, each with the fields of `rigdda.dynamics.run.EVENT`."""
+    absorbed: list[float]
+    """Energy that each barrier took [J]."""
+    thrust: list[float]
+    """Greatest mean over a second of the thrust on each barrier [N/m]."""
+
+
+class SingleBlock:
+    """The arrays of a scene of a single block, and what it takes to set them back for another one.
+
+    Parameters
+    ----------
+    scene : Scene
+        One such scene: its block is convex and free, no surface has a restitution of None, and no
+        barrier can move.
+    settings : Settings
+        How it is computed.
+    stations : (K,) array
+        Ascending chainages whose first crossings are recorded [m].
+    watch : (float, float)
+        Interval of x in which energies are watched [m].
+    leave : float
+        x beyond which what moves on is left alone [m].
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        stations: NDArray[np.float64],
+        watch: tuple[float, float],
+        leave: float,
+    ):
+        assert len(scene.blocks) == 1 and scene.smooth_ground is not None
+        self._dt, self._stations = settings.dt, stations
+        self._gravity = math.hypot(*scene.gravity_vector) or EARTH
+        self._surfaces = {name: i for i, name in enumerate(scene.surfaces)}
+        packed = pack(scene, settings, stations, watch, leave)
+        self._counters = np.zeros(COUNTERS, dtype=np.int64)
+        self._ledger, self._deepest = np.zeros(len(LEDGER)), np.zeros(1)
+        self._memory, self._arrays = together(packed)
+        self._fresh = self._memory.copy()
+        self._frames = no_frames(packed.bodies)
+        self._corners = np.zeros(scene.blocks[0].vertices.shape)
+        self._traits = np.zeros((1, 6))  # see `pack.bodies.Trait`
+        self._chain = np.array(scene.smooth_ground.points)
+        outlines = [scene.outline(i) for i in scene.bodies]
+        self._boxes = np.array(
+            [[*corners.min(axis=0), *corners.max(axis=0)] for corners in outlines]
+        ).reshape(-1, 4)
+        target = self._arrays.monitors.target.view(np.ndarray)
+        self._target, self._capacity, self._limit = target, target["capacity"], target["limit"]
+        self._event = self._arrays.monitors.event.view(np.ndarray)
+
+    def run(
+        self,
+        block: Block,
+        meetings: Meetings,
+        capacities: Sequence[float],
+        limits: Sequence[float],
+        steps: int,
+    ) -> Descent | None:
+        """Return what comes of a block with as many corners as that of the scene.
+
+        Parameters
+        ----------
+        block : Block
+            The block.
+        meetings : Meetings
+            How surfaces meet.
+        capacities, limits : sequence of float
+            What each barrier absorbs and what thrust it bears, inf: any [J/m, N/m].
+        steps : int
+            Most steps.
+
+        Returns
+        -------
+        Descent or None
+            None where it takes more than this to tell: the block may start in the ground or in a
+            barrier, is hardly convex, pushes an embankment away, or diverges.
+        """
+        a = self._arrays
+        self._memory[:] = self._fresh
+        if len(capacities):
+            self._capacity[:], self._limit[:] = capacities, limits
+        self._corners[:] = block.vertices
+        self._traits[0] = (block.density, *block.velocity, self._surfaces[block.surface], 0)
+        clear, start = _start.call(
+            self._corners, self._traits, self._chain, self._boxes, meetings.friction_deg,
+            meetings.restitution, meetings.damping, self._stations, self._gravity, a.bodies,
+            a.outlines, a.interfaces, a.monitors.rock, a.parameters, self._counters, self._ledger,
+            self._deepest,
+        )  # fmt: skip
+        if not clear:
+            return None
+        reason, _, _ = advance_directly.call(
+            a.bodies, a.outlines, a.ground, a.interfaces, a.links, a.shaking, a.now, a.before,
+            a.system, a.work, a.monitors, a.parameters, self._counters, self._ledger,
+            self._deepest, steps, self._frames, steps,
+        )  # fmt: skip
+        if reason != DONE and reason != ENDED:
+            return None
+        place, velocity, extent, energy, taken, happened = _read.call(
+            a.bodies, a.monitors.rock, self._counters
+        )
+        barriers = self._target.tolist()
+        return Descent(
+            start,
+            place,
+            velocity,
+            extent,
+            energy,
+            taken * self._dt,
+            self._event[:happened].tolist(),
+            [barrier[ABSORBED] for barrier in barriers],
+            [barrier[THRUST] for barrier in barriers],
+        )
+
+
+@short_kernel
+def start_single(
+    corners: NDArray, traits: NDArray, chain: NDArray, boxes: NDArray, friction_deg: NDArray,
+    restitution: NDArray, damping: NDArray, stations: NDArray, gravity: float, bodies: Bodies,
+    outlines: Outlines, interfaces: Interfaces, rock: NDArray, parameters: NDArray,
+    counters: NDArray, ledger: NDArray, deepest: NDArray,
+) -> tuple[bool, float]:  # fmt: skip
+    """Write a block and how surfaces meet into arrays that are otherwise as at the start.
+
+    Parameters
+    ----------
+    corners : (n, 2) array
+        Corners of the block [m].
+    traits : (1, 6) array
+        Its other properties, see `pack.bodies.Trait`.
+    chain : (m, 2) array
+        Corners of the ground [m].
+    boxes : (K, 4) array
+        Least x and y, greatest x and y of each barrier that is a body [m].
+    friction_deg, restitution, damping : arrays
+        How each two surfaces meet, see `Meetings` [deg, -, 1/s].
+    stations : (K,) array
+        Chainages that are watched [m].
+    gravity : float
+        Acceleration that gives the block its weight [m/s2].
+    bodies, outlines, interfaces, rock, parameters, counters, ledger, deepest : arrays
+        What is written.
+
+    Returns
+    -------
+    clear : bool
+        Whether the block is surely convex and clear of the ground and of barriers.
+    start : float
+        Chainage of its centroid [m].
+    """
+    if not is_sound(corners) or not surely_on_ground(chain, corners) or _near(corners, boxes):
+        return False, 0.0
+    write_bodies(corners, traits, bodies, outlines)
+    body, watched = bodies[0], rock[0]
+    watched.low, watched.high = body.x - body.radius, body.x + body.radius
+    passed = 0
+    while passed < len(stations) and stations[passed] <= body.x:
+        passed += 1
+    watched.next = passed
+    _set_interfaces(friction_deg, restitution, damping, interfaces)
+    size = math.sqrt(body.mass / traits[0, 0])
+    for k in range(len(parameters)):
+        p = parameters[k]
+        p.block_weight = body.mass * gravity
+        p.penetration, p.margin = PENETRATION_RATIO * size, MARGIN_RATIO * size
+    counters[:], ledger[:], deepest[:] = 0, 0.0, 0.0
+    return True, body.x
+
+
+_start = Direct(start_single)
+
+
+@kernel
+def _near(corners: NDArray, boxes: NDArray) -> bool:
+    """Return whether the bounding box of a block meets that of a barrier."""
+    left, right, low, high = math.inf, -math.inf, math.inf, -math.inf
+    for k in range(len(corners)):
+        left, right = min(left, corners[k, 0]), max(right, corners[k, 0])
+        low, high = min(low, corners[k, 1]), max(high, corners[k, 1])
+    for i in range(len(boxes)):
+        beside = left > boxes[i, 2] or right < boxes[i, 0]
+        if not beside and low <= boxes[i, 3] and high >= boxes[i, 1]:
+            return True
+    return False
+
+
+@kernel
+def _set_interfaces(
+    friction_deg: NDArray, restitution: NDArray, damping: NDArray, interfaces: Interfaces
+) -> None:
+    """Write how surfaces meet, but what no release draws, and the restitution of fences."""
+    for i in range(len(interfaces)):
+        for j in range(len(interfaces)):
+            interface = interfaces[i, j]
+            interface.friction = math.tan(math.radians(friction_deg[i, j]))
+            interface.damping = damping[i, j]
+            if i < len(restitution) and j < len(restitution):
+                interface.restitution = restitution[i, j]
+
+
+@short_kernel
+def read_single(
+    bodies: Bodies, rock: NDArray, counters: NDArray
+) -> tuple[
+    tuple[float, float], tuple[float, float], tuple[float, float], float, int, int
+]:  # fmt: skip
+    """Return place, velocity, extent and energy of a block, the steps taken and the events noted.
+
+    In [m], [m/s], [m] and [J], see `Descent`.
+    """
+    body, watched = bodies[0], rock[0]
+    extent = watched.low, watched.high
+    return (
+        (body.x, body.y), (body.vx, body.vy), extent, watched.energy, counters[STEPS],
+        counters[EVENTS],
+    )  # fmt: skip
+
+
+_read = Direct(read_single)

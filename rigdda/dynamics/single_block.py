@@ -16,21 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Outlines
-from rigdda.dynamics.constants import DONE, ENDED, MARGIN_RATIO, PENETRATION_RATIO
+from rigdda.dynamics.constants import AWAKE, MARGIN_RATIO, PENETRATION_RATIO
 from rigdda.dynamics.frames import no_frames
-from rigdda.dynamics.loop import advance_directly
+from rigdda.dynamics.loop import Loop
 from rigdda.dynamics.pack import pack
 from rigdda.dynamics.pack.again import together
 from rigdda.dynamics.pack.bodies import write_bodies
-from rigdda.dynamics.records import (
-    COUNTERS,
-    EVENTS,
-    LEDGER,
-    STEPS,
-    TARGET,
-    Bodies,
-    Interfaces,
-)
+from rigdda.dynamics.records import TARGET, Bodies, Interfaces
+from rigdda.errors import Diverged
 from rigdda.geometry import is_sound
 from rigdda.kernel import Direct, kernel, short_kernel
 from rigdda.model.apart import surely_on_ground
@@ -39,7 +32,7 @@ from rigdda.model.meetings import Meetings
 from rigdda.model.scene import Scene
 from rigdda.model.settings import EARTH, Settings
 
-ABSORBED, THRUST = (TARGET.names.index(name) for name in ("absorbed", "thrust"))
+ABSORBED, THRUST = (list(TARGET.fields or ()).index(name) for name in ("absorbed", "thrust"))
 """Places of these fields in a record of a barrier."""
 
 
@@ -93,15 +86,14 @@ class SingleBlock:
         leave: float,
     ):
         assert len(scene.blocks) == 1 and scene.smooth_ground is not None
-        self._dt, self._stations = settings.dt, stations
+        self._stations = stations
         self._gravity = math.hypot(*scene.gravity_vector) or EARTH
         self._surfaces = {name: i for i, name in enumerate(scene.surfaces)}
         packed = pack(scene, settings, stations, watch, leave)
-        self._counters = np.zeros(COUNTERS, dtype=np.int64)
-        self._ledger, self._deepest = np.zeros(len(LEDGER)), np.zeros(1)
         self._memory, self._arrays = together(packed)
         self._fresh = self._memory.copy()
-        self._frames = no_frames(packed.bodies)
+        self._loop = Loop(scene, self._arrays, settings.dt, timing=False)
+        self._no_frames = no_frames(packed.bodies)
         self._corners = np.zeros(scene.blocks[0].vertices.shape)
         self._traits = np.zeros((1, 6))  # see `pack.bodies.Trait`
         self._chain = np.array(scene.smooth_ground.points)
@@ -109,9 +101,7 @@ class SingleBlock:
         self._boxes = np.array(
             [[*corners.min(axis=0), *corners.max(axis=0)] for corners in outlines]
         ).reshape(-1, 4)
-        target = self._arrays.monitors.target.view(np.ndarray)
-        self._target, self._capacity, self._limit = target, target["capacity"], target["limit"]
-        self._event = self._arrays.monitors.event.view(np.ndarray)
+        self._target = self._arrays.monitors.target.view(np.ndarray)
 
     def run(
         self,
@@ -138,32 +128,27 @@ class SingleBlock:
         -------
         Descent or None
             None where it takes more than this to tell: the block may start in the ground or in a
-            barrier, is hardly convex, pushes an embankment away, or diverges.
+            barrier, is hardly convex, or the simulation diverges.
         """
-        a = self._arrays
+        a, loop = self._arrays, self._loop
         self._memory[:] = self._fresh
-        if len(capacities):
-            self._capacity[:], self._limit[:] = capacities, limits
+        loop.start(a)
+        if len(limits):
+            self._target["capacity"], self._target["limit"] = capacities, limits
         self._corners[:] = block.vertices
-        self._traits[0] = (block.density, *block.velocity, self._surfaces[block.surface], 0)
+        self._traits[0] = (block.density, *block.velocity, self._surfaces[block.surface], AWAKE)
         clear, start = _start.call(
             self._corners, self._traits, self._chain, self._boxes, meetings.friction_deg,
             meetings.restitution, meetings.damping, self._stations, self._gravity, a.bodies,
-            a.outlines, a.interfaces, a.monitors.rock, a.parameters, self._counters, self._ledger,
-            self._deepest,
+            a.outlines, a.interfaces, a.monitors.rock, a.parameters,
         )  # fmt: skip
         if not clear:
             return None
-        reason, _, _ = advance_directly.call(
-            a.bodies, a.outlines, a.ground, a.interfaces, a.links, a.shaking, a.now, a.before,
-            a.system, a.work, a.monitors, a.parameters, self._counters, self._ledger,
-            self._deepest, steps, self._frames, steps,
-        )  # fmt: skip
-        if reason != DONE and reason != ENDED:
+        try:
+            loop.advance(steps, self._no_frames)
+        except Diverged:
             return None
-        place, velocity, extent, energy, taken, happened = _read.call(
-            a.bodies, a.monitors.rock, self._counters
-        )
+        place, velocity, extent, energy = _read.call(a.bodies, a.monitors.rock)
         barriers = self._target.tolist()
         return Descent(
             start,
@@ -171,8 +156,8 @@ class SingleBlock:
             velocity,
             extent,
             energy,
-            taken * self._dt,
-            self._event[:happened].tolist(),
+            loop.time,
+            loop.events().tolist(),
             [barrier[ABSORBED] for barrier in barriers],
             [barrier[THRUST] for barrier in barriers],
         )
@@ -183,7 +168,6 @@ def start_single(
     corners: NDArray, traits: NDArray, chain: NDArray, boxes: NDArray, friction_deg: NDArray,
     restitution: NDArray, damping: NDArray, stations: NDArray, gravity: float, bodies: Bodies,
     outlines: Outlines, interfaces: Interfaces, rock: NDArray, parameters: NDArray,
-    counters: NDArray, ledger: NDArray, deepest: NDArray,
 ) -> tuple[bool, float]:  # fmt: skip
     """Write a block and how surfaces meet into arrays that are otherwise as at the start.
 
@@ -203,7 +187,7 @@ def start_single(
         Chainages that are watched [m].
     gravity : float
         Acceleration that gives the block its weight [m/s2].
-    bodies, outlines, interfaces, rock, parameters, counters, ledger, deepest : arrays
+    bodies, outlines, interfaces, rock, parameters : arrays
         What is written.
 
     Returns
@@ -228,7 +212,6 @@ def start_single(
         p = parameters[k]
         p.block_weight = body.mass * gravity
         p.penetration, p.margin = PENETRATION_RATIO * size, MARGIN_RATIO * size
-    counters[:], ledger[:], deepest[:] = 0, 0.0, 0.0
     return True, body.x
 
 
@@ -265,20 +248,12 @@ def _set_interfaces(
 
 @short_kernel
 def read_single(
-    bodies: Bodies, rock: NDArray, counters: NDArray
-) -> tuple[
-    tuple[float, float], tuple[float, float], tuple[float, float], float, int, int
-]:  # fmt: skip
-    """Return place, velocity, extent and energy of a block, the steps taken and the events noted.
-
-    In [m], [m/s], [m] and [J], see `Descent`.
-    """
+    bodies: Bodies, rock: NDArray
+) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float], float]:
+    """Return place [m], velocity [m/s], extent [m] and energy [J] of a block, see `Descent`."""
     body, watched = bodies[0], rock[0]
     extent = watched.low, watched.high
-    return (
-        (body.x, body.y), (body.vx, body.vy), extent, watched.energy, counters[STEPS],
-        counters[EVENTS],
-    )  # fmt: skip
+    return (body.x, body.y), (body.vx, body.vy), extent, watched.energy
 
 
 _read = Direct(read_single)

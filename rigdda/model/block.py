@@ -75,8 +75,8 @@ class Block:
     ) -> Block:
         """Return a block of finite floats that are known to be sound, unchecked.
 
-        Corners anticlockwise, of a simple polygon; they are copied. Checks take longer than all else in drawing a
-        release of one block.
+        Corners anticlockwise, of a simple polygon; they are copied. Checks take longer than all
+        else in drawing a release of one block.
         """
         block = object.__new__(cls)
         vertices = np.array(corners)

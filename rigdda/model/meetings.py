@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from rigdda.model.site import Site
 
 FRICTION, FRICTION_SD, RESTITUTION, RESTITUTION_SD, DAMPING, DAMPING_SD, VARIES = range(7)
-"""Columns of the table of surfaces: angle of friction [deg], coefficient of restitution [-], damping
-[1/s], inf where it is left to the scene, each with its standard deviation; 1 if a release draws
-them."""
+"""Columns of the table of surfaces: angle of friction [deg], coefficient of restitution [-] and
+damping [1/s], inf where it is left to the scene, each with its standard deviation; 1 if a release
+draws them."""
 
 Rows = tuple[int, int, int, int]
 """Two rows whose smaller values of friction and restitution count, and two for those of damping."""

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from rigdda.barriers import Built, Embankment, Fence, GravityWall, section
 from rigdda.barriers.base import Reach, sliding_resistance, surfaces_below
-from rigdda.dynamics.single_block import Descent, SingleBlock
+from rigdda.dynamics.single_block import MOST_CORNERS, Descent, SingleBlock
 from rigdda.dynamics.stations import chainages
-from rigdda.geometry import polygon_properties
+from rigdda.geometry import clearly_convex, polygon_properties
 from rigdda.model.events import Drawn
 from rigdda.model.meetings import Meetings
 from rigdda.model.scene import Scene
@@ -81,7 +81,7 @@ class SingleReleases:
         self._lines = stations(site, scene.barriers)
         self._leave = leave(site, scene)
         self._standing = [self._stand(i, names) for i in range(len(layout))]
-        self._blocks: dict[tuple[int, float], SingleBlock] = {}
+        self._blocks: dict[float, SingleBlock] = {}  # by the step [s]
 
     def _stand(self, index: int, names: list[str]) -> Standing:
         """Return how a barrier stands; `names` are those of the surfaces in their order."""
@@ -104,15 +104,17 @@ class SingleReleases:
         None where it takes a scene to tell, see `SingleBlock.run`.
         """
         (block,) = drawn.blocks
-        if block.fixed:
+        if block.fixed or len(block.vertices) > MOST_CORNERS:
             return None
         site, meetings = self._site, self._meetings
         meetings.draw(drawn)
         area = polygon_properties(block.vertices)[0]
         most = longest_step_of_single(area, self._gravity)
         dt = site.motion.dt / max(1, math.ceil(site.motion.dt / most))
-        arrays = self._blocks.get((len(block.vertices), dt))
+        arrays = self._blocks.get(dt)
         if arrays is None:
+            if not clearly_convex(block.vertices):
+                return None
             arrays = self._packed(drawn, dt)
         barriers = [barrier.for_width(drawn.width) for barrier in self._layout]
         resistances = [self._resistance(i, barrier) for i, barrier in enumerate(barriers)]
@@ -124,11 +126,11 @@ class SingleReleases:
         return self._ending(found, area, block.density, barriers, resistances)
 
     def _packed(self, drawn: Drawn, dt: float) -> SingleBlock:
-        """Return new arrays for blocks with as many corners as what was drawn, and a step [s]."""
+        """Return new arrays for single blocks that are computed in a step [s]."""
         scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
         lines, settings = chainages(self._lines), Settings(dt=dt)
         found = SingleBlock(scene, settings, lines, watch(self._site), self._leave)
-        self._blocks[len(drawn.blocks[0].vertices), dt] = found
+        self._blocks[dt] = found
         return found
 
     def _resistance(self, index: int, barrier: Built) -> float:

@@ -36,6 +36,10 @@ ABSORBED, THRUST = (list(TARGET.fields or ()).index(name) for name in ("absorbed
 """Places of these fields in a record of a barrier."""
 
 
+MOST_CORNERS = 12
+"""Most corners of such a block: blocks of a band have no more."""
+
+
 class Descent(NamedTuple):
     """What came of a block."""
 
@@ -90,11 +94,12 @@ class SingleBlock:
         self._gravity = math.hypot(*scene.gravity_vector) or EARTH
         self._surfaces = {name: i for i, name in enumerate(scene.surfaces)}
         packed = pack(scene, settings, stations, watch, leave)
+        packed = packed._replace(outlines=_with_room(packed.outlines))
         self._memory, self._arrays = together(packed)
         self._fresh = self._memory.copy()
         self._loop = Loop(scene, self._arrays, settings.dt, timing=False)
         self._no_frames = no_frames(packed.bodies)
-        self._corners = np.zeros(scene.blocks[0].vertices.shape)
+        self._corners = np.zeros((MOST_CORNERS, 2))
         self._traits = np.zeros((1, 6))  # see `pack.bodies.Trait`
         self._chain = np.array(scene.smooth_ground.points)
         outlines = [scene.outline(i) for i in scene.bodies]
@@ -111,12 +116,12 @@ class SingleBlock:
         limits: Sequence[float],
         steps: int,
     ) -> Descent | None:
-        """Return what comes of a block with as many corners as that of the scene.
+        """Return what comes of a block.
 
         Parameters
         ----------
         block : Block
-            The block.
+            The block, with `MOST_CORNERS` at most.
         meetings : Meetings
             How surfaces meet.
         capacities, limits : sequence of float
@@ -135,10 +140,11 @@ class SingleBlock:
         loop.start(a)
         if len(limits):
             self._target["capacity"], self._target["limit"] = capacities, limits
-        self._corners[:] = block.vertices
+        corners = self._corners[: len(block.vertices)]
+        corners[:] = block.vertices
         self._traits[0] = (block.density, *block.velocity, self._surfaces[block.surface], AWAKE)
         clear, start = _start.call(
-            self._corners, self._traits, self._chain, self._boxes, meetings.friction_deg,
+            corners, self._traits, self._chain, self._boxes, meetings.friction_deg,
             meetings.restitution, meetings.damping, self._stations, self._gravity, a.bodies,
             a.outlines, a.interfaces, a.monitors.rock, a.parameters,
         )  # fmt: skip
@@ -161,6 +167,16 @@ class SingleBlock:
             [barrier[ABSORBED] for barrier in barriers],
             [barrier[THRUST] for barrier in barriers],
         )
+
+
+def _with_room(outlines: Outlines) -> Outlines:
+    """Return outlines, the first one of a single block, with room for one of `MOST_CORNERS`."""
+    corner, local = outlines.corner, outlines.local
+    more = max(0, MOST_CORNERS - corner.shape[1])
+    wide = np.pad(corner.view(np.ndarray), ((0, 0), (0, more)))
+    wide["number"][0] = np.arange(wide.shape[1])
+    wide_local = np.pad(local.view(np.ndarray), ((0, 0), (0, more)))
+    return Outlines(outlines.polygon, wide.view(np.recarray), wide_local.view(np.recarray))
 
 
 @short_kernel
@@ -199,6 +215,7 @@ def start_single(
     """
     if not is_sound(corners) or not surely_on_ground(chain, corners) or _near(corners, boxes):
         return False, 0.0
+    bodies[0].count = outlines.polygon[0].count = len(corners)
     write_bodies(corners, traits, bodies, outlines)
     body, watched = bodies[0], rock[0]
     watched.low, watched.high = body.x - body.radius, body.x + body.radius

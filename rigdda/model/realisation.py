@@ -18,6 +18,7 @@ from rigdda.model.events import Drawn
 from rigdda.model.roughness import Roughness
 from rigdda.model.scene import Scene
 from rigdda.model.source import Source
+from rigdda.model.streams import stream
 from rigdda.model.surface import MOST_DAMPING, Surface, smaller
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def draw(site: Site, seed: int, event: str | None) -> Drawn:
     if rock.band is None:
         normal, blocks = _cut(msgspec.json.encode(rock), seed, index)
     else:
-        rng = np.random.Generator(np.random.PCG64([seed, index]))  # that of default_rng
+        rng = stream((seed, index))
         normal = rng.standard_normal()
         areas, drawn = boulders.draw(rng, rock, what, boulders.line(site.slope.points))
         blocks = tuple(drawn)
@@ -73,7 +74,7 @@ def _ground(
     """
     strengths: tuple[tuple[float, float, float], ...] = ()
     if any(surface.varies for surface in site.surfaces.values()):
-        rng = np.random.Generator(np.random.PCG64([seed, index, STRENGTHS]))
+        rng = stream((seed, index, STRENGTHS))
         drawn = rng.standard_normal((len(site.surfaces), 3)).tolist()
         strengths = tuple((_cut_off(a), _cut_off(b), _cut_off(c)) for a, b, c in drawn)
     amplitude = {name: s.roughness for name, s in site.surfaces.items() if s.roughness > 0.0}

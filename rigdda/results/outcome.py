@@ -6,7 +6,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, compress
 from operator import and_
 
 import numpy as np
@@ -136,27 +136,27 @@ def judge(site: Site, ended: Ending, event: str, width: float) -> Outcome:
     held = [at == 0 and any(r[k] for r in reach) for k, at in enumerate(on)]
 
     def share(where: Iterable[bool]) -> float:
-        return sum(w for w, here in zip(weight, where, strict=True) if here) / GRAIN
+        return sum(compress(weight, where)) / GRAIN
 
     def size(where: Iterable[bool]) -> float:
-        return math.fsum(a for a, here in zip(areas, where, strict=True) if here)
+        return math.fsum(compress(areas, where))
 
     return Outcome(
         event=event,
         width=width,
         released_mass=mass,
-        released_volume=width * size(w > 0.0 for w in weight),
+        released_volume=width * size([w > 0.0 for w in weight]),
         road_volume=width * size(came),
         reached=any(came),
         reach=ended.extent,
         debris_fraction=share(came),
-        debris_on_road=size(at == 1 for at in on),
+        debris_on_road=size([at == 1 for at in on]),
         max_energy_on_road=ended.road_energy,
         run_out=_run_out([min(x, road.end) for x, _ in places], weight),
-        slope_fraction=share(at == 0 and not h for at, h in zip(on, held, strict=True)),
+        slope_fraction=share([at == 0 and not h for at, h in zip(on, held, strict=True)]),
         held_fraction=share(held),
-        road_fraction=share(at == 1 for at in on),
-        beyond_fraction=share(at == 2 for at in on),
+        road_fraction=share([at == 1 for at in on]),
+        beyond_fraction=share([at == 2 for at in on]),
         barriers=tuple(
             measure_barrier(
                 own,
@@ -176,7 +176,7 @@ def _cut_off(site: Site, ended: Ending, weight: Sequence[float]) -> bool:
         return False  # nothing moved any more that matters
     pairs = zip(ended.places, ended.speeds, strict=True)
     moves = [x < site.road.start and speed > CUT_OFF for (x, _), speed in pairs]
-    return sum(w for w, on in zip(weight, moves, strict=True) if on) > MUCH * GRAIN
+    return sum(compress(weight, moves)) > MUCH * GRAIN
 
 
 def _weights(masses: Sequence[float]) -> tuple[float, list[float]]:

@@ -46,8 +46,9 @@ def as_site(site: Site) -> Site:
 class Batch:
     """Releases of a site with a layout, one after the other.
 
-    The ground and what stands on it are built once. For a release its blocks are checked and
-    written into the arrays of the last one, with what it draws of the ground. Outcomes are those of
+    The ground and what stands on it are built once, by the first release. Later ones of a single
+    block go without a scene, see `rigdda.single`. Of others the blocks are checked and written into
+    the arrays of the last one, with what is drawn of the ground. Outcomes are those of
     `rigdda.release`, whatever the order.
 
     Parameters
@@ -89,10 +90,8 @@ class Batch:
 
     def ending(self, drawn: Drawn) -> Ending:
         """Return how a release of what was drawn ends. Raises as `rigdda.release` does."""
-        if len(drawn.blocks) == 1 and self._base is not None:
-            if self._single is None and can_share(self._site, self._base[0]):
-                self._single = SingleReleases(self._site, self._standing, self._base[0])
-            ended = None if self._single is None else self._single.ending(drawn)
+        if len(drawn.blocks) == 1 and self._single is not None:
+            ended = self._single.ending(drawn)
             if ended is not None:
                 return ended
         duration = self._site.motion.duration
@@ -106,6 +105,8 @@ class Batch:
         if self._base is None:
             scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
             self._base = scene, drawn
+            if can_share(self._site, scene):
+                self._single = SingleReleases(self._site, self._standing, scene)
             return scene
         base, first = self._base
         surfaces, interfaces = base.surfaces, base.interfaces

@@ -200,21 +200,16 @@ def stage(function: Callable[..., Any]) -> Any:
 
 def entry_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls, and keep the machine code on disk."""
-    return _kept(function, {**INSIDE, "no_cpython_wrapper": False})
+    return _kept(function, nogil=True)
 
 
 def short_kernel(function: Callable[..., Any]) -> Any:
-    """Compile an entry kernel that runs for microseconds, during which other threads wait.
-
-    An entry kernel lets other threads run Python meanwhile. To get its turn back a thread may have
-    to wait for another one, and changing threads takes longer than such a kernel.
-    """
-    return _kept(function, {**INSIDE, "no_cpython_wrapper": False, "nogil": False})
+    """Compile an entry kernel of microseconds: to let other threads run meanwhile takes longer."""
+    return _kept(function, nogil=False)
 
 
-def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """Compile a kernel, and keep the machine code on disk."""
-    compiled = numba.njit(**options)(function)
+def _kept(function: Callable[..., Any], nogil: bool) -> Any:
+    compiled = numba.njit(**{**INSIDE, "no_cpython_wrapper": False, "nogil": nogil})(function)
     if config.DISABLE_JIT:
         return compiled
     before = config.CACHE_DIR

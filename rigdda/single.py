@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from rigdda.barriers import Built, Embankment, Fence, GravityWall, section
 from rigdda.barriers.base import Reach, sliding_resistance, surfaces_below
-from rigdda.dynamics.single_block import MOST_CORNERS, Descent, SingleBlock
+from rigdda.dynamics.pack.single import MOST_CORNERS
+from rigdda.dynamics.single_block import Descent, SingleBlock
 from rigdda.dynamics.stations import chainages
 from rigdda.geometry import clearly_convex, polygon_properties
 from rigdda.model.events import Drawn

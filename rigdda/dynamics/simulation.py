@@ -217,8 +217,9 @@ class Simulation:
                 error.run = self._record(kept, start + np.array(at))
                 raise
         # what follows from the load by default is as stiff as it should be
-        own = self.settings.penetration is not None or self._has_plain_contacts()
-        give = compression(self.loop.arrays, self.loop.contacts) if own else 0.0
+        plain = bool((self.loop.contacts["kind"] == PLAIN).any())
+        stated = plain or self.settings.penetration is not None
+        give = compression(self.loop.arrays, self.loop.contacts) if stated else 0.0
         if give > SOFT:
             warnings.warn(
                 f"contacts at rest give way by {give:.2g} of a block: what stands "
@@ -227,10 +228,6 @@ class Simulation:
                 stacklevel=2,
             )
         return self._record(kept, start + np.array(at))
-
-    def _has_plain_contacts(self) -> bool:
-        """Return whether a contact of the last step is one of a stiffness of its own."""
-        return bool((self.loop.contacts["kind"] == PLAIN).any())
 
     def _record(self, kept: list[NDArray], steps: NDArray) -> Run:
         """Return a run of the first frames that were kept, which were reached in such steps."""

@@ -1,4 +1,4 @@
-"""Streams of random numbers by seeds, those of numpy in half the time.
+"""Streams of random numbers by seeds, those of numpy in a quarter of the time.
 
 `numpy.random.default_rng(seed)` takes 7 us, most of it to hash the seed, which is a good part of
 drawing a block. Here a kernel hashes it as `numpy.random.SeedSequence` does, whose results are the

@@ -1,8 +1,8 @@
 """Processor time of a release in a batch: of one block or more, with and without barriers.
 
 Releases of the design site `bench` one after the other, as `rigdda.release_many` computes them in
-each of its threads, in steps of 10, 5 and 2.5 ms. The time is split into what is drawn and checked
-(scene), what is written into the arrays (pack), the steps (run) and the outcome.
+each of its threads, in steps of 10, 5 and 2.5 ms. The time is split into what is drawn (draw), the
+steps with what is written before and read after them (run), and what it means (outcome).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from experiments.script import Number, main, say, write
 from rigdda import Embankment, Fence, Layout, Site, sites
 from rigdda.batch import Batch
-from rigdda.results.outcome import measure
+from rigdda.results.outcome import judge
 
 SITE, TARGET = "bench", 0.5
 EVENTS = {"one block": "block", "group": "group", "slab": "slab"}
@@ -27,25 +27,22 @@ LAYOUTS: dict[str, Layout] = {
     "fence": (Fence(31.0, 4.0, capacity=1e6),),
     "embankment": (Embankment(31.0, 1.5),),
 }
-PARTS = ("scene", "pack", "run", "outcome")
+PARTS = ("draw", "run", "outcome")
 WARM = 20
 """Releases before those that are timed, by which all is packed that is packed once."""
 
 
 def cost(site: Site, layout: Layout, event: str, releases: int) -> dict[str, float]:
     """Return the mean processor time of each part of a release [ms]."""
-    batch, duration = Batch(site, layout), site.motion.duration
+    batch = Batch(site, layout)
     seconds = np.zeros((releases, len(PARTS)))
     for seed in range(-WARM, releases):
         clock = [time.thread_time()]
         drawn = site.draw(seed % releases, event)
-        scene = batch.scene(drawn)
         clock.append(time.thread_time())
-        simulation = batch.simulation(scene)
+        ended = batch.ending(drawn)
         clock.append(time.thread_time())
-        run = simulation.run(duration, duration)
-        clock.append(time.thread_time())
-        measure(site, run, drawn.event, drawn.width)
+        judge(site, ended, drawn.event, drawn.width)
         clock.append(time.thread_time())
         if seed >= 0:
             seconds[seed] = np.diff(clock)

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rigdda.kernel import Direct, entry_kernel, kernel
+from rigdda.kernel import Direct, kernel, short_kernel
 
 CLEARLY = 1e-6
 """Turn at a corner, or area, over the square of the perimeter that is more than rounding [-]."""
@@ -43,7 +43,7 @@ def moments(vertices: NDArray, low: int, high: int) -> tuple[float, float, float
     return area, x0 + x, y0 + y, second / 12.0 - area * (x * x + y * y)
 
 
-@entry_kernel
+@short_kernel
 def moments_of(vertices: NDArray) -> tuple[float, float, float, float]:
     """Return the `moments` of a whole polygon."""
     return moments(vertices, 0, len(vertices))
@@ -64,7 +64,7 @@ def polygon_properties(
     return area, np.array([x, y]), second
 
 
-@entry_kernel
+@short_kernel
 def is_sound(vertices: NDArray) -> bool:
     """Return whether a polygon is anticlockwise and clearly convex, so that it is simple.
 

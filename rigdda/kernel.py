@@ -153,7 +153,7 @@ class KernelCache(FunctionCache):
             warnings.warn(f"compiled kernels are not kept: {error}", RuntimeWarning, stacklevel=2)
 
 
-INSIDE = {
+INSIDE: dict[str, Any] = {
     "nogil": True,
     "error_model": "numpy",
     "_nrt": False,
@@ -200,7 +200,16 @@ def stage(function: Callable[..., Any]) -> Any:
 
 def entry_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls, and keep the machine code on disk."""
-    compiled = numba.njit(**{**INSIDE, "no_cpython_wrapper": False})(function)
+    return _kept(function, nogil=True)
+
+
+def short_kernel(function: Callable[..., Any]) -> Any:
+    """Compile an entry kernel of microseconds: to let other threads run meanwhile takes longer."""
+    return _kept(function, nogil=False)
+
+
+def _kept(function: Callable[..., Any], nogil: bool) -> Any:
+    compiled = numba.njit(**{**INSIDE, "no_cpython_wrapper": False, "nogil": nogil})(function)
     if config.DISABLE_JIT:
         return compiled
     before = config.CACHE_DIR

@@ -19,6 +19,10 @@ MANY = 0.05
 """Share of some releases that may be cut off without a warning: one late block in a hundred."""
 
 
+TOGETHER = 16
+"""Most releases that a thread takes at a time."""
+
+
 def release(
     site: Site,
     layout: Sequence[Barrier] = (),
@@ -112,8 +116,11 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     groups: dict[tuple[int, Layout], list[int]] = {}
     for place, (site, layout, _, _) in enumerate(each):
         groups.setdefault((id(site), layout), []).append(place)
-    queue = iter([place for group in groups.values() for place in group])
     threads = max(1, min(threads, len(each)))
+    most = max(1, min(TOGETHER, len(each) // (8 * threads)))
+    queue = iter(
+        [group[i : i + most] for group in groups.values() for i in range(0, len(group), most)]
+    )
     with ThreadPoolExecutor(threads) as pool:
         parts = list(pool.map(lambda _: outcomes(each, queue), range(threads)))
     found = sorted((pair for part in parts for pair in part), key=lambda pair: pair[0])

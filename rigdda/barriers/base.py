@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable
 from itertools import pairwise
@@ -113,6 +114,13 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
         """Check and set a field."""
         fields.set_number(self, name, low, high, open_low=low == 0.0, field=f"{self.words} {name}")
 
+    def _with(self, **values: float | None) -> Self:
+        """Return it with other values, which are known to be sound and are not checked."""
+        other = copy.copy(self)
+        for name, value in values.items():
+            msgspec.structs.force_setattr(other, name, value)
+        return other
+
     @property
     def words(self) -> str:
         """Name of the kind in words."""
@@ -130,11 +138,26 @@ def base_friction(scene: Scene, density: float, own: str, outline: Floats) -> fl
     The friction is the least of its surface, `own`, on those under it.
     """
     assert scene.terrain is not None
+    below = surfaces_below(scene.terrain, outline)
+    angle = min(scene.interface(own, name).friction_deg for name in below)
+    return sliding_resistance(-scene.gravity_vector[1], density, section(outline), angle)
+
+
+def surfaces_below(terrain: Terrain, outline: Floats) -> list[str]:
+    """Return the names of the surfaces of the terrain below an outline, each segment's."""
     low, high = outline[:, 0].min(), outline[:, 0].max()
-    extents = (sorted(ends) for ends in pairwise(scene.terrain.points[:, 0]))
-    angle = min(
-        scene.interface(own, name).friction_deg
-        for (start, end), name in zip(extents, scene.terrain.surfaces, strict=True)
+    extents = (sorted(ends) for ends in pairwise(terrain.points[:, 0]))
+    return [
+        name
+        for (start, end), name in zip(extents, terrain.surfaces, strict=True)
         if start < high and end > low
-    )
-    return -scene.gravity_vector[1] * density * section(outline) * math.tan(math.radians(angle))
+    ]
+
+
+def sliding_resistance(gravity: float, density: float, area: float, friction_deg: float) -> float:
+    """Return the thrust that slides a body over level ground [N/m].
+
+    Its weight times the coefficient of friction, for gravity [m/s2], density [kg/m3], area [m2] and
+    angle of friction [deg].
+    """
+    return gravity * density * area * math.tan(math.radians(friction_deg))

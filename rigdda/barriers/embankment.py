@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, Self
 
-import msgspec
 import numpy as np
 
 from rigdda.barriers.base import BarrierBase, Floats, Reach, base_friction, section
@@ -63,7 +62,7 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
         degrees.
         """
         factor = (width + 2.0 * self.height) / width
-        return msgspec.structs.replace(self, density=self.density * factor)
+        return self._with(density=self.density * factor)
 
     @property
     def end(self) -> float:

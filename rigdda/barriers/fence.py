@@ -151,7 +151,7 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         if self.energy_class is None:
             return self
         capacity = 1e3 * self.energy_class / min(width, PANEL)
-        return msgspec.structs.replace(self, capacity=capacity, energy_class=None)
+        return self._with(capacity=capacity, energy_class=None)
 
     def outline(self, ground: Terrain) -> Floats:
         """Return the (4, 2) corners, the foot below all ground over which it may give way.

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda.dynamics.arrays import Ground
 from rigdda.dynamics.constants import (
     ASLEEP,
     AWAKE,
@@ -24,14 +26,19 @@ from rigdda.dynamics.pack.ground import pack_ground
 from rigdda.dynamics.pack.space import empty_contacts, empty_system, empty_work
 from rigdda.dynamics.readings import contact_table, divergence
 from rigdda.dynamics.records import CONTACTS, COUNTERS, EVENTS, LEDGER, STEPS, Contacts
-from rigdda.dynamics.run import EVENT
 from rigdda.dynamics.step import advance
 from rigdda.errors import Diverged
 from rigdda.kernel import Direct
-from rigdda.model.scene import Scene
+from rigdda.model.scene import Scene, Terrain
 
 advance_directly = Direct(advance)
 """The step loop; the types of its arrays are the same for every scene."""
+
+
+@lru_cache(maxsize=16)
+def _packed_ground(ground: Terrain | None, names: tuple[str, ...]) -> Ground:
+    """Return a ground in arrays: releases of a site have the same one left, and only read it."""
+    return pack_ground(ground, list(names))
 
 
 class Loop:
@@ -66,11 +73,16 @@ class Loop:
 
     def __init__(self, scene: Scene, arrays: Arrays, dt: float, timing: bool):
         self._scene, self._dt, self._timing = scene, dt, timing
-        self.arrays = arrays
-        self.now, self.before = arrays.now, arrays.before
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.ledger = np.zeros(len(LEDGER))
         self.deepest = np.zeros(1)
+        self.start(arrays)
+
+    def start(self, arrays: Arrays) -> None:
+        """Begin with arrays before the first step, whatever was done before."""
+        self.arrays = arrays
+        self.now, self.before = arrays.now, arrays.before
+        self.counters[:], self.ledger[:], self.deepest[:] = 0, 0.0, 0.0
         self.seconds = 0.0
         self._events: list[NDArray[np.void]] = []
 
@@ -154,7 +166,7 @@ class Loop:
     def events(self) -> NDArray[np.void]:
         """Return what happened so far, an array of EVENT."""
         self._drain_events()
-        return np.concatenate([np.zeros(0, dtype=EVENT), *self._events])
+        return self._events[0] if len(self._events) == 1 else np.concatenate(self._events)
 
     def _drain_events(self) -> None:
         """Keep the events that the kernels noted, and make room for others."""
@@ -166,7 +178,8 @@ class Loop:
         """Take the embankments that were pushed away off the ground, and wake what sleeps."""
         failed = self.events()
         gone = failed["target"][failed["kind"] == FAILED]
-        ground = pack_ground(self._scene.ground_without(gone), list(self._scene.surfaces))
+        left, names = self._scene.ground_without(gone), tuple(self._scene.surfaces)
+        ground = _packed_ground(left, names)
         self.arrays = self.arrays._replace(ground=ground)
         bodies, contacts = self.arrays.bodies, self.now
         bodies["quiet"][bodies["status"] == ASLEEP] = 0.0

@@ -218,8 +218,9 @@ class Simulation:
                 raise
         # what follows from the load by default is as stiff as it should be
         plain = bool((self.loop.contacts["kind"] == PLAIN).any())
-        give = compression(self.loop.arrays, self.loop.contacts)
-        if (plain or self.settings.penetration is not None) and give > SOFT:
+        stated = plain or self.settings.penetration is not None
+        give = compression(self.loop.arrays, self.loop.contacts) if stated else 0.0
+        if give > SOFT:
             warnings.warn(
                 f"contacts at rest give way by {give:.2g} of a block: what stands "
                 "or falls may hang on it; give Settings a smaller penetration",

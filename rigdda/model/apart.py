@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rigdda.errors import BadInput
 from rigdda.geometry import overlap
-from rigdda.kernel import Direct, entry_kernel
+from rigdda.kernel import Direct, short_kernel
 from rigdda.model.terrain import Terrain
 
 FEW = 16
@@ -94,7 +94,7 @@ def in_ground(ground: Terrain, outlines: Sequence[NDArray[np.float64]]) -> Sunk 
     return found and Sunk(doubtful[found.block], found.shared)
 
 
-@entry_kernel
+@short_kernel
 def surely_on_ground(chain: NDArray, corners: NDArray) -> bool:
     """Return whether surely no more than a hundredth of a polygon is below a chain.
 

@@ -68,15 +68,15 @@ class Block:
     @classmethod
     def sound(
         cls,
-        corners: Sequence[tuple[float, float]],
+        corners: ArrayLike,
         density: float,
         surface: str,
         velocity: tuple[float, float, float],
     ) -> Block:
         """Return a block of finite floats that are known to be sound, unchecked.
 
-        Corners anticlockwise, of a simple polygon. Checks take longer than all else in drawing a
-        release of one block.
+        Corners anticlockwise, of a simple polygon; they are copied. Checks take longer than all
+        else in drawing a release of one block.
         """
         block = object.__new__(cls)
         vertices = np.array(corners)

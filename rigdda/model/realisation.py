@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 import numpy as np
@@ -18,10 +18,13 @@ from rigdda.model.events import Drawn
 from rigdda.model.roughness import Roughness
 from rigdda.model.scene import Scene
 from rigdda.model.source import Source
+from rigdda.model.streams import stream
 from rigdda.model.surface import MOST_DAMPING, Surface, smaller
 
 if TYPE_CHECKING:
     from rigdda.model.site import Site
+
+Value = TypeVar("Value")
 
 ROUNDING = 1e-9
 """Length by which a barrier may reach into loose rock [m]: vectors lose last digits of its edge."""
@@ -54,7 +57,7 @@ def draw(site: Site, seed: int, event: str | None) -> Drawn:
     if rock.band is None:
         normal, blocks = _cut(msgspec.json.encode(rock), seed, index)
     else:
-        rng = np.random.Generator(np.random.PCG64([seed, index]))  # that of default_rng
+        rng = stream((seed, index))
         normal = rng.standard_normal()
         areas, drawn = boulders.draw(rng, rock, what, boulders.line(site.slope.points))
         blocks = tuple(drawn)
@@ -71,15 +74,20 @@ def _ground(
     """
     strengths: tuple[tuple[float, float, float], ...] = ()
     if any(surface.varies for surface in site.surfaces.values()):
-        rng = np.random.Generator(np.random.PCG64([seed, index, STRENGTHS]))
-        drawn = np.clip(rng.standard_normal((len(site.surfaces), 3)), -FARTHEST, FARTHEST)
-        strengths = tuple(map(tuple, drawn.tolist()))
+        rng = stream((seed, index, STRENGTHS))
+        drawn = rng.standard_normal((len(site.surfaces), 3)).tolist()
+        strengths = tuple((_cut_off(a), _cut_off(b), _cut_off(c)) for a, b, c in drawn)
     amplitude = {name: s.roughness for name, s in site.surfaces.items() if s.roughness > 0.0}
     if not amplitude:
         return strengths, None
     event = site.events[index]
     spacing = event.block_size(site.source(event.source))
     return strengths, Roughness(spacing, amplitude, (seed, index, PITS))
+
+
+def _cut_off(normal: float) -> float:
+    """Return a normal number, or the nearest one that is not farther than `FARTHEST` from 0."""
+    return min(max(normal, -FARTHEST), FARTHEST)
 
 
 def built(site: Site, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
@@ -134,8 +142,8 @@ def scene(site: Site, drawn: Drawn, barriers: Sequence[Built]) -> Scene:
     )
 
 
-def pairs(site: Site, surfaces: Mapping[str, Surface]) -> dict[tuple[str, str], Surface]:
-    """Return the surfaces of contacts: of rock with the ground the ground's."""
+def pairs(site: Site, surfaces: Mapping[str, Value]) -> dict[tuple[str, str], Value]:
+    """Return what counts in contacts of rock with the ground: of the two surfaces the ground's."""
     grounds = {site.slope.surface, *(s.surface for s in site.slope.surfaces)}
     if "soil" in site.surfaces:
         grounds.add("soil")  # embankments are ground

@@ -121,6 +121,14 @@ def longest_step(areas: NDArray[np.float64], gravity: float) -> float:
 
     Without gravity as under that of the earth.
     """
-    mean, least = math.sqrt(np.add.reduce(areas) / len(areas)), math.sqrt(areas.min())
-    g = gravity or EARTH
+    return _longest_step(np.add.reduce(areas) / len(areas), areas.min(), gravity)
+
+
+def longest_step_of_single(area: float, gravity: float) -> float:
+    """Return the longest step [s] that suits a single block of this area [m2]."""
+    return _longest_step(area, area, gravity)
+
+
+def _longest_step(mean_area: float, least_area: float, gravity: float) -> float:
+    mean, least, g = math.sqrt(mean_area), math.sqrt(least_area), gravity or EARTH
     return min(LONGEST_STEP * math.sqrt(mean / g), SMALLEST * math.sqrt(least / g))

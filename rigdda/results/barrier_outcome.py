@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rigdda.dynamics.run import Run
-from rigdda.results.log import Log
+from rigdda.results.ending import BarrierEnding
 from rigdda.results.states import STANDS
 
 GONE = ("failed", "overturned", "pushed")
@@ -78,39 +77,46 @@ class BarrierOutcome:
 
 
 def measure_barrier(
-    run: Run, index: int, states: Sequence[tuple[float, str]], log: Log, caught: float, edge: float
+    ended: BarrierEnding,
+    hits: Sequence[tuple[float, float]],
+    passed: Iterable[tuple[float, float]],
+    caught: float,
 ) -> BarrierOutcome:
-    """Return the outcome of a barrier that was in these states and caught a share of the mass.
+    """Return the outcome of a barrier.
 
-    `edge` is the uphill edge of the road [m].
+    Parameters
+    ----------
+    ended : BarrierEnding
+        The barrier in the end.
+    hits : sequence of (energy, height)
+        Hits of it [J, m].
+    passed : iterable of (start, time)
+        Chainage of each block at the start, and when it first passed the barrier [m, s].
+    caught : float
+        Share of the released mass that it holds at rest [-].
     """
-    barrier, hits, state = run.scene.barriers[index], log.hits[index], states[-1][1]
-    moved = math.dist(*run.barrier_poses[[0, -1], index, :2].tolist())
-    gone = next((time for time, state in states if state in GONE), math.inf)
-    passed = zip(run.poses[0, :, 0].tolist(), log.passed[barrier.end], strict=True)
+    barrier, state = ended.barrier, ended.states[-1][1]
+    gone = next((time for time, state in ended.states if state in GONE), math.inf)
     return BarrierOutcome(
         hits=len(hits),
         max_energy=max((energy for energy, _ in hits), default=0.0),
         total_energy=math.fsum(energy for energy, _ in hits),
-        absorbed_energy=float(run.absorbed[index]),
+        absorbed_energy=ended.absorbed,
         impact_heights=tuple(height for _, height in hits),
         overtopped=sum(x < barrier.x and time < gone for x, time in passed),
         failed=state != STANDS,
         caught=caught,
         state=state,
-        displacement=moved,
-        road_area=barrier.area_beyond(edge, run.outline(index)),
-        thrust=float(run.thrust[index]),
-        resistance=run.scene.resistance(index),
-        left_height=0.0 if state in GONE else barrier.left_height(moved),
+        displacement=ended.displacement,
+        road_area=ended.road_area,
+        thrust=ended.thrust,
+        resistance=ended.resistance,
+        left_height=0.0 if state in GONE else barrier.left_height(ended.displacement),
     )
 
 
-def holding(run: Run, index: int, state: str, at: Sequence[tuple[float, float]]) -> list[bool]:
+def holding(ended: BarrierEnding, places: Sequence[tuple[float, float]]) -> list[bool]:
     """Return which centroids (x, y) a barrier holds at the end, see `rigdda.Outcome`."""
-    scene, barrier = run.scene, run.scene.barriers[index]
-    if state in GONE:
-        return [False] * len(at)
-    rise = math.tan(math.radians(min(s.friction_deg for s in scene.surfaces.values())))
-    reach = barrier.holds(run.outline(index), scene.ground, rise)
-    return [reach.includes(x, y) for x, y in at]
+    if ended.states[-1][1] in GONE:
+        return [False] * len(places)
+    return [ended.reach.includes(x, y) for x, y in places]

@@ -6,19 +6,17 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, compress
 from operator import and_
 
 import numpy as np
 
 from rigdda.barriers import Barrier
 from rigdda.dynamics.run import Run
-from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Scene
 from rigdda.model.site import Site
 from rigdda.results.barrier_outcome import BarrierOutcome, holding, measure_barrier
-from rigdda.results.log import log_of
-from rigdda.results.states import states
+from rigdda.results.ending import Ending, ending
 
 GRAIN = 2.0**40
 """Fractions are whole multiples of 1/GRAIN, so that they add up to 1 exactly in any order."""
@@ -123,70 +121,70 @@ def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
 
     It is one of an event, so wide [m].
     """
-    scene, road = run.scene, site.road
-    area, weight, mass = _masses(scene)
-    log = log_of(run, stations(site, scene.barriers))
-    at = list(zip(*run.poses[-1, :, :2].T.tolist(), strict=True))
-    place = [2 if x > road.end else int(x >= road.start) for x, _ in at]
-    came = [time < math.inf for time in log.passed[road.start]]
-    speed = [math.hypot(vx, vy) for vx, vy, _ in run.velocities[-1].tolist()]
-    resting = [v < AT_REST for v in speed]
-    known = [states(run, i) for i in range(len(scene.barriers))]
-    reach = [holding(run, i, own[-1][1], at) for i, own in enumerate(known)]
-    held = [on == 0 and any(r[k] for r in reach) for k, on in enumerate(place)]
+    ended = ending(run, stations(site, run.scene.barriers), site.road.start)
+    return judge(site, ended, event, width)
+
+
+def judge(site: Site, ended: Ending, event: str, width: float) -> Outcome:
+    """Return the outcome of a release of an event, so wide [m], by how it ended."""
+    road, places, areas = site.road, ended.places, ended.areas
+    mass, weight = _weights(ended.masses)
+    on = [2 if x > road.end else int(x >= road.start) for x, _ in places]
+    came = [time < math.inf for time in ended.log.passed[road.start]]
+    resting = [speed < AT_REST for speed in ended.speeds]
+    reach = [holding(barrier, places) for barrier in ended.barriers]
+    held = [at == 0 and any(r[k] for r in reach) for k, at in enumerate(on)]
 
     def share(where: Iterable[bool]) -> float:
-        return sum(w for w, here in zip(weight, where, strict=True) if here) / GRAIN
+        return sum(compress(weight, where)) / GRAIN
 
     def size(where: Iterable[bool]) -> float:
-        return math.fsum(a for a, here in zip(area, where, strict=True) if here)
+        return math.fsum(compress(areas, where))
 
     return Outcome(
         event=event,
         width=width,
         released_mass=mass,
-        released_volume=width * size(w > 0.0 for w in weight),
+        released_volume=width * size([w > 0.0 for w in weight]),
         road_volume=width * size(came),
         reached=any(came),
-        reach=(float(run.extent[:, 0].min()), float(run.extent[:, 1].max())),
+        reach=ended.extent,
         debris_fraction=share(came),
-        debris_on_road=size(on == 1 for on in place),
-        max_energy_on_road=float(run.watch_energy.max()),
-        run_out=_run_out([min(x, road.end) for x, _ in at], weight),
-        slope_fraction=share(on == 0 and not h for on, h in zip(place, held, strict=True)),
+        debris_on_road=size([at == 1 for at in on]),
+        max_energy_on_road=ended.road_energy,
+        run_out=_run_out([min(x, road.end) for x, _ in places], weight),
+        slope_fraction=share([at == 0 and not h for at, h in zip(on, held, strict=True)]),
         held_fraction=share(held),
-        road_fraction=share(on == 1 for on in place),
-        beyond_fraction=share(on == 2 for on in place),
+        road_fraction=share([at == 1 for at in on]),
+        beyond_fraction=share([at == 2 for at in on]),
         barriers=tuple(
-            measure_barrier(run, i, own, log, share(map(and_, reach[i], resting)), road.start)
-            for i, own in enumerate(known)
+            measure_barrier(
+                own,
+                ended.log.hits[i],
+                zip(ended.starts, ended.log.passed[own.barrier.end], strict=True),
+                share(map(and_, reach[i], resting)),
+            )
+            for i, own in enumerate(ended.barriers)
         ),
-        cut_off=_cut_off(site, run, at, speed, weight),
+        cut_off=_cut_off(site, ended, weight),
     )
 
 
-def _cut_off(
-    site: Site,
-    run: Run,
-    at: Sequence[tuple[float, float]],
-    speed: Sequence[float],
-    weight: Sequence[float],
-) -> bool:
+def _cut_off(site: Site, ended: Ending, weight: Sequence[float]) -> bool:
     """Return whether much of the rock still moved above the road as the time was over."""
-    if run.times[-1] < site.motion.duration - site.motion.dt:
+    if ended.time < site.motion.duration - site.motion.dt:
         return False  # nothing moved any more that matters
-    moves = [x < site.road.start and v > CUT_OFF for (x, _), v in zip(at, speed, strict=True)]
-    return sum(w for w, on in zip(weight, moves, strict=True) if on) > MUCH * GRAIN
+    pairs = zip(ended.places, ended.speeds, strict=True)
+    moves = [x < site.road.start and speed > CUT_OFF for (x, _), speed in pairs]
+    return sum(compress(weight, moves)) > MUCH * GRAIN
 
 
-def _masses(scene: Scene) -> tuple[list[float], list[float], float]:
-    """Return areas, whole-number weights that add up to GRAIN, and the released mass."""
-    area = [polygon_properties(b.vertices)[0] for b in scene.blocks]
-    mass = [0.0 if b.fixed else b.density * a for b, a in zip(scene.blocks, area, strict=True)]
-    whole = math.fsum(mass)
-    weight = [math.floor(m / whole * GRAIN) * 1.0 for m in mass]
+def _weights(masses: Sequence[float]) -> tuple[float, list[float]]:
+    """Return the released mass [kg/m] and whole-number weights that add up to GRAIN."""
+    whole = math.fsum(masses)
+    weight = [math.floor(m / whole * GRAIN) * 1.0 for m in masses]
     weight[weight.index(max(weight))] += GRAIN - sum(weight)
-    return area, weight, whole
+    return whole, weight
 
 
 def _run_out(x: list[float], weight: list[float]) -> tuple[float, float, float]:

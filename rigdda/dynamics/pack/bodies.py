@@ -24,7 +24,7 @@ from rigdda.dynamics.correction import polygon_row, set_body_coordinates
 from rigdda.dynamics.correction import polygons as polygons_of
 from rigdda.dynamics.records import BODY, CORNER, LINK, LOCAL, POLYGON, Bodies, Floats, Links
 from rigdda.geometry import convex_parts, moments, polygon_properties, turns
-from rigdda.kernel import Direct, entry_kernel
+from rigdda.kernel import Direct, short_kernel
 from rigdda.model.scene import Block, Scene
 from rigdda.model.supports import FixedPoint
 
@@ -105,7 +105,7 @@ def write_polygons(
     _write.call(corners, np.array(traits, dtype=np.float64), bodies, outlines)
 
 
-@entry_kernel
+@short_kernel
 def write_bodies(corners: NDArray, traits: NDArray, bodies: Bodies, outlines: Outlines) -> None:
     """Set bodies at their start from the corners of one after the other, and place their corners.
 

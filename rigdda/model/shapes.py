@@ -1,0 +1,219 @@
+"""Shapes of loose blocks and the places where they come to rest, as kernels.
+
+Corners of a block lie on an ellipse, so that they are convex, at angles that are spaced at random
+within `JITTER`. A block that was measured fills a face of its box: natural blocks of given edges
+weigh half to two thirds of a full box, as such outlines do.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import NDArray
+
+from rigdda.kernel import Direct, kernel, short_kernel
+
+JITTER = 0.35
+"""Greatest shift of a corner over the mean spacing of corners [-]: with four corners the widest gap
+is 153 deg, so that the centre stays inside."""
+
+CLEAR = 0.01
+"""Height of a block above what it rests on at the start [m]: clear of it whatever the rounding."""
+
+EVEN = 1e-9
+"""Power of a power law of areas below which it counts as 0, so that the law is a logarithm [-]."""
+
+AREA, CORNERS, ASPECT, TURN, PLACE, SPEED, SPIN = 0, 1, 2, 3, 4, 5, 6
+"""Random numbers in [0, 1) of a block, by their place among those drawn for it. Of a block that was
+measured the first one picks its face, and the third one turns the corners within it."""
+
+DRAWN = 7
+"""How many these are; those of the places of its corners follow."""
+
+
+@short_kernel
+def write_shapes(
+    numbers: NDArray, least_corners: int, most_corners: int, least_area: float,
+    greatest_area: float, power: float, least_aspect: float, greatest_aspect: float, long: float,
+    middle: float, short: float, measured: bool, corners: NDArray, count: NDArray, area: NDArray,
+) -> None:  # fmt: skip
+    """Write the outlines of blocks about their places, anticlockwise.
+
+    Parameters
+    ----------
+    numbers : (N, DRAWN + most_corners) array
+        Random numbers of each block, in [0, 1).
+    least_corners, most_corners : int
+        How many corners a block has.
+    least_area, greatest_area : float
+        Areas of blocks that were not measured [m2].
+    power : float
+        The number of blocks larger than an area falls as the area to the power of minus this [-].
+    least_aspect, greatest_aspect : float
+        Length over breadth of such blocks [-].
+    long, middle, short : float
+        Edges of the box around a block that was measured [m].
+    measured : bool
+        Whether blocks were measured.
+    corners : (N, most_corners, 2) array
+        Corners that are written [m].
+    count : (N,) array of int
+        Number of corners that is written.
+    area : (N,) array
+        Areas that are written [m2].
+    """
+    for i in range(len(numbers)):
+        u, corner = numbers[i], corners[i]
+        n = least_corners + int(u[CORNERS] * (most_corners - least_corners + 1))
+        gap = 2.0 * math.pi / n
+        for k in range(n):
+            corner[k, 0] = gap * (k + JITTER * (2.0 * u[DRAWN + k] - 1.0))
+        double = math.sin(corner[0, 0] - corner[n - 1, 0])  # twice the area on a circle of radius 1
+        for k in range(1, n):
+            double += math.sin(corner[k, 0] - corner[k - 1, 0])
+        if measured:
+            half_long, half_short = _face(u, long, middle, short, corner, n)
+        else:
+            size = truncated_power(u[AREA], least_area, greatest_area, power)
+            aspect = least_aspect + u[ASPECT] * (greatest_aspect - least_aspect)
+            root = math.sqrt(2.0 * size / double)
+            half_long, half_short = root * math.sqrt(aspect), root / math.sqrt(aspect)
+        turn = 2.0 * math.pi * u[TURN]
+        cos, sin = math.cos(turn), math.sin(turn)
+        for k in range(n):
+            angle = corner[k, 0]
+            a, b = half_long * math.cos(angle), half_short * math.sin(angle)
+            corner[k, 0], corner[k, 1] = cos * a - sin * b, sin * a + cos * b
+        count[i], area[i] = n, 0.5 * half_long * half_short * double
+
+
+write_shapes_directly = Direct(write_shapes)
+
+
+@kernel
+def _face(
+    u: NDArray, long: float, middle: float, short: float, corner: NDArray, n: int
+) -> tuple[float, float]:
+    """Return the half axes of the ellipse whose corners fill a face of a box [m].
+
+    The angles, the first column of `corner`, are turned by a random phase first: else a corner is
+    at the end of an axis.
+    """
+    phase = 2.0 * math.pi * u[ASPECT]
+    left, right, low, high = math.inf, -math.inf, math.inf, -math.inf
+    for k in range(n):
+        angle = corner[k, 0] + phase
+        corner[k, 0] = angle
+        left, right = min(left, math.cos(angle)), max(right, math.cos(angle))
+        low, high = min(low, math.sin(angle)), max(high, math.sin(angle))
+    out = int(3.0 * u[AREA])  # the edge that points along the road
+    first = middle if out == 0 else (short if out == 1 else long)
+    second = short if out == 0 else (long if out == 1 else middle)
+    return first / (right - left), second / (high - low)
+
+
+@kernel
+def truncated_power(u: float, least: float, greatest: float, power: float) -> float:
+    """Return the area whose share u of a truncated power law is above it [m2]."""
+    if power < EVEN:
+        return least * (greatest / least) ** u
+    low, high = least**-power, greatest**-power
+    return (high + u * (low - high)) ** (-1.0 / power)
+
+
+@short_kernel
+def lay_blocks(
+    numbers: NDArray, start: float, end: float, row: int, ground: NDArray, corners: NDArray,
+    count: NDArray,
+) -> None:  # fmt: skip
+    """Move blocks to their places in a band, one after the other, just above what they rest on.
+
+    Parameters
+    ----------
+    numbers : (N, ...) array
+        Random numbers of each block, in [0, 1).
+    start, end : float
+        The band [m].
+    row : int
+        How many blocks lie side by side.
+    ground : (m, 2) array
+        Corners of the ground, which never turns back [m].
+    corners : (N, P, 2) array
+        Corners of the blocks about their places; then where they are [m].
+    count : (N,) array of int
+        Number of corners of each.
+    """
+    for i in range(len(count)):
+        x = start + (end - start) * (i % row + numbers[i, PLACE]) / row
+        mine = corners[i, : count[i]]
+        for k in range(len(mine)):
+            mine[k, 0] = x + mine[k, 0]
+        lift = _lift(mine, ground)
+        for j in range(i):
+            lift = max(lift, _lift_off(mine, corners[j, : count[j]]))
+        lift = CLEAR + lift
+        for k in range(len(mine)):
+            mine[k, 1] += lift
+
+
+lay_blocks_directly = Direct(lay_blocks)
+
+
+@kernel
+def _extent(corners: NDArray) -> tuple[float, float]:
+    """Return least and greatest chainage of a polygon [m]."""
+    left, right = corners[0, 0], corners[0, 0]
+    for k in range(1, len(corners)):
+        left, right = min(left, corners[k, 0]), max(right, corners[k, 0])
+    return left, right
+
+
+@kernel
+def _lift(corners: NDArray, ground: NDArray) -> float:
+    """Return how far a block must be lifted to rest on the ground [m]."""
+    left, right = _extent(corners)
+    lift = -math.inf
+    for s in range(len(ground) - 1):  # each piece of the ground that is below it
+        x, y, end, low = ground[s, 0], ground[s, 1], ground[s + 1, 0], ground[s + 1, 1]
+        if end <= left or x > right:
+            continue
+        if end > x:
+            rise = (low - y) / (end - x)
+            for k in range(len(corners)):
+                if x <= corners[k, 0] <= end:
+                    lift = max(lift, y + rise * (corners[k, 0] - x) - corners[k, 1])
+        if end <= right:  # and each corner of it
+            lift = max(lift, low - _cut_at(corners, end)[0])
+    return lift
+
+
+@kernel
+def _lift_off(corners: NDArray, other: NDArray) -> float:
+    """Return how far a block must be lifted to rest on another one, -inf: it is not over it [m]."""
+    left, right = _extent(corners)
+    its_left, its_right = _extent(other)
+    lift = -math.inf
+    if its_right <= left or its_left >= right:
+        return lift
+    for k in range(len(corners) + len(other)):
+        x = corners[k, 0] if k < len(corners) else other[k - len(corners), 0]
+        lift = max(lift, _cut_at(other, x)[1] - _cut_at(corners, x)[0])
+    return lift
+
+
+@kernel
+def _cut_at(corners: NDArray, x: float) -> tuple[float, float]:
+    """Return the least and the greatest elevation of a polygon at a chainage [m].
+
+    inf and -inf where it does not reach.
+    """
+    low, high = math.inf, -math.inf
+    last = len(corners) - 1
+    ax, ay = corners[last, 0], corners[last, 1]
+    for k in range(len(corners)):
+        bx, by = corners[k, 0], corners[k, 1]
+        if min(ax, bx) <= x <= max(ax, bx):
+            y = ay if ax == bx else ay + (by - ay) * (x - ax) / (bx - ax)
+            low, high = min(low, y), max(high, y)
+        ax, ay = bx, by
+    return low, high

@@ -1,0 +1,125 @@
+"""Single blocks that share arrays come down as they do in scenes of their own."""
+
+from __future__ import annotations
+
+import dataclasses
+from itertools import product
+
+import msgspec
+import numpy as np
+import pytest
+
+import rigdda
+from rigdda import BadInput, Block, Ditch, Embankment, Fence, Layout, Site, Wall, sites
+from rigdda.batch import Batch
+from rigdda.dynamics.pack.parameters import pack_interfaces
+from rigdda.model.meetings import Meetings
+from rigdda.model.place import Scatter
+from rigdda.model.streams import stream
+from rigdda.model.surface import Interface
+from rigdda.single import SingleReleases, can_share
+
+BENCH = sites.load("bench")
+PUSHED = Embankment(31.0, 0.6, width=0.5, density=300.0)
+LAYOUTS: dict[str, Layout] = {
+    "nothing": (),
+    "ditch and wall": (Ditch(25.0, 0.8, 2.5), Wall(31.0, 0.8)),
+    "fence of a class": (Fence(31.0, 2.0, energy_class=100),),
+    "fence that fails, embankment that is pushed away": (Fence(25.0, 2.0, capacity=2e4), PUSHED),
+}
+
+
+def varied(site: Site) -> Site:
+    """Return a site on which all that may differ from release to release does."""
+    pairs = (
+        Interface("soil", "rock", 35.0, restitution=0.2),
+        Interface("rock", "asphalt", 25.0, damping=0.4),
+        Interface("asphalt", "soil", 28.0, restitution=0.1),
+    )
+    surfaces = dict(site.surfaces)
+    surfaces["asphalt"] = rigdda.Surface(33.0, restitution=0.3)  # varies not, and has no damping
+    return msgspec.structs.replace(
+        site,
+        surfaces=surfaces,
+        interfaces=pairs,
+        scatter=Scatter(friction_deg=4.0),
+        motion=msgspec.structs.replace(site.motion, damping=0.5),
+    )
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+@pytest.mark.parametrize("site", [BENCH, varied(BENCH)], ids=["bench", "varied"])
+def test_outcomes_are_those_of_scenes(site, name):
+    events = ("block", "small", "block, below bench")
+    wanted = [(site, LAYOUTS[name], s, e) for s, e in product(range(8), events)]
+    found = rigdda.release_many(wanted, 1)
+    assert found == [rigdda.release(*job)[1] for job in wanted]
+    states = {b.state for outcome in found for b in outcome.barriers}
+    assert ({"failed", "pushed"} <= states) == ("fails" in name)
+
+
+@pytest.mark.parametrize("name", sites.design_names())
+def test_outcomes_are_those_of_scenes_on_every_site(name):
+    site = sites.load(name)
+    wanted = [(site, (), seed, e.name) for e in site.events for seed in range(6)]
+    wanted = [job for job in wanted if len(site.draw(*job[2:]).blocks) == 1]
+    for found, job in zip(rigdda.release_many(wanted, 1), wanted, strict=True):
+        assert found == rigdda.release(*job)[1], job
+
+
+@pytest.mark.parametrize("barriers", [(), (Fence(31.0, 3.0, capacity=1e6),)])
+@pytest.mark.parametrize("site", [BENCH, varied(BENCH)], ids=["bench", "varied"])
+def test_how_surfaces_meet(site, barriers):
+    for seed in range(20):
+        drawn = site.draw(seed, "block")
+        scene = site.scene(drawn, barriers)
+        meetings = Meetings(site, scene.barrier_surface if barriers else None)
+        meetings.draw(drawn)
+        wanted, names = pack_interfaces(scene, list(scene.surfaces)), len(scene.surfaces)
+        tangents = np.vectorize(lambda angle: np.tan(np.radians(angle)))(meetings.friction_deg)
+        np.testing.assert_allclose(wanted["friction"], tangents, rtol=1e-15)
+        np.testing.assert_array_equal(wanted["damping"], meetings.damping)
+        np.testing.assert_array_equal(wanted["restitution"][:names, :names], meetings.restitution)
+        least = min(surface.friction_deg for surface in scene.surfaces.values())
+        assert meetings.least_friction_deg == least
+
+
+def test_what_takes_a_scene_is_left_to_one():
+    drawn = BENCH.draw(0, "block")
+    scene = BENCH.scene(drawn)
+    assert can_share(BENCH, scene)
+    single = SingleReleases(BENCH, [], scene)
+    assert single.ending(drawn) is not None
+    (block,) = drawn.blocks
+    sunk = Block.sound(block.vertices - (0.0, 0.5), block.density, block.surface, block.velocity)
+    assert single.ending(drawn._replace(blocks=(sunk,))) is None
+    batch = Batch(BENCH, ())
+    batch.ending(drawn)
+    with pytest.raises(BadInput, match="in the ground"):
+        batch.ending(drawn._replace(blocks=(sunk,)))
+    corners = [(0.0, 30.0), (2.0, 30.0), (1.0, 30.5), (1.0, 32.0)]
+    bent = Block(corners, block.density, block.surface)
+    assert single.ending(drawn._replace(blocks=(bent,))) is None
+    rough = {name: msgspec.structs.replace(s, roughness=0.1) for name, s in BENCH.surfaces.items()}
+    uneven = msgspec.structs.replace(BENCH, surfaces=rough)
+    assert not can_share(uneven, uneven.realise((), 0, "block"))
+    moving = (rigdda.GravityWall(31.0, 1.5),)
+    assert not can_share(BENCH, BENCH.realise(moving, 0, "block"))
+
+
+def test_order_changes_no_outcome():
+    batch = Batch(BENCH, LAYOUTS["fence that fails, embankment that is pushed away"])
+    releases = [(seed, "block") for seed in range(12)]
+    found = batch.outcomes(releases)
+    assert batch.outcomes(releases[::-1]) == found[::-1]
+    assert [batch.outcome(*release) for release in releases] == found
+    assert all(dataclasses.is_dataclass(outcome) for outcome in found)
+
+
+@pytest.mark.parametrize(
+    "seed", [(0,), (7, 0), (7, 2, 1), (2**32 - 1, 5), (2**32, 5), (2**70, 1), (1, 2, 3, 4, 5)]
+)
+def test_streams_are_those_of_numpy(seed):
+    found, wanted = stream(seed), np.random.default_rng(list(seed))
+    assert found.bit_generator.state == wanted.bit_generator.state
+    np.testing.assert_array_equal(found.standard_normal(5), wanted.standard_normal(5))

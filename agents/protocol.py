@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from agents import limits
 from agents.bounds import on_bound
-from agents.reuse import Reuse
 from agents.seeds import release_seeds
 from agents.store import Batch, Store
 from envs import DesignProblem, Evaluation
@@ -144,7 +143,6 @@ class Ledger:
         self.entries: list[Entry] = []
         self._progress = progress
         self._store = store or Store()
-        self._reuse = Reuse(problem.site)
         self._begun = time.process_time()
 
     @property
@@ -170,8 +168,7 @@ class Ledger:
         stage : str
             Stream of the releases.
         start, counts : mapping of str to int
-            By name of event: how many releases of the stream are passed over, how many are drawn;
-            of these the ones that need no simulation are not counted, see `agents.reuse`.
+            By name of event: how many releases of the stream are passed over, how many are drawn.
         """
         drawn = {name: n for name, n in counts.items() if n > 0}
         seeds = {
@@ -179,8 +176,7 @@ class Ledger:
             for name, n in drawn.items()
         }
         batch = self._store.sample(self.problem, layout, seeds)
-        spared = self._reuse.spared(layout, seeds, batch.releases)
-        self.used += sum(drawn.values()) - spared
+        self.used += sum(drawn.values())
         self._enter(stage, batch.evaluation)
         return batch
 

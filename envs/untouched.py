@@ -163,7 +163,7 @@ def _idle(built: Built, barrier: Built, there: Standing, holds: bool) -> Barrier
     """Return what happens to a barrier that no block comes near."""
     bears = there.bears
     if isinstance(built, Fence):
-        bears = built.bears
+        bears = built.braking_force
     elif isinstance(built, GravityWall | Embankment):
         unit = barrier.for_width(UNIT)
         assert isinstance(unit, GravityWall | Embankment)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from numpy.typing import NDArray
+from rigdda.dynamics.forces import accumulate_forces
 
 from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
@@ -13,7 +14,6 @@ from experiments.deformable.submatrices import UNKNOWNS
 from rigdda.dynamics.arrays import Ground, Matrix, Monitors, Outlines, Work
 from rigdda.dynamics.correction import place_edges
 from rigdda.dynamics.detection import copy_index, detect
-from rigdda.dynamics.forces import accumulate_forces
 from rigdda.dynamics.islands import find_islands, pair_blocks
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,

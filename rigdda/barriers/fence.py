@@ -12,7 +12,6 @@ import msgspec
 from rigdda.barriers.base import Floats
 from rigdda.barriers.standing import FOUNDATION, Standing
 from rigdda.errors import BadInput, DoubtfulInput
-
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ import math
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Islands, Matrix, Monitors, Outlines, Rows, System, Work
-from rigdda.dynamics.assembly.island import damping_of, load_moment
+from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, System, Work
 from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
+from rigdda.dynamics.assembly.island import damping_of, load_moment
 from rigdda.dynamics.constants import (
     BOLT,
     BRAKE,
@@ -283,9 +283,7 @@ def step_island(
         counters[EVENTS] = note_hits(
             bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time
         )
-    account_contacts(
-        bodies, interfaces, contacts, islands, rows, c0, c1, monitors, p, ledger
-    )
+    account_contacts(bodies, interfaces, contacts, islands, rows, c0, c1, monitors, p, ledger)
     for q in range(n):
         rows.slot[q, COS], rows.slot[q, SIN] = (
             math.cos(rows.slot[q, TURN]),

@@ -95,7 +95,11 @@ def is_over(bodies: Bodies, monitors: Monitors, counters: Ints, p: Parameters) -
         return False
     for i in range(p.blocks):
         body = bodies[i]
-        if body.status == AWAKE and not body.guided and not (body.x - body.radius > monitors.leave and body.vx > 0.0):
+        if (
+            body.status == AWAKE
+            and not body.guided
+            and not (body.x - body.radius > monitors.leave and body.vx > 0.0)
+        ):
             counters[STILL] = 0
             return False
     counters[STILL] += END_CHECK

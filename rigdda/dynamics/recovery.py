@@ -31,7 +31,9 @@ from rigdda.kernel import inlined, kernel
 
 
 @inlined
-def find_deepest(contacts: Contacts, islands: Islands, rows: Rows, island: int, most: float) -> float:
+def find_deepest(
+    contacts: Contacts, islands: Islands, rows: Rows, island: int, most: float
+) -> float:
     """Set rows.height to the gaps after the step that the load does not explain; returns the deepest.
 
     The compression that the load explains counts up to `most` [m]. Springs whose stiffness is given

@@ -299,9 +299,7 @@ def count_row(row: Floats, fact: Floats, a: Floats, b: Floats, normal: float, sh
 
 
 @kernel
-def end_rows(
-    rows: Rows, n: int, count: int, number: int, least: float
-) -> tuple[float, bool, bool]:
+def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple[float, bool, bool]:
     """End a substep for its contacts: count their impulses, and note which were struck.
 
     A contact was if it closed faster than `least` [m/s] before its bodies touched others.
@@ -427,9 +425,7 @@ def rebound(
 
 
 @kernel
-def settle(
-    rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float
-) -> int:
+def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float) -> int:
     """Sweep until no normal velocity changes by more than a tolerance; returns how often."""
     for s in range(n + 1):
         rows.moved_in[s] = -1

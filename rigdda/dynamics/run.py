@@ -121,7 +121,8 @@ class Run:
         start, (x, y, theta) = self.barrier_poses[0, barrier], self.barrier_poses[frame, barrier]
         if isinstance(one, Fence):
             path = abs(x - start[0])
-            return corners + [(x - start[0], 0.0)] * 2 + [(x - start[0], -one.sag * path)] * 2
+            sunk = np.array([0.0, 0.0, path, path]) * one.sag
+            return corners + np.stack([np.full(4, x - start[0]), -sunk], axis=1)
         if not isinstance(one, GravityWall):
             return corners
         cos, sin = np.cos(theta), np.sin(theta)

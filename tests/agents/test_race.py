@@ -14,7 +14,6 @@ from agents.arms import Arm, allocation, behind
 from agents.bounds import on_bound
 from agents.menu import Menu, spread
 from agents.protocol import Entry
-from agents.reuse import Reuse
 from agents.store import Release, Store
 from envs import DesignProblem
 from envs.targets import Targets
@@ -140,18 +139,6 @@ def test_all_on_the_menu_may_be_built(kind: str) -> None:
     assert len(set(some)) == len(some) <= 5
     near = list(menu.neighbours((some[0],), 1.0, 1))
     assert near and all(problem.fits(layout) and layout != (some[0],) for layout in near)
-
-
-def test_a_weaker_fence_that_holds_is_not_counted(site: Site) -> None:
-    reuse = Reuse(site)
-    held, failed = Release(0.0, 0.0, False, False), Release(9.0, 1.0, True, True)
-    strong, weak = Fence(16.0, 2.0, energy_class=1000), Fence(16.0, 2.0, energy_class=250)
-    seeds = {"block": (1, 2, 3), "group": (1,)}
-    first = {"block": (held, held, held), "group": (held,)}
-    assert reuse.spared((strong,), seeds, first) == 0
-    second = {"block": (held, failed, held), "group": (held,)}
-    assert reuse.spared((weak,), seeds, second) == 2  # a group is never known
-    assert reuse.spared((Fence(16.5, 2.0, energy_class=250),), seeds, second) == 0
 
 
 def test_an_arm_is_behind_by_its_paired_difference(valley: Valley) -> None:

@@ -24,8 +24,7 @@ def site() -> Site:
 
 @pytest.fixture(autouse=True)
 def fresh(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("free", "held"):
-        monkeypatch.setattr(reuse, name, Memory(4096))
+    monkeypatch.setattr(reuse, "free", Memory(4096))
 
 
 def same(one: Outcome, two: Outcome) -> None:
@@ -80,29 +79,6 @@ def test_a_release_that_stays_clear_of_its_layout_is_one_without(site: Site) -> 
             assert untouched.misses(site, fingerprint(site), layout, first[seed])
 
 
-@pytest.mark.parametrize("event", ["small", "block"])
-def test_a_fence_that_held_a_block_holds_it_in_every_class_above(site: Site, event: str) -> None:
-    tried = [(Fence(10.5, 2.0, energy_class=k),) for k in (1000, 100, 250)]
-    reuse.outcomes(jobs(site, tried[0], event))
-    for layout in tried[1:]:
-        found = reuse.outcomes(jobs(site, layout, event))
-        assert found.simulated < len(SEEDS)
-        for seed, outcome in zip(SEEDS, found, strict=True):
-            same(outcome, rigdda.release(site, layout, seed, event)[1])
-
-
-def test_groups_and_several_fences_are_simulated(site: Site) -> None:
-    one, two = Fence(10.5, 2.0, energy_class=250), Fence(14.0, 2.0, energy_class=250)
-    for layout, event in (((one,), "group"), ((one, two), "small")):
-        higher = tuple(
-            msgspec.structs.replace(f, energy_class=500, elongation=None) for f in layout
-        )
-        reuse.outcomes(jobs(site, layout, event)[:4])
-        touched = reuse.outcomes(jobs(site, higher, event)[:4])
-        clear = [untouched.misses(site, fingerprint(site), higher, o) for o in touched]
-        assert touched.simulated >= 4 - sum(clear)
-
-
 def test_equal_releases_are_simulated_once_and_other_sites_anew(site: Site) -> None:
     job = (site, (), 3, "small")
     found = reuse.outcomes([job, job, (site, (), 4, "small")])
@@ -153,24 +129,6 @@ def test_blocks_that_stop_short_by_less_than_a_step_may_have_touched(site: Site)
     near, far = (replace(cases.outcome("small"), reach=(0.0, 15.0 - d)) for d in (0.25, 0.5))
     assert not untouched.misses(site, fingerprint(site), layout, near)
     assert untouched.misses(site, fingerprint(site), layout, far)
-
-
-def test_what_a_fence_holds_is_of_its_height() -> None:
-    """It is lower by what it took, in a higher class by less."""
-    weak, strong = (Fence(15.0, 2.0, energy_class=k) for k in (100, 250))
-    outcome = cases.outcome("small", 0.0, False, width=1.0)
-    took = replace(outcome.barriers[0], absorbed_energy=4e3, thrust=0.0)
-
-    def of(fence: Fence, held: float, slope: float) -> Outcome:
-        built = fence.for_width(1.0)
-        left = replace(took, left_height=built.left_height(took.absorbed_energy))
-        return replace(outcome, barriers=(left,), held_fraction=held, slope_fraction=slope)
-
-    assert reuse._of_class(strong, of(weak, 0.0, 1.0)) is None  # so high it may hold it
-    assert reuse._of_class(weak, of(strong, 1.0, 0.0)) is None  # so low it may not
-    found, wanted = reuse._of_class(strong, of(weak, 1.0, 0.0)), of(strong, 1.0, 0.0)
-    assert found is not None and found.barriers[0].left_height == wanted.barriers[0].left_height
-    assert reuse._of_class(weak, of(strong, 0.0, 1.0)) is not None
 
 
 def test_outcomes_without_barriers_have_nothing_held(site: Site) -> None:

@@ -137,9 +137,7 @@ def touch_time(gap: float, time: float, square: float, margin: float) -> float:
 
 
 @kernel
-def edge_over_point(
-    outlines: Outlines, i: int, edge: int, edges: int, x: float, y: float
-) -> int:
+def edge_over_point(outlines: Outlines, i: int, edge: int, edges: int, x: float, y: float) -> int:
     """Return the edge of i, nearly in line with `edge`, that lies over a point.
 
     Of edges in one line rounding alone decides which is the best face.

@@ -119,9 +119,8 @@ class SingleReleases:
             arrays = self._packed(drawn, dt)
         barriers = [barrier.for_width(drawn.width) for barrier in self._layout]
         resistances = [self._resistance(i, barrier) for i, barrier in enumerate(barriers)]
-        forces = [
-            barriers[i].braking_force for i in self._scene.bodies if isinstance(barriers[i], Fence)
-        ]
+        bodies = [barriers[i] for i in self._scene.bodies]
+        forces = [barrier.braking_force for barrier in bodies if isinstance(barrier, Fence)]
         limits = [
             bears if isinstance(barrier, Embankment) else math.inf
             for bears, barrier in zip(resistances, barriers, strict=True)

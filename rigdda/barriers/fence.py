@@ -22,8 +22,8 @@ PANEL = 10.0
 """Length of a panel of a fence along the slope, which acts whole [m]."""
 
 LOST = 0.5
-"""Share of its height that a fence has lost when its elongation is spent [-]: after an impact of its
-class at least half is left (EAD 340059, class A)."""
+"""Share of its height that a fence has lost when its elongation is spent [-]: after an impact of
+its class at least half is left (EAD 340059, class A)."""
 
 MASS = 6.0
 """Mass of net and ropes, which move with the rock, per area of a fence [kg/m2], from memory."""
@@ -117,13 +117,10 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
             if self.capacity < WEAK:
                 told = f"fence capacity = {self.capacity:g}: is it meant? It is in J per metre"
                 warnings.warn(told, DoubtfulInput, stacklevel=3)
+            if self.elongation is None:
+                msgspec.structs.force_setattr(self, "elongation", _usual_elongation(self.capacity))
         else:
             self._check_class()
-        if self.elongation is None:
-            energy = 1e-3 * self.capacity * PANEL
-            found = next((c for e, c in FENCE_CLASSES.items() if e >= energy), None)
-            longest = FENCE_CLASSES[max(FENCE_CLASSES)]
-            msgspec.structs.force_setattr(self, "elongation", (found or longest).elongation)
         self._check_number("elongation", SHORTEST)
 
     def _check_class(self) -> None:
@@ -208,3 +205,9 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         capacity, named = self.capacity, self.energy_class
         takes = f"{named} kJ" if capacity is None else f"{capacity / 1e3:.0f} kJ/m"
         return f"{metres(self.height)} high, {takes}"
+
+
+def _usual_elongation(capacity: float) -> float:
+    """Return the elongation of the next class that takes so much on a panel [J/m, m]."""
+    above = [c for energy, c in FENCE_CLASSES.items() if 1e3 * energy >= capacity * PANEL]
+    return (above or [FENCE_CLASSES[max(FENCE_CLASSES)]])[0].elongation

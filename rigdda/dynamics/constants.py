@@ -14,50 +14,21 @@ SOFT = 5e-3
 buckles there: at 1.96/n^2 of the size of its blocks."""
 
 IMPACT_STIFFNESS = 1e4
-"""Stiffness of an impact and of a new contact, times effective mass / dt^2 [-]. The velocity after
-an impact misses its target by half the inverse of this, 5e-5 of the change."""
+"""Stiffness of a new contact, times effective mass / dt^2 [-]. The velocity after its first step
+misses its target by half the inverse of this, 5e-5 of the change."""
 
 START_STIFFNESS = 1e3
 """Factor of that in the first step of a simulation [-]: the blocks of a stack give way one after
 the other, and a tall one must start without a jolt. And of a pin, in every step."""
 
 IMPACT_STEPS = 3.0
-"""Least closing speed of an impact in units of g dt [-]: what gravity alone gives a resting block
-in a few steps is no impact."""
-
-BLOW_SPEED = 1.0
-"""Least closing speed with which a closed contact begins an impact [m/s]. Such a contact was
-foreseen, and closed in the step before, ahead of the impact. Lower: contacts of a pressed pile that
-close slowly count as impacts, and are never pushed out."""
+"""Least closing speed of an impact in units of g dt [-], of a lone body in units of g h with h the
+substep: what gravity alone gives a resting body in a few steps is no impact."""
 
 AT_ONCE = 1e-4
-"""Time over the step of a lone block [-]: an impact acts in a part of the step that begins no more
-than this before it and ends this after it. Corners that strike within that part do so at once, and
-until its impact what bears the block does not act. With 2e-2 a square that lands on a corner, the
-next one 1 mm above the ground, misses its velocity by 5 %, at most by 43 %, in steps of 10 ms with
-a restitution of 0.5."""
-
-BEFORE_IMPACT = 0.995
-"""Time of a part of a step that ends before an impact, over the estimated time to that impact [-].
-Closer to one, and the part may reach the impact, as the estimate is not exact."""
-
-LANDING = 0.1
-"""Least closing speed of an impact of a lone block in units of g dt [-]: the parts that its step is
-taken in may be short. With 3, as `IMPACT_STEPS`, what rocks loses 5 % more of its speed in each
-impact in steps of 10 ms, at most 36 %; like this 0.3 %, at most 1.4 %."""
-
-MOST_PARTS = 24
-"""Most parts of a step of a lone block: corners that strike in turn, ever sooner, do so at once in
-the last one. With eight, small blocks that turn fast use them up by turning."""
-
-TURN = 0.05
-"""Turn of a lone block in contact, at its first rate, in each part of its step but the last [rad].
-With 0.15, and eight parts, blocks of 0.05 m2 that do not bounce run out 3.8 % less far in steps of
-10 ms than in 0.6 ms; like this 1.9 %."""
-
-PLASTIC_SPEED = 0.1
-"""Closing speed that a closed contact may keep over a step [m/s]. Faster: its spring is too soft
-for what hits the block from the other side, and it is treated as a plastic impact."""
+"""Least substep of a lone body over the step [-]: corners that strike within it do so at once. With
+2e-2 a square that lands on a corner, the next one 1 mm above the ground, misses its velocity by
+5 %, at most by 43 %, in steps of 10 ms with a restitution of 0.5."""
 
 RECOVERY_SWEEPS = 4
 """Sweeps over the contacts of an island that push out what they are too deep."""
@@ -72,22 +43,19 @@ FRICTION_TOLERANCE = 2e-2
 
 SUBSTEPS = 10
 """Substeps in the relaxation of an island in motion [-]: a blow goes on from contact to contact in
-each, and what the sweeps leave of it is as much smaller as they are shorter. With five, 4 % more of
-the rock of the highway case reach the road in steps of 20 ms, and a pile in a silo that settles
-rises by three to four times the energy; with three, 60 layers do not come to rest in 10 ms."""
+each, and what the sweeps leave of it is as much smaller as they are shorter."""
 
 MOST_SUBSTEPS = 60
 """Substeps of a lone body from which on they do not end where it is struck."""
 
 MOST_SWEEPS = 100
 """Most sweeps over the contacts of an island in a substep. Sweeps end once none changes a normal
-displacement by more than the tolerance times the substep. That tolerance [m/s] is
-`Settings.sweep_tolerance`, lessened by the next two."""
+velocity by more than the tolerance. That is `Settings.sweep_tolerance`, lessened by the next two.
+"""
 
 LARGE_ISLAND = 128
 """Blocks of an island from which on the tolerance is `Settings.sweep_tolerance` itself; in smaller
-ones it is less in proportion. Where a train of ten blocks hits the ground it is the difference
-between one blow and ten: with 1 m/s instead of 0.1 a seventh more of it reached a road."""
+ones it is less in proportion, and next to nothing for a lone body."""
 
 RELAXATION_SHARE = 0.05
 """Greatest tolerance over the speed of the island [-], so that slow islands come to rest."""
@@ -96,22 +64,7 @@ LAYERS = 64
 """Layers in which the contacts of an island are ordered by height for relaxation."""
 
 QUIET_SPEED = 0.1
-"""Speed below which all blocks of an island are solved together, accurately; faster islands of
-more than SMALL_ISLAND blocks are relaxed [m/s]."""
-
-SMALL_ISLAND = 2
-"""Most blocks of an island that is solved as a whole at any speed."""
-
-BREAK_TOLERANCE = 1e-3
-"""Share of what it has left by which a failing fence may miss it [-]."""
-
-BREAK_SOLVES = 8
-"""Most solutions of the step in which a fence fails: one without it, then one if nothing bends the
-law by which it takes energy."""
-
-CHAIN = 8
-"""Most blocks through which a blow is followed to a fence: each but the first adds its mass, and
-passes on what its contacts turn aside least of."""
+"""Speed below which an island whose relaxation does not settle is solved as a whole [m/s]."""
 
 SAME_NORMAL = 0.7
 """Least cosine between the normals of one vertex's contact in two steps, for it to be one [-]."""
@@ -155,11 +108,7 @@ END_CHECK = 8
 """Steps from one look at whether a release is over to the next."""
 
 SPEED_LIMIT = 1e4
-"""Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall. In
-`fence.aim` it stands for a velocity that is not known yet."""
-
-WAIT_STEPS = 40
-"""Steps for which an island that did not settle as a whole is relaxed before it is tried again."""
+"""Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall."""
 
 # status of a body
 AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Boxes, Ground, Monitors, Outlines, Work
-from rigdda.dynamics.clock import lap
 from rigdda.dynamics.constants import (
     ASLEEP,
     AWAKE,
@@ -21,8 +20,6 @@ from rigdda.dynamics.contact.terrain_phase import collide_terrain
 from rigdda.dynamics.contact.transfer import copy_contact, recall
 from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.records import (
-    BROAD_PHASE,
-    NARROW_PHASE,
     Bodies,
     Contacts,
     Interfaces,
@@ -110,10 +107,8 @@ def detect(
     counters: NDArray, deepest: NDArray,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
-    since = lap(counters, BROAD_PHASE, 0, p.timing)
     if not candidate_pairs(bodies, outlines.polygon, work.boxes, p):
         return -1
-    since = lap(counters, BROAD_PHASE, since, p.timing)
     start = time <= 1.5 * p.dt
     count, link = int(np.int64(0)), 0  # with a literal all that it is handed to is compiled twice
     for a in range(p.blocks):
@@ -136,5 +131,4 @@ def detect(
             if count < 0:
                 return -1
     work.begin[p.blocks] = count
-    lap(counters, NARROW_PHASE, since, p.timing)
     return count

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rigdda.dynamics.arrays import Ground, Islands, Monitors, Outlines
 from rigdda.dynamics.constants import ASLEEP, AWAKE, LONGEST_FLIGHT, RETIRED
 from rigdda.dynamics.correction import place_corners
-from rigdda.dynamics.island_step import end_body, fall
+from rigdda.dynamics.island_step import check_body, fall
 from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.motion import top_speed
 from rigdda.dynamics.records import Bodies, Body, Contacts, Ints, Parameters, Polygons
@@ -151,7 +151,7 @@ def fly(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
     bodies[i].apart += p.dt
     fall(bodies[i], p, ledger)
     bodies[i].quiet = 0.0
-    return end_body(bodies, i, p, ledger)
+    return check_body(bodies, i, p, ledger)
 
 
 @kernel

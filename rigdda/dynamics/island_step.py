@@ -119,17 +119,80 @@ def island_speed(bodies: Bodies, islands: Islands, low: int, high: int) -> float
 
 
 @kernel
-def has_springs(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
-    """Return whether an island has supports or the paper's contacts, whose stiffness is given.
+def is_tried_whole(
+    bodies: Bodies, contacts: Contacts, islands: Islands, island: int, quiet: bool, p: Parameters
+) -> bool:
+    """Return whether an island is solved as a whole before relaxation is tried.
 
-    Not if it has a brake: a body that is guided has no entries in the system of equations.
+    It is in static mode and without post-correction; where it has supports, or the paper's
+    contacts, whose stiffness is given; and where it is `quiet` and has joints that hold, or was
+    solved so in the last step. Never if it has a brake: a body that is guided has no entries in the
+    system of equations.
     """
-    found = braked = False
-    for item in range(low, high):
+    springs, bonds, rested = p.static or not p.post_correction, False, True
+    for place in range(islands.block_start[island], islands.block_start[island + 1]):
+        rested = rested and bodies[islands.block_item[place]].whole
+    for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
-        found = found or is_elastic(c)
-        braked = braked or c.kind == BRAKE
-    return found and not braked
+        if c.kind == BRAKE:
+            return False
+        springs = springs or is_elastic(c)
+        bonds = bonds or c.bond > 0.0
+    return springs or (quiet and (bonds or rested))
+
+
+@stage
+def settle_island(
+    bodies: Bodies, contacts: Contacts, system: System, work: Work, island: int, p: Parameters,
+    counters: NDArray, ledger: NDArray,
+) -> bool:  # fmt: skip
+    """Move the slots of an island through the step, and set the forces of its contacts.
+
+    What moves is relaxed. Where that does not settle, an island at rest is solved as a whole.
+    Returns whether a contact was struck.
+    """
+    islands, rows, m = work.islands, work.rows, system.matrix
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    pairs = pair_blocks(bodies, contacts, m, islands, c0, c1)
+    speed = island_speed(bodies, islands, b0, b1)
+    quiet = speed <= QUIET_SPEED
+    whole = struck = False
+    tried = is_tried_whole(bodies, contacts, islands, island, quiet, p)
+    if tried:
+        whole = solve_states(bodies, contacts, system, islands, island, pairs, p, counters)
+        whole = whole or p.static or not p.post_correction
+    start_slots(bodies, islands, rows, island, p)
+    count = pack_rows(contacts, islands, rows, island)
+    if not whole:
+        counters[RELAXED] += 1
+        sweeps, struck, settled = relax(rows, b1 - b0, count, speed, p, ledger)
+        counters[SWEEPS] += sweeps
+        if quiet and not (settled or tried or has_brake(contacts, islands, c0, c1)):
+            whole = solve_states(bodies, contacts, system, islands, island, pairs, p, counters)
+            if whole:
+                start_slots(bodies, islands, rows, island, p)
+                pack_rows(contacts, islands, rows, island)
+    for place in range(b0, b1):
+        bodies[islands.block_item[place]].whole = whole
+    if whole:
+        take_solution(bodies, contacts, m, islands, rows, island, p, ledger)
+        accumulate_forces(contacts, islands, c0, c1)
+    else:
+        take_impulses(contacts, islands, rows, c0, c1, p.dt)
+    for s in range(b1 - b0):
+        slot = rows.slot[s]
+        slot[COS], slot[SIN] = math.cos(slot[TURN]), math.sin(slot[TURN])
+    return struck and not whole
+
+
+@kernel
+def has_brake(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
+    """Return whether one of the contacts low:high of an island is the brake of a fence."""
+    found = False
+    for item in range(low, high):
+        found = found or contacts[islands.contact_item[item]].kind == BRAKE
+    return found
 
 
 @kernel
@@ -216,7 +279,7 @@ def account_contacts(
 
 
 @inlined
-def end_body(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
+def check_body(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
     """Retire a body that has left the site; returns it if it went bad, else -1."""
     body = bodies[i]
     bad = -1
@@ -227,84 +290,52 @@ def end_body(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
     return bad
 
 
-@stage
-def step_island(
-    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
-    system: System, work: Work, monitors: Monitors, time: float, s: int, p: Parameters,
-    counters: NDArray, ledger: NDArray,
-) -> int:  # fmt: skip
-    """Settle island s, note its hits, and move its bodies; returns one that went bad, or -1."""
-    islands, rows, m = work.islands, work.rows, system.matrix
-    c0, c1 = islands.contact_start[s], islands.contact_start[s + 1]
-    b0, b1 = islands.block_start[s], islands.block_start[s + 1]
-    bad, n = -1, b1 - b0
-    for q in range(b0, b1):
-        bodies[islands.block_item[q]].apart += p.dt
-    if c1 == c0:
-        for q in range(b0, b1):
-            i = islands.block_item[q]
-            before = bodies[i].theta, bodies[i].x, bodies[i].y
-            fall(bodies[i], p, ledger)
-            finish_body(bodies, outlines, i, before, p)
-            bad = max(bad, end_body(bodies, i, p, ledger))
-        return bad
-    speed = island_speed(bodies, islands, b0, b1)
-    pairs = pair_blocks(bodies, contacts, m, islands, c0, c1)
-    start_slots(bodies, islands, rows, s, p)
-    count = pack_rows(contacts, islands, rows, s)
-    always, settled, struck = p.static or not p.post_correction, False, False
-    first = always or has_springs(contacts, islands, c0, c1)
-    quiet = rested = speed <= QUIET_SPEED
-    for q in range(b0, b1):
-        body = bodies[islands.block_item[q]]
-        quiet = quiet and not body.guided
-        rested = rested and body.whole
-    first = first or rested
-    if first:
-        settled = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
-    whole = first and (settled or always)
-    if not whole:
-        counters[RELAXED] += 1
-        sweeps, struck, settled = relax(rows, n, count, speed, p, ledger)
-        counters[SWEEPS] += sweeps
-        if quiet and not settled and not first:
-            whole = solve_states(bodies, contacts, system, islands, s, pairs, p, counters)
-    for q in range(b0, b1):
-        bodies[islands.block_item[q]].whole = whole
-    if whole:
-        struck = False
-        start_slots(bodies, islands, rows, s, p)
-        count = pack_rows(contacts, islands, rows, s)
-        take_solution(bodies, contacts, m, islands, rows, s, p, ledger)
-        accumulate_forces(contacts, islands, c0, c1)
-    else:
-        take_impulses(contacts, islands, rows, c0, c1, p.dt)
-    if len(monitors.target) > 0:
-        counters[EVENTS] = note_hits(
-            bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time
-        )
-    account_contacts(bodies, interfaces, contacts, islands, rows, c0, c1, monitors, p, ledger)
-    for q in range(n):
-        rows.slot[q, COS], rows.slot[q, SIN] = (
-            math.cos(rows.slot[q, TURN]),
-            math.sin(rows.slot[q, TURN]),
-        )
-    push_out(contacts, islands, rows, s, struck, p)
-    for q in range(n):
-        i = islands.block_item[b0 + q]
-        before = bodies[i].theta, bodies[i].x, bodies[i].y
-        take_slot(bodies[i], rows.slot[q], rows.scale[q], p, ledger)
-        finish_body(bodies, outlines, i, before, p)
-        bad = max(bad, end_body(bodies, i, p, ledger))
-    return bad
-
-
 @inlined
-def finish_body(
-    bodies: Bodies, outlines: Outlines, i: int, before: tuple[float, float, float], p: Parameters
-) -> None:
-    """Place the corners of a body that has moved."""
+def end_body(
+    bodies: Bodies, outlines: Outlines, i: int, before: tuple[float, float, float], p: Parameters,
+    ledger: NDArray,
+) -> int:  # fmt: skip
+    """Place the corners of a body that has moved, and retire one that has left the site.
+
+    `before` is where it was: angle, x and y. Returns the body if it went bad, else -1.
+    """
     if p.post_correction:
         place_corners(bodies, outlines, i)
     else:
         move_corners(bodies, outlines, i, before)
+    return check_body(bodies, i, p, ledger)
+
+
+@stage
+def step_island(
+    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
+    system: System, work: Work, monitors: Monitors, time: float, island: int, p: Parameters,
+    counters: NDArray, ledger: NDArray,
+) -> int:  # fmt: skip
+    """Take the step of an island: settle it, note its hits, push out, move its bodies.
+
+    Returns a body that went bad, or -1.
+    """
+    islands, rows = work.islands, work.rows
+    c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
+    b0, b1 = islands.block_start[island], islands.block_start[island + 1]
+    bad = -1
+    for place in range(b0, b1):
+        bodies[islands.block_item[place]].apart += p.dt
+    if c1 > c0:
+        struck = settle_island(bodies, contacts, system, work, island, p, counters, ledger)
+        if len(monitors.target) > 0:
+            counters[EVENTS] = note_hits(
+                bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time
+            )
+        account_contacts(bodies, interfaces, contacts, islands, rows, c0, c1, monitors, p, ledger)
+        push_out(contacts, islands, rows, island, struck, p)
+    for place in range(b0, b1):
+        i = islands.block_item[place]
+        before = bodies[i].theta, bodies[i].x, bodies[i].y
+        if c1 > c0:
+            take_slot(bodies[i], rows.slot[place - b0], rows.scale[place - b0], p, ledger)
+        else:
+            fall(bodies[i], p, ledger)
+        bad = max(bad, end_body(bodies, outlines, i, before, p, ledger))
+    return bad

@@ -52,8 +52,6 @@ class Loop:
         The scene in arrays, before the first step.
     dt : float
         Step [s].
-    timing : bool
-        Whether processor time is read.
 
     Attributes
     ----------
@@ -71,8 +69,8 @@ class Loop:
         Processor time so far [s].
     """
 
-    def __init__(self, scene: Scene, arrays: Arrays, dt: float, timing: bool):
-        self._scene, self._dt, self._timing = scene, dt, timing
+    def __init__(self, scene: Scene, arrays: Arrays, dt: float):
+        self._scene, self._dt = scene, dt
         self.counters = np.zeros(COUNTERS, dtype=np.int64)
         self.ledger = np.zeros(len(LEDGER))
         self.deepest = np.zeros(1)
@@ -124,7 +122,7 @@ class Loop:
         target = self.counters[STEPS] + steps
         stride = steps // max(len(frames), 1)
         while self.counters[STEPS] < target:
-            a, before = self.arrays, time.thread_time() if self._timing else 0.0
+            a, before = self.arrays, time.thread_time()
             reason, block, swapped = advance_directly.call(
                 a.bodies,
                 a.outlines,
@@ -145,8 +143,7 @@ class Loop:
                 frames,
                 stride,
             )
-            if self._timing:
-                self.seconds += time.thread_time() - before
+            self.seconds += time.thread_time() - before
             if swapped:
                 self.now, self.before = self.before, self.now
             if reason == EVENTS_FULL:

@@ -21,7 +21,6 @@ from rigdda.dynamics.constants import (
 from rigdda.dynamics.contact.links import pull_of_bolts
 from rigdda.dynamics.pack import Arrays
 from rigdda.dynamics.records import (
-    BROAD_PHASE,
     CONTACT_TOTAL,
     ITERATIONS,
     LEDGER,
@@ -54,10 +53,6 @@ CONTACT_TABLE = np.dtype(
 normal points from b to a; shear is positive along the normal turned by +90 degrees. Forces act on a
 [N]; penetration [m]."""
 
-PHASES = ("broad phase", "narrow phase", "open-close", "motion")
-"""Phases of a step: pairs of bodies that may touch; their contacts and the law of each; open-close
-iteration, solution and relaxation; islands, movement and monitors."""
-
 STATES = np.array(["open", "stick", "slip"])
 
 
@@ -87,7 +82,7 @@ class Diagnostics(NamedTuple):
     `relaxed` counts islands whose contact forces were relaxed, since they move or their open-close
     iteration did not settle. `compression` is how far contacts at rest give way now: their median,
     of plain ones the greatest, over the mean block size [-].
-    `seconds` is the processor time by phase [s], nothing without `Settings.timing`.
+    `seconds` is the processor time of all steps so far [s].
     """
 
     steps: int
@@ -99,7 +94,7 @@ class Diagnostics(NamedTuple):
     contacts: int
     penetration: float
     compression: float
-    seconds: dict[str, float]
+    seconds: float
 
 
 def contact_table(scene: Scene, c: Contacts) -> NDArray[np.void]:
@@ -190,16 +185,8 @@ def diagnosed(
         int(count[CONTACT_TOTAL]),
         deepest,
         compression(arrays, c),
-        seconds_by_phase(count, seconds),
+        seconds,
     )
-
-
-def seconds_by_phase(count: Ints, seconds: float) -> dict[str, float]:
-    """Return the time spent in each phase [s], in proportion to its cycles."""
-    cycles = count[BROAD_PHASE:].astype(float)
-    total = cycles.sum()
-    share = cycles / total if total > 0.0 else cycles
-    return dict(zip(PHASES, (seconds * share).tolist(), strict=True))
 
 
 def compression(arrays: Arrays, c: Contacts) -> float:

@@ -204,7 +204,6 @@ PARAMETERS = _record(
     solver=int,  # PCG, BLOCK_PCG, SOR, DIRECT
     relaxation=float,  # over-relaxation factor of SOR [-]; not that of linear.relaxation
     sleeping=bool,
-    timing=bool,
     floor=float,  # a centroid below it is retired [m]
     bonded=bool,  # whether a surface has cohesion or tension
 )
@@ -273,7 +272,7 @@ Corners = NDArray[np.void]
 LEDGER = ("friction", "impact", "damping", "external", "links")
 """Work done on the blocks so far [J]: entries of the ledger array."""
 
-COUNTERS = 14
+COUNTERS = 10
 """Length of the counter array. Its entries:"""
 
 STEPS, ITERATIONS, RELAXED, SOLVES, SOLVER_ITERATIONS = 0, 1, 2, 3, 4
@@ -281,6 +280,3 @@ CONTACTS, EVENTS, CONTACT_TOTAL, SWEEPS, STILL = 5, 6, 7, 8, 9
 """Steps; open-close iterations; islands relaxed; systems solved and iterations of their solver;
 contacts now; events not yet read; contacts and sweeps of relaxation so far; steps since anything
 moved that matters."""
-
-BROAD_PHASE, NARROW_PHASE, OPEN_CLOSE, MOTION = 10, 11, 12, 13
-"""Processor cycles by phase of the step, if they are timed."""

@@ -34,11 +34,11 @@ from rigdda.kernel import inlined, kernel
 def find_deepest(
     contacts: Contacts, islands: Islands, rows: Rows, island: int, most: float
 ) -> float:
-    """Set rows.height to the gaps after the step that the load does not explain; returns the deepest.
+    """Set rows.height to the gaps after the step that the load does not explain.
 
     The compression that the load explains counts up to `most` [m]. Springs whose stiffness is given
-    are as deep as they are to be. A cluster in flight is left as it is: to displace its bodies would
-    change its angular momentum.
+    are as deep as they are to be. A cluster in flight is left as it is: to displace its bodies
+    would change its angular momentum. Returns the deepest [m].
     """
     deepest, grounded = 0.0, False
     for q in range(islands.contact_start[island], islands.contact_start[island + 1]):

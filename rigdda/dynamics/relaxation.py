@@ -3,7 +3,8 @@ r"""Relaxation: the motion of an island whose contacts open, close, stick, slip 
 The step is taken in `SUBSTEPS` substeps of length h. In each, weight, loads and contacts act as
 impulses, with the geometry of its start, and the bodies then move with their new velocities,
 
-.. math:: v \leftarrow v + \frac{h}{M} F + \frac{1}{M} \sum_c p_c e_c^t, \qquad x \leftarrow x + h v,
+.. math:: v \leftarrow v + \frac{1}{M} \Bigl(h F + \sum_c p_c e_c^t\Bigr), \qquad
+    x \leftarrow x + h v,
 
 with F weight and loads, p_c the impulse of a contact and e_c its row (a body that no contact acts
 on moves with the mean of its velocities, as it would under a constant force). Momentum and angular

@@ -37,7 +37,8 @@ COLUMNS = 32
 
 # columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: place of the vertex and of the point
 # of the face, and normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR at which a spring is free,
-# FREE_GAP at which a brake is [m]. STRENGTH, + 1, + 2: the forces of which COHESION, TENSION and MOST are impulses [N].
+# FREE_GAP at which a brake is [m]. STRENGTH, + 1, + 2: the forces of which COHESION, TENSION and
+# MOST are impulses [N].
 VERTEX, FACE, DIRECTION, FREE_GAP, FREE_SHEAR, STRENGTH = 0, 2, 4, 6, 7, 8
 
 # RESTITUTION [-]. BOUNCE: velocity with which a contact that was struck in this substep is to open

@@ -84,7 +84,7 @@ class Simulation:
         self.scene = scene
         self.settings = settings or Settings()
         arrays = template.write(scene) if template else self._packed(stations, watch, leave)
-        self.loop = Loop(scene, arrays, self.settings.dt, self.settings.timing)
+        self.loop = Loop(scene, arrays, self.settings.dt)
         self._no_frames = no_frames(arrays.bodies)
         self._elastic_at_start = elastic_energy(arrays, self.loop.contacts)
         self._barrier_start = scene.barrier_poses

@@ -93,7 +93,7 @@ class SingleBlock:
         packed = packed._replace(outlines=with_room(packed.outlines))
         self._memory, self._arrays = together(packed)
         self._fresh = self._memory.copy()
-        self._loop = Loop(scene, self._arrays, settings.dt, timing=False)
+        self._loop = Loop(scene, self._arrays, settings.dt)
         self._no_frames = no_frames(packed.bodies)
         self._corners = np.zeros((MOST_CORNERS, 2))
         self._traits = np.zeros((1, 6))  # see `pack.bodies.Trait`

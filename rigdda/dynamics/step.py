@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Ground, Monitors, Outlines, System, Work
-from rigdda.dynamics.clock import lap
 from rigdda.dynamics.constants import (
     AWAKE,
     BAD_STATE,
@@ -29,7 +28,6 @@ from rigdda.dynamics.records import (
     CONTACT_TOTAL,
     CONTACTS,
     EVENTS,
-    MOTION,
     STEPS,
     Bodies,
     Contacts,
@@ -51,9 +49,7 @@ def solve_and_move(
     counters: NDArray, ledger: NDArray,
 ) -> int:  # fmt: skip
     """Take the step of every island; returns a block that went bad, or -1."""
-    since = lap(counters, MOTION, 0, p.timing)
     found = find_islands(bodies, contacts, work.begin, work.islands, p.blocks, p.islands)
-    since = lap(counters, MOTION, since, p.timing)
     bad = -1
     for s in range(found):
         worse = step_island(
@@ -62,9 +58,7 @@ def solve_and_move(
         )  # fmt: skip
         bad = max(bad, worse)
     if p.sleeping:
-        since = lap(counters, MOTION, 0, p.timing)
         watch_quiet(bodies, work.islands, found, p)
-        lap(counters, MOTION, since, p.timing)
     return bad
 
 

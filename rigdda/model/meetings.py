@@ -41,12 +41,13 @@ class Meetings:
     site : Site
         The site, without surfaces of restitution None.
     fences : str or None
-        Name of the surface whose friction and damping fences have, None: there are no fences.
+        Name of the surface whose damping fences have, None: there are no fences.
 
     Attributes
     ----------
     friction_deg : (S, S) array
-        Angle of friction of each two surfaces in the last release that was drawn [deg].
+        Angle of friction of each two surfaces in the last release that was drawn [deg]; fences have
+        none, whatever stands in their rows.
     restitution : (N, N) array
         Coefficient of restitution of each two surfaces of the site [-].
     damping : (S, S) array

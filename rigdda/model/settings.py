@@ -77,8 +77,6 @@ class Settings:
         Solve each cluster of blocks that touch on its own. False: all blocks in one system.
     sleeping : bool
         Let blocks at rest sleep until they are disturbed. They cost nothing then.
-    timing : bool
-        Time the phases of a step, see `Diagnostics`; costs a few reads of the cycle counter.
 
     Raises
     ------
@@ -97,7 +95,6 @@ class Settings:
     post_correction: bool = True
     islands: bool = True
     sleeping: bool = True
-    timing: bool = False
 
     def __post_init__(self) -> None:
         fields.set_number(self, "dt", SHORTEST_DT, LARGEST_DT)
@@ -110,7 +107,7 @@ class Settings:
         check.one_of("mode", self.mode, ("dynamic", "static"))
         check.one_of("solver", self.solver, SOLVERS)
         fields.set_number(self, "relaxation", 0.0, 1.99, open_low=True)
-        fields.set_booleans(self, "post_correction", "islands", "sleeping", "timing")
+        fields.set_booleans(self, "post_correction", "islands", "sleeping")
 
 
 def longest_step(areas: NDArray[np.float64], gravity: float) -> float:

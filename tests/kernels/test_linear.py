@@ -12,7 +12,7 @@ from rigdda.dynamics.linear import direct, pcg, skyline, sor
 from rigdda.dynamics.pack.space import empty_matrix, empty_scratch
 from rigdda.kernel import from_python
 
-solve_block, solve_two_blocks = map(from_python, (direct.solve_block, direct.solve_two_blocks))
+solve_block = from_python(direct.solve_block)
 multiply, solve_pcg = map(from_python, (pcg.multiply, pcg.solve_pcg))
 profile, solve_skyline = map(from_python, (skyline.profile, skyline.solve_skyline))
 solve_sor = from_python(sor.solve_sor)
@@ -128,25 +128,6 @@ def test_sor(seed, n, factor):
     assert sweeps < 100 * n + 300
     exact = np.linalg.solve(dense, m.rhs.ravel())
     assert np.abs(m.d[:n].ravel() - exact).max() < 1e-6 * np.abs(exact).max()
-
-
-@given(seeds, st.booleans(), st.booleans())
-def test_solve_two_blocks(seed, touching, swapped):
-    """Unsymmetric, as friction makes it, and either block first in the pair."""
-    rng = np.random.default_rng(seed)
-    m = empty_matrix(2, 1)
-    dense = rng.normal(size=(6, 6)) + 6.0 * np.eye(6)
-    first, second = (1, 0) if swapped else (0, 1)
-    m.pair_i[0], m.pair_j[0] = first, second
-    if not touching:
-        dense[:3, 3:] = dense[3:, :3] = 0.0
-    m.diagonal[0], m.diagonal[1] = dense[:3, :3], dense[3:, 3:]
-    upper, lower = dense[:3, 3:], dense[3:, :3]
-    m.off[0], m.lower[:] = (lower, upper) if swapped else (upper, lower)
-    m.rhs[:] = rng.normal(size=(2, 3))
-    exact = np.linalg.solve(dense, m.rhs.ravel())
-    solve_two_blocks(m, scratch(m).dense)
-    assert np.abs(m.d[:2].ravel() - exact).max() < 1e-9 * max(np.abs(exact).max(), 1.0)
 
 
 @given(seeds, st.floats(3.0, 10.0))

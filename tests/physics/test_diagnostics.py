@@ -10,16 +10,12 @@ from rigdda import Scene, Settings, Simulation, Terrain
 STACK = Scene(Terrain(FLAT), tuple(box(0.0, 0.5 + i) for i in range(5)), rock())
 
 
-def test_phases_of_a_step_are_timed_on_demand():
-    sim = Simulation(STACK, Settings(timing=True, sleeping=False))
-    sim.step(2000)
-    seconds = sim.diagnostics.seconds
-    assert set(seconds) == {"broad phase", "narrow phase", "open-close", "motion"}
-    assert all(value > 0.0 for value in seconds.values())
-    plain = Simulation(STACK, Settings(sleeping=False))
-    plain.step(2000)
-    assert sum(plain.diagnostics.seconds.values()) == 0.0
-    assert (plain.poses == sim.poses).all()
+def test_the_processor_time_of_all_steps_is_told():
+    sim = Simulation(STACK, Settings(sleeping=False))
+    sim.step(200)
+    some = sim.diagnostics.seconds
+    sim.step(200)
+    assert 0.0 < some < sim.diagnostics.seconds < 10.0
 
 
 def test_compression_is_that_of_the_lowest_contact():

@@ -189,21 +189,21 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
             return point
         return point[0] - bodies["x"][block], point[1] - bodies["y"][block]
 
-    def place(end: tuple[int, tuple[float, float]]) -> tuple[bool, int]:
+    def rank(end: tuple[int, tuple[float, float]]) -> tuple[bool, int]:
         block = end[0]
         return block == TERRAIN or bodies["status"][block] == FIXED, block
 
     fences = [
-        (place, number)
+        (place, number, barrier)
         for place, number in enumerate(scene.bodies, len(scene.blocks))
-        if isinstance(scene.barriers[number], Fence)
+        if isinstance(barrier := scene.barriers[number], Fence)
     ]
     links = np.zeros(len(scene.supports) + len(fences), dtype=LINK).view(np.recarray)
-    for link, (place, number) in zip(links[len(scene.supports) :], fences, strict=True):
-        link["kind"], link["a"], link["b"], link["number"] = BRAKE, place, TERRAIN, number
-        link["bx"], link["by"] = bodies["x"][place], bodies["y"][place]
-        link["yielding"] = scene.barriers[number].braking_force
-        link["length"] = scene.barriers[number].elongation
+    for q, (place, number, fence) in enumerate(fences, start=len(scene.supports)):
+        brake = links[q]
+        brake["kind"], brake["a"], brake["b"], brake["number"] = BRAKE, place, TERRAIN, number
+        brake["bx"], brake["by"] = bodies["x"][place], bodies["y"][place]
+        brake["yielding"], brake["length"] = fence.braking_force, fence.elongation
     of_supports = links[: len(scene.supports)]
     for number, (link, support) in enumerate(zip(of_supports, scene.supports, strict=True)):
         link["number"], link["yielding"], link["sign"] = number, math.inf, 1.0
@@ -214,7 +214,7 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
             continue
         second = TERRAIN if support.block_b is None else support.block_b
         ends = (support.block_a, support.point_a), (second, support.point_b)
-        (a, at_a), (b, at_b) = ends if second == TERRAIN else sorted(ends, key=place)
+        (a, at_a), (b, at_b) = ends if second == TERRAIN else sorted(ends, key=rank)
         link["kind"], link["a"], link["b"] = BOLT, a, b
         link["ax"], link["ay"] = anchor(a, at_a)
         link["bx"], link["by"] = anchor(b, at_b)

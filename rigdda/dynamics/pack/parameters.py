@@ -121,7 +121,6 @@ def pack_parameters(
         "solver": SOLVERS.index(settings.solver),
         "relaxation": settings.relaxation,
         "sleeping": settings.sleeping and not (static or shaken or scene.supports),
-        "timing": settings.timing,
         "floor": floor,
         "bonded": (interfaces["cohesion"] + interfaces["tension"]).any(),
     }

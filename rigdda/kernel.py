@@ -187,7 +187,7 @@ def arithmetic_kernel(function: Callable[..., Any]) -> Any:
 
     The only liberty: NaN and order stay as they are. The same results on one kind of machine.
     """
-    return numba.njit(fastmath={"contract"}, **INSIDE)(function)
+    return numba.njit(fastmath={"contract"}, forceinline=True, **INSIDE)(function)
 
 
 def stage(function: Callable[..., Any]) -> Any:

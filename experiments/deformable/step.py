@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from numpy.typing import NDArray
-from rigdda.dynamics.forces import accumulate_forces
+from rigdda.dynamics.island_step import accumulate_force
 
 from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
@@ -118,10 +118,10 @@ def advance(
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         find_islands(bodies, now, work.begin, work.islands, p.blocks, False)
-        pairs, _ = pair_blocks(bodies, now, m, work.islands, 0, count)
+        pairs = pair_blocks(bodies, now, m, work.islands, 0, count)
         settle(bodies, outlines, now, count, s, m, n, pairs, p, counters)
         for k in range(count):
-            accumulate_forces(now[k], False, False)
+            accumulate_force(now[k])
         for i in range(n):
             move_block(bodies, outlines, s, i, p.dt)
         counters[STEPS] += 1

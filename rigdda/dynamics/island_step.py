@@ -177,7 +177,8 @@ def settle_island(
         bodies[islands.block_item[place]].whole = whole
     if whole:
         take_solution(bodies, contacts, m, islands, rows, island, p, ledger)
-        accumulate_forces(contacts, islands, c0, c1)
+        for item in range(c0, c1):
+            accumulate_force(contacts[islands.contact_item[item]])
     else:
         take_impulses(contacts, islands, rows, c0, c1, p.dt)
     for s in range(b1 - b0):
@@ -223,17 +224,15 @@ def take_impulses(
 
 
 @kernel
-def accumulate_forces(contacts: Contacts, islands: Islands, low: int, high: int) -> None:
-    """Carry the forces of a solved island to the next step."""
-    for item in range(low, high):
-        c = contacts[islands.contact_item[item]]
-        c.struck = 0
-        if c.state == OPEN:
-            c.accumulated_normal = c.accumulated_shear = 0.0
-        else:
-            elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
-            c.accumulated_normal += elastic * (c.normal - c.accumulated_normal)
-            c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)
+def accumulate_force(c: Contact) -> None:
+    """Carry the force of a contact that was solved for to the next step."""
+    c.struck = 0
+    if c.state == OPEN:
+        c.accumulated_normal = c.accumulated_shear = 0.0
+    else:
+        elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
+        c.accumulated_normal += elastic * (c.normal - c.accumulated_normal)
+        c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)
 
 
 @kernel

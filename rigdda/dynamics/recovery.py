@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Islands, Rows
-from rigdda.dynamics.constants import OPEN, RECOVERY_SWEEPS, SUBSTEPS
+from rigdda.dynamics.constants import RECOVERY_SWEEPS, SUBSTEPS
 from rigdda.dynamics.records import Contacts, Parameters
 from rigdda.dynamics.rows import (
     AIM,
@@ -51,7 +51,7 @@ def find_deepest(
         row = rows.row[k]
         a, b = rows.slot[i], rows.slot[j]
         place_row(row, rows.fact[k], rows.form[k], a, b, rows.scale[i], rows.scale[j])
-        load = max(min(c.normal, c.accumulated_normal), 0.0) if c.state != OPEN else 0.0
+        load = max(c.accumulated_normal, 0.0)
         explained = min(load / c.stiffness, most)
         rows.height[k] = row[GAP] + explained
         deepest = max(deepest, -rows.height[k])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rigdda.barriers import GravityWall
 from rigdda.dynamics.pack import Arrays, pack
-from rigdda.dynamics.pack.bodies import barrier_trait, block_traits, write_polygons
+from rigdda.dynamics.pack.bodies import barrier_trait, block_traits, set_brakes, write_polygons
 from rigdda.dynamics.pack.ground import pack_ground
 from rigdda.dynamics.pack.monitors import start_rock, start_targets
 from rigdda.dynamics.pack.parameters import pack_interfaces, rock_numbers
@@ -104,6 +104,7 @@ class Template:
         other_surfaces = scene.surfaces is not self.scene.surfaces
         if other_surfaces or scene.barriers != self.scene.barriers:
             start_targets(arrays.monitors.target, scene)  # of embankments friction is the strength
+            set_brakes(arrays.links, scene)
         if other_surfaces:
             arrays.interfaces[...] = pack_interfaces(scene, self._names)
         start_rock(self._rock, bodies, self._stations)

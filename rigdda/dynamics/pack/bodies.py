@@ -203,7 +203,7 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
         brake = links[q]
         brake["kind"], brake["a"], brake["b"], brake["number"] = BRAKE, place, TERRAIN, number
         brake["bx"], brake["by"] = bodies["x"][place], bodies["y"][place]
-        brake["yielding"], brake["length"] = fence.braking_force, fence.elongation
+        brake["length"] = fence.elongation
     of_supports = links[: len(scene.supports)]
     for number, (link, support) in enumerate(zip(of_supports, scene.supports, strict=True)):
         link["number"], link["yielding"], link["sign"] = number, math.inf, 1.0
@@ -223,4 +223,14 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
         link["length"] = math.dist(support.point_a, support.point_b)
         if support.yield_force is not None:
             link["yielding"] = support.yield_force
-    return links[np.argsort(links["a"], kind="stable")]
+    links = links[np.argsort(links["a"], kind="stable")]
+    set_brakes(links, scene)
+    return links
+
+
+def set_brakes(links: Links, scene: Scene) -> None:
+    """Write the forces against which the fences of a scene give way, by the width of its event."""
+    for q in np.flatnonzero(links["kind"] == BRAKE):
+        fence = scene.barriers[links["number"][q]]
+        assert isinstance(fence, Fence)
+        links["yielding"][q] = fence.braking_force

@@ -95,7 +95,7 @@ def take_slot(body: Body, slot: Floats, scale: Floats, p: Parameters, ledger: ND
     """
     body.lately = LATELY * max(top_speed(body), body.lately)
     if body.guided:
-        body.vx, body.x = slot[NOW] * scale[0], slot[X]
+        body.vx, body.x = slot[NOW] / math.sqrt(body.mass), slot[X]
         return
     dx, dy, turn = slot[X] - body.x, slot[Y] - body.y, slot[TURN]
     fx, fy = body.mass * p.field_x + body.force_x, body.mass * p.field_y + body.force_y
@@ -184,6 +184,8 @@ def settle_island(
     for s in range(b1 - b0):
         slot = rows.slot[s]
         slot[COS], slot[SIN] = math.cos(slot[TURN]), math.sin(slot[TURN])
+        if bodies[islands.block_item[b0 + s]].guided:  # position correction leaves it
+            rows.scale[s, 0] = 0.0
     return struck and not whole
 
 

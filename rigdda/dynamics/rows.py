@@ -83,8 +83,8 @@ def push(row: Floats, first: int, a: Floats, b: Floats, column: int, impulse: fl
 
 @kernel
 def is_elastic(c: Contact) -> bool:
-    """Return whether a contact is a spring whose stiffness is given, or a support."""
-    return c.kind == PLAIN or c.kind == BOLT or c.kind == PIN
+    """Return whether a contact is a spring whose stiffness is given, a support or a brake."""
+    return c.kind == PLAIN or c.kind == BOLT or c.kind == PIN or c.kind == BRAKE
 
 
 @inlined

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from numpy.typing import NDArray
-from rigdda.dynamics.island_step import accumulate_force
 
 from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
@@ -14,6 +13,7 @@ from experiments.deformable.submatrices import UNKNOWNS
 from rigdda.dynamics.arrays import Ground, Matrix, Monitors, Outlines, Work
 from rigdda.dynamics.correction import place_edges
 from rigdda.dynamics.detection import copy_index, detect
+from rigdda.dynamics.island_step import accumulate_force
 from rigdda.dynamics.islands import find_islands, pair_blocks
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,

@@ -66,11 +66,12 @@ kits; heights and elongations are orders of magnitude, from memory."""
 class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     """A flexible fence, which brakes rock with a constant force over its elongation.
 
-    It stands still until it is pushed with more than capacity / elongation, by a blow or by what
-    lies against it. Then it gives way against that force, and so takes that force times its path.
-    Its top sinks in proportion, by half when its elongation is spent. Then it fails, and what is
-    left of the energy goes on with the blocks. Impacts on it are plastic whatever its surface, and
-    the mass of its net moves with the rock.
+    It stands still until it is pushed downhill with more than capacity / elongation, by a blow or
+    by what lies against it. Then it gives way against that force, and so takes that force times
+    its path. Its top sinks in proportion, by half when its elongation is spent. Then it fails, and
+    what is left of the energy goes on with the blocks. Impacts on it are plastic whatever its
+    surface and without friction, and the mass of its net moves with the rock. What pushes it uphill
+    does not move it.
 
     Parameters
     ----------

@@ -1,12 +1,14 @@
 """Fences: yielding supports that give way against a constant force until their elongation is spent.
 
-A fence is a body that moves along x alone. Its brake, a row of the contacts (`contact.links`),
-holds it with any force up to F = capacity / elongation. What pushes harder, be it a blow or a pile,
-moves it against F, so that it takes the energy F times its path. When its elongation is spent, it
-has taken its capacity and is gone.
+A fence is a body that moves along x alone, and downhill only. Its brake, a row of the contacts
+(`contact.links`), holds it with any force up to F = capacity / elongation. What pushes harder, be
+it a blow or a pile, moves it against F, so that it takes the energy F times its path. When its
+elongation is spent, it has taken its capacity and is gone.
 """
 
 from __future__ import annotations
+
+import math
 
 from numpy.typing import NDArray
 
@@ -20,15 +22,25 @@ from rigdda.kernel import kernel, stage
 
 
 @kernel
-def hardest_push(contacts: Contacts, count: int, fence: int) -> int:
-    """Return the contact that presses hardest on a body in this step, -1 if none does."""
-    hardest, most = -1, 0.0
+def last_block(
+    contacts: Contacts, count: int, fence: int, barrier: int, monitors: Monitors
+) -> tuple[int, float, float]:
+    """Return the block that presses hardest on a fence in this step, and where it does [m].
+
+    Where none does, the one that touched it last, at infinity.
+    """
+    block, most, x, y = -1, 0.0, math.inf, math.inf
     for k in range(count):
         c = contacts[k]
         pushes = (c.a == fence or c.b == fence) and c.kind != BRAKE and c.state != OPEN
         if pushes and c.normal > most:
-            hardest, most = k, c.normal
-    return hardest
+            block, most, x, y = c.a if c.b == fence else c.b, c.normal, c.x, c.y
+    if block < 0:
+        block = 0
+        for i in range(len(monitors.rock)):
+            if monitors.last_touch[i, barrier] > monitors.last_touch[block, barrier]:
+                block = i
+    return block, x, y
 
 
 @stage
@@ -38,7 +50,7 @@ def give_way(
 ) -> None:  # fmt: skip
     """Spend the elongation of the fences that have moved in this step, and lower their tops.
 
-    A fence whose elongation is spent fails, by the block that presses hardest on it.
+    A fence whose elongation is spent fails, by the block that presses hardest on it or did last.
     """
     for q in range(len(links)):
         link = links[q]
@@ -58,11 +70,10 @@ def give_way(
         if link.length > 0.0:
             continue
         ledger[1] -= retire(bodies[fence])
-        k = hardest_push(contacts, count, fence)
-        if k >= 0:
-            c = contacts[k]
-            i = c.a if c.b == fence else c.b
-            counters[EVENTS] = write_event(
-                monitors, counters[EVENTS], time, FAILED, bodies[i], i, barrier, c.x, c.y,
-                c.y - target.ground,
-            )  # fmt: skip
+        block, x, y = last_block(contacts, count, fence, barrier, monitors)
+        if x == math.inf:
+            x, y = bodies[fence].x, bodies[block].y
+        counters[EVENTS] = write_event(
+            monitors, counters[EVENTS], time, FAILED, bodies[block], block, barrier, x, y,
+            y - target.ground,
+        )  # fmt: skip

@@ -219,7 +219,7 @@ def take_impulses(
                 c.state, c.kind, c.kappa = STICK, REST, c.stiffness
                 continue
         if is_support(c):
-            c.state = SLIP if abs(c.normal) == c.tension else STICK
+            c.state = SLIP if c.normal == -c.tension else STICK
             continue
         within = c.cohesion + c.friction * max(c.normal, 0.0) > abs(c.shear)
         c.state = OPEN if c.normal == 0.0 else (STICK if within else SLIP)

@@ -103,7 +103,7 @@ LINK = _record(
     by=float,
     stiffness=float,  # [N/m]
     prestress=float,  # [N]
-    yielding=float,  # tension at which it yields [N]; of a brake the force both ways
+    yielding=float,  # tension at which it yields [N]; of a brake the force downhill
     length=float,  # at which the tension is `prestress`; grows as it yields [m]; of a brake the
     # elongation that is left
 )

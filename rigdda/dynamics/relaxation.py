@@ -68,7 +68,6 @@ from rigdda.dynamics.rows import (
     KEEP,
     KEEP_SHEAR,
     LOAD,
-    MOST,
     NORMAL,
     NOW,
     PULL,
@@ -169,9 +168,9 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float) -> None:
         cross += row[NORMAL + q] * row[SHEAR + q]
     row[FLEXIBLE] = flexible
     row[COHESION], row[TENSION] = h * fact[STRENGTH], h * fact[STRENGTH + 1]
-    row[MOST] = h * fact[STRENGTH + 2]
-    if row[MOST] < math.inf and abs(row[GAP]) >= fact[FREE_GAP]:  # a brake that is spent
-        row[TENSION] = row[MOST] = 0.0
+    brake = fact[STRENGTH] == math.inf and row[TENSION] < math.inf
+    if brake and row[GAP] >= fact[FREE_GAP]:  # its elongation is spent
+        row[TENSION] = 0.0
     if row[STIFFNESS] == 0.0:
         row[KEEP] = row[KEEP_SHEAR] = 1.0
         row[GAIN], row[GAIN_SHEAR] = 1.0 / flexible, 1.0 / rolling if rolling > 0.0 else 0.0
@@ -256,8 +255,7 @@ def sweep(
         u, v, w, u2, v2, w2 = a[0], a[1], a[2], b[0], b[1], b[2]
         speed = (n[0] * u + n[1] * v + n[2] * w) + (n[3] * u2 + n[4] * v2 + n[5] * w2)
         force, before = r[IMPULSE], r[IMPULSE + 1]
-        normal = r[KEEP] * force + r[GAIN] * (r[AIM] - speed)
-        normal = min(max(normal, -r[TENSION]), r[MOST])
+        normal = max(r[KEEP] * force + r[GAIN] * (r[AIM] - speed), -r[TENSION])
         if normal == 0.0 and force == 0.0 and before == 0.0 and r[COHESION] == 0.0:
             if r[STIFFNESS] == 0.0:
                 wait = (speed - r[AIM]) / (reach + abs(speed))

@@ -20,9 +20,9 @@ from rigdda.kernel import arithmetic_kernel, inlined, kernel
 # normal and shear impulse in this substep [N s]. AIM: normal velocity to reach at least [m/s].
 NORMAL, IMPULSE, AIM = 0, 6, 8
 
-# p = KEEP p + GAIN (AIM - v), see relaxation.sweep [-], [kg]. COHESION, TENSION, MOST: shear
-# impulse and tension that the contact bears besides friction and pressure, greatest pressure [N s].
-KEEP, GAIN, COHESION, TENSION, MOST = 9, 10, 11, 12, 13
+# p = KEEP p + GAIN (AIM - v), see relaxation.sweep [-], [kg]. COHESION, TENSION: shear impulse
+# and tension that the contact bears besides friction and pressure [N s].
+KEEP, GAIN, COHESION, TENSION = 9, 10, 11, 12
 
 # SHEAR to + 5, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR: the same for shear. CROSS: shear impulse that a
 # change of the normal impulse takes [-]. FLEXIBLE: normal velocity per impulse [1/kg]. FRICTION:
@@ -37,8 +37,8 @@ COLUMNS = 32
 
 # columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: place of the vertex and of the point
 # of the face, and normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR at which a spring is free,
-# FREE_GAP at which a brake is [m]. STRENGTH, + 1, + 2: the forces of which COHESION, TENSION and
-# MOST are impulses [N].
+# FREE_GAP at which a brake is [m]. STRENGTH, + 1: the forces of which COHESION and TENSION are
+# impulses [N].
 VERTEX, FACE, DIRECTION, FREE_GAP, FREE_SHEAR, STRENGTH = 0, 2, 4, 6, 7, 8
 
 # RESTITUTION [-]. BOUNCE: velocity with which a contact that was struck in this substep is to open
@@ -105,10 +105,10 @@ def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, still: int) -
     row[IMPULSE], row[IMPULSE + 1] = c.accumulated_normal, c.accumulated_shear
     support = c.kind == PIN or c.kind == BRAKE
     fact[STRENGTH] = math.inf if support else c.cohesion
-    fact[STRENGTH + 1], fact[STRENGTH + 2] = c.tension, math.inf
+    fact[STRENGTH + 1] = c.tension
     row[STIFFNESS] = fact[FREE_GAP] = fact[FREE_SHEAR] = 0.0
     if c.kind == BRAKE:
-        fact[STRENGTH + 2], fact[FREE_GAP] = c.tension, c.reach
+        fact[FREE_GAP] = c.reach
     if c.kind == BOLT:
         row[STIFFNESS] = c.stiffness
         fact[FREE_GAP] = c.gap + c.bias * c.kappa / c.stiffness

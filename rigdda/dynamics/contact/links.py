@@ -1,7 +1,7 @@
 """Supports as contacts that may pull: bolts act along their line, pins in both directions.
 
-A brake holds a fence, which moves along x alone: with any force up to its yielding one, both ways.
-What pushes harder moves the fence against that force, until the elongation is spent.
+A brake holds a fence, which moves along x alone: uphill with any force, downhill with any up to its
+yielding one. What pushes harder moves the fence against that force, until the elongation is spent.
 
 They enter the system of equations, the exchange of forces and the ledger like any closed contact,
 and follow the same law (`contact.law`): a pin with b = 0. The mean tension of a bolt over a step,

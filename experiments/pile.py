@@ -99,6 +99,6 @@ def assemble(
     """Assemble all blocks as one island with their contacts as they are; returns the pairs."""
     p = levels[0]
     find_islands(bodies, contacts, work.begin, work.islands, p.blocks, False)
-    pairs, _ = pair_blocks(bodies, contacts, m, work.islands, 0, count)
+    pairs = pair_blocks(bodies, contacts, m, work.islands, 0, count)
     assemble_island(bodies, contacts, m, work.islands, 0, pairs, p)
     return pairs

@@ -223,9 +223,9 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
         link["length"] = math.dist(support.point_a, support.point_b)
         if support.yield_force is not None:
             link["yielding"] = support.yield_force
-    links = links[np.argsort(links["a"], kind="stable")]
-    set_brakes(links, scene)
-    return links
+    ordered: Links = links[np.argsort(links["a"], kind="stable")]
+    set_brakes(ordered, scene)
+    return ordered
 
 
 def set_brakes(links: Links, scene: Scene) -> None:

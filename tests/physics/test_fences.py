@@ -450,16 +450,20 @@ def test_its_top_does_not_bear_what_comes_down_on_it(dt):
 # what a fence is
 
 
-def test_a_fence_that_fails_with_nothing_against_it_is_told():
-    """A light fence that a fast block throws ahead: it is by that block that it failed."""
-    for dt in STEPS:
-        sharp = Block([(-3.5, 1.0), (-2.5, 2.0), (-3.5, 3.0)], velocity=(12.0, 6.0, 8.0))
-        fence = Fence(0.0, 4.0, 1e4, elongation=0.5)
-        sim = in_motion(Scene(GROUND, (sharp,), rock(), barriers=(fence,), gravity=0.0), dt)
-        run = sim.run(1.5)
-        spent = sim.loop.arrays.links["length"][0] <= 0.0
-        assert spent == math.isfinite(run.failure(0))
-        assert spent == (sim.loop.arrays.bodies["status"][-1] == RETIRED)
+@at_all_steps
+def test_a_fence_that_moves_on_by_itself_fails_like_any_other(dt):
+    """A corner throws a light plate ahead, whose elongation is spent with nothing against it."""
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        corners = rough(rng, int(rng.integers(3, 7)), 1.0)
+        speed = (rng.uniform(5.0, 20.0), rng.uniform(0.0, 10.0), rng.uniform(-10.0, 10.0))
+        block = Block(polygon(corners, (-3.0, 3.0), rng.uniform(0.0, 6.28)), velocity=speed)
+        fence = Fence(0.0, 4.0, 1e4, elongation=2.0)
+        sim = in_motion(Scene(GROUND, (block,), rock(), barriers=(fence,), gravity=0.0), dt)
+        run = sim.run(1.0)
+        spent = sim.loop.arrays.bodies["status"][-1] == RETIRED
+        assert spent == math.isfinite(run.failure(0)), seed
+        assert spent == (path(run) >= fence.elongation), seed
 
 
 def test_without_an_elongation_it_has_that_of_the_next_class():

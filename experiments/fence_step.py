@@ -40,7 +40,7 @@ LAYOUTS: dict[str, tuple[str, Layout]] = {
     "none on quick": ("quick", ()),
     "fences, 0.7 MJ/m": ("shu-hwa", benches(7e5, 7e5)),
     "fences, 3 MJ/m": ("shu-hwa", benches(3e6, 3e6)),
-    "fences, 2.5 and 5 MJ/m": ("shu-hwa", benches(2.5e6, 5e6)),
+    "fences, 6 and 12 MJ/m": ("shu-hwa", benches(6e6, 1.2e7)),
     "fence": ("quick", (Fence(24.0, 3.0, 1.4e6),)),
     "ditch": ("quick", (Ditch(29.8, 1.5, 4.0),)),
     "embankment": ("quick", (Embankment(24.5, 1.0, 0.5, 0.5),)),

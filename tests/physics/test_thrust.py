@@ -43,10 +43,11 @@ def row(blocks, dam=DAM):
 
 
 def test_resistances_are_weight_times_friction():
+    """And of a fence the force against which it gives way."""
     barriers = (
         Wall(20.0, 2.0),
         GravityWall(5.0, 2.0),
-        Fence(10.0, 2.0, 1e6),
+        Fence(10.0, 2.0, 1e6, elongation=4.5),
         DAM,
         Ditch(30.0, 1, 4),
     )
@@ -55,7 +56,7 @@ def test_resistances_are_weight_times_friction():
     expected = (
         math.inf,
         2400 * 2.0 * GRAVITY * tan,
-        math.inf,
+        1e6 / 4.5,
         1900 * 4.0 * GRAVITY * tan,
         math.inf,
     )

@@ -115,7 +115,7 @@ AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3
 # state of a contact
 OPEN, STICK, SLIP = 0, 1, 2
 # kind of a contact in one step
-REST, NEW, PLAIN, BOLT, PIN, BRAKE = 0, 1, 2, 3, 4, 5
+REST, NEW, PLAIN, BOLT, PIN = 0, 1, 2, 3, 4
 # why the step loop returned
 DONE, CONTACTS_FULL, EVENTS_FULL, BAD_STATE, GROUND_MOVED, ENDED = 0, 1, 2, 3, 4, 5
 # solver

@@ -9,13 +9,14 @@ from rigdda.dynamics.arrays import Boxes, Ground, Monitors, Outlines, Work
 from rigdda.dynamics.constants import (
     ASLEEP,
     AWAKE,
+    SAME_NORMAL,
     TERRAIN,
 )
 from rigdda.dynamics.contact.broad_phase import partners_of_bodies, sweep_and_prune
 from rigdda.dynamics.contact.joint import bond_joints
 from rigdda.dynamics.contact.law import prepare
 from rigdda.dynamics.contact.links import add_link
-from rigdda.dynamics.contact.narrow_phase import collide_pair
+from rigdda.dynamics.contact.narrow_phase import add_contact, collide_pair
 from rigdda.dynamics.contact.terrain_phase import collide_terrain
 from rigdda.dynamics.contact.transfer import copy_contact, recall
 from rigdda.dynamics.monitors import barrier_contact
@@ -63,6 +64,24 @@ def keep_asleep(
     return count
 
 
+@kernel
+def keep_sideways(contacts: Contacts, low: int, high: int, most: float) -> int:
+    """Keep those of the contacts low:high that push sideways; returns the new number.
+
+    A net holds what comes against it, not what comes down on its top; and what is in it already, by
+    more than `most` [m], goes over it.
+    """
+    kept = low
+    for k in range(low, high):
+        c = contacts[k]
+        if abs(c.nx) >= SAME_NORMAL and c.gap > -most:
+            add_contact(
+                contacts[kept], c.a, c.b, c.key, c.owner, c.other, c.x, c.y, c.nx, c.ny, c.gap
+            )
+            kept += 1
+    return kept
+
+
 @stage
 def collide_block(
     bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, contacts: Contacts,
@@ -76,12 +95,16 @@ def collide_block(
         The new number of contacts; -1 if they do not fit.
     """
     first, room, boxes = count, len(contacts) - outlines.corner.shape[1] - 4, work.boxes
-    if not bodies[a].guided:
+    if bodies[a].brake == 0.0:
         count = collide_terrain(bodies, outlines, ground, boxes.swept[a], contacts, count, a, p)
     for q in range(boxes.partner_start[a], boxes.partner_start[a + 1]):
         if count < 0 or count > room:
             return -1
-        count = collide_pair(bodies, outlines, contacts, count, a, boxes.partner[q], p)
+        b, before = boxes.partner[q], count
+        count = collide_pair(bodies, outlines, contacts, count, a, b, p)
+        if bodies[a].brake > 0.0 or bodies[b].brake > 0.0:
+            fence = a if bodies[a].brake > 0.0 else b
+            count = keep_sideways(contacts, before, count, abs(outlines.local[fence, 0].x))
     if count < 0 or count > room:
         return -1
     recall(contacts, first, count, old, work.first, p.margin)

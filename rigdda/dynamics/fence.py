@@ -1,8 +1,8 @@
 """Fences: yielding supports that give way against a constant force until their elongation is spent.
 
-A fence is a body that moves along x alone, and downhill only. Its brake, a row of the contacts
-(`contact.links`), holds it with any force up to F = capacity / elongation. What pushes harder, be
-it a blow or a pile, moves it against F, so that it takes the energy F times its path. When its
+A fence is a body that moves along x alone, and downhill only. Its brake holds it with any force up
+to F = capacity / elongation (`relaxation.release_fences`). What pushes harder, be it a blow or a
+pile, moves it against F, so that it takes the energy F times its path. When its
 elongation is spent, it has taken its capacity and is gone.
 """
 
@@ -13,11 +13,11 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Monitors, Outlines
-from rigdda.dynamics.constants import BRAKE, OPEN, RETIRED
+from rigdda.dynamics.constants import OPEN, RETIRED
 from rigdda.dynamics.correction import set_body_coordinates
 from rigdda.dynamics.monitors import FAILED, write_event
 from rigdda.dynamics.motion import retire
-from rigdda.dynamics.records import EVENTS, Bodies, Contacts, Links
+from rigdda.dynamics.records import EVENTS, Bodies, Contacts, Parameters
 from rigdda.kernel import kernel, stage
 
 
@@ -32,7 +32,7 @@ def last_block(
     block, most, x, y = -1, 0.0, math.inf, math.inf
     for k in range(count):
         c = contacts[k]
-        pushes = (c.a == fence or c.b == fence) and c.kind != BRAKE and c.state != OPEN
+        pushes = (c.a == fence or c.b == fence) and c.state != OPEN
         if pushes and c.normal > most:
             block, most, x, y = c.a if c.b == fence else c.b, c.normal, c.x, c.y
     if block < 0:
@@ -45,34 +45,33 @@ def last_block(
 
 @stage
 def give_way(
-    bodies: Bodies, outlines: Outlines, links: Links, contacts: Contacts, count: int,
-    monitors: Monitors, counters: NDArray, ledger: NDArray, time: float,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, monitors: Monitors,
+    counters: NDArray, ledger: NDArray, time: float, p: Parameters,
 ) -> None:  # fmt: skip
     """Spend the elongation of the fences that have moved in this step, and lower their tops.
 
     A fence whose elongation is spent fails, by the block that presses hardest on it or did last.
     """
-    for q in range(len(links)):
-        link = links[q]
-        fence = link.a
-        if link.kind != BRAKE or bodies[fence].status == RETIRED:
+    for fence in range(len(monitors.rock), p.blocks):
+        body = bodies[fence]
+        if body.brake == 0.0 or body.status == RETIRED:
             continue
-        moved = abs(bodies[fence].x - link.bx)
-        if moved == 0.0:
+        moved = body.x - body.held_at
+        if moved <= 0.0:
             continue
-        link.bx = bodies[fence].x
-        link.length -= moved
+        body.held_at = body.x
+        body.elongation -= moved
         barrier = monitors.barrier[fence]
         target = monitors.target[barrier]
         for corner in range(2, 4):
             outlines.local[fence, corner].y -= target.sag * moved
         set_body_coordinates(bodies, outlines, fence)
-        if link.length > 0.0:
+        if body.elongation > 0.0:
             continue
-        ledger[1] -= retire(bodies[fence])
+        ledger[1] -= retire(body)
         block, x, y = last_block(contacts, count, fence, barrier, monitors)
         if x == math.inf:
-            x, y = bodies[fence].x, bodies[block].y
+            x, y = body.x, bodies[block].y
         counters[EVENTS] = write_event(
             monitors, counters[EVENTS], time, FAILED, bodies[block], block, barrier, x, y,
             y - target.ground,

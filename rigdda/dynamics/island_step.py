@@ -11,7 +11,6 @@ from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.dynamics.assembly.island import damping_of, load_moment
 from rigdda.dynamics.constants import (
     BOLT,
-    BRAKE,
     LATELY,
     OPEN,
     PIN,
@@ -42,9 +41,11 @@ from rigdda.dynamics.records import (
 from rigdda.dynamics.recovery import push_out
 from rigdda.dynamics.relaxation import relax, start_slots
 from rigdda.dynamics.rows import (
+    BRAKE,
     COS,
     FIELD,
     IMPULSE,
+    MOVES,
     NOW,
     SIN,
     STRUCK,
@@ -94,8 +95,8 @@ def take_slot(body: Body, slot: Floats, scale: Floats, p: Parameters, ledger: ND
     them counts as impact.
     """
     body.lately = LATELY * max(top_speed(body), body.lately)
-    if body.guided:
-        body.vx, body.x = slot[NOW] / math.sqrt(body.mass), slot[X]
+    if body.brake > 0.0:
+        body.vx, body.x = slot[NOW] * slot[MOVES], slot[X]
         return
     dx, dy, turn = slot[X] - body.x, slot[Y] - body.y, slot[TURN]
     fx, fy = body.mass * p.field_x + body.force_x, body.mass * p.field_y + body.force_y
@@ -126,16 +127,17 @@ def is_tried_whole(
 
     It is in static mode and without post-correction; where it has supports, or the paper's
     contacts, whose stiffness is given; and where it is `quiet` and has joints that hold, or was
-    solved so in the last step. Never if it has a brake: a body that is guided has no entries in the
-    system of equations.
+    solved so in the last step. Never if a fence belongs to it, which has no entries in the system
+    of equations.
     """
     springs, bonds, rested = p.static or not p.post_correction, False, True
     for place in range(islands.block_start[island], islands.block_start[island + 1]):
-        rested = rested and bodies[islands.block_item[place]].whole
+        body = bodies[islands.block_item[place]]
+        if body.brake > 0.0:
+            return False
+        rested = rested and body.whole
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
-        if c.kind == BRAKE:
-            return False
         springs = springs or is_elastic(c)
         bonds = bonds or c.bond > 0.0
     return springs or (quiet and (bonds or rested))
@@ -168,7 +170,7 @@ def settle_island(
         counters[RELAXED] += 1
         sweeps, struck, settled = relax(rows, b1 - b0, count, speed, p, ledger)
         counters[SWEEPS] += sweeps
-        if quiet and not (settled or tried or has_brake(contacts, islands, c0, c1)):
+        if quiet and not (settled or tried or has_fence(bodies, islands, b0, b1)):
             whole = solve_states(bodies, contacts, system, islands, island, pairs, p, counters)
             if whole:
                 start_slots(bodies, islands, rows, island, p)
@@ -184,17 +186,17 @@ def settle_island(
     for s in range(b1 - b0):
         slot = rows.slot[s]
         slot[COS], slot[SIN] = math.cos(slot[TURN]), math.sin(slot[TURN])
-        if bodies[islands.block_item[b0 + s]].guided:  # position correction leaves it
+        if slot[BRAKE] > 0.0:  # position correction leaves fences where they are
             rows.scale[s, 0] = 0.0
     return struck and not whole
 
 
 @kernel
-def has_brake(contacts: Contacts, islands: Islands, low: int, high: int) -> bool:
-    """Return whether one of the contacts low:high of an island is the brake of a fence."""
+def has_fence(bodies: Bodies, islands: Islands, low: int, high: int) -> bool:
+    """Return whether one of the bodies low:high of the islands is a fence."""
     found = False
-    for item in range(low, high):
-        found = found or contacts[islands.contact_item[item]].kind == BRAKE
+    for place in range(low, high):
+        found = found or bodies[islands.block_item[place]].brake > 0.0
     return found
 
 
@@ -218,7 +220,7 @@ def take_impulses(
             if not joint_breaks(contacts, islands, low, high, item):
                 c.state, c.kind, c.kappa = STICK, REST, c.stiffness
                 continue
-        if is_support(c):
+        if c.kind == BOLT or c.kind == PIN:
             c.state = SLIP if c.normal == -c.tension else STICK
             continue
         within = c.cohesion + c.friction * max(c.normal, 0.0) > abs(c.shear)
@@ -235,12 +237,6 @@ def accumulate_force(c: Contact) -> None:
         elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
         c.accumulated_normal += elastic * (c.normal - c.accumulated_normal)
         c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)
-
-
-@kernel
-def is_support(c: Contact) -> bool:
-    """Return whether a contact stands for a support or a brake."""
-    return c.kind == BOLT or c.kind == PIN or c.kind == BRAKE
 
 
 @inlined
@@ -260,7 +256,7 @@ def account_contacts(
         c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
         if c.state == OPEN:
             continue
-        support = is_support(c)
+        support = c.kind == BOLT or c.kind == PIN
         block, barrier = barrier_contact(monitors, c.a, c.b)
         if barrier >= 0:
             own = row[WORK_ON_A]

@@ -97,7 +97,7 @@ def is_over(bodies: Bodies, monitors: Monitors, counters: Ints, p: Parameters) -
         body = bodies[i]
         if (
             body.status == AWAKE
-            and not body.guided
+            and body.brake == 0.0
             and not (body.x - body.radius > monitors.leave and body.vx > 0.0)
         ):
             counters[STILL] = 0

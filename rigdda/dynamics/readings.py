@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from rigdda.dynamics.constants import (
     BOLT,
-    BRAKE,
     FIXED,
     MARGIN_RATIO,
     OPEN,
@@ -99,7 +98,7 @@ class Diagnostics(NamedTuple):
 
 def contact_table(scene: Scene, c: Contacts) -> NDArray[np.void]:
     """Return contacts of a step as a structured array, see `CONTACT_TABLE`."""
-    c = c[(c["kind"] != BOLT) & (c["kind"] != PIN) & (c["kind"] != BRAKE)]
+    c = c[(c["kind"] != BOLT) & (c["kind"] != PIN)]
     out = np.zeros(len(c), dtype=CONTACT_TABLE)
     blocks = len(scene.blocks)
     number = np.array([*range(blocks), *(blocks + i for i in scene.bodies), -1])
@@ -121,8 +120,7 @@ def support_forces(arrays: Arrays, c: Contacts) -> Floats:
     fx = c["normal"] * c["nx"] - c["shear"] * c["ny"]
     fy = c["normal"] * c["ny"] + c["shear"] * c["nx"]
     out[-1 - c["key"]] = np.stack([fx, fy], axis=1)
-    supports = arrays.links["kind"] != BRAKE
-    return out[supports][np.argsort(arrays.links["number"][supports])]
+    return out[np.argsort(arrays.links["number"])]
 
 
 def bolt_forces(arrays: Arrays) -> Floats:

@@ -41,7 +41,9 @@ BODY = _record(
     parts=int,  # number of them
     surface=int,  # index of the surface
     status=int,  # AWAKE, ASLEEP, FIXED, RETIRED
-    guided=bool,  # whether it moves along x alone, and nothing but contacts and brakes acts on it
+    brake=float,  # force against which it gives way along x, of a fence; 0: it moves freely [N]
+    elongation=float,  # by which a fence may still give way [m]
+    held_at=float,  # x up to which it has spent it [m]
     island=int,  # island in which a sleeping body fell asleep
     apart=float,  # time since a contact of it was closed, 0 if one was in the last step [s]
     damping=float,  # that of what it touched last, see assembly.island.damping_of [1/s]
@@ -60,7 +62,7 @@ CONTACT = _record(
     owner=np.int32,  # 1: the vertex belongs to a, 0: to b
     other=np.int32,  # surface of b
     state=np.int32,  # OPEN, STICK, SLIP
-    kind=np.int32,  # REST, NEW, PLAIN, BOLT, PIN, BRAKE
+    kind=np.int32,  # REST, NEW, PLAIN, BOLT, PIN
     struck=np.int32,  # 1 if it was struck in this step
     pair=np.int32,  # off-diagonal block of the pair of bodies, -1: no coupling
     x=float,  # the vertex [m]
@@ -78,8 +80,7 @@ CONTACT = _record(
     restitution=float,
     bond=float,  # length of joint that the contact stands for and that is not broken [m]
     cohesion=float,  # shear force that it bears without normal force [N]
-    tension=float,  # tension that it, or a bolt or brake before it yields, bears [N]
-    reach=float,  # elongation that is left of a brake [m]
+    tension=float,  # tension that it, or a bolt before it yields, bears [N]
     stiffness=float,  # of the contact at rest [N/m]
     kappa=float,  # in this step [N/m]
     bias=float,  # displacement at which the spring is free [m], see contact.law
@@ -94,8 +95,8 @@ CONTACT = _record(
 LINK = _record(
     a=int,  # block
     b=int,  # block or TERRAIN
-    kind=int,  # BOLT, PIN or BRAKE
-    number=int,  # index of the support in the scene, or of the barrier that a brake holds
+    kind=int,  # BOLT or PIN
+    number=int,  # index of the support in the scene
     sign=float,  # -1 where a is the second block of the support, else 1 [-]
     ax=float,  # anchors in body coordinates, in the ground where b is TERRAIN [m]
     ay=float,
@@ -103,11 +104,10 @@ LINK = _record(
     by=float,
     stiffness=float,  # [N/m]
     prestress=float,  # [N]
-    yielding=float,  # tension at which it yields [N]; of a brake the force downhill
-    length=float,  # at which the tension is `prestress`; grows as it yields [m]; of a brake the
-    # elongation that is left
+    yielding=float,  # tension at which it yields [N]
+    length=float,  # at which the tension is `prestress`; grows as it yields [m]
 )
-"""One support, or the brake of a fence."""
+"""One support."""
 
 BOX = _record(
     low_x=float,  # [m]

@@ -50,6 +50,7 @@ from rigdda.dynamics.rows import (
     BEFORE,
     BEND,
     BOUNCE,
+    BRAKE,
     COHESION,
     COS,
     CROSS,
@@ -67,13 +68,16 @@ from rigdda.dynamics.rows import (
     IMPULSE,
     KEEP,
     KEEP_SHEAR,
+    LEFT,
     LOAD,
+    MOVES,
     NORMAL,
     NOW,
     PULL,
     RESTITUTION,
     SHEAR,
     SIN,
+    START,
     STIFFNESS,
     STRENGTH,
     STRUCK,
@@ -102,7 +106,9 @@ def start_slot(body: Body, slot: Floats, scale: Floats, p: Parameters) -> None:
     slot[PULL + 2] = load_moment(body) / spin
     slot[X], slot[Y], slot[TURN], slot[COS], slot[SIN] = body.x, body.y, 0.0, 1.0, 0.0
     slot[DAMPING], slot[FIELD] = damping_of(body, p), 0.0
-    if body.guided:
+    slot[BRAKE], slot[MOVES], slot[LEFT] = body.brake, scale[0], body.elongation
+    slot[START] = body.x
+    if body.brake > 0.0:
         scale[1] = scale[2] = slot[PULL] = slot[PULL + 1] = slot[DAMPING] = 0.0
 
 
@@ -168,14 +174,11 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float) -> None:
         cross += row[NORMAL + q] * row[SHEAR + q]
     row[FLEXIBLE] = flexible
     row[COHESION], row[TENSION] = h * fact[STRENGTH], h * fact[STRENGTH + 1]
-    brake = fact[STRENGTH] == math.inf and row[TENSION] < math.inf
-    if brake and row[GAP] >= fact[FREE_GAP]:  # its elongation is spent
-        row[TENSION] = 0.0
     if row[STIFFNESS] == 0.0:
         row[KEEP] = row[KEEP_SHEAR] = 1.0
-        row[GAIN], row[GAIN_SHEAR] = 1.0 / flexible, 1.0 / rolling if rolling > 0.0 else 0.0
+        row[GAIN], row[GAIN_SHEAR] = 1.0 / flexible, 1.0 / rolling
         row[AIM], row[AIM_SHEAR] = -0.5 * h * row[BEND], 0.0
-        if fact[STRENGTH] == math.inf:  # a pin, which `mend_links` puts in its place, or a brake
+        if fact[STRENGTH] == math.inf:  # a pin, which `mend_links` puts in its place
             row[AIM_SHEAR] = -0.5 * h * row[BEND + 1]
         elif row[GAP] > 0.0:
             row[AIM] -= row[GAP] / h
@@ -440,6 +443,78 @@ def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance:
 
 
 @kernel
+def hold_fences(slots: Floats, scale: Floats, n: int) -> float:
+    """Hold the fences of an island for a substep; returns the energy that they had [J]."""
+    energy = 0.0
+    for s in range(n):
+        slot = slots[s]
+        if slot[BRAKE] > 0.0:
+            energy += 0.5 * slot[BEFORE] * slot[BEFORE]
+            slot[NOW] = slot[FREE] = scale[s, 0] = 0.0
+    return energy
+
+
+@kernel
+def push_on(rows: Rows, count: int, number: int, s: int) -> float:
+    """Return the impulse downhill of contacts on slot s in this substep [N s]."""
+    total = 0.0
+    for k in range(count):
+        row, i, j = rows.row[k], rows.row_i[k], rows.row_j[k]
+        if rows.idle[k] > number or (i != s and j != s):
+            continue
+        other, sign = (j, 3) if i == s else (i, 0)
+        if rows.scale[other, 0] > 0.0:
+            total -= row[IMPULSE] * row[sign] / rows.scale[other, 0]
+    return total
+
+
+@kernel
+def release_fences(
+    rows: Rows, n: int, count: int, number: int, h: float, ledger: NDArray
+) -> bool:  # fmt: skip
+    """Let the fences give way on which contacts push harder than their brakes; whether one does.
+
+    Held, a fence has stopped with what it brought from the substep before. Released, its brake acts
+    with its force, and its contacts as they do now; they are to be settled anew. A brake whose
+    elongation is spent does not act.
+    """
+    released = False
+    for s in range(n):
+        slot = rows.slot[s]
+        if slot[BRAKE] == 0.0:
+            continue
+        brake = h * slot[BRAKE] if slot[X] - slot[START] < slot[LEFT] else 0.0
+        if push_on(rows, count, number, s) + slot[BEFORE] / slot[MOVES] <= brake:
+            slot[BEFORE] = 0.0
+            continue
+        released = True
+        ledger[1] += 0.5 * slot[BEFORE] * slot[BEFORE]
+        rows.scale[s, 0] = slot[MOVES]
+        slot[NOW] = slot[FREE] = slot[BEFORE] - brake * slot[MOVES]
+        for k in range(count):
+            i, j = rows.row_i[k], rows.row_j[k]
+            if rows.idle[k] > number or (i != s and j != s):
+                continue
+            row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
+            place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
+            aim_row(row, fact, a, b, h)
+            slot[NOW] += row[IMPULSE] * row[0 if i == s else 3]
+    return released
+
+
+@kernel
+def end_fences(slots: Floats, scale: Floats, n: int, h: float, ledger: NDArray) -> None:
+    """Account for the work of the brakes of fences that have given way; none goes uphill."""
+    for s in range(n):
+        slot = slots[s]
+        if slot[BRAKE] > 0.0 and scale[s, 0] > 0.0:
+            if slot[NOW] < 0.0:
+                ledger[1] -= 0.5 * slot[NOW] * slot[NOW]
+                slot[NOW] = 0.0
+            ledger[4] += (slot[FREE] - slot[BEFORE]) * 0.5 * (slot[BEFORE] + slot[NOW])
+
+
+@kernel
 def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
     """Return in what time, at most `most`, a contact closes faster than `least` [m/s]."""
     for k in range(count):
@@ -485,6 +560,9 @@ def relax(
     alone, reach, least = n == 1, speed + p.gravity * p.dt, IMPACT_STEPS * p.gravity * p.dt
     if alone:
         reach, least = math.inf, IMPACT_STEPS * p.gravity * usual
+    fenced = False
+    for s in range(n):
+        fenced = fenced or rows.slot[s, BRAKE] > 0.0
     sweeps, struck, last, left, number, parts, swept = 0, False, 1.0, p.dt, 0, 0, 0
     while left > 0.0:
         h = min(usual, left)
@@ -493,9 +571,14 @@ def relax(
         if left - h < 0.5 * AT_ONCE * p.dt:
             h = left
         pull(rows.slot, n, h)
+        if fenced:
+            ledger[1] -= hold_fences(rows.slot, rows.scale, n)
         start_rows(rows, count, number, h, h / last)
         swept = settle(rows, n, count, number, reach, tolerance)
         sweeps += swept
+        if fenced and release_fences(rows, n, count, number, h, ledger):
+            sweeps += settle(rows, n, count, number, reach, tolerance)
+            end_fences(rows.slot, rows.scale, n, h, ledger)
         lost, hit, bouncing = end_rows(rows, n, count, number, least)
         ledger[2] += drift(rows.slot, rows.scale, n, h)
         if bouncing:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Islands, Rows
-from rigdda.dynamics.constants import BOLT, BRAKE, PIN, PLAIN
+from rigdda.dynamics.constants import BOLT, PIN, PLAIN
 from rigdda.dynamics.records import Contact, Contacts, Floats
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
@@ -36,9 +36,8 @@ GAP, BEND = 27, 28
 COLUMNS = 32
 
 # columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: place of the vertex and of the point
-# of the face, and normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR at which a spring is free,
-# FREE_GAP at which a brake is [m]. STRENGTH, + 1: the forces of which COHESION and TENSION are
-# impulses [N].
+# of the face, and normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR at which a spring is free
+# [m]. STRENGTH, + 1: the forces of which COHESION and TENSION are impulses [N].
 VERTEX, FACE, DIRECTION, FREE_GAP, FREE_SHEAR, STRENGTH = 0, 2, 4, 6, 7, 8
 
 # RESTITUTION [-]. BOUNCE: velocity with which a contact that was struck in this substep is to open
@@ -60,7 +59,12 @@ FACTS = 21
 NOW, FREE, BEFORE, X, Y, TURN, COS, SIN = 0, 3, 6, 9, 10, 11, 12, 13
 PULL, DAMPING, FIELD, HELD = 14, 17, 18, 19
 
-SLOT_COLUMNS = 20
+# BRAKE: force against which a fence gives way [N], 0: no fence. MOVES: its 1 / sqrt(M) along x,
+# which counts while it does. LEFT: elongation that is left at the start of the step, START: x then
+# [m].
+BRAKE, MOVES, LEFT, START = 20, 21, 22, 23
+
+SLOT_COLUMNS = 24
 
 # rows.form: which body owns the vertex, or that it is a bolt
 OF_A, OF_B, BETWEEN = 0, 1, 2
@@ -83,8 +87,8 @@ def push(row: Floats, first: int, a: Floats, b: Floats, column: int, impulse: fl
 
 @kernel
 def is_elastic(c: Contact) -> bool:
-    """Return whether a contact is a spring whose stiffness is given, a support or a brake."""
-    return c.kind == PLAIN or c.kind == BOLT or c.kind == PIN or c.kind == BRAKE
+    """Return whether a contact is a spring whose stiffness is given, or a support."""
+    return c.kind == PLAIN or c.kind == BOLT or c.kind == PIN
 
 
 @inlined
@@ -103,12 +107,10 @@ def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, still: int) -
     fact[DIRECTION], fact[DIRECTION + 1] = c.nx, c.ny
     row[FRICTION], fact[RESTITUTION] = c.friction, max(c.restitution, 0.0)
     row[IMPULSE], row[IMPULSE + 1] = c.accumulated_normal, c.accumulated_shear
-    support = c.kind == PIN or c.kind == BRAKE
+    support = c.kind == PIN
     fact[STRENGTH] = math.inf if support else c.cohesion
     fact[STRENGTH + 1] = c.tension
     row[STIFFNESS] = fact[FREE_GAP] = fact[FREE_SHEAR] = 0.0
-    if c.kind == BRAKE:
-        fact[FREE_GAP] = c.reach
     if c.kind == BOLT:
         row[STIFFNESS] = c.stiffness
         fact[FREE_GAP] = c.gap + c.bias * c.kappa / c.stiffness

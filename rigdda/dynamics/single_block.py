@@ -20,6 +20,7 @@ from rigdda.dynamics.frames import no_frames
 from rigdda.dynamics.loop import Loop
 from rigdda.dynamics.pack import pack
 from rigdda.dynamics.pack.again import together
+from rigdda.dynamics.pack.bodies import fences
 from rigdda.dynamics.pack.single import MOST_CORNERS, with_room
 from rigdda.dynamics.pack.single import read_single_directly as read_single
 from rigdda.dynamics.pack.single import start_single_directly as start_single
@@ -103,7 +104,8 @@ class SingleBlock:
             [[*corners.min(axis=0), *corners.max(axis=0)] for corners in outlines]
         ).reshape(-1, 4)
         self._target = self._arrays.monitors.target.view(np.ndarray)
-        self._links = self._arrays.links.view(np.ndarray)
+        self._brake = self._arrays.bodies.view(np.ndarray)["brake"]
+        self._fences = list(fences(scene))
         self._start = packed.bodies["x"][1:].copy()
 
     def run(
@@ -140,7 +142,7 @@ class SingleBlock:
         loop.start(a)
         if len(limits):
             self._target["limit"] = limits
-            self._links["yielding"] = forces
+            self._brake[self._fences] = forces
         corners = self._corners[: len(block.vertices)]
         corners[:] = block.vertices
         self._traits[0] = (block.density, *block.velocity, self._surfaces[block.surface], AWAKE)

@@ -33,7 +33,7 @@ def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int
         i, j = pairs[2 * q], pairs[2 * q + 1]
         if bodies[j].status != ASLEEP:
             continue
-        if top_speed(bodies[i]) < SLEEP_SPEED and not bodies[j].guided:
+        if top_speed(bodies[i]) < SLEEP_SPEED and bodies[j].brake == 0.0:
             continue
         woken += wake_island(bodies, bodies[j].island, blocks)
     return woken

@@ -9,7 +9,6 @@ from rigdda.dynamics.arrays import Ground, Monitors, Outlines, System, Work
 from rigdda.dynamics.constants import (
     AWAKE,
     BAD_STATE,
-    BRAKE,
     CONTACTS_FULL,
     DONE,
     ENDED,
@@ -125,9 +124,7 @@ def advance(
         Whether `now` and `before` have changed roles.
     """
     swapped, reason, bad, p = False, DONE, -1, parameters[0]
-    may_fly = len(shaking) == 0 and not p.static and p.post_correction
-    for q in range(len(links)):
-        may_fly = may_fly and links[q].kind == BRAKE
+    may_fly = len(links) == 0 and len(shaking) == 0 and not p.static and p.post_correction
     flyer, flown, flight = -1, 0, 0  # steps of a flight that are taken, and all of them
     while steps > 0 and reason == DONE:
         room = len(monitors.event) - counters[EVENTS]
@@ -162,7 +159,7 @@ def advance(
                 bodies, outlines, interfaces, now, system, work, monitors, time, p, counters, ledger
             )
             ledger[4] += mend_links(bodies, outlines, links, p)
-            give_way(bodies, outlines, links, now, count, monitors, counters, ledger, time)
+            give_way(bodies, outlines, now, count, monitors, counters, ledger, time, p)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         press_asleep(bodies, now, count, monitors, p.dt)

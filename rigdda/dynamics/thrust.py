@@ -17,7 +17,6 @@ from rigdda.dynamics.arrays import Islands, Monitors
 from rigdda.dynamics.constants import (
     ASLEEP,
     BOLT,
-    BRAKE,
     FIXED,
     OPEN,
     PIN,
@@ -36,7 +35,7 @@ LEANING, STRIKING = 0, 1
 @kernel
 def pressed(monitors: Monitors, c: Contact) -> int:
     """Return the barrier that a contact presses on, -1 for none."""
-    if c.state == OPEN or c.kind == BOLT or c.kind == PIN or c.kind == BRAKE:
+    if c.state == OPEN or c.kind == BOLT or c.kind == PIN:
         return -1
     if c.b != TERRAIN:
         return barrier_contact(monitors, c.a, c.b)[1]

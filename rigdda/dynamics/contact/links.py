@@ -1,8 +1,5 @@
 """Supports as contacts that may pull: bolts act along their line, pins in both directions.
 
-A brake holds a fence, which moves along x alone: uphill with any force, downhill with any up to its
-yielding one. What pushes harder moves the fence against that force, until the elongation is spent.
-
 They enter the system of equations, the exchange of forces and the ledger like any closed contact,
 and follow the same law (`contact.law`): a pin with b = 0. The mean tension of a bolt over a step,
 T + k d / 2, is this law with w_0 = 0, kappa = k / 4 and b = -T / kappa: at no step energy is lost.
@@ -15,7 +12,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Outlines
-from rigdda.dynamics.constants import BOLT, BRAKE, PIN, START_STIFFNESS, STICK
+from rigdda.dynamics.constants import BOLT, PIN, START_STIFFNESS, STICK
 from rigdda.dynamics.contact.approach import effective_mass, point_velocity
 from rigdda.dynamics.contact.law import impact_stiffness
 from rigdda.dynamics.correction import place_corners
@@ -87,10 +84,6 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) ->
         c.stiffness, c.kappa = link.stiffness, 0.25 * link.stiffness
         c.bias = -tension(link, length) / c.kappa
         c.tension = link.yielding
-    elif link.kind == BRAKE:
-        c.nx, c.ny, c.un, c.us, c.bias = 1.0, 0.0, 0.0, 0.0, 0.0
-        c.stiffness = c.kappa = 1.0  # not read: islands with brakes are relaxed
-        c.tension, c.reach = link.yielding, link.length
     else:
         c.nx, c.ny = 1.0, 0.0
         mass = effective_mass(bodies, c)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Ground, Monitors, Outlines, System, Work
-from rigdda.dynamics.pack.bodies import free_bodies, guide_fences, pack_bodies, pack_links
+from rigdda.dynamics.pack.bodies import free_bodies, pack_bodies, pack_links, start_fences
 from rigdda.dynamics.pack.ground import pack_ground, pack_shaking
 from rigdda.dynamics.pack.monitors import pack_monitors
 from rigdda.dynamics.pack.parameters import pack_interfaces, pack_parameters
@@ -60,7 +60,7 @@ def pack(
     room = 16 * blocks + 64
     interfaces = pack_interfaces(scene, names)
     parameters = pack_parameters(scene, settings, bodies, interfaces)
-    guide_fences(scene, bodies, parameters)
+    start_fences(scene, bodies, parameters)
     return Arrays(
         bodies,
         outlines,

@@ -104,7 +104,7 @@ class Template:
         other_surfaces = scene.surfaces is not self.scene.surfaces
         if other_surfaces or scene.barriers != self.scene.barriers:
             start_targets(arrays.monitors.target, scene)  # of embankments friction is the strength
-            set_brakes(arrays.links, scene)
+            set_brakes(scene, arrays.bodies)
         if other_surfaces:
             arrays.interfaces[...] = pack_interfaces(scene, self._names)
         start_rock(self._rock, bodies, self._stations)

@@ -15,7 +15,6 @@ from rigdda.dynamics.constants import (
     ASLEEP,
     AWAKE,
     BOLT,
-    BRAKE,
     FIXED,
     PIN,
     TERRAIN,
@@ -83,18 +82,30 @@ def barrier_trait(scene: Scene, number: int, names: list[str]) -> Trait:
     return 1.0, 0.0, 0.0, 0.0, surface, FIXED
 
 
-def guide_fences(scene: Scene, bodies: Bodies, parameters: NDArray[np.void]) -> None:
-    """Let the fences move along x alone; they sleep until something comes near.
+def start_fences(scene: Scene, bodies: Bodies, parameters: NDArray[np.void]) -> None:
+    """Write how fences give way; they sleep until something comes near.
 
     Where nothing sleeps they are awake, and in static mode and without post-correction fixed.
     """
     p = parameters[0]
     moves = p["post_correction"] and not p["static"]
-    for place, number in enumerate(scene.bodies, len(scene.blocks)):
-        if isinstance(scene.barriers[number], Fence):
-            body = bodies[place]
-            body["guided"], body["island"] = True, place
-            body["status"] = (ASLEEP if p["sleeping"] else AWAKE) if moves else FIXED
+    for place in fences(scene):
+        body = bodies[place]
+        body["island"], body["held_at"] = place, body["x"]
+        body["status"] = (ASLEEP if p["sleeping"] else AWAKE) if moves else FIXED
+    set_brakes(scene, bodies)
+
+
+def fences(scene: Scene) -> dict[int, Fence]:
+    """Return the fences of a scene by their places among the bodies."""
+    found = ((place, scene.barriers[i]) for place, i in enumerate(scene.bodies, len(scene.blocks)))
+    return {place: barrier for place, barrier in found if isinstance(barrier, Fence)}
+
+
+def set_brakes(scene: Scene, bodies: Bodies) -> None:
+    """Write the forces against which fences give way, by the width of an event, and how far."""
+    for place, fence in fences(scene).items():
+        bodies["brake"][place], bodies["elongation"][place] = fence.braking_force, fence.elongation
 
 
 def write_polygons(
@@ -179,7 +190,7 @@ def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
 
 
 def pack_links(scene: Scene, bodies: Bodies) -> Links:
-    """Return the supports, and the brakes of fences, in order of their body a.
+    """Return the supports in order of their block a.
 
     Block a is free unless both are not, and the first of two that are free, as of contacts.
     """
@@ -193,19 +204,8 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
         block = end[0]
         return block == TERRAIN or bodies["status"][block] == FIXED, block
 
-    fences = [
-        (place, number, barrier)
-        for place, number in enumerate(scene.bodies, len(scene.blocks))
-        if isinstance(barrier := scene.barriers[number], Fence)
-    ]
-    links = np.zeros(len(scene.supports) + len(fences), dtype=LINK).view(np.recarray)
-    for q, (place, number, fence) in enumerate(fences, start=len(scene.supports)):
-        brake = links[q]
-        brake["kind"], brake["a"], brake["b"], brake["number"] = BRAKE, place, TERRAIN, number
-        brake["bx"], brake["by"] = bodies["x"][place], bodies["y"][place]
-        brake["length"] = fence.elongation
-    of_supports = links[: len(scene.supports)]
-    for number, (link, support) in enumerate(zip(of_supports, scene.supports, strict=True)):
+    links = np.zeros(len(scene.supports), dtype=LINK).view(np.recarray)
+    for number, (link, support) in enumerate(zip(links, scene.supports, strict=True)):
         link["number"], link["yielding"], link["sign"] = number, math.inf, 1.0
         if isinstance(support, FixedPoint):
             link["kind"], link["a"], link["b"] = PIN, support.block, TERRAIN
@@ -223,14 +223,4 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
         link["length"] = math.dist(support.point_a, support.point_b)
         if support.yield_force is not None:
             link["yielding"] = support.yield_force
-    ordered: Links = links[np.argsort(links["a"], kind="stable")]
-    set_brakes(ordered, scene)
-    return ordered
-
-
-def set_brakes(links: Links, scene: Scene) -> None:
-    """Write the forces against which the fences of a scene give way, by the width of its event."""
-    for q in np.flatnonzero(links["kind"] == BRAKE):
-        fence = scene.barriers[links["number"][q]]
-        assert isinstance(fence, Fence)
-        links["yielding"][q] = fence.braking_force
+    return links[np.argsort(links["a"], kind="stable")]

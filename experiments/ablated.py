@@ -29,12 +29,7 @@ VARIANTS = (
     "START_STIFFNESS=1",
     "IMPACT_STIFFNESS=1e5",
     "IMPACT_STEPS=0",
-    "BLOW_SPEED=0",
     "AT_ONCE=2e-2",
-    "LANDING=3",
-    "MOST_PARTS=1",
-    "TURN=1e9",
-    "PLASTIC_SPEED=1e9",
     "RECOVERY_SWEEPS=0",
     "RETARDATION_TIME=0",
     "FRICTION_TOLERANCE=0.2",
@@ -44,10 +39,6 @@ VARIANTS = (
     "RELAXATION_SHARE=1e9",
     "LAYERS=1",
     "QUIET_SPEED=1e-9",
-    "SMALL_ISLAND=1",
-    "BREAK_TOLERANCE=0.1",
-    "BREAK_SOLVES=1",
-    "CHAIN=1",
     "SAME_NORMAL=-2",
     "SAME_FACE=0.9",
     "OTHER_FACE=0",
@@ -60,7 +51,6 @@ VARIANTS = (
     "APART=0",
     "LONGEST_FLIGHT=1",
     "END_CHECK=1",
-    "WAIT_STEPS=1",
 )
 """What each constant is set to; not those that only stop a run or warn."""
 

@@ -88,6 +88,18 @@ def fall(body: Body, p: Parameters, ledger: NDArray) -> None:
 
 
 @inlined
+def stop_fence(body: Body, p: Parameters, ledger: NDArray) -> None:
+    """Let a fence that nothing touches come to a stop against its brake."""
+    deceleration = body.brake / body.mass
+    time = min(p.dt, body.vx / deceleration)
+    speed = body.vx - deceleration * time
+    ledger[4] -= 0.5 * body.mass * (body.vx * body.vx - speed * speed)
+    body.lately = LATELY * max(top_speed(body), body.lately)
+    body.x += 0.5 * (body.vx + speed) * time
+    body.vx = speed
+
+
+@inlined
 def take_slot(body: Body, slot: Floats, scale: Floats, p: Parameters, ledger: NDArray) -> None:
     """Move a body to where its slot is, and account for weight and loads.
 
@@ -332,6 +344,8 @@ def step_island(
         before = bodies[i].theta, bodies[i].x, bodies[i].y
         if c1 > c0:
             take_slot(bodies[i], rows.slot[place - b0], rows.scale[place - b0], p, ledger)
+        elif bodies[i].brake > 0.0:
+            stop_fence(bodies[i], p, ledger)
         else:
             fall(bodies[i], p, ledger)
         bad = max(bad, end_body(bodies, outlines, i, before, p, ledger))

@@ -52,7 +52,8 @@ def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> 
             speed = top_speed(body)
             body.slowest = min(body.slowest, speed) if body.quiet > 0.0 else speed
             growing = speed > body.slowest + GROWN * SLEEP_SPEED
-            quiet = body.apart == 0.0 and speed < SLEEP_SPEED and not growing
+            rests = body.apart == 0.0 or body.brake > 0.0
+            quiet = rests and speed < SLEEP_SPEED and not growing
             body.quiet = body.quiet + p.dt if quiet else 0.0
             least = min(least, body.quiet)
         if least < SLEEP_TIME:

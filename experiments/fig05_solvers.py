@@ -69,7 +69,7 @@ def sor(m: Matrix, scratch: Scratch, n: int, pairs: int, factor: float) -> int:
 
 def row(courses: int, h: float) -> dict[str, Any]:
     """Return iterations and times of both solvers for one pile."""
-    (matrix, scratch, _), n, pairs = system(pile(courses), h)
+    (matrix, scratch), n, pairs = system(pile(courses), h)
     sweeps = {factor: sor(matrix, scratch, n, pairs, factor) for factor in (*FACTORS, FACTOR)}
     best = min(sweeps, key=lambda factor: sweeps[factor])
     found = matrix.d[:n].copy()  # by FACTOR

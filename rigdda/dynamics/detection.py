@@ -102,7 +102,7 @@ def collide_block(
             return -1
         b, before = boxes.partner[q], count
         count = collide_pair(bodies, outlines, contacts, count, a, b, p)
-        if bodies[a].brake > 0.0 or bodies[b].brake > 0.0:
+        if count > before and (bodies[a].brake > 0.0 or bodies[b].brake > 0.0):
             fence = a if bodies[a].brake > 0.0 else b
             count = keep_sideways(contacts, before, count, abs(outlines.local[fence, 0].x))
     if count < 0 or count > room:

@@ -91,7 +91,7 @@ def fall(body: Body, p: Parameters, ledger: NDArray) -> None:
 def stop_fence(body: Body, p: Parameters, ledger: NDArray) -> None:
     """Let a fence that nothing touches come to a stop against its brake."""
     deceleration = body.brake / body.mass
-    time = min(p.dt, body.vx / deceleration)
+    time = min(p.dt, max(body.vx, 0.0) / deceleration)
     speed = body.vx - deceleration * time
     ledger[4] -= 0.5 * body.mass * (body.vx * body.vx - speed * speed)
     body.lately = LATELY * max(top_speed(body), body.lately)
@@ -180,11 +180,13 @@ def settle_island(
     count = pack_rows(contacts, islands, rows, island)
     if not whole:
         counters[RELAXED] += 1
+        damped = ledger[2]
         sweeps, struck, settled = relax(rows, b1 - b0, count, speed, p, ledger)
         counters[SWEEPS] += sweeps
         if quiet and not (settled or tried or has_fence(bodies, islands, b0, b1)):
             whole = solve_states(bodies, contacts, system, islands, island, pairs, p, counters)
             if whole:
+                ledger[2] = damped
                 start_slots(bodies, islands, rows, island, p)
                 pack_rows(contacts, islands, rows, island)
     for place in range(b0, b1):

@@ -67,7 +67,7 @@ def list_rows(rows: Rows, count: int, reach: float) -> int:
             row, flexible = rows.row[k], 0.0
             for q in range(6):
                 flexible += row[NORMAL + q] * row[NORMAL + q]
-            row[GAIN], row[AIM] = 1.0 / flexible, 0.0
+            row[GAIN], row[AIM] = 1.0 / flexible if flexible > 0.0 else 0.0, 0.0
             rows.visit[listed] = k
             listed += 1
     return listed

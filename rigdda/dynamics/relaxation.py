@@ -176,11 +176,13 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float) -> None:
     row[COHESION], row[TENSION] = h * fact[STRENGTH], h * fact[STRENGTH + 1]
     if row[STIFFNESS] == 0.0:
         row[KEEP] = row[KEEP_SHEAR] = 1.0
-        row[GAIN], row[GAIN_SHEAR] = 1.0 / flexible, 1.0 / rolling
+        # nothing gives way along x between two fences, nor along y beside one
+        row[GAIN] = 1.0 / flexible if flexible > 0.0 else 0.0
+        row[GAIN_SHEAR] = 1.0 / rolling if rolling > 0.0 else 0.0
         row[AIM], row[AIM_SHEAR] = -0.5 * h * row[BEND], 0.0
         if fact[STRENGTH] == math.inf:  # a pin, which `mend_links` puts in its place
             row[AIM_SHEAR] = -0.5 * h * row[BEND + 1]
-        elif row[GAP] > 0.0:
+        elif row[GAP] > 0.0 and fact[STRENGTH + 1] == 0.0:  # a joint does not draw it shut
             row[AIM] -= row[GAP] / h
     else:
         give = 0.25 * row[STIFFNESS] * h * h
@@ -403,6 +405,9 @@ def rebound(
             place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
             aim_row(row, fact, a, b, h)
             fact[LOAD], fact[LOAD + 1] = row[IMPULSE], row[IMPULSE + 1]
+            if row[STIFFNESS] > 0.0:  # a spring keeps its impulse meanwhile
+                row[KEEP] = row[KEEP_SHEAR] = 1.0
+                row[GAIN] = row[GAIN_SHEAR] = row[CROSS] = 0.0
     sweeps, share = 0, 1.0
     for attempt in range(3):
         aim_rebound(rows, n, count, number, share)
@@ -481,11 +486,10 @@ def release_fences(
     released = False
     for s in range(n):
         slot = rows.slot[s]
-        if slot[BRAKE] == 0.0:
+        if slot[BRAKE] == 0.0 or rows.scale[s, 0] > 0.0:
             continue
         brake = h * slot[BRAKE] if slot[X] - slot[START] < slot[LEFT] else 0.0
         if push_on(rows, count, number, s) + slot[BEFORE] / slot[MOVES] <= brake:
-            slot[BEFORE] = 0.0
             continue
         released = True
         ledger[1] += 0.5 * slot[BEFORE] * slot[BEFORE]
@@ -503,15 +507,29 @@ def release_fences(
 
 
 @kernel
-def end_fences(slots: Floats, scale: Floats, n: int, h: float, ledger: NDArray) -> None:
+def end_fences(slots: Floats, scale: Floats, n: int, ledger: NDArray) -> None:
     """Account for the work of the brakes of fences that have given way; none goes uphill."""
     for s in range(n):
         slot = slots[s]
-        if slot[BRAKE] > 0.0 and scale[s, 0] > 0.0:
+        if slot[BRAKE] > 0.0 and scale[s, 0] == 0.0:
+            slot[BEFORE] = 0.0
+        elif slot[BRAKE] > 0.0:
             if slot[NOW] < 0.0:
-                ledger[1] -= 0.5 * slot[NOW] * slot[NOW]
+                ledger[1] -= 0.5 * slot[BEFORE] * slot[NOW]
                 slot[NOW] = 0.0
             ledger[4] += (slot[FREE] - slot[BEFORE]) * 0.5 * (slot[BEFORE] + slot[NOW])
+
+
+@kernel
+def stop_uphill(slots: Floats, n: int) -> float:
+    """Stop the fences that a rebound has sent uphill; returns the energy that they had [J]."""
+    energy = 0.0
+    for s in range(n):
+        slot = slots[s]
+        if slot[BRAKE] > 0.0 and slot[NOW] < 0.0:
+            energy += 0.5 * slot[NOW] * slot[NOW]
+            slot[NOW] = 0.0
+    return energy
 
 
 @kernel
@@ -576,18 +594,21 @@ def relax(
         start_rows(rows, count, number, h, h / last)
         swept = settle(rows, n, count, number, reach, tolerance)
         sweeps += swept
-        if fenced and release_fences(rows, n, count, number, h, ledger):
+        while fenced and release_fences(rows, n, count, number, h, ledger):
             sweeps += settle(rows, n, count, number, reach, tolerance)
-            end_fences(rows.slot, rows.scale, n, h, ledger)
+        if fenced:
+            end_fences(rows.slot, rows.scale, n, ledger)
         lost, hit, bouncing = end_rows(rows, n, count, number, least)
         ledger[2] += drift(rows.slot, rows.scale, n, h)
         if bouncing:
             following = AT_ONCE * p.dt if alone else h
             sweeps += rebound(rows, n, count, number, following, lost, reach, tolerance)
+            ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1
         parts += 1
-    for place in range(count):  # a force again
-        rows.row[place, IMPULSE] /= last
-        rows.row[place, IMPULSE + 1] /= last
+    for place in range(count):  # a force again, but for that of a blow in a short substep
+        lasts = 0.0 if rows.fact[place, STRUCK] > 0.0 and last < 0.5 * usual else 1.0 / last
+        rows.row[place, IMPULSE] *= lasts
+        rows.row[place, IMPULSE + 1] *= lasts
     return sweeps, struck, swept < MOST_SWEEPS

@@ -20,7 +20,6 @@ from rigdda.dynamics.constants import (
     FIXED,
     OPEN,
     PIN,
-    RETIRED,
     TERRAIN,
 )
 from rigdda.dynamics.islands import root
@@ -132,7 +131,4 @@ def watch_thrust(
             monitors, events, time, FAILED, bodies[target.block], target.block, barrier, target.x,
             target.y, target.y - target.ground,
         )  # fmt: skip
-        for fence in range(p.blocks, len(bodies)):
-            if monitors.barrier[fence] == barrier:
-                bodies[fence].status = RETIRED
     return events, ground

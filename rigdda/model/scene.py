@@ -255,7 +255,9 @@ class Scene:
         """Return the ground after some of the barriers were pushed away: embankments change it."""
         if self.terrain is None or len(gone) == 0:
             return self.ground
-        left = [b for i, b in enumerate(self.barriers) if i not in gone]
+        left = [
+            b for i, b in enumerate(self.barriers) if i not in gone or not isinstance(b, Earthwork)
+        ]
         return self._with_pits(earthworks(self.terrain, left, self.fill)[0], left)
 
     @property

@@ -29,7 +29,7 @@ SLOPES_DEG = {"rolling": 35, "bouncing": 60, "falling": 80}
 
 CONTACTS = {"restitution 0.35": 0.35, "plain": None}
 
-RELEASES, QUICK_RELEASES = 64, 16
+RELEASES, QUICK_RELEASES = 64, 32
 """Blocks pushed off each crest."""
 
 DRAWN, EVERY, STRIDE, WATCHED = 3, 0.2, 4, 8.0

@@ -460,17 +460,31 @@ def hold_fences(slots: Floats, scale: Floats, n: int) -> float:
 
 
 @kernel
-def push_on(rows: Rows, count: int, number: int, s: int) -> float:
-    """Return the impulse downhill of contacts on slot s in this substep [N s]."""
-    total = 0.0
+def push_downhill(rows: Rows, k: int, s: int) -> float:
+    """Return the impulse downhill of row k on slot s, a fence that is held [N s]."""
+    i, j = rows.row_i[k], rows.row_j[k]
+    other, first = (j, 3) if i == s else (i, 0)
+    scale = rows.scale[other, 0]
+    return -rows.row[k, IMPULSE] * rows.row[k, first] / scale if scale > 0.0 else 0.0
+
+
+@kernel
+def rest_on(rows: Rows, count: int, number: int, s: int, share: float) -> None:
+    """Let what pushes a held fence downhill do so with a share of its impulse, all else not at all.
+
+    What pushes a body at rest is far more than what a light one that moves can pass on, and sweeps
+    that start from it may end with a gain of energy.
+    """
     for k in range(count):
-        row, i, j = rows.row[k], rows.row_i[k], rows.row_j[k]
+        i, j = rows.row_i[k], rows.row_j[k]
         if rows.idle[k] > number or (i != s and j != s):
             continue
-        other, sign = (j, 3) if i == s else (i, 0)
-        if rows.scale[other, 0] > 0.0:
-            total -= row[IMPULSE] * row[sign] / rows.scale[other, 0]
-    return total
+        row, a, b = rows.row[k], rows.slot[i], rows.slot[j]
+        kept = share if push_downhill(rows, k, s) > 0.0 else 0.0
+        push(row, NORMAL, a, b, NOW, (kept - 1.0) * row[IMPULSE])
+        push(row, SHEAR, a, b, NOW, (kept - 1.0) * row[IMPULSE + 1])
+        row[IMPULSE] *= kept
+        row[IMPULSE + 1] *= kept
 
 
 @kernel
@@ -480,8 +494,8 @@ def release_fences(
     """Let the fences give way on which contacts push harder than their brakes; whether one does.
 
     Held, a fence has stopped with what it brought from the substep before. Released, its brake acts
-    with its force, and its contacts as they do now; they are to be settled anew. A brake whose
-    elongation is spent does not act.
+    with its force, and its contacts are to be settled anew. A brake whose elongation is spent does
+    not act.
     """
     released = False
     for s in range(n):
@@ -489,12 +503,19 @@ def release_fences(
         if slot[BRAKE] == 0.0 or rows.scale[s, 0] > 0.0:
             continue
         brake = h * slot[BRAKE] if slot[X] - slot[START] < slot[LEFT] else 0.0
-        if push_on(rows, count, number, s) + slot[BEFORE] / slot[MOVES] <= brake:
+        net = pushed = 0.0
+        for k in range(count):
+            if rows.idle[k] <= number and (rows.row_i[k] == s or rows.row_j[k] == s):
+                net += push_downhill(rows, k, s)
+                pushed += max(push_downhill(rows, k, s), 0.0)
+        if net + slot[BEFORE] / slot[MOVES] <= brake:
             continue
         released = True
         ledger[1] += 0.5 * slot[BEFORE] * slot[BEFORE]
-        rows.scale[s, 0] = slot[MOVES]
         slot[NOW] = slot[FREE] = slot[BEFORE] - brake * slot[MOVES]
+        share = min(brake / pushed, 1.0) if pushed > 0.0 else 0.0
+        rest_on(rows, count, number, s, share)
+        rows.scale[s, 0] = slot[MOVES]
         for k in range(count):
             i, j = rows.row_i[k], rows.row_j[k]
             if rows.idle[k] > number or (i != s and j != s):

@@ -55,7 +55,7 @@ FACTS = 21
 # body would have in this substep without contacts, and in the substep before [kg^1/2 m/s]. X, Y:
 # centroid [m]; TURN since the start of the step [rad], with its COS and SIN. PULL: scaled
 # acceleration of weight and loads. DAMPING [1/s]. FIELD: work of weight and loads since the start
-# of the step [J]. HELD: 1 if a rigid contact acts on it in this substep, else 0.
+# of the step [J]. HELD: 1 if it was struck or touches another body in this substep, else 0.
 NOW, FREE, BEFORE, X, Y, TURN, COS, SIN = 0, 3, 6, 9, 10, 11, 12, 13
 PULL, DAMPING, FIELD, HELD = 14, 17, 18, 19
 

@@ -48,8 +48,8 @@ class Standing(NamedTuple):
 def can_share(site: Site, scene: Scene) -> bool:
     """Return whether releases of single blocks can share what a scene of one of them has.
 
-    Its ground must be the same in all, no gravity wall may stand in it, and contacts must rebound as
-    their restitution says.
+    Its ground must be the same in all, no gravity wall may stand in it, and contacts must rebound
+    as their restitution says.
     """
     surfaces = (*site.surfaces.values(), *(pair.surface for pair in site.interfaces))
     return (

@@ -67,7 +67,7 @@ class SingleBlock:
     ----------
     scene : Scene
         One such scene: its block is convex and free, no surface has a restitution of None, and no
-        barrier can move.
+        gravity wall can move.
     settings : Settings
         How it is computed.
     stations : (K,) array

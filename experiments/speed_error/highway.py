@@ -33,7 +33,7 @@ BARRIER = SITE.slope.toe
 
 OUTCOMES = ("debris fraction [-]", "95 % run-out [m]", "energy at the barrier [kJ]")
 
-FINEST = {"dt": 1e-3, "tolerance": 1e-9, "sweep_tolerance": 2e-3, "open_close_iterations": 50}
+FINEST = {"dt": 1e-3, "tolerance": 1e-9, "sweep_tolerance": 2e-5, "open_close_iterations": 50}
 """Settings of the reference."""
 
 BLOCKS = "block area"

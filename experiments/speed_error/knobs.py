@@ -21,8 +21,8 @@ Stiffness is the load over it."""
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-10)
 """Of conjugate gradients, `Settings.tolerance` [-]."""
 
-SWEEP_TOLERANCES = (5.0, 1.0, 0.2, 0.05, 0.01)
-"""Of the relaxation of blocks in motion, `Settings.sweep_tolerance` [m/s]."""
+SWEEP_TOLERANCES = (1.0, 0.02, 0.005, 1e-3, 1e-4)
+"""Of the relaxation of blocks in motion, `Settings.sweep_tolerance` [m/s], per block."""
 
 OPEN_CLOSE = (1, 3, 12, 50)
 """Most open-close iterations a step."""

@@ -95,7 +95,7 @@ class Rows(NamedTuple):
     visit: Ints  # (C,) contacts that a sweep visits
     place: Ints  # (C,) row of each contact
     height: Floats  # (C,) of each contact [m]; in `recovery` the excess gap of each row
-    layer: Ints  # (LAYERS + 1,) contacts below a height
+    layer: Ints  # (contacts + 1,) contacts below a height
     moved_in: Ints  # (G + 1,) last sweep in which a slot moved
     scale: Floats  # (G + 1, 3) inverse roots of the inertia of each slot
     slot: Floats  # (G + 1, SLOT_COLUMNS); the last of what does not move

@@ -1,29 +1,20 @@
 """Tolerances and limits of the mechanics: unit, reason and consequence of each."""
 
-SOLVED = 1e-250
-"""Residual below which a system counts as solved whatever its forces, in the norm of its inverse
-diagonal [J]. Forces that balance leave a right-hand side of zero, of which no share is a limit;
-squares of less would underflow."""
-
 PENETRATION_RATIO = 1e-4
 """Wanted penetration over block size [-]. Smaller: stiffer contacts, taller stacks stand, more
 solver iterations."""
 
-SOFT = 5e-3
-"""Compression of a contact at rest over block size, above which a run warns [-]. A stack of 20
-buckles there: at 1.96/n^2 of the size of its blocks."""
+RIGID = 1e7
+"""Stiffness of a pin, and of a new contact where an island is solved as a whole, times effective
+mass / dt^2 [-]. The velocity after a step misses its target by half the inverse of this, 5e-8 of
+the change. The blocks of a tall stack, which give way one after the other, start without a jolt."""
 
-IMPACT_STIFFNESS = 1e4
-"""Stiffness of a new contact, times effective mass / dt^2 [-]. The velocity after its first step
-misses its target by half the inverse of this, 5e-5 of the change."""
-
-START_STIFFNESS = 1e3
-"""Factor of that in the first step of a simulation [-]: the blocks of a stack give way one after
-the other, and a tall one must start without a jolt. And of a pin, in every step."""
+NEW_SHARE = 1e-3
+"""Stiffness of a contact that is new after the first step of a simulation, over that [-]."""
 
 IMPACT_STEPS = 3.0
-"""Least closing speed of an impact in units of g dt [-], of a lone body in units of g h with h the
-substep: what gravity alone gives a resting body in a few steps is no impact."""
+"""Least closing speed of an impact in units of g dt [-], of a lone body in units of g dt over
+`SUBSTEPS`: what gravity alone gives a resting body in a few steps is no impact."""
 
 AT_ONCE = 1e-4
 """Least substep of a lone body over the step [-]: corners that strike within it do so at once. With
@@ -38,43 +29,23 @@ RETARDATION_TIME = 5e-3
 the force follows the velocity at their end. Without it an arch near its limit vibrates in steps of
 0.1 ms until it falls."""
 
-FRICTION_TOLERANCE = 2e-2
-"""Relative change of a friction limit between open-close iterations that counts as settled [-]."""
-
-SUBSTEPS = 10
-"""Substeps in the relaxation of an island in motion [-]: a blow goes on from contact to contact in
-each, and what the sweeps leave of it is as much smaller as they are shorter."""
-
-MOST_SUBSTEPS = 60
-"""Substeps of a lone body from which on they do not end where it is struck."""
+SUBSTEPS = 8
+"""Substeps in the relaxation of an island of several bodies [-]: a blow goes on from contact to
+contact in each, and what the sweeps leave of it is as much smaller as they are shorter. With 5 a
+silo that fills pumps up half a per cent of its energy."""
 
 MOST_SWEEPS = 100
-"""Most sweeps over the contacts of an island in a substep. Sweeps end once none changes a normal
-velocity by more than the tolerance. That is `Settings.sweep_tolerance`, lessened by the next two.
-"""
+"""Most sweeps over the contacts of an island in a substep, which end once none changes a normal
+velocity by more than the tolerance; and most parts of the step of a lone body."""
 
-LARGE_ISLAND = 128
-"""Blocks of an island from which on the tolerance is `Settings.sweep_tolerance` itself; in smaller
-ones it is less in proportion, and next to nothing for a lone body."""
-
-RELAXATION_SHARE = 0.05
-"""Greatest tolerance over the speed of the island [-], so that slow islands come to rest."""
-
-LAYERS = 64
-"""Layers in which the contacts of an island are ordered by height for relaxation."""
-
-QUIET_SPEED = 0.1
-"""Speed below which an island whose relaxation does not settle is solved as a whole [m/s]."""
+RELAXATION_SHARE = 0.02
+"""Greatest tolerance of sweeps over the speed of the island [-]: slow islands come to rest."""
 
 SAME_NORMAL = 0.7
 """Least cosine between the normals of one vertex's contact in two steps, for it to be one [-]."""
 
 SAME_FACE = 0.999
 """Cosine above which two edges, or two contacts of one vertex, count as in one line [-]."""
-
-OTHER_FACE = 0.02
-"""Depth, over the margin, by which a face of the second body must be the better one [-]: parallel
-faces do not alternate."""
 
 LATELY = 0.7
 """Share of a body's greatest speed of late that counts on in the next step [-]. In a pile blocks
@@ -85,7 +56,8 @@ MARGIN_RATIO = 5e-3
 """Distance over block size within which contacts are candidates even at rest [-]."""
 
 SLEEP_SPEED = 0.02
-"""Speed of any point of a block below which it counts as quiet [m/s]."""
+"""Speed of any point of a block below which it counts as quiet [m/s]. An island of such blocks that
+does not settle in relaxation is solved as a whole."""
 
 SLEEP_TIME = 0.5
 """Time for which a whole island must be quiet before it sleeps [s]."""
@@ -103,9 +75,6 @@ the road of `quick` at 10 / 5 / 2.5 / 1.25 ms, +- .02; like this .44 / .45 / .44
 
 LONGEST_FLIGHT = 64
 """Steps for which a flight is looked ahead: the more, the wider the search for what may be met."""
-
-END_CHECK = 8
-"""Steps from one look at whether a release is over to the next."""
 
 SPEED_LIMIT = 1e4
 """Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall."""

@@ -14,8 +14,8 @@ from rigdda.dynamics.constants import (
     LATELY,
     OPEN,
     PIN,
-    QUIET_SPEED,
     REST,
+    SLEEP_SPEED,
     SLIP,
     SPEED_LIMIT,
     STICK,
@@ -170,7 +170,7 @@ def settle_island(
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     pairs = pair_blocks(bodies, contacts, m, islands, c0, c1)
     speed = island_speed(bodies, islands, b0, b1)
-    quiet = speed <= QUIET_SPEED
+    quiet = speed <= SLEEP_SPEED
     whole = struck = False
     tried = is_tried_whole(bodies, contacts, islands, island, quiet, p)
     if tried:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Islands, Monitors
-from rigdda.dynamics.constants import APART, AWAKE, END_CHECK, OPEN
+from rigdda.dynamics.constants import APART, AWAKE, OPEN
 from rigdda.dynamics.motion import kinetic_energy
-from rigdda.dynamics.records import STEPS, STILL, Bodies, Body, Contacts, Ints, Parameters
+from rigdda.dynamics.records import STILL, Bodies, Body, Contacts, Ints, Parameters
 from rigdda.kernel import inlined, kernel
 
 HIT, CROSSING, FAILED = 0, 1, 2
@@ -88,10 +88,9 @@ def is_over(bodies: Bodies, monitors: Monitors, counters: Ints, p: Parameters) -
     """Return whether nothing moves any more but what has left `monitors.leave` behind, downhill.
 
     Where there are barriers it must have been so for a second: what lies on them presses on, and
-    thrust is a mean over a second. Looked at every so many steps of the run, so that it ends in the
-    same one however it is called.
+    thrust is a mean over a second.
     """
-    if monitors.leave == -math.inf or counters[STEPS] % END_CHECK != 0:
+    if monitors.leave == -math.inf:
         return False
     for i in range(p.blocks):
         body = bodies[i]
@@ -102,5 +101,5 @@ def is_over(bodies: Bodies, monitors: Monitors, counters: Ints, p: Parameters) -
         ):
             counters[STILL] = 0
             return False
-    counters[STILL] += END_CHECK
-    return len(monitors.target) == 0 or counters[STILL] * p.dt >= 1.0 + END_CHECK * p.dt
+    counters[STILL] += 1
+    return len(monitors.target) == 0 or counters[STILL] * p.dt > 1.0 + p.dt

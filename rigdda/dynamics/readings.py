@@ -14,8 +14,8 @@ from rigdda.dynamics.constants import (
     OPEN,
     PIN,
     PLAIN,
-    QUIET_SPEED,
     REST,
+    SLEEP_SPEED,
 )
 from rigdda.dynamics.contact.links import pull_of_bolts
 from rigdda.dynamics.pack import Arrays
@@ -194,7 +194,7 @@ def compression(arrays: Arrays, c: Contacts) -> float:
     all of one stiffness.
     """
     b = arrays.bodies
-    quiet = np.hypot(b["vx"], b["vy"]) + np.abs(b["omega"]) * b["radius"] < QUIET_SPEED
+    quiet = np.hypot(b["vx"], b["vy"]) + np.abs(b["omega"]) * b["radius"] < SLEEP_SPEED
     c = c[(c["state"] != OPEN) & quiet[c["a"]]]
     rest, plain = (c[c["kind"] == kind] for kind in (REST, PLAIN))
     rest, plain = (some["normal"] / some["stiffness"] for some in (rest, plain))

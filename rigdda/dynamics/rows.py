@@ -168,11 +168,11 @@ def place_row(
 def sort_by_height(contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int) -> None:
     """Set the rows of the contacts low:high by height, lowest first: a sweep carries loads through.
 
-    A counting sort in as many layers as there is room for: within one the order does not matter.
+    A counting sort in as many layers as there are contacts; within one the order does not matter.
     Contacts stay in order: to read them one after the other is what takes long in a large island.
     """
     place, height, layer = rows.place, rows.height, rows.layer
-    layers = min(len(layer) - 1, high - low)
+    layers = high - low
     least, most = math.inf, -math.inf
     for q in range(low, high):
         height[q] = contacts[islands.contact_item[q]].y

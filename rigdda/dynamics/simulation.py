@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check
-from rigdda.dynamics.constants import PLAIN, SOFT
+from rigdda.dynamics.constants import PLAIN
 from rigdda.dynamics.frames import frame_of, no_frames, pieces, tracked
 from rigdda.dynamics.loop import Loop
 from rigdda.dynamics.pack import Arrays, pack
@@ -34,6 +34,10 @@ from rigdda.model.settings import Settings
 MOST_STEPS, PIECE = 1e9, 10_000
 """Most steps of a run, a day or more of computing for a single block, and most of them between
 which nothing interrupts it."""
+
+SOFT = 5e-3
+"""Compression of a contact at rest over block size, above which a run warns [-]. A stack of 20
+buckles there: at 1.96/n^2 of the size of its blocks."""
 
 
 class Simulation:

@@ -55,9 +55,9 @@ class Settings:
         Relative residual at which conjugate gradients stop. 1e-7: looser, and the small forces at
         the top of a tall stack drown in the error of the large ones at its base.
     sweep_tolerance : float
-        Islands of several blocks in motion take a step in ten substeps. In each their contacts
-        are swept over until no velocity changes by more than this [m/s], up to 100 times. Islands
-        of less than 128 blocks, and slow ones, are settled more closely.
+        Islands of several blocks in motion take a step in eight substeps. In each their contacts
+        are swept over until no velocity changes by more than this times the number of blocks but
+        one [m/s], nor by more than 2 % of the greatest speed, up to 100 times.
     open_close_iterations : int
         Most open-close iterations in a step; nearly all steps need 1 to 3. What has not settled
         then is relaxed.
@@ -87,7 +87,7 @@ class Settings:
     dt: float = USUAL_DT
     penetration: float | None = None
     tolerance: float = 1e-7
-    sweep_tolerance: float = 1.0
+    sweep_tolerance: float = 0.005
     open_close_iterations: int = 12
     mode: str = "dynamic"
     solver: str = "pcg"

@@ -36,7 +36,8 @@ def fly(lab: Lab, scene: Scene) -> tuple[bool, bool, float]:
         sim.step()
         deepest = max(deepest, float(sim.vertices(0)[:, 0].max()) - WALL.x)
         centre = max(centre, float(sim.poses[0, 0]))
-    arrived = sim.energy().impact < 0.0  # a wall that is hit takes energy
+    energy = sim.energy()
+    arrived = energy.impact + energy.friction < 0.0  # a wall that is hit takes energy
     return arrived, centre > WALL.x, deepest
 
 

@@ -25,7 +25,7 @@ def falling(dt: float, tolerance: float) -> Simulation:
 
 @pytest.mark.parametrize(("dt", "substeps"), [(5e-3, 3), (0.02, 6)])
 def test_a_closer_tolerance_takes_more_sweeps(dt: float, substeps: int) -> None:
-    loose, close = falling(dt, 1e6).diagnostics, falling(dt, 1e-3).diagnostics
+    loose, close = falling(dt, 1e6).diagnostics, falling(dt, 1e-5).diagnostics
     assert loose.relaxed > 50
     assert loose.sweeps >= substeps * loose.relaxed
     assert close.sweeps > 1.5 * loose.sweeps

@@ -30,14 +30,14 @@ import math
 
 from rigdda.dynamics.constants import (
     AWAKE,
-    IMPACT_STIFFNESS,
     NEW,
+    NEW_SHARE,
     OPEN,
     PLAIN,
     PLAIN_CONTACT,
     REST,
     RETARDATION_TIME,
-    START_STIFFNESS,
+    RIGID,
     STICK,
 )
 from rigdda.dynamics.contact.approach import effective_mass, set_arms, set_velocities
@@ -62,12 +62,6 @@ def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
 
 
 @kernel
-def impact_stiffness(mass: float, dt: float) -> float:
-    """Return the stiffness [N/m] that gives an effective mass its velocity within a step."""
-    return IMPACT_STIFFNESS * mass / (dt * dt)
-
-
-@kernel
 def set_rest(c: Contact, p: Parameters) -> None:
     """Make a contact a spring that carries on with the force of the last step."""
     c.kind = REST
@@ -80,11 +74,17 @@ def set_rest(c: Contact, p: Parameters) -> None:
 
 
 @kernel
+def rigid_stiffness(mass: float, dt: float) -> float:
+    """Return the stiffness [N/m] that gives an effective mass its velocity within a step."""
+    return RIGID * mass / (dt * dt)
+
+
+@kernel
 def set_new(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
     """Make a contact one that closes now, or may close."""
     c.kind = NEW
-    stiffness = impact_stiffness(effective_mass(bodies, c), p.dt)
-    c.kappa = max(START_STIFFNESS * stiffness if start else stiffness, c.stiffness)
+    stiffness = rigid_stiffness(effective_mass(bodies, c), p.dt)
+    c.kappa = max(stiffness if start else NEW_SHARE * stiffness, c.stiffness)
     c.bias = -max(c.gap, 0.0)
 
 

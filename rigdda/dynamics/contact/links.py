@@ -12,9 +12,9 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Outlines
-from rigdda.dynamics.constants import BOLT, PIN, START_STIFFNESS, STICK
+from rigdda.dynamics.constants import BOLT, PIN, STICK
 from rigdda.dynamics.contact.approach import effective_mass, point_velocity
-from rigdda.dynamics.contact.law import impact_stiffness
+from rigdda.dynamics.contact.law import rigid_stiffness
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.records import Bodies, Body, Contact, Link, Links, Parameters
 from rigdda.kernel import entry_kernel, kernel
@@ -87,7 +87,7 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) ->
     else:
         c.nx, c.ny = 1.0, 0.0
         mass = effective_mass(bodies, c)
-        c.kappa = c.stiffness = START_STIFFNESS * impact_stiffness(mass, p.dt)
+        c.kappa = c.stiffness = rigid_stiffness(mass, p.dt)
         c.tension = math.inf
         c.un, c.us = point_velocity(bodies, a, ax, ay)
         c.bias = 0.0  # no velocity at the end

@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Outlines
-from rigdda.dynamics.constants import AWAKE, OTHER_FACE, SAME_FACE
+from rigdda.dynamics.constants import AWAKE, SAME_FACE
 from rigdda.dynamics.contact.separating_axes import (
     SQUARE,
+    TOUCH,
     axis_gap,
     face_of_contact,
     following,
@@ -259,7 +260,7 @@ def collide_parts(
     if not possible:
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
-    of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + OTHER_FACE * margin)
+    of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + TOUCH * margin)
     reach = (dx * dx + dy * dy) ** 0.5 + spread
     touching = max(apart_i, apart_j) <= margin
     # where they touch, not where they are deeper than the margin

@@ -5,12 +5,15 @@ Or, for comparison, by the inverses of the 3x3 blocks on it.
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Matrix, Scratch
-from rigdda.dynamics.constants import SOLVED
 from rigdda.dynamics.linear.direct import solve_block
 from rigdda.kernel import kernel
+
+SMALLEST = float(np.finfo(float).tiny)
+"""Least residual that is told from none: forces that balance leave a right-hand side of zero."""
 
 
 @kernel
@@ -59,7 +62,7 @@ def solve_pcg(
     """Solve K d = rhs from the start value in m.d, in place.
 
     Stops when the residual, in the norm of the preconditioner, is below `tolerance` times the
-    forces, or below `SOLVED`.
+    forces, or as small as numbers can be.
 
     Returns
     -------
@@ -76,7 +79,7 @@ def solve_pcg(
     for i in range(n):
         for j in range(3):
             scratch.direction[i, j] = scratch.scaled[i, j]
-    limit = max(tolerance * tolerance * scale, SOLVED)
+    limit = max(tolerance * tolerance * scale, SMALLEST)
     iterations = 0
     while rho > limit and iterations < 10 * n + 30:
         multiply(m, n, pairs, scratch.direction, scratch.product)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rigdda.dynamics.arrays import Matrix, Scratch
-from rigdda.dynamics.constants import SOLVED
 from rigdda.dynamics.linear.direct import solve_block
+from rigdda.dynamics.linear.pcg import SMALLEST
 from rigdda.kernel import kernel
 
 
@@ -26,14 +26,14 @@ def solve_sor(
     """Solve K d = rhs from the start value in m.d, row by row of 3x3 blocks; returns the sweeps.
 
     Stops when the residual, in the norm of the inverse diagonal as for conjugate gradients, is
-    below `tolerance` times the forces, or below `SOLVED`.
+    below `tolerance` times the forces, or as small as numbers can be.
     """
     list_neighbours(m, scratch, n, pairs)
     scale = 0.0
     for i in range(n):
         for a in range(3):
             scale += m.rhs[i, a] ** 2 / m.diagonal[i, a, a]
-    limit = max(tolerance * tolerance * scale, SOLVED)
+    limit = max(tolerance * tolerance * scale, SMALLEST)
     sweeps, off = 0, 1e300
     while off > limit and sweeps < 100 * n + 300:
         off = 0.0

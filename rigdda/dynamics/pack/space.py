@@ -6,9 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Boxes, Islands, Matrix, Rows, Scratch, System, Work
-from rigdda.dynamics.constants import (
-    LAYERS,
-)
 from rigdda.dynamics.records import BOX, CONTACT, Contacts
 from rigdda.dynamics.rows import COLUMNS, FACTS, SLOT_COLUMNS
 
@@ -91,7 +88,7 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
             visit=whole(room),
             place=whole(room),
             height=np.zeros(room),
-            layer=whole(LAYERS + 1),
+            layer=whole(room + 1),
             moved_in=whole(blocks + 1),
             scale=np.zeros((blocks + 1, 3)),
             slot=np.zeros((blocks + 1, SLOT_COLUMNS)),

@@ -21,7 +21,7 @@ AT_ONCE = 1e-4
 2e-2 a square that lands on a corner, the next one 1 mm above the ground, misses its velocity by
 5 %, at most by 43 %, in steps of 10 ms with a restitution of 0.5."""
 
-RECOVERY_SWEEPS = 4
+RECOVERY_SWEEPS = 6
 """Sweeps over the contacts of an island that push out what they are too deep."""
 
 RETARDATION_TIME = 5e-3

@@ -80,7 +80,7 @@ def test_numbers_are_not_read_from_text():
 
 @pytest.fixture(scope="module")
 def released():
-    return rigdda.release(QUICK, LAYOUT, 1, "mass")
+    return rigdda.release(QUICK, LAYOUT, 8, "mass")
 
 
 def test_every_kind_reports(released):
@@ -104,7 +104,7 @@ def test_every_kind_reports(released):
     shares = ("slope_fraction", "held_fraction", "road_fraction", "beyond_fraction")
     assert sum(getattr(outcome, name) for name in shares) == 1.0
     assert outcome.held_fraction >= ditch.caught
-    released_mass = rigdda.release(QUICK, (), 1, "mass")[1].released_mass
+    released_mass = rigdda.release(QUICK, (), 8, "mass")[1].released_mass
     assert outcome.released_mass == pytest.approx(released_mass, rel=1e-12)
 
 
@@ -189,7 +189,7 @@ def test_pictures_show_every_kind(released):
     run, _ = released
     image = picture(run, (QUICK.road.start, QUICK.road.end), "all")
     bare = picture(
-        rigdda.release(QUICK, (), 3, "mass")[0], (QUICK.road.start, QUICK.road.end), "all"
+        rigdda.release(QUICK, (), 8, "mass")[0], (QUICK.road.start, QUICK.road.end), "all"
     )
     assert image.shape == bare.shape and np.abs(image.astype(int) - bare).sum() > 0
 

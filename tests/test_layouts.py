@@ -79,11 +79,21 @@ def test_numbers_are_not_read_from_text():
 
 
 @pytest.fixture(scope="module")
-def released():
-    return rigdda.release(QUICK, LAYOUT, 8, "mass")
+def seed():
+    """Return the first release in which the fence and the gravity wall fail."""
+    for found in range(20):
+        _, heavy, fence, *_ = rigdda.release_outcome(QUICK, LAYOUT, found, "mass").barriers
+        if heavy.failed and fence.failed:
+            return found
+    pytest.fail("the fence and the gravity wall never fail in the same release")
 
 
-def test_every_kind_reports(released):
+@pytest.fixture(scope="module")
+def released(seed):
+    return rigdda.release(QUICK, LAYOUT, seed, "mass")
+
+
+def test_every_kind_reports(released, seed):
     _, outcome = released
     wall, heavy, fence, ditch, dam = outcome.barriers
     assert wall.state == "stands" and wall.displacement == 0.0
@@ -104,7 +114,7 @@ def test_every_kind_reports(released):
     shares = ("slope_fraction", "held_fraction", "road_fraction", "beyond_fraction")
     assert sum(getattr(outcome, name) for name in shares) == 1.0
     assert outcome.held_fraction >= ditch.caught
-    released_mass = rigdda.release(QUICK, (), 8, "mass")[1].released_mass
+    released_mass = rigdda.release(QUICK, (), seed, "mass")[1].released_mass
     assert outcome.released_mass == pytest.approx(released_mass, rel=1e-12)
 
 
@@ -183,13 +193,13 @@ def test_replays_show_every_kind(released, tmp_path):
     assert colours[0] != colours[1]
 
 
-def test_pictures_show_every_kind(released):
+def test_pictures_show_every_kind(released, seed):
     from envs.picture import picture
 
     run, _ = released
     image = picture(run, (QUICK.road.start, QUICK.road.end), "all")
     bare = picture(
-        rigdda.release(QUICK, (), 8, "mass")[0], (QUICK.road.start, QUICK.road.end), "all"
+        rigdda.release(QUICK, (), seed, "mass")[0], (QUICK.road.start, QUICK.road.end), "all"
     )
     assert image.shape == bare.shape and np.abs(image.astype(int) - bare).sum() > 0
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from rigdda.dynamics.constants import (
+    FRICTION_TOLERANCE,
     OPEN,
     SLIP,
     STICK,
 )
 from rigdda.dynamics.records import Contact
 from rigdda.kernel import kernel
-
-FRICTION_TOLERANCE = 2e-2
-"""Greatest change of a friction force in an iteration, over its limit, for it to be settled [-]."""
 
 
 @kernel

@@ -11,8 +11,8 @@ on moves with the mean of its velocities, as it would under a constant force). M
 momentum are kept whatever the impulses are.
 
 A lone body takes its step in one, or in parts that end where it is struck. As nothing is struck
-within a part, its contacts act with the geometry of the middle, which is of second order: a wheel
-of sixteen sides rolls as far to 1e-4 in one part a step as to 8e-4 in ten with that of the start.
+within a part, its contacts act with the geometry of the middle, which is of second order. A wheel
+of sixteen sides rolls 1e-4 too far; in ten substeps with the geometry of their start, 8e-4.
 
 Impulses are found by projected Gauss-Seidel sweeps, which decide the state of each contact as they
 visit it. The normal impulse does not pull. It leaves an open contact at most the velocity with
@@ -627,10 +627,10 @@ def relax(
     tolerance = max(min(p.sweep_tolerance * (n - 1), RELAXATION_SHARE * speed), 1e-7 * speed)
     for s in range(n):
         fenced = fenced or rows.slot[s, BRAKE] > 0.0
-    sweeps, struck, last, left, number, parts, swept = 0, False, 1.0, p.dt, 0, 0, 0
+    sweeps, struck, last, left, number, swept = 0, False, 1.0, p.dt, 0, 0
     while left > 0.0:
         h = min(usual, left)
-        if alone and parts < MOST_SWEEPS:
+        if alone:
             h = part_of_step(rows, count, h, least, shortest)
         if left - h < 0.5 * shortest:
             h = left
@@ -654,7 +654,6 @@ def relax(
             ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1
-        parts += 1
     for place in range(count):  # a force again, but for that of a blow in a short substep
         lasts = 0.0 if rows.fact[place, STRUCK] > 0.0 and last < 0.5 * usual else 1.0 / last
         rows.row[place, IMPULSE] *= lasts

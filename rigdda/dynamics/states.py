@@ -6,11 +6,13 @@ friction limit, a slipping one must slip against its friction.
 
 from __future__ import annotations
 
+import math
+
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.assembly.springs import relative_displacement
-from rigdda.dynamics.constants import BOLT, OPEN, PIN, SLIP, STICK
+from rigdda.dynamics.constants import BOLT, FRICTION_TOLERANCE, OPEN, PIN, SLIP, STICK
 from rigdda.dynamics.contact.joint import joint_breaks
 from rigdda.dynamics.records import Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
@@ -42,9 +44,10 @@ def next_friction(c: Contact, shear: float) -> bool:
     if abs(shear) <= limit:
         c.state = STICK
         return state != STICK
+    change = abs(c.shear - c.lag) if state == SLIP else math.inf
     c.state = SLIP
     c.lag = c.shear
-    return state != SLIP
+    return change > FRICTION_TOLERANCE * limit
 
 
 @inlined

@@ -212,7 +212,7 @@ def test_a_study_s_table_is_what_the_problem_says(folder: Path, site: Site) -> N
 
 
 def test_the_example_in_python_says_that_stronger_fences_fail_less() -> None:
-    found = example("study").study(releases=60)
+    found = example("study").study(releases=40)
     failed = [e.failure["block"].probability for e in found.values()]
     assert failed == sorted(failed, reverse=True) and failed[0] > failed[-1]
     assert [e.cost for e in found.values()] == sorted(e.cost for e in found.values())

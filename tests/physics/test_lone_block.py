@@ -10,6 +10,8 @@ from physics.helpers import FLAT, polygon, rock, rough
 from rigdda import Block, Scene, Settings, Simulation
 from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Terrain
+from rigdda.validation.case import Lab
+from rigdda.validation.impacts import rebound
 
 AREA, RESTITUTION, TIME = 0.1, 0.4, 0.2
 """Area [m2] and restitution of the blocks, time in which they bounce once or twice [s]."""
@@ -40,6 +42,14 @@ def energy_kept(dt: float, blocks: int = 300) -> tuple[float, float]:
         first[seed] = (start.kinetic + start.potential) / mass
         last[seed] = (end.kinetic + end.potential) / mass
     return float(last.mean()), float((first - last).mean())
+
+
+def test_a_flat_landing_rebounds_wherever_in_the_step_it_falls():
+    """Both corners rebound at once; one did alone where a part of the step ended at the blow."""
+    lab = Lab(5e-3)
+    for dt in (3e-4, 3e-3, 5e-3):
+        for phase in np.linspace(0.0, 1.0, 41):
+            assert abs(rebound(lab, 0.7, dt, float(phase), 1e4) - 0.7) < 1e-3
 
 
 def test_a_bounce_takes_the_same_energy_at_every_step():

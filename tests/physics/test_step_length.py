@@ -12,7 +12,7 @@ from rigdda import BadInput, Block, Scene, Settings, Simulation, Terrain
 from rigdda.model.scene import Surface
 from rigdda.model.settings import EARTH, longest_step
 from rigdda.model.supports import FixedPoint
-from rigdda.validation.scenes import polygon
+from rigdda.validation.scenes import incline, polygon
 
 
 def test_a_slide_at_a_long_step_stays_exact():
@@ -21,6 +21,21 @@ def test_a_slide_at_a_long_step_stays_exact():
     sim.step(60)
     way = 12.0 - 0.5 * 9.81 * math.tan(math.radians(30.0))
     assert sim.poses[0, 0] == pytest.approx(way, rel=1e-5)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 5e-3, 1e-2])
+@pytest.mark.parametrize(("slope", "friction"), [(30.0, 20.0), (45.0, 30.0)])
+def test_a_slide_on_the_contacts_of_the_paper_is_exact(slope, friction, dt):
+    """Its friction is found by open-close iteration, since its island is solved as a whole."""
+    scene, down = incline(slope, friction)
+    surfaces = {name: Surface(friction, restitution=None) for name in scene.surfaces}
+    sim = Simulation(Scene(scene.terrain, scene.blocks, surfaces), Settings(dt=dt))
+    start = sim.poses
+    sim.step(round(1.0 / dt))
+    angle = math.radians(slope)
+    pull = math.sin(angle) - math.tan(math.radians(friction)) * math.cos(angle)
+    way = (sim.poses - start)[0, :2] @ down
+    assert way == pytest.approx(0.5 * 9.81 * pull, rel=1e-3)
 
 
 @pytest.mark.parametrize(("steps", "bar"), [(200, 2e-3), (60, 4e-3)])

@@ -152,7 +152,7 @@ def test_without_events_a_band_alone_brings_nothing_down():
     [
         ("restitution = 0.2", "restitution = 3.0", "surfaces.rock.restitution"),
         ("[motion]", "[lumped.rock]\nnormal = 3.0\n\n[motion]", "lumped.rock.normal"),
-        ("duration = 10.0", "dt = 5.0", "motion.dt"),
+        ("duration = 20.0", "dt = 5.0", "motion.dt"),
     ],
 )
 def test_fields_are_told_with_their_table(old, new, field, tmp_path):
@@ -273,7 +273,7 @@ def test_mesh_is_no_part_of_a_scene():
 
 def test_releases_that_take_minutes_are_doubted() -> None:
     text = sites.text("quick")
-    with pytest.warns(DoubtfulInput, match=r"motion\.dt: give more.* 1e\+06 steps"):
-        Site.parse(text.replace("duration = 10.0", "duration = 10.0\ndt = 1e-5"), "site")
+    with pytest.warns(DoubtfulInput, match=r"motion\.dt: give more.* 2e\+06 steps"):
+        Site.parse(text.replace("duration = 20.0", "duration = 20.0\ndt = 1e-5"), "site")
     with pytest.warns(DoubtfulInput, match=r"sources\.mass\.block_area: give more.* 4\d{3} blocks"):
         Site.parse(text.replace("block_area = ", "block_area = 0.01 # "), "site")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
-from rigdda.dynamics.arrays import Matrix, System, Work
+from rigdda.dynamics.arrays import Matrix, Scratch, Work
 from rigdda.dynamics.assembly.island import assemble_island
 from rigdda.dynamics.islands import find_islands, pair_blocks
 from rigdda.dynamics.records import CONTACTS, Bodies, Contacts
@@ -66,7 +66,7 @@ def settings(h: float, **more: object) -> Settings:
     return Settings(dt=DT, penetration=0.5 * GRAVITY * DT**2 / h, sleeping=False, **more)  # type: ignore[arg-type]
 
 
-def system(scene: Scene, h: float) -> tuple[System, int, int]:
+def system(scene: Scene, h: float) -> tuple[tuple[Matrix, Scratch], int, int]:
     """Return the simultaneous equations of a step of a pressed scene.
 
     A random force and moment on each block stand for its motion. Without them an even load leaves
@@ -74,8 +74,8 @@ def system(scene: Scene, h: float) -> tuple[System, int, int]:
 
     Returns
     -------
-    system : System
-        Its matrix is K d = F, block-sparse.
+    system : (Matrix, Scratch)
+        The matrix is K d = F, block-sparse, and what solvers work on.
     n, pairs : int
         Blocks, and pairs of blocks that touch.
     """
@@ -84,20 +84,18 @@ def system(scene: Scene, h: float) -> tuple[System, int, int]:
     a = sim.loop.arrays
     count = int(sim.loop.counters[CONTACTS])
     a.bodies["vx"] = a.bodies["vy"] = a.bodies["omega"] = 0.0
-    pairs = assemble(a.bodies, sim.loop.now, count, a.system.matrix, a.work, a.parameters)
+    pairs = assemble(a.bodies, sim.loop.now, count, a.work, a.parameters)
     n = len(scene.blocks)
     stir = STIR * np.random.default_rng(n).standard_normal((n, 3))
-    rhs = a.system.matrix.rhs
+    rhs = a.work.matrix.rhs
     rhs[:n] += stir * np.abs(rhs[:n]).max()
-    return a.system, n, pairs
+    return (a.work.matrix, a.work.scratch), n, pairs
 
 
 @entry_kernel
-def assemble(
-    bodies: Bodies, contacts: Contacts, count: int, m: Matrix, work: Work, levels: NDArray
-) -> int:
+def assemble(bodies: Bodies, contacts: Contacts, count: int, work: Work, levels: NDArray) -> int:
     """Assemble all blocks as one island with their contacts as they are; returns the pairs."""
-    p = levels[0]
+    p, m = levels[0], work.matrix
     find_islands(bodies, contacts, work.begin, work.islands, p.blocks, False)
     pairs = pair_blocks(bodies, contacts, m, work.islands, 0, count)
     assemble_island(bodies, contacts, m, work.islands, 0, pairs, p)

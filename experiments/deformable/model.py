@@ -11,6 +11,7 @@ from experiments.deformable.equations import Solid
 from experiments.deformable.step import advance
 from experiments.deformable.submatrices import UNKNOWNS
 from rigdda import Scene, Settings, Simulation
+from rigdda.dynamics.arrays import Totals, World
 from rigdda.dynamics.records import CONTACTS, COUNTERS, ITERATIONS, SOLVER_ITERATIONS, STEPS
 from rigdda.geometry import is_convex, polygon_properties
 
@@ -59,10 +60,16 @@ class Deformable:
         """Take `n` steps."""
         loop, a = self._sim.loop, self._sim.loop.arrays
         fits, swapped = advance(
-            a.bodies, a.outlines, a.ground, a.interfaces, a.links, loop.now, loop.before,
-            a.system.matrix, a.work, a.monitors, a.parameters, self._counters, loop.deepest,
-            self._solid, n,
-        )  # fmt: skip
+            World(a.bodies, a.outlines, a.ground, a.interfaces, a.links, a.shaking),
+            loop.now,
+            loop.before,
+            a.work,
+            a.monitors,
+            a.parameters,
+            Totals(self._counters, loop.ledger, loop.deepest),
+            self._solid,
+            n,
+        )
         if not fits:
             raise RuntimeError("too many contacts")
         if swapped:

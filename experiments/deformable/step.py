@@ -10,7 +10,7 @@ from experiments.deformable.compiled import entry
 from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
 from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
-from rigdda.dynamics.arrays import Ground, Matrix, Monitors, Outlines, Work
+from rigdda.dynamics.arrays import Matrix, Monitors, Outlines, Totals, Work, World
 from rigdda.dynamics.correction import place_edges
 from rigdda.dynamics.detection import copy_index, detect
 from rigdda.dynamics.island_step import accumulate_force
@@ -25,8 +25,6 @@ from rigdda.dynamics.records import (
     Bodies,
     Contacts,
     Floats,
-    Interfaces,
-    Links,
     Parameters,
 )
 from rigdda.kernel import kernel
@@ -90,9 +88,8 @@ def rest_all(bodies: Bodies, velocity: Floats) -> None:
 
 @entry
 def advance(
-    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
-    now: Contacts, before: Contacts, m: Matrix, work: Work, monitors: Monitors, levels: NDArray,
-    counters: NDArray, deepest: NDArray, s: Solid, steps: int,
+    world: World, now: Contacts, before: Contacts, work: Work, monitors: Monitors, levels: NDArray,
+    totals: Totals, s: Solid, steps: int,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Take steps with the contact detection of the core.
 
@@ -102,15 +99,13 @@ def advance(
         Whether all contacts fitted; whether `now` and `before` have changed roles.
     """
     n, swapped, p = len(s.d), False, levels[0]
+    bodies, outlines, m, counters = world.bodies, world.outlines, work.matrix, totals.counters
     for _ in range(steps):
         start = counters[STEPS] * p.dt
         if p.static:
             rest_all(bodies, s.velocity)
         copy_index(work.begin, work.first)
-        count = detect(
-            bodies, outlines, ground, interfaces, links, before, now, work, monitors, start + p.dt,
-            p, counters, deepest,
-        )  # fmt: skip
+        count = detect(world, before, now, work, monitors, start + p.dt, p, totals)
         if count < 0:
             return False, swapped
         now, before = before, now

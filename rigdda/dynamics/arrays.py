@@ -7,7 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.records import Corners, Floats, Ints, Polygons
+from rigdda.dynamics.records import (
+    Bodies,
+    Corners,
+    Floats,
+    Interfaces,
+    Ints,
+    Links,
+    Polygons,
+    Shaking,
+)
 
 
 class Outlines(NamedTuple):
@@ -29,6 +38,25 @@ class Ground(NamedTuple):
     bin_item: Ints
     bin_origin: float
     bin_width: float
+
+
+class World(NamedTuple):
+    """What there is in a scene."""
+
+    bodies: Bodies
+    outlines: Outlines
+    ground: Ground
+    interfaces: Interfaces
+    links: Links
+    shaking: Shaking
+
+
+class Totals(NamedTuple):
+    """What is counted and added up over a run."""
+
+    counters: NDArray[np.int64]  # see records.COUNTERS
+    ledger: Floats  # work by what does it [J], see records.LEDGER
+    deepest: Floats  # (1,) greatest penetration [m]
 
 
 class Matrix(NamedTuple):
@@ -53,13 +81,6 @@ class Scratch(NamedTuple):
     row: Ints  # (3 G,) place in `factor` of column 0 of a scalar row
     factor: Floats  # Cholesky factor within the profile
     next: Ints  # (2 pairs,) next entry in a chain of neighbours, -1 at its end
-
-
-class System(NamedTuple):
-    """An island in work."""
-
-    matrix: Matrix
-    scratch: Scratch
 
 
 class Boxes(NamedTuple):
@@ -107,6 +128,8 @@ class Work(NamedTuple):
     boxes: Boxes
     islands: Islands
     rows: Rows
+    matrix: Matrix
+    scratch: Scratch
     first: Ints  # (M + 1,) first contact of each body a in the last step
     begin: Ints  # (M + 1,) the same in this step
 

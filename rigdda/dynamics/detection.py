@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Boxes, Ground, Monitors, Outlines, Work
+from rigdda.dynamics.arrays import Boxes, Monitors, Totals, Work, World
 from rigdda.dynamics.constants import (
     ASLEEP,
     AWAKE,
@@ -23,9 +22,7 @@ from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.records import (
     Bodies,
     Contacts,
-    Interfaces,
     Ints,
-    Links,
     Parameters,
     Polygons,
 )
@@ -84,8 +81,8 @@ def keep_sideways(contacts: Contacts, low: int, high: int, most: float) -> int:
 
 @stage
 def collide_block(
-    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, contacts: Contacts,
-    count: int, old: Contacts, work: Work, a: int, start: bool, p: Parameters, deepest: NDArray,
+    world: World, contacts: Contacts, count: int, old: Contacts, work: Work, a: int, start: bool,
+    p: Parameters, totals: Totals,
 ) -> int:  # fmt: skip
     """Write the contacts of awake block a with the terrain and with its partners.
 
@@ -94,9 +91,11 @@ def collide_block(
     int
         The new number of contacts; -1 if they do not fit.
     """
+    bodies, outlines = world.bodies, world.outlines
     first, room, boxes = count, len(contacts) - outlines.corner.shape[1] - 4, work.boxes
     if bodies[a].brake == 0.0:
-        count = collide_terrain(bodies, outlines, ground, boxes.swept[a], contacts, count, a, p)
+        box = boxes.swept[a]
+        count = collide_terrain(bodies, outlines, world.ground, box, contacts, count, a, p)
     for q in range(boxes.partner_start[a], boxes.partner_start[a + 1]):
         if count < 0 or count > room:
             return -1
@@ -111,8 +110,8 @@ def collide_block(
     if p.bonded and start:
         bond_joints(contacts, first, count, p)
     for k in range(first, count):
-        prepare(bodies, contacts[k], interfaces, start, p)
-        deepest[0] = max(deepest[0], -contacts[k].gap)
+        prepare(bodies, contacts[k], world.interfaces, start, p)
+        totals.deepest[0] = max(totals.deepest[0], -contacts[k].gap)
     return count
 
 
@@ -125,12 +124,12 @@ def copy_index(index: Ints, to: Ints) -> None:
 
 @stage
 def detect(
-    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
-    contacts: Contacts, old: Contacts, work: Work, monitors: Monitors, time: float, p: Parameters,
-    counters: NDArray, deepest: NDArray,
+    world: World, contacts: Contacts, old: Contacts, work: Work, monitors: Monitors, time: float,
+    p: Parameters, totals: Totals,
 ) -> int:  # fmt: skip
     """Write all contacts of the step in order of their first body; -1 if they do not fit."""
-    if not candidate_pairs(bodies, outlines.polygon, work.boxes, p):
+    bodies, links = world.bodies, world.links
+    if not candidate_pairs(bodies, world.outlines.polygon, work.boxes, p):
         return -1
     start = time <= 1.5 * p.dt
     count, link = int(np.int64(0)), 0  # with a literal all that it is handed to is compiled twice
@@ -140,10 +139,7 @@ def detect(
         while link < len(links) and links[link].a == a:
             link += 1
         if bodies[a].status == AWAKE:
-            count = collide_block(
-                bodies, outlines, ground, interfaces, contacts, count, old, work, a, start, p,
-                deepest,
-            )  # fmt: skip
+            count = collide_block(world, contacts, count, old, work, a, start, p, totals)
             if count < 0 or count + link - low_link > len(contacts):
                 return -1
             for q in range(low_link, link):

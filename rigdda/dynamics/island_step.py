@@ -6,7 +6,7 @@ import math
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, System, Work
+from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, Totals, Work, World
 from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
 from rigdda.dynamics.assembly.island import damping_of, load_moment
 from rigdda.dynamics.constants import (
@@ -157,15 +157,15 @@ def is_tried_whole(
 
 @stage
 def settle_island(
-    bodies: Bodies, contacts: Contacts, system: System, work: Work, island: int, p: Parameters,
-    counters: NDArray, ledger: NDArray,
-) -> bool:  # fmt: skip
+    bodies: Bodies, contacts: Contacts, work: Work, island: int, p: Parameters, totals: Totals
+) -> bool:
     """Move the slots of an island through the step, and set the forces of its contacts.
 
     What moves is relaxed. Where that does not settle, an island at rest is solved as a whole.
     Returns whether a contact was struck.
     """
-    islands, rows, m = work.islands, work.rows, system.matrix
+    counters, ledger = totals.counters, totals.ledger
+    islands, rows, m = work.islands, work.rows, work.matrix
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     pairs = pair_blocks(bodies, contacts, m, islands, c0, c1)
@@ -174,7 +174,7 @@ def settle_island(
     whole = struck = False
     tried = is_tried_whole(bodies, contacts, islands, island, quiet, p)
     if tried:
-        whole = solve_states(bodies, contacts, system, islands, island, pairs, p, counters)
+        whole = solve_states(bodies, contacts, work, island, pairs, p, counters)
         whole = whole or p.static or not p.post_correction
     start_slots(bodies, islands, rows, island, p)
     count = pack_rows(contacts, islands, rows, island)
@@ -184,7 +184,7 @@ def settle_island(
         sweeps, struck, settled = relax(rows, b1 - b0, count, speed, p, ledger)
         counters[SWEEPS] += sweeps
         if quiet and not (settled or tried or has_fence(bodies, islands, b0, b1)):
-            whole = solve_states(bodies, contacts, system, islands, island, pairs, p, counters)
+            whole = solve_states(bodies, contacts, work, island, pairs, p, counters)
             if whole:
                 ledger[2] = damped
                 start_slots(bodies, islands, rows, island, p)
@@ -319,14 +319,15 @@ def end_body(
 
 @stage
 def step_island(
-    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
-    system: System, work: Work, monitors: Monitors, time: float, island: int, p: Parameters,
-    counters: NDArray, ledger: NDArray,
+    world: World, contacts: Contacts, work: Work, monitors: Monitors, time: float, island: int,
+    p: Parameters, totals: Totals,
 ) -> int:  # fmt: skip
     """Take the step of an island: settle it, note its hits, push out, move its bodies.
 
     Returns a body that went bad, or -1.
     """
+    bodies, outlines, interfaces = world.bodies, world.outlines, world.interfaces
+    counters, ledger = totals.counters, totals.ledger
     islands, rows = work.islands, work.rows
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
@@ -334,7 +335,7 @@ def step_island(
     for place in range(b0, b1):
         bodies[islands.block_item[place]].apart += p.dt
     if c1 > c0:
-        struck = settle_island(bodies, contacts, system, work, island, p, counters, ledger)
+        struck = settle_island(bodies, contacts, work, island, p, totals)
         if len(monitors.target) > 0:
             counters[EVENTS] = note_hits(
                 bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time

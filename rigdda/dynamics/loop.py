@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Ground
+from rigdda.dynamics.arrays import Ground, Totals, World
 from rigdda.dynamics.constants import (
     ASLEEP,
     AWAKE,
@@ -23,7 +23,7 @@ from rigdda.dynamics.constants import (
 from rigdda.dynamics.monitors import FAILED
 from rigdda.dynamics.pack import Arrays
 from rigdda.dynamics.pack.ground import pack_ground
-from rigdda.dynamics.pack.space import empty_contacts, empty_system, empty_work
+from rigdda.dynamics.pack.space import empty_contacts, empty_work
 from rigdda.dynamics.readings import contact_table, divergence
 from rigdda.dynamics.records import CONTACTS, COUNTERS, EVENTS, LEDGER, STEPS, Contacts
 from rigdda.dynamics.step import advance
@@ -121,24 +121,17 @@ class Loop:
         """
         target = self.counters[STEPS] + steps
         stride = steps // max(len(frames), 1)
+        totals = Totals(self.counters, self.ledger, self.deepest)
         while self.counters[STEPS] < target:
             a, before = self.arrays, time.thread_time()
             reason, block, swapped = advance_directly.call(
-                a.bodies,
-                a.outlines,
-                a.ground,
-                a.interfaces,
-                a.links,
-                a.shaking,
+                World(a.bodies, a.outlines, a.ground, a.interfaces, a.links, a.shaking),
                 self.now,
                 self.before,
-                a.system,
                 a.work,
                 a.monitors,
                 a.parameters,
-                self.counters,
-                self.ledger,
-                self.deepest,
+                totals,
                 target - self.counters[STEPS],
                 frames,
                 stride,
@@ -193,4 +186,4 @@ class Loop:
         self.now, self.before = grown, empty_contacts(room)
         work, before = empty_work(len(bodies), blocks, room), self.arrays.work
         work.boxes.row[:], work.begin[:] = before.boxes.row, before.begin
-        self.arrays = self.arrays._replace(system=empty_system(blocks, room), work=work)
+        self.arrays = self.arrays._replace(work=work)

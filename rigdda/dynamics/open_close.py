@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Islands, Matrix, Rows, Scratch, System
+from rigdda.dynamics.arrays import Islands, Matrix, Rows, Scratch, Work
 from rigdda.dynamics.assembly.island import (
     assemble_blocks,
     assemble_island,
@@ -52,14 +52,14 @@ def solve_system(m: Matrix, scratch: Scratch, n: int, pairs: int, p: Parameters)
 
 @kernel
 def solve_states(
-    bodies: Bodies, contacts: Contacts, system: System, islands: Islands, island: int, pairs: int,
-    p: Parameters, counters: NDArray,
+    bodies: Bodies, contacts: Contacts, work: Work, island: int, pairs: int, p: Parameters,
+    counters: NDArray,
 ) -> bool:  # fmt: skip
     """Iterate until no contact of the island changes; returns whether that was reached.
 
     Afterwards normal and shear of each contact hold its force, zero where it is open.
     """
-    m = system.matrix
+    islands, m = work.islands, work.matrix
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     n = b1 - b0
@@ -70,7 +70,7 @@ def solve_states(
         assemble_island(bodies, contacts, m, islands, island, pairs, p)
         counters[ITERATIONS] += 1
         counters[SOLVES] += 1
-        counters[SOLVER_ITERATIONS] += solve_system(m, system.scratch, n, pairs, p)
+        counters[SOLVER_ITERATIONS] += solve_system(m, work.scratch, n, pairs, p)
         if not update_states(contacts, m.d, islands, c0, c1, p):
             return True
     return False

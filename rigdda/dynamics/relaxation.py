@@ -45,7 +45,7 @@ from rigdda.dynamics.constants import (
     RELAXATION_SHARE,
     SUBSTEPS,
 )
-from rigdda.dynamics.records import Bodies, Body, Floats, Ints, Parameters
+from rigdda.dynamics.records import Bodies, Body, Floats, Parameters
 from rigdda.dynamics.rows import (
     AIM,
     AIM_SHEAR,
@@ -253,9 +253,8 @@ def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
 
 @arithmetic_kernel
 def sweep(
-    row: Floats, row_i: Ints, row_j: Ints, slot: Floats, still: int, visit: Ints, visits: int,
-    tries: int, number: int, idle: Ints, reach: float, moved_in: Ints, quiet: float,
-) -> float:  # fmt: skip
+    rows: Rows, still: int, visits: int, tries: int, number: int, reach: float, quiet: float
+) -> float:
     """Visit the contacts listed once, from the lowest up, or down.
 
     Returns the greatest change of a normal velocity [m/s]; shear does not count. One that is open
@@ -268,9 +267,9 @@ def sweep(
     """
     worst = 0.0
     for q in range(visits):
-        place = np.uintp(visit[np.uintp(visits - 1 - q if tries % 2 == 1 else q)])
-        i, j = np.uintp(row_i[place]), np.uintp(row_j[place])
-        r, a, b = row[place], slot[i], slot[j]
+        place = np.uintp(rows.visit[np.uintp(visits - 1 - q if tries % 2 == 1 else q)])
+        i, j = np.uintp(rows.row_i[place]), np.uintp(rows.row_j[place])
+        r, a, b = rows.row[place], rows.slot[i], rows.slot[j]
         n, s = r[NORMAL : NORMAL + 6], r[SHEAR : SHEAR + 6]
         u, v, w, u2, v2, w2 = a[0], a[1], a[2], b[0], b[1], b[2]
         speed = (n[0] * u + n[1] * v + n[2] * w) + (n[3] * u2 + n[4] * v2 + n[5] * w2)
@@ -279,7 +278,7 @@ def sweep(
         if normal == 0.0 and force == 0.0 and before == 0.0 and r[COHESION] == 0.0:
             if r[STIFFNESS] == 0.0:
                 wait = (speed - r[AIM]) / (reach + abs(speed))
-                idle[place] = number + int(min(wait, float(SUBSTEPS)))
+                rows.idle[place] = number + int(min(wait, float(SUBSTEPS)))
             continue
         change = (normal - force) * r[FLEXIBLE]
         worst = max(worst, abs(change))
@@ -290,9 +289,9 @@ def sweep(
         shear = min(max(shear, -limit), limit)
         drag = shear - before
         if abs(change) + abs(drag) * r[FLEXIBLE] > quiet:
-            moved_in[i] = tries
+            rows.moved_in[i] = tries
             if j != np.uintp(still):
-                moved_in[j] = tries
+                rows.moved_in[j] = tries
         a[0], a[1] = (u + more * n[0]) + drag * s[0], (v + more * n[1]) + drag * s[1]
         b[0], b[1] = (u2 + more * n[3]) + drag * s[3], (v2 + more * n[4]) + drag * s[4]
         a[2], b[2] = (w + more * n[2]) + drag * s[2], (w2 + more * n[5]) + drag * s[5]
@@ -452,10 +451,7 @@ def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance:
         rows.moved_in[s] = -1
     for tries in range(MOST_SWEEPS):
         visits = list_visits(rows, count, tries, number)
-        worst = sweep(
-            rows.row, rows.row_i, rows.row_j, rows.slot, n, rows.visit, visits, tries, number,
-            rows.idle, reach, rows.moved_in, tolerance,
-        )  # fmt: skip
+        worst = sweep(rows, n, visits, tries, number, reach, tolerance)
         if worst <= tolerance:
             return tries + 1
     return MOST_SWEEPS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Ground, Monitors, Outlines, System, Work
+from rigdda.dynamics.arrays import Monitors, Totals, Work, World
 from rigdda.dynamics.constants import (
     AWAKE,
     BAD_STATE,
@@ -30,8 +30,6 @@ from rigdda.dynamics.records import (
     STEPS,
     Bodies,
     Contacts,
-    Interfaces,
-    Links,
     Parameters,
     Shaking,
 )
@@ -43,21 +41,17 @@ from rigdda.kernel import entry_kernel, kernel, stage
 
 @stage
 def solve_and_move(
-    bodies: Bodies, outlines: Outlines, interfaces: Interfaces, contacts: Contacts,
-    system: System, work: Work, monitors: Monitors, time: float, p: Parameters,
-    counters: NDArray, ledger: NDArray,
+    world: World, contacts: Contacts, work: Work, monitors: Monitors, time: float, p: Parameters,
+    totals: Totals,
 ) -> int:  # fmt: skip
     """Take the step of every island; returns a block that went bad, or -1."""
-    found = find_islands(bodies, contacts, work.begin, work.islands, p.blocks, p.islands)
+    found = find_islands(world.bodies, contacts, work.begin, work.islands, p.blocks, p.islands)
     bad = -1
     for s in range(found):
-        worse = step_island(
-            bodies, outlines, interfaces, contacts, system, work, monitors, time, s, p, counters,
-            ledger,
-        )  # fmt: skip
+        worse = step_island(world, contacts, work, monitors, time, s, p, totals)
         bad = max(bad, worse)
     if p.sleeping:
-        watch_quiet(bodies, work.islands, found, p)
+        watch_quiet(world.bodies, work.islands, found, p)
     return bad
 
 
@@ -80,8 +74,8 @@ def set_out(bodies: Bodies, shaking: Shaking, since: float, time: float, p: Para
 
 @stage
 def end_step(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, work: Work,
-    monitors: Monitors, counters: NDArray, p: Parameters,
+    bodies: Bodies, contacts: Contacts, count: int, work: Work, monitors: Monitors,
+    counters: NDArray, p: Parameters,
 ) -> int:  # fmt: skip
     """Watch what a whole step has brought; returns DONE, GROUND_MOVED or ENDED."""
     counters[STEPS] += 1
@@ -97,10 +91,8 @@ def end_step(
 
 @entry_kernel
 def advance(
-    bodies: Bodies, outlines: Outlines, ground: Ground, interfaces: Interfaces, links: Links,
-    shaking: Shaking, now: Contacts, before: Contacts, system: System, work: Work,
-    monitors: Monitors, parameters: NDArray[np.void], counters: NDArray, ledger: NDArray,
-    deepest: NDArray, steps: int, frames: NDArray, stride: int,
+    world: World, now: Contacts, before: Contacts, work: Work, monitors: Monitors,
+    parameters: NDArray[np.void], totals: Totals, steps: int, frames: NDArray, stride: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Take up to `steps` steps, and keep a frame whenever a multiple of `stride` is left.
 
@@ -108,8 +100,6 @@ def advance(
     ----------
     parameters : (1,) array of PARAMETERS
         Numbers of the scene and the settings.
-    counters, ledger, deepest : arrays
-        See `records.COUNTERS`, `records.LEDGER`; deepest[0] is the greatest penetration [m].
     frames : (F, M, 6) array
         The last is for the state in the end; see `frames.keep_frame`.
 
@@ -124,6 +114,8 @@ def advance(
         Whether `now` and `before` have changed roles.
     """
     swapped, reason, bad, p = False, DONE, -1, parameters[0]
+    bodies, outlines, ground, _, links, shaking = world
+    counters, ledger = totals.counters, totals.ledger
     may_fly = len(links) == 0 and len(shaking) == 0 and not p.static and p.post_correction
     flyer, flown, flight = -1, 0, 0  # steps of a flight that are taken, and all of them
     while steps > 0 and reason == DONE:
@@ -145,26 +137,21 @@ def advance(
         else:
             set_out(bodies, shaking, counters[STEPS] * p.dt, time, p)
             copy_index(work.begin, work.first)
-            count = detect(
-                bodies, outlines, ground, interfaces, links, before, now, work, monitors, time, p,
-                counters, deepest,
-            )  # fmt: skip
+            count = detect(world, before, now, work, monitors, time, p, totals)
             if count < 0:
                 copy_index(work.first, work.begin)
                 reason = CONTACTS_FULL
                 break
             now, before = before, now
             swapped = not swapped
-            bad = solve_and_move(
-                bodies, outlines, interfaces, now, system, work, monitors, time, p, counters, ledger
-            )
+            bad = solve_and_move(world, now, work, monitors, time, p, totals)
             ledger[4] += mend_links(bodies, outlines, links, p)
             give_way(bodies, outlines, now, count, monitors, counters, ledger, time, p)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         press_asleep(bodies, now, count, monitors, p.dt)
         events = counters[EVENTS]
-        reason = end_step(bodies, outlines, now, count, work, monitors, counters, p)
+        reason = end_step(bodies, now, count, work, monitors, counters, p)
         if counters[EVENTS] > events:  # a barrier may have failed: detection wakes what it held
             flight = flown
         steps -= 1

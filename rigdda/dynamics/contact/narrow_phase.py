@@ -9,20 +9,44 @@ leads through a neighbouring part, and that one has the contact.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import AWAKE, SAME_FACE
 from rigdda.dynamics.contact.separating_axes import (
     SQUARE,
     TOUCH,
+    Approach,
     axis_gap,
     face_of_contact,
     following,
     incident_edge,
+    reverse,
     touch_time,
 )
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
+
+
+class Meeting(NamedTuple):
+    """Which edges of two bodies meet."""
+
+    a: int  # bodies; the normal of a contact points to a
+    b: int
+    i: int  # polygon of the face of contact, and its edge
+    edge: int
+    j: int  # the other polygon, and its incident edge
+    other: int
+
+
+class Window(NamedTuple):
+    """Where corners of the incident edge make a contact with the face."""
+
+    shift_x: float  # moves polygon j to where it is at the time of entry, but for its turning [m]
+    shift_y: float
+    reach: float  # greatest gap [m]
+    margin: float  # a corner may be so far beyond an end of the face that is in a notch [m]
+    beside: float  # or so far beyond any end: it may come over the face within the step [m]
 
 
 @kernel
@@ -37,16 +61,13 @@ def add_contact(
 
 @inlined
 def clip_contacts(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
-    edge: int, j: int, other: int, shift_x: float, shift_y: float, reach: float, margin: float,
-    beside: float,
-) -> int:  # fmt: skip
-    """Add up to two contacts of bodies a and b where the incident edge lies over the face.
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting, window: Window
+) -> int:
+    """Add up to two contacts of two bodies where the incident edge lies over the face.
 
-    The face of contact is edge `edge` of polygon i, the incident edge is edge `other` of polygon j;
-    (shift_x, shift_y) moves j to where it is at the time of entry, but for its turning: a corner
-    within `beside` of the face may come over it. Returns the new number of contacts.
+    Returns the new number of contacts.
     """
+    i, edge, j, other = meeting.i, meeting.edge, meeting.j, meeting.other
     face = outlines.corner[i, edge]
     nx, ny, x0, y0 = face.normal_x, face.normal_y, face.x, face.y
     tx, ty = -ny, nx
@@ -56,13 +77,13 @@ def clip_contacts(
     other_end = following(other, outlines.polygon[j].count)
     # along the face, the incident edge runs from its end (s1) to its start (s2)
     one, two = outlines.corner[j, other_end], outlines.corner[j, other]
-    s1 = tx * (one.x + shift_x - x0) + ty * (one.y + shift_y - y0)
-    s2 = tx * (two.x + shift_x - x0) + ty * (two.y + shift_y - y0)
+    s1 = tx * (one.x + window.shift_x - x0) + ty * (one.y + window.shift_y - y0)
+    s2 = tx * (two.x + window.shift_x - x0) + ty * (two.y + window.shift_y - y0)
     g1 = nx * (one.x - x0) + ny * (one.y - y0)
     g2 = nx * (two.x - x0) + ny * (two.y - y0)
     # a corner of j that touches the next edge of a notch, too, may be a little beyond the face
-    start = -margin if face.reentrant else -beside
-    stop = length + margin if next_corner.reentrant else length + beside
+    start = -window.margin if face.reentrant else -window.beside
+    stop = length + window.margin if next_corner.reentrant else length + window.beside
     low = s1 if s1 >= start else 0.0
     high = s2 if s2 <= stop else length
     if high < low:
@@ -73,7 +94,7 @@ def clip_contacts(
         if which == 1 and high - low < 1e-9 * length:
             break
         gap = g1 + slope * (s - s1)
-        if gap > reach:
+        if gap > window.reach:
             continue
         if which == 0:
             own_corner = s1 < start
@@ -82,9 +103,9 @@ def clip_contacts(
             own_corner = s2 > stop
             corner, other_corner = end, other
         if own_corner:  # a corner of i on the incident edge
-            k = add_corner(bodies, outlines, contacts, k, a, b, i, corner, i, edge, gap)
+            k = add_corner(bodies, outlines, contacts, k, meeting, i, corner, gap)
         else:
-            k = add_corner(bodies, outlines, contacts, k, a, b, j, other_corner, i, edge, gap)
+            k = add_corner(bodies, outlines, contacts, k, meeting, j, other_corner, gap)
     return k
 
 
@@ -106,16 +127,15 @@ def edges_in_line(outlines: Outlines, i: int, edge: int, way: int) -> int:
 
 @inlined
 def clip_lines(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
-    edge: int, j: int, other: int, shift_x: float, shift_y: float, reach: float, margin: float,
-    beside: float,
-) -> int:  # fmt: skip
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting, window: Window
+) -> int:
     """Add the contacts of the line of the face of contact with that of the incident edge.
 
     Each edge in line with the face is clipped against each edge in line with the incident one, so
-    that two bodies bear on each other over all of the length that they share. Takes and returns
-    what `clip_contacts` does, but -1 if the contacts do not fit.
+    that two bodies bear on each other over all of the length that they share. Returns the new
+    number of contacts, -1 if they do not fit.
     """
+    a, b, i, edge, j, other = meeting
     first, n, m = k, outlines.polygon[i].count, outlines.polygon[j].count
     face_low, face_high = edges_in_line(outlines, i, edge, -1), edges_in_line(outlines, i, edge, 1)
     low, high = edges_in_line(outlines, j, other, -1), edges_in_line(outlines, j, other, 1)
@@ -124,10 +144,8 @@ def clip_lines(
         for against in range(other - low, other + high + 1):
             if k + 2 > len(contacts):
                 return -1
-            found = clip_contacts(
-                bodies, outlines, contacts, k, a, b, i, (at + n) % n, j, (against + m) % m, shift_x,
-                shift_y, reach, margin, beside,
-            )  # fmt: skip
+            edges = Meeting(a, b, i, (at + n) % n, j, (against + m) % m)
+            found = clip_contacts(bodies, outlines, contacts, k, edges, window)
             if alone:
                 return found
             for new in range(k, found):
@@ -137,13 +155,14 @@ def clip_lines(
 
 @inlined
 def add_corner(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, owner: int,
-    corner: int, i: int, edge: int, gap: float,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting, owner: int,
+    corner: int, gap: float,
 ) -> int:  # fmt: skip
-    """Add the contact of a corner of polygon `owner` with the face `edge` of polygon i.
+    """Add the contact of a corner of polygon `owner` with the face of contact.
 
     Its key is that of the corner of the body, so that parts share accumulated forces.
     """
+    a, b, i, edge = meeting.a, meeting.b, meeting.i, meeting.edge
     sign = 1.0 if outlines.polygon[i].body == b else -1.0  # the normal points to a
     body = outlines.polygon[owner].body
     own, face = outlines.corner[owner, corner], outlines.corner[i, edge]
@@ -156,10 +175,8 @@ def add_corner(
 
 
 @inlined
-def collide_pair(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, p: Parameters
-) -> int:  # fmt: skip
-    """Add the contacts of bodies a and b from entry k on; returns the new number, or -1."""
+def approach_of(bodies: Bodies, a: int, b: int, p: Parameters) -> Approach:
+    """Return how body b comes nearer to body a over the step."""
     dt = p.dt
     one, two = bodies[a], bodies[b]
     dx, dy = -one.vx * dt, -one.vy * dt
@@ -169,35 +186,38 @@ def collide_pair(
         dy += two.vy * dt
         path += two.path
         fall = 0.0
-    spread = path + fall + p.margin
-    beside = 0.5 * dt * (abs(one.omega) * one.radius + abs(two.omega) * two.radius)
     # both turn about their centroids
     other = two.omega if two.status == AWAKE else 0.0
-    turn = (other - one.omega) * dt
-    px = (other * two.y - one.omega * one.y) * dt
-    py = (one.omega * one.x - other * two.x) * dt
+    return Approach(
+        dx, dy, (other * two.y - one.omega * one.y) * dt, (one.omega * one.x - other * two.x) * dt,
+        (other - one.omega) * dt, path + fall + p.margin, p.margin,
+    )  # fmt: skip
+
+
+@inlined
+def collide_pair(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, p: Parameters
+) -> int:
+    """Add the contacts of bodies a and b from entry k on; returns the new number, or -1."""
+    one, two = bodies[a], bodies[b]
+    approach = approach_of(bodies, a, b, p)
+    beside = 0.5 * p.dt * (abs(one.omega) * one.radius + abs(two.omega) * two.radius)
     if one.parts == 1 and two.parts == 1:
         return collide_parts(
-            bodies, outlines, contacts, k, a, b, a, b, dx, dy, px, py, turn, spread, p.margin, 0.0,
-            beside,
-        )  # fmt: skip
-    first = k
-    k = collide_all_parts(
-        bodies, outlines, contacts, k, a, b, dx, dy, px, py, turn, spread, p.margin,
-        0.0, beside,
-    )  # fmt: skip
-    if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
-        k = collide_all_parts(
-            bodies, outlines, contacts, k, a, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p.margin, 1e300, 0.0
+            bodies, outlines, contacts, k, one.part, two.part, approach, 0.0, beside
         )
+    first = k
+    k = collide_all_parts(bodies, outlines, contacts, k, a, b, approach, 0.0, beside)
+    if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
+        still = Approach(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p.margin)
+        k = collide_all_parts(bodies, outlines, contacts, k, a, b, still, 1e300, 0.0)
     return k
 
 
 @kernel
 def collide_all_parts(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, dx: float,
-    dy: float, px: float, py: float, turn: float, spread: float, margin: float, sunk: float,
-    beside: float,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int,
+    approach: Approach, sunk: float, beside: float,
 ) -> int:  # fmt: skip
     """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
     first, one, two = k, bodies[a], bodies[b]
@@ -205,10 +225,7 @@ def collide_all_parts(
         for j in range(two.part, two.part + two.parts):
             if k + 2 > len(contacts):
                 return -1
-            found = collide_parts(
-                bodies, outlines, contacts, k, a, b, i, j, dx, dy, px, py, turn, spread, margin,
-                sunk, beside,
-            )  # fmt: skip
+            found = collide_parts(bodies, outlines, contacts, k, i, j, approach, sunk, beside)
             if found < 0:
                 return -1
             for new in range(k, found):
@@ -237,31 +254,31 @@ def keep_nearest(contacts: Contacts, first: int, k: int, new: int) -> int:
 
 @inlined
 def collide_parts(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int, j: int,
-    dx: float, dy: float, px: float, py: float, turn: float, spread: float, margin: float,
-    sunk: float, beside: float,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, i: int, j: int,
+    approach: Approach, sunk: float, beside: float,
 ) -> int:  # fmt: skip
-    """Add the contacts of polygon i of body a with polygon j of body b; returns the new number.
+    """Add the contacts of polygon i of one body with polygon j of another; returns the new number.
 
-    (dx, dy) is the displacement of b relative to a over the step, (px - turn y, py + turn x) what
-    turning adds to it at (x, y), see `face_of_contact`, and `beside` half of how far both may turn.
+    `approach` is how the second body comes nearer, `sunk` see `face_of_contact`, and `beside` half
+    of how far both may turn [m].
     """
-    ni, nj = outlines.polygon[i].count, outlines.polygon[j].count
+    a, b = outlines.polygon[i].body, outlines.polygon[j].body
+    dx, dy, margin = approach.dx, approach.dy, approach.margin
     # what moves may be deflected by others before they meet
     square = math.inf if bodies[b].status == AWAKE else SQUARE * math.sqrt(dx * dx + dy * dy)
     possible, time_i, gap_i, apart_i, edge_i = face_of_contact(
-        outlines, i, ni, j, nj, dx, dy, px, py, turn, spread, margin, sunk, square
+        outlines, i, j, approach, sunk, square
     )
     if not possible:
         return k
     possible, time_j, gap_j, apart_j, edge_j = face_of_contact(
-        outlines, j, nj, i, ni, -dx, -dy, -px, -py, -turn, spread, margin, sunk, square
+        outlines, j, i, reverse(approach), sunk, square
     )
     if not possible:
         return k
     # near a tie keep the face of a, so that parallel faces do not alternate
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + TOUCH * margin)
-    reach = (dx * dx + dy * dy) ** 0.5 + spread
+    reach = (dx * dx + dy * dy) ** 0.5 + approach.spread
     touching = max(apart_i, apart_j) <= margin
     # where they touch, not where they are deeper than the margin
     time_i = touch_time(gap_i, time_i, square, margin)
@@ -275,10 +292,9 @@ def collide_parts(
         if outlines.corner[face, edge].inner or outlines.corner[other, facing].inner:
             return k
         shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
-        found = clip_lines(
-            bodies, outlines, contacts, k, a, b, face, edge, other, facing, dx * shift, dy * shift,
-            reach, margin, beside,
-        )  # fmt: skip
+        meeting = Meeting(a, b, face, edge, other, facing)
+        window = Window(dx * shift, dy * shift, reach, margin, beside)
+        found = clip_lines(bodies, outlines, contacts, k, meeting, window)
         if found != k or (shift == 0.0 and not touching):
             return found
         if touching:
@@ -286,21 +302,20 @@ def collide_parts(
         else:
             time_i = time_j = 0.0
     face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
-    return deepest_corner(bodies, outlines, contacts, k, a, b, face, edge, other)
+    return add_deepest(bodies, outlines, contacts, k, Meeting(a, b, face, edge, other, 0))
 
 
 @kernel
-def deepest_corner(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, i: int,
-    edge: int, j: int,
-) -> int:  # fmt: skip
-    """Add the contact of the nearest corner of polygon j with the line of an edge of polygon i.
+def add_deepest(
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting
+) -> int:
+    """Add the contact of the nearest corner of the other polygon with the line of the face.
 
     For bodies that touch although the face does not reach over the corner: nearly parallel edges
     in a row, where rounding decides which of them is the face.
     """
-    n = outlines.polygon[j].count
-    face = outlines.corner[i, edge]
-    nx, ny, x0, y0 = face.normal_x, face.normal_y, face.x, face.y
-    gap, corner = axis_gap(nx, ny, x0, y0, outlines.corner, j, n)
-    return add_corner(bodies, outlines, contacts, k, a, b, j, corner, i, edge, gap)
+    face, n = outlines.corner[meeting.i, meeting.edge], outlines.polygon[meeting.j].count
+    gap, corner = axis_gap(
+        face.normal_x, face.normal_y, face.x, face.y, outlines.corner, meeting.j, n
+    )
+    return add_corner(bodies, outlines, contacts, k, meeting, meeting.j, corner, gap)

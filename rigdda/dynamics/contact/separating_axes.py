@@ -11,6 +11,8 @@ is not caught by the side of the next body, whose face is flush with it.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import SAME_FACE
 from rigdda.dynamics.records import Corners
@@ -26,6 +28,25 @@ counts as struck rather than grazed [-]."""
 
 NEVER = 1e3
 """Time of entry, over the step, of what comes nearer no faster than what is at rest may."""
+
+
+class Approach(NamedTuple):
+    """How one body comes nearer to another over the step, if nothing deflects them."""
+
+    dx: float  # displacement of the one relative to the other [m]
+    dy: float
+    px: float  # (px - turn y, py + turn x) is what turning adds to it at (x, y) [m]
+    py: float
+    turn: float  # [rad]
+    spread: float  # how far any of their points may come nearer, whatever deflects them [m]
+    margin: float  # of contact candidates [m]
+
+
+@kernel
+def reverse(approach: Approach) -> Approach:
+    """Return how the other body comes nearer to the one."""
+    dx, dy, px, py, turn, spread, margin = approach
+    return Approach(-dx, -dy, -px, -py, -turn, spread, margin)
 
 
 @kernel
@@ -69,19 +90,16 @@ def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
 
 @inlined
 def face_of_contact(
-    outlines: Outlines, i: int, edges: int, j: int, corners: int, dx: float, dy: float,
-    px: float, py: float, turn: float, spread: float, margin: float, sunk: float, square: float,
-) -> tuple[bool, float, float, float, int]:  # fmt: skip
+    outlines: Outlines, i: int, j: int, approach: Approach, sunk: float, square: float
+) -> tuple[bool, float, float, float, int]:
     """Return whether the edges of i leave a contact with j possible, and the best edge.
 
     Besides its time of entry, over the step, its gap now and the greatest gap of any edge that was
     looked at [m]: (possible, time, gap, apart, edge). If a contact is ruled out, the rest is not to
     be used.
 
-    (dx, dy) is the displacement of j relative to i over the step if nothing deflects them,
-    (px - turn y, py + turn x) what turning adds to it at (x, y), `spread` how far any of their
-    points may come nearer, whatever does. Edges inside the body count as deeper by `sunk`, so that
-    on a tie the real one is best.
+    `approach` is how j comes nearer to i. Edges inside the body count as deeper by `sunk` [m], so
+    that on a tie the real one is best.
 
     A face that is struck, approached by more than `square` [m], is entered when the nearest corner
     meets it. One that it touches, or that is grazed, is entered when the corner is deeper than the
@@ -92,6 +110,8 @@ def face_of_contact(
     The edge that the middle of j is farthest over comes first: most often it is the best one, or
     one that separates them. Others are looked at only as far as the circle in j may be over them.
     """
+    dx, dy, px, py, turn, spread, margin = approach
+    edges, corners = outlines.polygon[i].count, outlines.polygon[j].count
     time, depth, best, nearest, apart = -1.0, -1e300, -1, -1, -1e300
     facing = facing_edge(outlines, i, edges, j)
     for visit in range(-1, edges):
@@ -114,10 +134,10 @@ def face_of_contact(
             if gap <= margin:
                 ux -= turn * outlines.corner[j, corner].y - px
                 uy += turn * outlines.corner[j, corner].x + py
-            approach = -(nx * ux + ny * uy)
-            late = gap + margin >= NEVER * approach
-            struck = gap > 2.0 * TOUCH * margin and approach > square
-            entry = NEVER if late else (gap + (-TOUCH if struck else 1.0) * margin) / approach
+            closing = -(nx * ux + ny * uy)
+            late = gap + margin >= NEVER * closing
+            struck = gap > 2.0 * TOUCH * margin and closing > square
+            entry = NEVER if late else (gap + (-TOUCH if struck else 1.0) * margin) / closing
         later = entry > time or (entry == time and gap > depth)
         if later or (entry == time and gap == depth and edge < best):
             time, depth, best, nearest = entry, gap, edge, corner

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Ground, Monitors, Outlines, System, Work
+from rigdda.dynamics.arrays import Ground, Monitors, Outlines, Work
 from rigdda.dynamics.pack.bodies import free_bodies, pack_bodies, pack_links, start_fences
 from rigdda.dynamics.pack.ground import pack_ground, pack_shaking
 from rigdda.dynamics.pack.monitors import pack_monitors
 from rigdda.dynamics.pack.parameters import pack_interfaces, pack_parameters
-from rigdda.dynamics.pack.space import empty_contacts, empty_system, empty_work
+from rigdda.dynamics.pack.space import empty_contacts, empty_work
 from rigdda.dynamics.records import Bodies, Contacts, Interfaces, Links, Shaking
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
@@ -30,7 +30,6 @@ class Arrays(NamedTuple):
     shaking: Shaking
     now: Contacts
     before: Contacts
-    system: System
     work: Work
     monitors: Monitors
     parameters: NDArray[np.void]  # (1,) of PARAMETERS
@@ -70,7 +69,6 @@ def pack(
         pack_shaking(scene),
         empty_contacts(room),
         empty_contacts(room),
-        empty_system(blocks, room),
         empty_work(len(bodies), blocks, room),
         pack_monitors(scene, bodies, stations, watch, leave, settings.dt),
         parameters,

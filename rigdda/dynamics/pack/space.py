@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Boxes, Islands, Matrix, Rows, Scratch, System, Work
+from rigdda.dynamics.arrays import Boxes, Islands, Matrix, Rows, Scratch, Work
 from rigdda.dynamics.records import BOX, CONTACT, Contacts
 from rigdda.dynamics.rows import COLUMNS, FACTS, SLOT_COLUMNS
 
@@ -42,11 +42,6 @@ def empty_scratch(blocks: int, room: int) -> Scratch:
         np.zeros(profile_room(blocks)),
         np.zeros(2 * room, dtype=np.int64),
     )
-
-
-def empty_system(blocks: int, room: int) -> System:
-    """Return space for an island of all blocks."""
-    return System(empty_matrix(blocks, room), empty_scratch(blocks, room))
 
 
 def profile_room(blocks: int) -> int:
@@ -93,6 +88,8 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
             scale=np.zeros((blocks + 1, 3)),
             slot=np.zeros((blocks + 1, SLOT_COLUMNS)),
         ),
+        empty_matrix(blocks, room),
+        empty_scratch(blocks, room),
         first=whole(bodies + 1),
         begin=whole(bodies + 1),
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from rigdda.dynamics.arrays import Boxes, Monitors, Totals, Work, World
 from rigdda.dynamics.constants import (
     ASLEEP,
@@ -27,7 +25,7 @@ from rigdda.dynamics.records import (
     Polygons,
 )
 from rigdda.dynamics.sleep import wake_neighbours
-from rigdda.kernel import kernel, stage
+from rigdda.kernel import kernel, stage, variable
 
 
 @kernel
@@ -132,7 +130,7 @@ def detect(
     if not candidate_pairs(bodies, world.outlines.polygon, work.boxes, p):
         return -1
     start = time <= 1.5 * p.dt
-    count, link = int(np.int64(0)), 0  # with a literal all that it is handed to is compiled twice
+    count, link = variable(0), 0
     for a in range(p.blocks):
         work.begin[a] = count
         low_link = link

@@ -5,13 +5,12 @@ Fixed and sleeping bodies and the terrain have no unknowns and join nothing.
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands, Matrix
 from rigdda.dynamics.constants import AWAKE
 from rigdda.dynamics.records import Bodies, Contact, Contacts, Ints
-from rigdda.kernel import kernel
+from rigdda.kernel import kernel, variable
 
 
 @kernel
@@ -66,7 +65,7 @@ def find_islands(
     parent, slot = islands.parent, islands.slot
     block_start, contact_start = islands.block_start, islands.contact_start
     join_blocks(bodies, contacts, begin[blocks], parent, blocks, apart)
-    count = int(np.int64(0))  # with a literal `_fill` would be compiled twice
+    count = variable(0)
     for s in range(len(block_start)):
         block_start[s] = contact_start[s] = 0
     # slot serves first as the number of the root's island

@@ -94,7 +94,7 @@ from rigdda.dynamics.rows import (
     place_row,
     push,
 )
-from rigdda.kernel import arithmetic_kernel, inlined, kernel
+from rigdda.kernel import arithmetic_kernel, inlined, kernel, variable
 
 
 @kernel
@@ -623,7 +623,7 @@ def relax(
     tolerance = max(min(p.sweep_tolerance * (n - 1), RELAXATION_SHARE * speed), 1e-7 * speed)
     for s in range(n):
         fenced = fenced or rows.slot[s, BRAKE] > 0.0
-    sweeps, struck, last, left, number, swept = 0, False, 1.0, p.dt, 0, 0
+    sweeps, struck, last, left, number, swept = 0, False, 1.0, p.dt, variable(0), 0
     while left > 0.0:
         h = min(usual, left)
         if alone:

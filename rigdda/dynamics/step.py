@@ -36,7 +36,7 @@ from rigdda.dynamics.records import (
 from rigdda.dynamics.shaking import set_field
 from rigdda.dynamics.sleep import watch_quiet
 from rigdda.dynamics.thrust import press_asleep, watch_thrust
-from rigdda.kernel import entry_kernel, kernel, stage
+from rigdda.kernel import entry_kernel, kernel, stage, variable
 
 
 @stage
@@ -117,7 +117,11 @@ def advance(
     bodies, outlines, ground, _, links, shaking = world
     counters, ledger = totals.counters, totals.ledger
     may_fly = len(links) == 0 and len(shaking) == 0 and not p.static and p.post_correction
-    flyer, flown, flight = -1, 0, 0  # steps of a flight that are taken, and all of them
+    flyer, flown, flight = (
+        variable(-1),
+        variable(0),
+        0,
+    )  # steps of a flight that are taken, and all of them
     while steps > 0 and reason == DONE:
         room = len(monitors.event) - counters[EVENTS]
         if room < (p.blocks + 1) * (len(monitors.station) + len(monitors.target)):

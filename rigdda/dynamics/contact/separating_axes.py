@@ -16,7 +16,7 @@ from typing import NamedTuple
 from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import SAME_FACE
 from rigdda.dynamics.records import Corners
-from rigdda.kernel import inlined, kernel
+from rigdda.kernel import inlined, kernel, variable
 
 TOUCH = 2e-3
 """Distance over the margin at which a face that is struck is entered [-]. It is the sooner reached
@@ -112,7 +112,7 @@ def face_of_contact(
     """
     dx, dy, px, py, turn, spread, margin = approach
     edges, corners = outlines.polygon[i].count, outlines.polygon[j].count
-    time, depth, best, nearest, apart = -1.0, -1e300, -1, -1, -1e300
+    time, depth, best, nearest, apart = -1.0, -1e300, variable(-1), variable(-1), -1e300
     facing = facing_edge(outlines, i, edges, j)
     for visit in range(-1, edges):
         edge = facing if visit < 0 else visit

@@ -20,7 +20,7 @@ from rigdda.dynamics.contact.segments import (
 )
 from rigdda.dynamics.contact.separating_axes import edge_over_point, following
 from rigdda.dynamics.records import Bodies, Box, Contacts, Parameters
-from rigdda.kernel import inlined, kernel
+from rigdda.kernel import inlined, kernel, variable
 
 SHARP = 1e-9
 """Cosine of the angle between normals beyond which a ridge turns by more than 90 degrees [-]."""
@@ -198,7 +198,7 @@ def edge_on_ridge(
     out_x, out_y = left.normal_x, left.normal_y
     if left.normal_x * right.normal_x + left.normal_y * right.normal_y < -SHARP:
         out_x, out_y = out_x + right.normal_x, out_y + right.normal_y
-    best, best_time, best_gap = -1, -1.0, -1e300
+    best, best_time, best_gap = variable(-1), -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, fitting or not
     for edge in range(n):
         own = outlines.corner[part, edge]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rigdda.dynamics.constants import (
-    FRICTION_TOLERANCE,
     OPEN,
+    SETTLED,
     SLIP,
     STICK,
 )
@@ -32,6 +32,6 @@ def next_state(c: Contact, normal: float, shear: float, weight: float) -> bool:
     if abs(shear) <= limit:
         c.state = STICK
         return state != STICK
-    settled = abs(c.shear - c.lag) <= FRICTION_TOLERANCE * limit
+    settled = abs(c.shear - c.lag) <= SETTLED * limit
     c.state, c.lag = SLIP, c.shear
     return state == STICK or not settled

@@ -29,10 +29,11 @@ RETARDATION_TIME = 5e-3
 the force follows the velocity at their end. Without it an arch near its limit vibrates in steps of
 0.1 ms until it falls."""
 
-FRICTION_TOLERANCE = 2e-2
-"""Greatest change of a friction force in an open-close iteration, over its limit, at which the
-iteration may end [-]. Without it a block on the paper's contacts, at 35 deg with 34 deg of
-friction, slides six times as far as it should in steps of 10 ms."""
+SETTLED = 0.02
+"""Greatest change in an iteration at which it may end [-]: in open-close iteration of a friction
+force, over its limit; in relaxation of a normal velocity, over the speed of the island, so that
+slow islands come to rest. Without the first a block on the paper's contacts, at 35 deg with 34 deg
+of friction, slides six times as far as it should in steps of 10 ms."""
 
 SUBSTEPS = 8
 """Substeps in the relaxation of an island of several bodies [-]: a blow goes on from contact to
@@ -42,9 +43,6 @@ silo that fills in steps of 10 ms gains up to 1.5 % of the energy that was relea
 MOST_SWEEPS = 100
 """Most sweeps over the contacts of an island in a substep. They end once none changes a normal
 velocity by more than the tolerance."""
-
-RELAXATION_SHARE = 0.02
-"""Greatest tolerance of sweeps over the speed of the island [-]: slow islands come to rest."""
 
 SAME_NORMAL = 0.7
 """Least cosine between the normals of one vertex's contact in two steps, for it to be one [-]."""

@@ -68,6 +68,7 @@ def give_way(
         set_body_coordinates(bodies, outlines, fence)
         if body.elongation > 0.0:
             continue
+        body.x += body.elongation  # not what the last substep went beyond its end
         ledger[1] -= retire(body)
         block, x, y = last_block(contacts, count, fence, barrier, monitors)
         if x == math.inf:

@@ -15,6 +15,7 @@ from rigdda.dynamics.constants import RECOVERY_SWEEPS, SUBSTEPS
 from rigdda.dynamics.records import Contacts, Parameters
 from rigdda.dynamics.rows import (
     AIM,
+    BRAKE,
     FREE,
     GAIN,
     GAP,
@@ -43,11 +44,11 @@ def find_deepest(
     deepest, grounded = 0.0, False
     for q in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c, k = contacts[islands.contact_item[q]], rows.place[q]
-        grounded = grounded or c.pair < 0
+        i, j = rows.row_i[k], rows.row_j[k]
+        grounded = grounded or c.pair < 0 or rows.slot[i, BRAKE] + rows.slot[j, BRAKE] > 0.0
         rows.height[k] = math.inf
         if is_elastic(c) or rows.idle[k] > SUBSTEPS:
             continue
-        i, j = rows.row_i[k], rows.row_j[k]
         row = rows.row[k]
         a, b = rows.slot[i], rows.slot[j]
         place_row(row, rows.fact[k], rows.form[k], a, b, rows.scale[i], rows.scale[j])

@@ -42,7 +42,7 @@ from rigdda.dynamics.constants import (
     AT_ONCE,
     IMPACT_STEPS,
     MOST_SWEEPS,
-    RELAXATION_SHARE,
+    SETTLED,
     SUBSTEPS,
 )
 from rigdda.dynamics.records import Bodies, Body, Floats, Parameters
@@ -139,6 +139,16 @@ def pull(slots: Floats, n: int, h: float) -> None:
             after = ((1.0 - half) * slot[NOW + q] + h * slot[PULL + q]) / (1.0 + half)
             slot[NOW + q] = slot[FREE + q] = after
         slot[HELD] = 0.0
+
+
+@kernel
+def greatest_pull(rows: Rows, n: int) -> float:
+    """Return the greatest acceleration that weight and loads give a centroid [m/s2]."""
+    most = 0.0
+    for s in range(n):
+        x, y = rows.slot[s, PULL] * rows.scale[s, 0], rows.slot[s, PULL + 1] * rows.scale[s, 1]
+        most = max(most, math.sqrt(x * x + y * y))
+    return most
 
 
 @kernel
@@ -616,11 +626,11 @@ def relax(
         Whether the sweeps of the last substep came to their tolerance.
     """
     alone, fenced, shortest = n == 1, False, AT_ONCE * p.dt
-    usual, reach = p.dt / SUBSTEPS, speed + p.gravity * p.dt
+    usual, reach = p.dt / SUBSTEPS, speed + greatest_pull(rows, n) * p.dt
     least, gone = IMPACT_STEPS * p.gravity * p.dt, 0.0
     if alone:
         usual, reach, least, gone = p.dt, math.inf, least / SUBSTEPS, 0.5
-    tolerance = max(min(p.sweep_tolerance * (n - 1), RELAXATION_SHARE * speed), 1e-7 * speed)
+    tolerance = max(min(p.sweep_tolerance * (n - 1), SETTLED * speed), p.tolerance * speed)
     for s in range(n):
         fenced = fenced or rows.slot[s, BRAKE] > 0.0
     sweeps, struck, last, left, number, swept = 0, False, 1.0, p.dt, variable(0), 0

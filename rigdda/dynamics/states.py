@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands
 from rigdda.dynamics.assembly.springs import relative_displacement
-from rigdda.dynamics.constants import BOLT, FRICTION_TOLERANCE, OPEN, PIN, SLIP, STICK
+from rigdda.dynamics.constants import BOLT, OPEN, PIN, SETTLED, SLIP, STICK
 from rigdda.dynamics.contact.joint import joint_breaks
 from rigdda.dynamics.records import Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
@@ -47,7 +47,7 @@ def next_friction(c: Contact, shear: float) -> bool:
     change = abs(c.shear - c.lag) if state == SLIP else math.inf
     c.state = SLIP
     c.lag = c.shear
-    return change > FRICTION_TOLERANCE * limit
+    return change > SETTLED * limit
 
 
 @inlined

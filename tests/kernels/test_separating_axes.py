@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigdda import Block, Scene, Settings
-from rigdda.dynamics.contact.separating_axes import NEVER, SQUARE, TOUCH, face_of_contact
+from rigdda.dynamics.contact.separating_axes import (
+    NEVER,
+    SQUARE,
+    TOUCH,
+    Approach,
+    face_of_contact,
+)
 from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.pack import Arrays, pack
 from rigdda.kernel import from_python
@@ -73,20 +79,9 @@ def test_the_face_of_contact_is_that_of_all_edges(seed: int) -> None:
             spread = math.hypot(*way) + SLACK
             turning = rng.uniform(-reach, reach, 3)
             wanted = over_all_edges(arrays, i, j, way, turning, spread)
-            count = arrays.outlines.polygon.count
-            possible, time, depth, apart, _ = face(
-                arrays.outlines,
-                i,
-                count[i],
-                j,
-                count[j],
-                *way,
-                *turning,
-                spread,
-                SLACK,
-                0.0,
-                SQUARE * math.hypot(*way),
-            )
+            approach = Approach(*way, *turning, spread, SLACK)
+            square = SQUARE * math.hypot(*way)
+            possible, time, depth, apart, _ = face(arrays.outlines, i, j, approach, 0.0, square)
             assert possible == wanted[0]
             if possible:
                 found = time, depth, apart

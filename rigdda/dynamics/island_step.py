@@ -137,12 +137,12 @@ def is_tried_whole(
 ) -> bool:
     """Return whether an island is solved as a whole before relaxation is tried.
 
-    It is in static mode and without post-correction; where it has supports, or the paper's
+    It is in static mode; where it has supports, or the paper's
     contacts, whose stiffness is given; and where it is `quiet` and has joints that hold, or was
     solved so in the last step. Never if a fence belongs to it, which has no entries in the system
     of equations.
     """
-    springs, bonds, rested = p.static or not p.post_correction, False, True
+    springs, bonds, rested = p.static, False, True
     for place in range(islands.block_start[island], islands.block_start[island + 1]):
         body = bodies[islands.block_item[place]]
         if body.brake > 0.0:
@@ -175,7 +175,7 @@ def settle_island(
     tried = is_tried_whole(bodies, contacts, islands, island, quiet, p)
     if tried:
         whole = solve_states(bodies, contacts, work, island, pairs, p, counters)
-        whole = whole or p.static or not p.post_correction
+        whole = whole or p.static
     start_slots(bodies, islands, rows, island, p)
     count = pack_rows(contacts, islands, rows, island)
     if not whole:

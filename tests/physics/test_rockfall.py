@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
-from rigdda import Simulation, Site, Wall
+from rigdda import Settings, Simulation, Site, Wall
 from rigdda.geometry import polygon_properties
 from rigdda.results.outcome import measure, stations, watch
 
@@ -73,3 +73,14 @@ def test_many_releases():
         depths = sorted(pool.map(check_release, jobs))
     assert len(depths) == 100
     assert depths[98] < 0.1 and depths[50] < 0.03
+
+
+@pytest.mark.parametrize("dt", [1e-2, 5e-3])
+def test_without_post_correction_a_mass_comes_down_too(dt):
+    """Its blocks grow as they turn, as in the paper's Fig. 1; nothing is thrown away by that."""
+    scene = Site.load("quick").realise((), 1, "mass")
+    sim = Simulation(scene, Settings(dt=dt, post_correction=False))
+    start = sim.poses
+    sim.step(round(2.0 / dt))
+    assert (sim.poses[:, 1] < start[:, 1]).mean() > 0.9
+    assert np.hypot(*sim.velocities[:, :2].T).max() < 25.0  # a fall of 32 m

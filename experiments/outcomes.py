@@ -1,0 +1,184 @@
+"""Outcomes that a change of structure must not change, compared bit for bit.
+
+`python -m experiments.outcomes` computes a fixed set of releases, layouts, scenes and episodes, and
+compares a digest of each with the recorded one (`results/outcomes/outcomes.csv`). It lists what
+differs and exits with 1. `--record` records today's digests. `--carry` marks the tables of all
+results that the kernels of the record made as made by the kernels of today, if nothing that is
+computed differs: what has been renamed or moved since has changed none of them.
+
+Digests are of all bits, so they are those of one kind of machine.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+import gymnasium
+import numpy as np
+
+import envs  # noqa: F401  registers the environments
+from envs import DesignProblem
+from experiments.made_by import KERNELS, kernels_hash, made_by
+from experiments.script import RESULTS, put, say, write
+from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Simulation, Site
+from rigdda.batch import Batch
+from rigdda.model.settings import Settings
+from rigdda.validation.case import evaluate
+from rigdda.validation.suite import CASES
+
+TABLE = Path("outcomes/outcomes.csv")
+"""The record, below a folder of results."""
+
+LAYOUTS: dict[str, tuple[tuple[str, Layout], ...]] = {
+    "shu-hwa": (
+        ("nothing", ()),
+        ("fence and ditch", (Fence(51.9, 2.0, energy_class=250), Ditch(83.1, 3.0, 5.0))),
+    ),
+    "talus": (("nothing", ()), ("embankment", (Embankment(82.0, 3.0, 1.5),))),
+    "quick": (
+        ("gravity wall", (GravityWall(31.0, 2.0, 1.0),)),
+        ("ditch", (Ditch(29.5, 1.0, 4.0),)),
+    ),
+}
+"""Layouts of the releases by site."""
+
+RELEASES = {"mass": 1, "group": 4}
+"""Releases of an event, by what its name begins with."""
+SINGLES = 24
+"""Those of all others."""
+
+CASE_NAMES = (
+    "slide-35-34-2s", "joints-35-20", "joint-shear", "16-gon", "tipping", "restitution-0.5",
+    "eccentric-hits", "collisions-many", "crest-blocks", "thin-wall-10ms", "wall-slides",
+    "wall-overturns", "fence-train", "fence-eccentric", "fence-thrust", "stack-50", "pyramid-55",
+    "mass-1-1000", "pin-swing", "bolt-drop", "arch-falls", "toppling-forces", "toppling-modes",
+)  # fmt: skip
+"""Cases of `rigdda validate` that are computed, see `rigdda.validation`."""
+
+SOLVERS = ("pcg", "block-pcg", "sor", "direct")
+
+
+def digest(*parts: Any) -> str:
+    """Return a digest of arrays and of whatever has a `repr`."""
+    whole = hashlib.sha256()
+    for part in parts:
+        whole.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
+    return whole.hexdigest()[:16]
+
+
+def outcomes_of(site: Site, layout: Layout, event: str) -> str:
+    """Return the digest of the outcomes of the first releases of an event."""
+    batch = Batch(site, layout)
+    releases = next((n for name, n in RELEASES.items() if event.startswith(name)), SINGLES)
+    return digest(*(batch.outcome(seed, event) for seed in range(releases)))
+
+
+def motion_of(**settings: Any) -> str:
+    """Return the digest of where the first release of the mass of `quick` is after 4 s."""
+    scene = Site.load("quick").realise((), 1, "mass")
+    simulation = Simulation(scene, Settings(dt=1e-2, **settings))
+    simulation.step(400)
+    return digest(simulation.poses, simulation.velocities, simulation.energy())
+
+
+def episode_of(name: str) -> str:
+    """Return the digest of an episode of an environment with random actions."""
+    env = gymnasium.make(name, site="quick")
+    found = [env.reset(seed=3)[0]]
+    actions = np.random.default_rng(3)
+    ended = False
+    while not ended:
+        space = env.action_space
+        space.seed(int(actions.integers(2**31)))
+        observation, reward, terminated, truncated, info = env.step(space.sample())
+        found += [observation, reward, info.get("objective")]
+        ended = terminated or truncated
+    env.close()
+    flat = [v for o in found for v in (o.values() if isinstance(o, dict) else [o])]
+    return digest(*flat)
+
+
+def evaluation_of(site: Site, layout: Layout) -> str:
+    """Return the digest of what a layout costs, with its interval."""
+    found = DesignProblem(site).evaluate(layout, range(60))
+    return digest(found.objective, found.ci, found.capital, found.harm, found.repair)
+
+
+def computed() -> Iterator[tuple[str, Callable[[], str]]]:
+    """Yield the name of everything that is computed, and the call that returns its digest."""
+    for name, layouts in LAYOUTS.items():
+        site = Site.load(name)
+        for words, layout in layouts:
+            for event in site.event_names:
+                what = f"releases of {name}, {words}, {event}"
+                yield what, lambda s=site, a=layout, e=event: outcomes_of(s, a, e)
+    for solver in SOLVERS:
+        yield f"motion with solver {solver}", lambda s=solver: motion_of(solver=s)
+    yield "motion in static mode", lambda: motion_of(mode="static")
+    yield "motion without post-correction", lambda: motion_of(post_correction=False)
+    yield "motion as one island", lambda: motion_of(islands=False, sleeping=False)
+    for case in CASES:
+        if case.name in CASE_NAMES:
+            yield f"case {case.name}", lambda c=case: digest(*(str(r) for r in evaluate(c)))
+    for words, layout in LAYOUTS["quick"]:
+        yield f"cost of quick, {words}", lambda a=layout: evaluation_of(Site.load("quick"), a)
+    for name in ("rigdda/BarrierDesign-v0", "rigdda/BarrierPlacement-v0"):
+        yield f"episode of {name}", lambda n=name: episode_of(n)
+
+
+def recorded(out: Path) -> dict[str, str]:
+    """Return the recorded digests, none if there is no record."""
+    path = out / TABLE
+    if not path.exists():
+        return {}
+    with path.open(newline="") as file:
+        return {row["what"]: row["digest"] for row in csv.DictReader(file)}
+
+
+def carry(out: Path) -> list[Path]:
+    """Mark what the kernels of the record made as made by today's; returns these tables."""
+    old, new = made_by((out / TABLE).parent).get(TABLE.name), kernels_hash()
+    carried = []
+    for path in sorted(out.rglob(KERNELS)):
+        made = made_by(path.parent)
+        tables = [table for table, kernels in made.items() if kernels == old != new]
+        if tables:
+            carried += [path.parent / table for table in tables]
+            made |= dict.fromkeys(tables, new)
+            put(path, [{"table": k, "kernels": made[k]} for k in sorted(made)])
+    return carried
+
+
+@click.command(help=__doc__)
+@click.option("--record", is_flag=True, help="Record the digests of today.")
+@click.option("--carry", "carries", is_flag=True, help="Mark recorded tables as today's.")
+@click.option("--out", type=click.Path(path_type=Path), default=RESULTS, show_default=True,
+              help="Folder of results.")  # fmt: skip
+def main(record: bool, carries: bool, out: Path) -> None:
+    """Compute, compare, and record or carry over."""
+    before, rows, other = recorded(out), [], []
+    for what, call in computed():
+        found = call()
+        rows.append({"what": what, "digest": found})
+        if found != before.get(what):
+            other.append(what)
+        same = record or found == before.get(what)
+        say(f"{found} {what}{'' if same else ': differs from the record'}")
+    if record:
+        write(out / TABLE, rows)
+        return
+    if carries and not other:
+        for table in carry(out):
+            click.echo(f"{table} is as the kernels of today would make it")
+    click.echo(f"{len(other)} of {len(rows)} differ from the record")
+    sys.exit(bool(other))
+
+
+if __name__ == "__main__":
+    main()

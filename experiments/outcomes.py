@@ -50,7 +50,7 @@ LAYOUTS: dict[str, tuple[tuple[str, Layout], ...]] = {
 
 RELEASES = {"mass": 1, "group": 4}
 """Releases of an event, by what its name begins with."""
-SINGLES = 24
+SINGLES = 40
 """Those of all others."""
 
 CASE_NAMES = (
@@ -60,6 +60,9 @@ CASE_NAMES = (
     "mass-1-1000", "pin-swing", "bolt-drop", "arch-falls", "toppling-forces", "toppling-modes",
 )  # fmt: skip
 """Cases of `rigdda validate` that are computed, see `rigdda.validation`."""
+
+COSTS, EPISODES = 60, 50
+"""Random layouts of `quick` whose cost is computed, and episodes of each environment."""
 
 SOLVERS = ("pcg", "block-pcg", "sor", "direct")
 
@@ -87,27 +90,31 @@ def motion_of(**settings: Any) -> str:
     return digest(simulation.poses, simulation.velocities, simulation.energy())
 
 
-def episode_of(name: str) -> str:
-    """Return the digest of an episode of an environment with random actions."""
+def episodes_of(name: str) -> str:
+    """Return the digest of episodes of an environment with random actions."""
     env = gymnasium.make(name, site="quick")
-    found = [env.reset(seed=3)[0]]
-    actions = np.random.default_rng(3)
-    ended = False
-    while not ended:
-        space = env.action_space
-        space.seed(int(actions.integers(2**31)))
-        observation, reward, terminated, truncated, info = env.step(space.sample())
-        found += [observation, reward, info.get("objective")]
-        ended = terminated or truncated
+    found: list[Any] = []
+    env.action_space.seed(3)
+    for episode in range(EPISODES):
+        found.append(env.reset(seed=episode)[0])
+        ended = False
+        while not ended:
+            observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+            found += [observation, reward, info.get("objective")]
+            ended = terminated or truncated
     env.close()
     flat = [v for o in found for v in (o.values() if isinstance(o, dict) else [o])]
     return digest(*flat)
 
 
-def evaluation_of(site: Site, layout: Layout) -> str:
-    """Return the digest of what a layout costs, with its interval."""
-    found = DesignProblem(site).evaluate(layout, range(60))
-    return digest(found.objective, found.ci, found.capital, found.harm, found.repair)
+def costs_of(site: Site) -> str:
+    """Return the digest of what random layouts cost, with their intervals."""
+    problem = DesignProblem(site)
+    low, high = problem.bounds
+    random = np.random.default_rng(5)
+    layouts = [problem.decode(random.uniform(low, high)) for _ in range(COSTS)]
+    found = [problem.evaluate(layout, range(12)) for layout in layouts]
+    return digest(*((layout, e.objective, e.ci) for layout, e in zip(layouts, found, strict=True)))
 
 
 def computed() -> Iterator[tuple[str, Callable[[], str]]]:
@@ -126,10 +133,9 @@ def computed() -> Iterator[tuple[str, Callable[[], str]]]:
     for case in CASES:
         if case.name in CASE_NAMES:
             yield f"case {case.name}", lambda c=case: digest(*(str(r) for r in evaluate(c)))
-    for words, layout in LAYOUTS["quick"]:
-        yield f"cost of quick, {words}", lambda a=layout: evaluation_of(Site.load("quick"), a)
+    yield f"cost of {COSTS} layouts of quick", lambda: costs_of(Site.load("quick"))
     for name in ("rigdda/BarrierDesign-v0", "rigdda/BarrierPlacement-v0"):
-        yield f"episode of {name}", lambda n=name: episode_of(n)
+        yield f"{EPISODES} episodes of {name}", lambda n=name: episodes_of(n)
 
 
 def recorded(out: Path) -> dict[str, str]:

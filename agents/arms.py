@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.store import Release
-from envs import DesignProblem
-from envs.intervals import CONFIDENCE, upper_bound
 from rigdda import Layout
+from rigdda.agents.store import Release
+from rigdda.envs import DesignProblem
+from rigdda.envs.intervals import CONFIDENCE, upper_bound
 
 Floats = NDArray[np.float64]
 

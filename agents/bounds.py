@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from agents.menu import Menu
-from envs import DesignProblem
-from envs.encoding import CLASSES
-from envs.sizes import MIN_HEIGHT
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
+from rigdda.agents.menu import Menu
+from rigdda.envs import DesignProblem
+from rigdda.envs.encoding import CLASSES
+from rigdda.envs.sizes import MIN_HEIGHT
 
 NEAR = 0.05
 """Distance from a bound at which a length lies on it [m]."""

@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.crossings import Ensemble
-from agents.menu import Menu
-from envs import DesignProblem
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Mesh, Site, Wall
+from rigdda.agents.crossings import Ensemble
+from rigdda.agents.menu import Menu
 from rigdda.barriers.base import ELEMENT
 from rigdda.barriers.fence import PANEL
 from rigdda.barriers.gravity_wall import SLID
+from rigdda.envs import DesignProblem
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
-from envs import DesignProblem
 from rigdda import BadInput
+from rigdda.envs import DesignProblem
 from rigdda.files import atomic
 
 FILE = "problem.json"

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import click
 
-from agents.commands import evaluate, fit, study, train, validate
-from agents.designing import design
-from agents.options import count_option, layout_option, out_option, read_layout, seed_option
-from agents.terminal import Stopped, fail, folder_for, kept, note, once, progress, show
+from rigdda.agents.commands import evaluate, fit, study, train, validate
+from rigdda.agents.designing import design
+from rigdda.agents.options import count_option, layout_option, out_option, read_layout, seed_option
+from rigdda.agents.terminal import Stopped, fail, folder_for, kept, note, once, progress, show
 
 BAD_PATH = (
     FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError, PermissionError,
@@ -80,7 +80,7 @@ for command in (design, fit, study, train, evaluate, validate):
 def sites() -> None:
     """List the built-in sites: families, events with their rates, where barriers may stand."""
     import rigdda
-    from agents import tables
+    from rigdda.agents import tables
 
     show(tables.sites(map(rigdda.Site.load, rigdda.sites.names())))
 
@@ -111,7 +111,7 @@ def simulate(
     of the block just before it touches; a barrier absorbs what its forces take from all blocks.
     """
     import rigdda
-    from agents import doubts, job, section, tables
+    from rigdda.agents import doubts, job, section, tables
 
     where, barriers = rigdda.Site.load(site), read_layout(layout)
     seeds = range(seed, seed + releases)
@@ -147,8 +147,8 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
     Compares Z and the processor time of a release, for no barrier, the constant and what the
     engineering rule builds. Writes fidelity.csv.
     """
-    from agents import fidelity_bias as job
-    from envs import DesignProblem
+    from rigdda.agents import fidelity_bias as job
+    from rigdda.envs import DesignProblem
 
     where = DesignProblem(site).site
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
@@ -171,8 +171,8 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     For a site, writes episode.rrd and prints its path; for a run, FILE.rrd beside it.
     """
     import rigdda
-    from agents import doubts
-    from agents.wording import short, standing
+    from rigdda.agents import doubts
+    from rigdda.agents.wording import short, standing
     from rigdda.results.marks import Marks
     from rigdda.results.viewer import open_viewer
 

@@ -1,7 +1,7 @@
 """CMA-ES (Hansen 2016, arXiv:1604.00772; pycma) on the decision vector, ask and tell.
 
 It starts from the best in simulation of what one barrier-free ensemble suggests, see
-`agents.starts`.
+`rigdda.agents.starts`.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.protocol import DesignResult, Ledger, Progress, Proposals
-from agents.ranking import value
-from agents.searching import search
-from agents.starts import starts
-from agents.store import Store
-from envs import DesignProblem
-from envs.encoding import NUMBERS, slot_size
 from rigdda import Layout
+from rigdda.agents.protocol import DesignResult, Ledger, Progress, Proposals
+from rigdda.agents.ranking import value
+from rigdda.agents.searching import search
+from rigdda.agents.starts import starts
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem
+from rigdda.envs.encoding import NUMBERS, slot_size
 
 Floats = NDArray[np.float64]
 

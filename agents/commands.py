@@ -8,10 +8,10 @@ from typing import Literal
 
 import click
 
-from agents.limits import SEED
-from agents.names import DESIGNERS
-from agents.options import count_option, out_option, seed_option
-from agents.terminal import Stopped, folder_for, kept, note, progress, show
+from rigdda.agents.limits import SEED
+from rigdda.agents.names import DESIGNERS
+from rigdda.agents.options import count_option, out_option, seed_option
+from rigdda.agents.terminal import Stopped, folder_for, kept, note, progress, show
 
 
 @click.command()
@@ -25,7 +25,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
     and either `barriers`, as in a layout file, or the `file` that holds them. A study that was
     killed goes on from its study.csv.
     """
-    from agents import doubts, studies, study_file
+    from rigdda.agents import doubts, studies, study_file
 
     asked = study_file.load(file)
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
@@ -70,9 +70,9 @@ def fit(
     with them), fit.csv and fit.png.
     """
     import rigdda
-    from agents import fit as job
-    from agents import fit_results, run_outs, tables
-    from agents.parameters import parse
+    from rigdda.agents import fit as job
+    from rigdda.agents import fit_results, run_outs, tables
+    from rigdda.agents.parameters import parse
 
     where = rigdda.Site.load(site)
     seen, parameters = run_outs.read(observed, where), [parse(name) for name in names]
@@ -99,7 +99,7 @@ def train(sites: int, episodes: int, seed: int, processes: int, out: Path | None
     Writes policy.safetensors, which `rigdda evaluate --policy` takes, and logs for TensorBoard.
     A training that was killed goes on where it stopped. Needs the extra rl.
     """
-    from agents import training
+    from rigdda.agents import training
 
     terms = training.Terms(sites, episodes, seed)
     folder = folder_for(out, "train", *training.FILES)
@@ -138,9 +138,9 @@ def evaluate(
     Prints means over the sites with 95 % intervals; writes scores.csv. Layouts that a killed or
     former run has evaluated are not simulated again.
     """
-    from agents import contest, extra, tables
-    from agents.policy import load, using
-    from agents.store import Store
+    from rigdda.agents import contest, extra, tables
+    from rigdda.agents.policy import load, using
+    from rigdda.agents.store import Store
 
     tried = dict.fromkeys(("constant", "random", *names))
     designers = {name: extra.module(name).design for name in tried}
@@ -171,7 +171,7 @@ def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path | None) -> 
     Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
     last column of the table is processor time per simulated time, in microseconds a second.
     """
-    from agents import accuracy
+    from rigdda.agents import accuracy
 
     cases = accuracy.choose(only, slow)
     folder = folder_for(out, "validate", "validate.csv", "convergence.csv")

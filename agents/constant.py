@@ -5,12 +5,12 @@ What a designer must beat to be worth its releases: it knows nothing of the site
 
 from __future__ import annotations
 
-from agents.menu import Menu
-from agents.protocol import DesignResult, Ledger, Progress
-from agents.rule import RELEASES
-from agents.store import Store
-from envs import DesignProblem
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Wall
+from rigdda.agents.menu import Menu
+from rigdda.agents.protocol import DesignResult, Ledger, Progress
+from rigdda.agents.rule import RELEASES
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem
 
 CONSTANTS: tuple[tuple[Barrier, float], ...] = (
     (Ditch(0.0, 2.5, 5.0), 1.0),

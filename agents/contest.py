@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agents.protocol import Designer
-from agents.store import Store
-from agents.tables import empty_table
-from agents.verify import verify
-from agents.wording import euros, percent, span
-from envs import DesignProblem, Evaluation
-from envs.intervals import student_interval
 from rigdda import check, sites
+from rigdda.agents.protocol import Designer
+from rigdda.agents.store import Store
+from rigdda.agents.tables import empty_table
+from rigdda.agents.verify import verify
+from rigdda.agents.wording import euros, percent, span
+from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.intervals import student_interval
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -1,9 +1,9 @@
 """Barriers by mixed-integer linear programming on one barrier-free ensemble.
 
-The best choices of one, two and three barriers are sought, see `agents.programme`, as a catalogue
-estimates them, see `agents.catalogue`. The estimate does not know what a barrier does to the flow
-further down, so the simulation has the last word, and the engineering rule's barrier is tried
-beside the optima.
+The best choices of one, two and three barriers are sought, see `rigdda.agents.programme`, as a
+catalogue estimates them, see `rigdda.agents.catalogue`. The estimate does not know what a barrier
+does to the flow further down, so the simulation has the last word, and the engineering rule's
+barrier is tried beside the optima.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.catalogue import Catalogue, whole
-from agents.crossings import Ensemble, ensemble_for
-from agents.menu import Menu
-from agents.programme import Choice, choose
-from agents.protocol import DesignResult, Ledger, Progress, Proposals
-from agents.rule import rule
-from agents.searching import search
-from agents.store import Store
-from envs import DesignProblem
 from rigdda import Layout
+from rigdda.agents.catalogue import Catalogue, whole
+from rigdda.agents.crossings import Ensemble, ensemble_for
+from rigdda.agents.menu import Menu
+from rigdda.agents.programme import Choice, choose
+from rigdda.agents.protocol import DesignResult, Ledger, Progress, Proposals
+from rigdda.agents.rule import rule
+from rigdda.agents.searching import search
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem
 
 CAREFUL = (1.0, 0.8, 0.5)
 """Shares of the estimated reliefs that count."""

@@ -11,9 +11,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.protocol import Ledger
-from agents.seeds import release_seeds
 from rigdda import Simulation, Site
+from rigdda.agents.protocol import Ledger
+from rigdda.agents.seeds import release_seeds
 from rigdda.geometry import polygon_properties
 
 Floats = NDArray[np.float64]

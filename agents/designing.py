@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from agents.limits import SEED
-from agents.names import DEFAULT, DESIGNERS
-from agents.options import count_option, out_option, seed_option
-from agents.terminal import folder_for, kept, progress, show
+from rigdda.agents.limits import SEED
+from rigdda.agents.names import DEFAULT, DESIGNERS
+from rigdda.agents.options import count_option, out_option, seed_option
+from rigdda.agents.terminal import folder_for, kept, progress, show
 
 if TYPE_CHECKING:
-    from agents.job import Study
-    from agents.store import Store
-    from envs import DesignProblem
+    from rigdda.agents.job import Study
+    from rigdda.agents.store import Store
+    from rigdda.envs import DesignProblem
 
 BUDGET = 20_000
 """Default budget of a search: about a minute for a built-in site on two cores."""
@@ -70,8 +70,8 @@ def design(
     killed or former run has evaluated are in evaluations.jsonl and are not simulated again; a
     folder that holds a design of another problem (problem.json) is refused.
     """
-    from agents import job, results
-    from agents.claim import FILE, claim
+    from rigdda.agents import job, results
+    from rigdda.agents.claim import FILE, claim
 
     problem = _pose(site, kinds, target, failure, zone)
     folder = folder_for(out, f"design-{problem.site.name}", *results.FILES, FILE)
@@ -92,8 +92,8 @@ def _pose(
     zone: tuple[float, float] | None,
 ) -> DesignProblem:
     """Return the problem that was asked."""
-    from envs import DesignProblem
-    from envs.targets import Targets
+    from rigdda.envs import DesignProblem
+    from rigdda.envs.targets import Targets
 
     asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None}
     if target is not None or failure is not None:
@@ -103,9 +103,9 @@ def _pose(
 
 def _tell(done: Study, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, what limits it, and what it took."""
-    from agents import findings, verdict
-    from agents.results import FILES
-    from agents.wording import order
+    from rigdda.agents import findings, verdict
+    from rigdda.agents.results import FILES
+    from rigdda.agents.wording import order
 
     chosen, result = done.chosen.evaluation, done.result
     click.echo(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from envs.building import Room
 from rigdda import BadInput, Layout, Mesh, Site
 from rigdda.barriers import KINDS
+from rigdda.envs.building import Room
 
 
 def unbuildable(site: Site, layout: Layout) -> str:

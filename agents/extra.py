@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-from agents.names import DESIGNERS
 from rigdda import BadInput, check
+from rigdda.agents.names import DESIGNERS
 
 
 def module(name: str) -> ModuleType:
@@ -18,7 +18,7 @@ def module(name: str) -> ModuleType:
         If there is none of that name, or it needs what is not installed.
     """
     try:
-        return import_module(f"agents.{check.one_of('designer', name, DESIGNERS)}")
+        return import_module(f"rigdda.agents.{check.one_of('designer', name, DESIGNERS)}")
     except ModuleNotFoundError as error:
         mend = f"install {error.name}: pip install 'rigdda[rl]'"
         raise BadInput("designer", name, mend) from None

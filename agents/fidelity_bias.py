@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from agents import constant, rule
-from agents.seeds import release_seeds
-from agents.tables import empty_table, write_rows
-from agents.wording import euros, short, span
-from envs import DesignProblem, Evaluation, fidelity
-from envs.evaluation import Interval
 from rigdda import Layout, Site
+from rigdda.agents import constant, rule
+from rigdda.agents.seeds import release_seeds
+from rigdda.agents.tables import empty_table, write_rows
+from rigdda.agents.wording import euros, short, span
+from rigdda.envs import DesignProblem, Evaluation, fidelity
+from rigdda.envs.evaluation import Interval
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from agents.protocol import DesignResult
-from agents.wording import euros, percent, span
-from envs import DesignProblem, Evaluation
 from rigdda import Site
+from rigdda.agents.protocol import DesignResult
+from rigdda.agents.wording import euros, percent, span
+from rigdda.envs import DesignProblem, Evaluation
 
 SURE = 0.05
 """Share of its design events in which a barrier may fail without a word: its upper bound."""

@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.fit_trials import Candidate, Compute, Trials, explore
-from agents.parameters import Parameter, check_parameters, with_values
-from agents.prediction import Quality, quality
-from agents.run_outs import Model, run_outs
 from rigdda import BadInput, Site
+from rigdda.agents.fit_trials import Candidate, Compute, Trials, explore
+from rigdda.agents.parameters import Parameter, check_parameters, with_values
+from rigdda.agents.prediction import Quality, quality
+from rigdda.agents.run_outs import Model, run_outs
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.fit import Fit
-from agents.prediction import QUANTILES, Quality, seen
-from agents.tables import write_rows
+from rigdda.agents.fit import Fit
+from rigdda.agents.prediction import QUANTILES, Quality, seen
+from rigdda.agents.tables import write_rows
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def draw(path: Path, fitted: Fit, observed: Mapping[str, Floats]) -> None:
     """Write a PNG: cumulative run-out observed and computed, all runs and each event."""
     from matplotlib.figure import Figure
 
-    from agents.pictures import save
+    from rigdda.agents.pictures import save
 
     names = ["all", *observed] if len(observed) > 1 else list(observed)
     figure = Figure(figsize=(3.2 * len(names) + 0.6, 3.6), layout="constrained")

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from agents.parameters import Parameter
-from agents.prediction import scores
+from rigdda.agents.parameters import Parameter
+from rigdda.agents.prediction import scores
 
 Floats = NDArray[np.float64]
 Compute = Callable[[Floats, range], Mapping[str, Floats]]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.wording import standing
 from rigdda import Layout, Run, Simulation, Site
+from rigdda.agents.wording import standing
 from rigdda.geometry import polygon_properties
 
 Floats = NDArray[np.float64]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rigdda
-from agents import extra, findings
-from agents.largest import HOLDS, unheld
-from agents.protocol import DesignResult, Entry
-from agents.store import Store
-from agents.tables import EvaluationsFile
-from agents.verify import verify
-from envs import DesignProblem, Evaluation
 from rigdda import Layout, Outcome, Run, Site
+from rigdda.agents import extra, findings
+from rigdda.agents.largest import HOLDS, unheld
+from rigdda.agents.protocol import DesignResult, Entry
+from rigdda.agents.store import Store
+from rigdda.agents.tables import EvaluationsFile
+from rigdda.agents.verify import verify
+from rigdda.envs import DesignProblem, Evaluation
 
 Tick = Callable[[int, str], None]
 """Called as a job goes on: releases done so far, and what is being done."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from agents.menu import Menu
-from agents.seeds import release_seeds
-from envs import DesignProblem
 from rigdda import Barrier, Ditch, Embankment, Fence, Layout
+from rigdda.agents.menu import Menu
+from rigdda.agents.seeds import release_seeds
 from rigdda.barriers import Standing
+from rigdda.envs import DesignProblem
 from rigdda.geometry import polygon_properties
 
 STATIONS = 3

@@ -13,11 +13,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from envs import DesignProblem
-from envs.encoding import CLASSES
-from envs.sizes import MIN_HEIGHT, SLENDER
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall
 from rigdda.barriers import FENCE_CLASSES
+from rigdda.envs import DesignProblem
+from rigdda.envs.encoding import CLASSES
+from rigdda.envs.sizes import MIN_HEIGHT, SLENDER
 
 Floats = NDArray[np.float64]
 

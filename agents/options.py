@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from agents.limits import RELEASES
+from rigdda.agents.limits import RELEASES
 
 if TYPE_CHECKING:
     from rigdda import Layout

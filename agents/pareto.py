@@ -2,10 +2,10 @@
 
 Deb et al. (2002, IEEE TEC 6, 182-197), as Optuna has it.
 
-It starts from what one barrier-free ensemble suggests, see `agents.starts`, or from layouts that
-other designers found. What nothing dominates in the search is evaluated again on other releases,
-and what nothing dominates there is the front: so no layout is in it because it was lucky in the
-search.
+It starts from what one barrier-free ensemble suggests, see `rigdda.agents.starts`, or from layouts
+that other designers found. What nothing dominates in the search is evaluated again on other
+releases, and what nothing dominates there is the front: so no layout is in it because it was lucky
+in the search.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from functools import partial
 
 import numpy as np
 
-from agents import trials
-from agents.protocol import DesignResult, Ledger, Progress, Proposals
-from agents.ranking import score
-from agents.searching import search
-from agents.starts import starts
-from agents.store import Store
-from envs import DesignProblem, Evaluation
 from rigdda import Layout, check
+from rigdda.agents import trials
+from rigdda.agents.protocol import DesignResult, Ledger, Progress, Proposals
+from rigdda.agents.ranking import score
+from rigdda.agents.searching import search
+from rigdda.agents.starts import starts
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem, Evaluation
 
 FINALISTS = 12
 """Layouts of the search's front that are evaluated again, at most."""

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from envs import Evaluation
-from envs.picture import GROUND, ROAD
+from rigdda.envs import Evaluation
+from rigdda.envs.picture import GROUND, ROAD
 from rigdda.files import atomic
 
 if TYPE_CHECKING:

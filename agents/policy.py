@@ -12,14 +12,14 @@ from functools import lru_cache
 import numpy as np
 from msgspec.structs import replace
 
-from agents.features import WIDTH, features
-from agents.network import Network
-from agents.protocol import Designer, DesignResult, Ledger, Progress
-from agents.store import Store
-from envs import DesignProblem
-from envs.observation import observe
-from envs.slots import KINDS, Slots
 from rigdda import BadInput, Layout
+from rigdda.agents.features import WIDTH, features
+from rigdda.agents.network import Network
+from rigdda.agents.protocol import Designer, DesignResult, Ledger, Progress
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem
+from rigdda.envs.observation import observe
+from rigdda.envs.slots import KINDS, Slots
 
 SLOTS = Slots(KINDS, 3)
 """Barriers that a policy decides on, of any kind that a problem allows."""

@@ -21,13 +21,13 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
-from agents.features import features
-from agents.network import Network, scaled
-from agents.policy import ANCHOR, SLOTS
-from agents.protocol import DesignResult, Ledger, Progress
-from agents.searching import Plan, finish
-from agents.store import Store
-from envs import DesignProblem, sb3_vec_env
+from rigdda.agents.features import features
+from rigdda.agents.network import Network, scaled
+from rigdda.agents.policy import ANCHOR, SLOTS
+from rigdda.agents.protocol import DesignResult, Ledger, Progress
+from rigdda.agents.searching import Plan, finish
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem, sb3_vec_env
 from rigdda.files import atomic
 
 Floats = NDArray[np.float32]
@@ -52,7 +52,7 @@ def design(
     """Return the best layout that PPO tries within the budget, all of it on this problem.
 
     A policy learned for one problem is a point of the decision box with a spread, so this is a
-    search as the others are; what pays is a policy for many sites, see `agents.policy`.
+    search as the others are; what pays is a policy for many sites, see `rigdda.agents.policy`.
 
     Raises
     ------
@@ -114,8 +114,9 @@ class _WhilePaid(BaseCallback):
 class Featured(VecEnvWrapper):
     """`BarrierDesign` as the policy's network sees it and acts on it.
 
-    Scaled features are seen; actions are added to `agents.policy.ANCHOR`. A reward is what is
-    better than usual at its site: sites differ in what can be gained, and copies keep their site.
+    Scaled features are seen; actions are added to `rigdda.agents.policy.ANCHOR`. A reward is what
+    is better than usual at its site: sites differ in what can be gained, and copies keep their
+    site.
     """
 
     def __init__(self, venv: VecEnv, mean: Floats, scale: Floats):

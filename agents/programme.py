@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.catalogue import Catalogue, Floats
-from envs.building import MIN_GAP
 from rigdda import Layout
+from rigdda.agents.catalogue import Catalogue, Floats
+from rigdda.envs.building import MIN_GAP
 
 
 @dataclass(frozen=True, slots=True)

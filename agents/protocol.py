@@ -10,12 +10,12 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import limits
-from agents.bounds import on_bound
-from agents.seeds import release_seeds
-from agents.store import Batch, Store
-from envs import DesignProblem, Evaluation
 from rigdda import BadInput, Layout, check
+from rigdda.agents import limits
+from rigdda.agents.bounds import on_bound
+from rigdda.agents.seeds import release_seeds
+from rigdda.agents.store import Batch, Store
+from rigdda.envs import DesignProblem, Evaluation
 
 Origin = Literal["start", "search"]
 

@@ -1,12 +1,12 @@
 """The default designer: a catalogue of all kinds, raced; pairs of the best; their neighbours.
 
 Singles of every allowed kind over stations and sizes are looked at where they promise most, as far
-as a barrier-free ensemble and their neighbours tell, see `agents.scouting`. Pairs of the best of
-each kind are foretold from them: of what one lets past, the other lets past its share. The
-promising ones race on common releases, see `agents.racing`, and then neighbours of the best: other
-stations and sizes, with ever smaller steps, a barrier more or less. Each race meets fresh releases.
-The best few, and no barrier at all, are chosen from on releases of their own, and the chosen one is
-reported on others again, which chose nothing: so its value does not flatter.
+as a barrier-free ensemble and their neighbours tell, see `rigdda.agents.scouting`. Pairs of the
+best of each kind are foretold from them: of what one lets past, the other lets past its share. The
+promising ones race on common releases, see `rigdda.agents.racing`, and then neighbours of the best:
+other stations and sizes, with ever smaller steps, a barrier more or less. Each race meets fresh
+releases. The best few, and no barrier at all, are chosen from on releases of their own, and the
+chosen one is reported on others again, which chose nothing: so its value does not flatter.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from agents.arms import Arm
-from agents.crossings import ensemble_for
-from agents.menu import FINEST, Menu
-from agents.protocol import DesignResult, Ledger, Progress
-from agents.racing import Track
-from agents.scouting import scout
-from agents.searching import search
-from agents.starts import offered, unsearched
-from agents.store import Store
-from envs import DesignProblem
 from rigdda import Layout
+from rigdda.agents.arms import Arm
+from rigdda.agents.crossings import ensemble_for
+from rigdda.agents.menu import FINEST, Menu
+from rigdda.agents.protocol import DesignResult, Ledger, Progress
+from rigdda.agents.racing import Track
+from rigdda.agents.scouting import scout
+from rigdda.agents.searching import search
+from rigdda.agents.starts import offered, unsearched
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem
 
 SINGLES, PAIRS, NEARBY, FINAL = 0.36, 0.14, 0.30, 0.10
 """Shares of the budget: singles, races of pairs and of neighbours, and the choice among the best;

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from agents.arms import Arm, allocation, behind
-from agents.protocol import Ledger
 from rigdda import Fence, Layout
+from rigdda.agents.arms import Arm, allocation, behind
+from rigdda.agents.protocol import Ledger
 
 KEPT = 0.4
 """Share of the candidates that goes on to the next round, at most."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.protocol import DesignResult, Ledger, Progress, Proposals
-from agents.searching import search
-from agents.store import Store
-from envs import DesignProblem
+from rigdda.agents.protocol import DesignResult, Ledger, Progress, Proposals
+from rigdda.agents.searching import search
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem
 
 
 def design(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from envs import DesignProblem, Evaluation
+from rigdda.envs import DesignProblem, Evaluation
 
 MISSED = 1e6
 """What ranks layouts that miss a target behind all others [EUR per m and year]."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import rigdda
-from agents import findings, flights, pictures
-from agents.flights import BLOCKS, Flights, fly
-from agents.job import SHED, Case, Study
-from agents.section import Panel, section
-from agents.seeds import release_seeds
-from agents.wording import euros, short, span, standing
 from rigdda import Layout, Site
+from rigdda.agents import findings, flights, pictures
+from rigdda.agents.flights import BLOCKS, Flights, fly
+from rigdda.agents.job import SHED, Case, Study
+from rigdda.agents.section import Panel, section
+from rigdda.agents.seeds import release_seeds
+from rigdda.agents.wording import euros, short, span, standing
 from rigdda.results.marks import Marks
 
 FILES = (

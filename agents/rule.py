@@ -18,14 +18,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.crossings import Ensemble, ensemble_for
-from agents.menu import Menu
-from agents.protocol import DesignResult, Ledger, Progress
-from agents.store import Store
-from envs import DesignProblem
-from envs.building import MIN_HEIGHT
 from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Site, Wall
+from rigdda.agents.crossings import Ensemble, ensemble_for
+from rigdda.agents.menu import Menu
+from rigdda.agents.protocol import DesignResult, Ledger, Progress
+from rigdda.agents.store import Store
 from rigdda.barriers import FENCE_CLASSES
+from rigdda.envs import DesignProblem
+from rigdda.envs.building import MIN_HEIGHT
 
 QUANTILE = 0.95
 

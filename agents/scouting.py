@@ -1,7 +1,8 @@
 """Singles of a catalogue, looked at where they promise most: the first part of a race.
 
 At first barriers of every kind as different as can be, then in batches those that may be the best
-as far as their neighbours tell, see `agents.surface`: of least mean less one standard deviation.
+as far as their neighbours tell, see `rigdda.agents.surface`: of least mean less one standard
+deviation.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.arms import Arm, error
-from agents.catalogue import Catalogue, tabulate
-from agents.crossings import Ensemble
-from agents.menu import Menu, spread
-from agents.racing import Track
-from agents.surface import Surface
 from rigdda import Barrier, Ditch, Layout
+from rigdda.agents.arms import Arm, error
+from rigdda.agents.catalogue import Catalogue, tabulate
+from rigdda.agents.crossings import Ensemble
+from rigdda.agents.menu import Menu, spread
+from rigdda.agents.racing import Track
+from rigdda.agents.surface import Surface
 
 SPREAD_OUT = 0.5
 """Share of the budget that goes to barriers as different as can be."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from agents.protocol import DesignResult, Ledger, Proposals
-from agents.ranking import final_score, ranked
-from envs import DesignProblem, Evaluation
 from rigdda import Layout
+from rigdda.agents.protocol import DesignResult, Ledger, Proposals
+from rigdda.agents.ranking import final_score, ranked
+from rigdda.envs import DesignProblem, Evaluation
 
 Choose = Callable[[DesignProblem, Sequence[Evaluation], int], list[Evaluation]]
 """Returns at most so many of some evaluations."""

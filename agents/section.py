@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agents.flights import Flights, Floats, fly, reach, sources, stations_of
-from agents.pictures import BARRIER, DPI, FONT, GROUND, ROAD, ZONE, colours, save
-from agents.wording import short, standing
 from rigdda import Barrier, Ditch, Fence, Layout, Site
+from rigdda.agents.flights import Flights, Floats, fly, reach, sources, stations_of
+from rigdda.agents.pictures import BARRIER, DPI, FONT, GROUND, ROAD, ZONE, colours, save
+from rigdda.agents.wording import short, standing
 from rigdda.barriers import Earthwork, earthworks
 from rigdda.model.place import BarrierZone
 
@@ -101,7 +101,7 @@ def released(
     Raises
     ------
     BadInput, Diverged
-        As `agents.flights.fly` does.
+        As `rigdda.agents.flights.fly` does.
     """
     names = site.event_names if event is None else (event,)
     stations = stations_of(site)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents import limits
 from rigdda import check
+from rigdda.agents import limits
 
 STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
 """search: all layouts of a search; semifinal, final: the best of them again, to choose; report: the

@@ -6,16 +6,16 @@ what it costs), the best constant, and no barrier at all.
 
 from __future__ import annotations
 
-from agents import convex
-from agents.constant import constant
-from agents.crossings import Ensemble, ensemble_for
-from agents.menu import STEP, Menu
-from agents.protocol import Ledger, Proposals
-from agents.rule import rule
-from envs import DesignProblem
-from envs.encoding import CLASSES
 from rigdda import Fence, Layout
+from rigdda.agents import convex
+from rigdda.agents.constant import constant
+from rigdda.agents.crossings import Ensemble, ensemble_for
+from rigdda.agents.menu import STEP, Menu
+from rigdda.agents.protocol import Ledger, Proposals
+from rigdda.agents.rule import rule
 from rigdda.barriers import FENCE_CLASSES
+from rigdda.envs import DesignProblem
+from rigdda.envs.encoding import CLASSES
 
 CHEAPER = ((0, 1), (1, 0), (1, 1), (0, 2))
 """Steps of height and of class by which the rule's fence is tried smaller."""

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-import envs
 import rigdda
-from envs import DesignProblem, Evaluation
+import rigdda.envs
 from rigdda import Layout, Outcome, __version__
+from rigdda.envs import DesignProblem, Evaluation
 from rigdda.kernel import source_hash
 
 CONSTANTS = {"Infinity": math.inf, "-Infinity": -math.inf, "NaN": math.nan}
@@ -183,10 +183,10 @@ def _key(problem: DesignProblem, layout: Layout, seeds: Any) -> str:
 def mechanics() -> str:
     """Return a hash of all sources, and numba's version, that an evaluation depends on."""
     digest = hashlib.sha256(source_hash().encode())
-    for name in (rigdda.__file__, envs.__file__):
+    for name in (rigdda.__file__, rigdda.envs.__file__):
         assert name is not None
         folder = Path(name).parent
         for path in sorted(folder.rglob("*.py")):
-            if "validation" not in path.relative_to(folder).parts:
+            if path.relative_to(folder).parts[0] not in ("agents", "envs", "validation"):
                 digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rigdda
-from agents.store import mechanics
-from agents.study_file import Study
-from agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
-from agents.wording import euros, span, standing
-from envs.accounts import Account, learn
-from envs.estimator import stratified
-from envs.evaluation import Facts
 from rigdda import BadInput, Outcome, Site
+from rigdda.agents.store import mechanics
+from rigdda.agents.study_file import Study
+from rigdda.agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
+from rigdda.agents.wording import euros, span, standing
+from rigdda.envs.accounts import Account, learn
+from rigdda.envs.estimator import stratified
+from rigdda.envs.evaluation import Facts
 
 if TYPE_CHECKING:
     from rich.table import Table

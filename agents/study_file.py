@@ -10,8 +10,8 @@ from typing import Any
 import msgspec
 
 import rigdda
-from agents import limits
 from rigdda import BadInput, Layout, Site, check
+from rigdda.agents import limits
 from rigdda.barriers import from_table
 from rigdda.files import read
 from rigdda.mistyped import mistyped

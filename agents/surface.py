@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.menu import numbers
 from rigdda import Barrier, Mesh
+from rigdda.agents.menu import numbers
 
 Floats = NDArray[np.float64]
 

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.protocol import Entry
-from agents.wording import short, standing
-from envs.intervals import estimate, mid_p, student_interval
 from rigdda import Fence, GravityWall, Layout, Outcome, Points, Site
+from rigdda.agents.protocol import Entry
+from rigdda.agents.wording import short, standing
 from rigdda.barriers import Earthwork, Embankment, to_tables
+from rigdda.envs.intervals import estimate, mid_p, student_interval
 from rigdda.files import atomic
 
 if TYPE_CHECKING:

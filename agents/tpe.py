@@ -1,18 +1,18 @@
 """Tree-structured Parzen estimator (Bergstra et al. 2011, NeurIPS 24; Optuna), ask and tell.
 
-It is told first what one barrier-free ensemble suggests, see `agents.starts`.
+It is told first what one barrier-free ensemble suggests, see `rigdda.agents.starts`.
 """
 
 from __future__ import annotations
 
-from agents import trials
-from agents.protocol import DesignResult, Ledger, Progress, Proposals
-from agents.ranking import value
-from agents.searching import search
-from agents.starts import starts
-from agents.store import Store
-from envs import DesignProblem
 from rigdda import Layout
+from rigdda.agents import trials
+from rigdda.agents.protocol import DesignResult, Ledger, Progress, Proposals
+from rigdda.agents.ranking import value
+from rigdda.agents.searching import search
+from rigdda.agents.starts import starts
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem
 
 DRAWN = 10
 """Layouts, the starts among them, before the estimator is trusted: Optuna's default."""

@@ -17,18 +17,18 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import extra, limits
-from agents.features import features
-from agents.network import Network
-from agents.policy import SLOTS, decide
-from agents.seeds import release_seeds
-from agents.store import mechanics
-from envs import DesignProblem
-from envs.crew import Crew
-from envs.envelope import barrier_free
-from envs.observation import observe
-from envs.places import pose
 from rigdda import BadInput, __version__, check, sites
+from rigdda.agents import extra, limits
+from rigdda.agents.features import features
+from rigdda.agents.network import Network
+from rigdda.agents.policy import SLOTS, decide
+from rigdda.agents.seeds import release_seeds
+from rigdda.agents.store import mechanics
+from rigdda.envs import DesignProblem
+from rigdda.envs.crew import Crew
+from rigdda.envs.envelope import barrier_free
+from rigdda.envs.observation import observe
+from rigdda.envs.places import pose
 from rigdda.files import atomic
 
 Tick = Callable[[int], None]

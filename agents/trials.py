@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from envs import DesignProblem
-from envs.encoding import NUMBERS, slot_size
 from rigdda import Layout
+from rigdda.envs import DesignProblem
+from rigdda.envs.encoding import NUMBERS, slot_size
 
 if TYPE_CHECKING:
     from optuna.distributions import BaseDistribution
 
 NAMES = ("presence", "station", "height", "size")
-"""Numbers of a slot, as in `envs.encoding`."""
+"""Numbers of a slot, as in `rigdda.envs.encoding`."""
 
 
 def space(problem: DesignProblem) -> dict[str, BaseDistribution]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from agents.findings import design_events
-from agents.job import SHED, Study
-from agents.tables import empty_table
-from agents.wording import euros, percent, span
-from envs.intervals import Estimate
+from rigdda.agents.findings import design_events
+from rigdda.agents.job import SHED, Study
+from rigdda.agents.tables import empty_table
+from rigdda.agents.wording import euros, percent, span
+from rigdda.envs.intervals import Estimate
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from agents.seeds import release_seeds
-from agents.store import Store
-from envs import DesignProblem, Evaluation
 from rigdda import Layout
+from rigdda.agents.seeds import release_seeds
+from rigdda.agents.store import Store
+from rigdda.envs import DesignProblem, Evaluation
 
 
 def verify(

@@ -1,18 +1,18 @@
 """Gymnasium environments of barrier design, and the same problem without Gymnasium.
 
-Importing this package registers the environments; `gymnasium.make("envs:rigdda/BarrierDesign-v0")`
-imports it on its own.
+Importing this package registers the environments;
+`gymnasium.make("rigdda.envs:rigdda/BarrierDesign-v0")` imports it on its own.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from envs.comparison import Difference, compare
-from envs.evaluation import Evaluation
-from envs.problem import DesignProblem
-from envs.registration import register
-from envs.targets import Targets
+from rigdda.envs.comparison import Difference, compare
+from rigdda.envs.evaluation import Evaluation
+from rigdda.envs.problem import DesignProblem
+from rigdda.envs.registration import register
+from rigdda.envs.targets import Targets
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
@@ -40,7 +40,7 @@ def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
     BadInput
         If a keyword is unsound.
     """
-    from envs import sb3
+    from rigdda.envs import sb3
 
     return sb3.sb3_vec_env(id, num_envs, **keywords)
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from envs.evaluation import Facts
-from envs.intervals import Known
 from rigdda import Layout, Outcome, Site
+from rigdda.envs.evaluation import Facts
+from rigdda.envs.intervals import Known
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

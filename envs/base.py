@@ -18,14 +18,14 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 import rigdda
-from envs import encoding, observation
-from envs.evaluation import Evaluation
-from envs.picture import picture
-from envs.places import Place, Venue
-from envs.recorder import Recorder, Shown, Trigger
-from envs.reuse import Sample
-from envs.trial import Answer, Ask, look_ahead, plain, simulate
 from rigdda import BadInput, Run, check
+from rigdda.envs import encoding, observation
+from rigdda.envs.evaluation import Evaluation
+from rigdda.envs.picture import picture
+from rigdda.envs.places import Place, Venue
+from rigdda.envs.recorder import Recorder, Shown, Trigger
+from rigdda.envs.reuse import Sample
+from rigdda.envs.trial import Answer, Ask, look_ahead, plain, simulate
 
 Action = NDArray[np.floating[Any]]
 Observation = dict[str, NDArray[np.float32]] | NDArray[np.float32]

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from envs.gaps import MIN_GAP, Span, meet, room
-from envs.rules import MACHINE, STEEPEST, Rules
-from envs.sizes import MIN_HEIGHT, SLENDER, TOLERANCE
 from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, GravityWall, Mesh
+from rigdda.envs.gaps import MIN_GAP, Span, meet, room
+from rigdda.envs.rules import MACHINE, STEEPEST, Rules
+from rigdda.envs.sizes import MIN_HEIGHT, SLENDER, TOLERANCE
 
 MIN_FLOOR = 1.0
 """Least width of the floor of a ditch that is designed [m]: a machine empties it, and what falls

@@ -1,7 +1,7 @@
 """What one layout costs more than another, from releases that both meet.
 
 Most releases cost the same with both. What the first one costs more, and what it costs less, are
-two means of costs that few releases have, with the intervals of such, see `envs.intervals`.
+two means of costs that few releases have, with the intervals of such, see `rigdda.envs.intervals`.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from envs import ensemble
-from envs.accounts import Account, account
-from envs.evaluation import Facts
-from envs.intervals import Known, Mean, cost
-from envs.problem import DesignProblem
 from rigdda import BadInput, Barrier, Layout, Outcome, Site
+from rigdda.envs import ensemble
+from rigdda.envs.accounts import Account, account
+from rigdda.envs.evaluation import Facts
+from rigdda.envs.intervals import Known, Mean, cost
+from rigdda.envs.problem import DesignProblem
 
 LEAST = 2
 """Releases of an event that tell how much they differ."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from envs.base import BarrierEnv
-from envs.recorder import Recorder
+from rigdda.envs.base import BarrierEnv
+from rigdda.envs.recorder import Recorder
 
 
 class BarrierDesign(BarrierEnv):
@@ -14,8 +14,8 @@ class BarrierDesign(BarrierEnv):
         or class, then one score for each kind if there are several, as `DesignProblem.decode`
         reads them; size is 4 max_barriers for one kind, else (4 + kinds) max_barriers.
     Observation
-        Dict of 1-D float32 arrays, see `envs.observation`, or these as one array if `flat`. It
-        depends on the site and on what stands, not on the episode's releases.
+        Dict of 1-D float32 arrays, see `rigdda.envs.observation`, or these as one array if `flat`.
+        It depends on the site and on what stands, not on the episode's releases.
     Reward
         (Z of nothing - Z of the layout) / Z of nothing, a float. Z of nothing is the site's cached
         mean, Z of the layout that of the episode's releases.

@@ -29,11 +29,11 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from envs.building import Room
-from envs.gaps import Span
-from envs.sizes import MIN_HEIGHT, TOLERANCE
 from rigdda import BadInput, Barrier, Fence, Layout, Mesh
 from rigdda.barriers import FENCE_CLASSES, Built
+from rigdda.envs.building import Room
+from rigdda.envs.gaps import Span
+from rigdda.envs.sizes import MIN_HEIGHT, TOLERANCE
 from rigdda.model.place import BarrierZone
 
 Floats = NDArray[np.float64]

@@ -18,13 +18,13 @@ import msgspec
 import numpy as np
 
 import rigdda
-from envs import reuse
-from envs.accounts import account, learn
-from envs.estimator import judge
-from envs.evaluation import Evaluation, Facts
-from envs.memory import Memory
-from envs.samples import Sample
 from rigdda import Outcome, Site
+from rigdda.envs import reuse
+from rigdda.envs.accounts import account, learn
+from rigdda.envs.estimator import judge
+from rigdda.envs.evaluation import Evaluation, Facts
+from rigdda.envs.memory import Memory
+from rigdda.envs.samples import Sample
 from rigdda.files import atomic
 from rigdda.kernel import cache_directory
 

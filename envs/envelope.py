@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from envs.crew import Workers
-from envs.memory import Memory, fingerprint
 from rigdda import Run, Simulation, Site
+from rigdda.envs.crew import Workers
+from rigdda.envs.memory import Memory, fingerprint
 from rigdda.geometry import polygon_properties
 
 Floats = NDArray[np.float64]

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from envs.accounts import Account, account
-from envs.evaluation import Evaluation, Facts
-from envs.intervals import Estimate, Known, Mean, cost, estimate, pair, total
 from rigdda import BadInput, Layout, Outcome, Site
 from rigdda.barriers.fence import PANEL
+from rigdda.envs.accounts import Account, account
+from rigdda.envs.evaluation import Evaluation, Facts
+from rigdda.envs.intervals import Estimate, Known, Mean, cost, estimate, pair, total
 from rigdda.model.economy import capitals
 
 Floats = NDArray[np.float64]

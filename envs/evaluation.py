@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from envs.intervals import Estimate, Interval, Known
 from rigdda import BadInput, Layout, Outcome
+from rigdda.envs.intervals import Estimate, Interval, Known
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Evaluation:
         Seed of each release, in the order of `outcomes`; empty where they are not kept.
     objective, ci : float, (float, float)
         Z and its 95 % interval [EUR per metre of road and year]. Of fewer than two releases an
-        event, it and what is told of harm and debris may be negative, see `envs.estimator`.
+        event, it and what is told of harm and debris may be negative, see `rigdda.envs.estimator`.
     capital, harm, repair : float
         The parts of Z: what the barriers cost a year, what rock on the road costs, what mending and
         emptying the barriers costs.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from envs.envelope import BINS, STATIONS
+from rigdda.envs.envelope import BINS, STATIONS
 
 PROFILE_POINTS = 16
 BOUND = 10.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from envs.sizes import TOLERANCE
 from rigdda import BadInput, Barrier, Fence
+from rigdda.envs.sizes import TOLERANCE
 
 Span = tuple[float, float]
 

@@ -1,6 +1,6 @@
 """What a designer sees of a site: 1-D float32 arrays of about unit spread over sites.
 
-`envs.fields` says what is in them: logarithms of what spreads over orders of magnitude,
+`rigdda.envs.fields` says what is in them: logarithms of what spreads over orders of magnitude,
 each array less its centre over its spread, so that one policy can read many sites. What lies beyond
 the bounds is clipped. A field is here if it differs between sites; what is the same at all of them
 tells nothing.
@@ -15,12 +15,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from envs.envelope import Envelope, envelope, largest, stations
-from envs.evaluation import Evaluation
-from envs.fields import BOUND, FIELDS, LOOKED, PROFILE_POINTS
-from envs.memory import Memory
-from envs.problem import DesignProblem
 from rigdda import Barrier, Fence, Mesh, Outcome, Site
+from rigdda.envs.envelope import Envelope, envelope, largest, stations
+from rigdda.envs.evaluation import Evaluation
+from rigdda.envs.fields import BOUND, FIELDS, LOOKED, PROFILE_POINTS
+from rigdda.envs.memory import Memory
+from rigdda.envs.problem import DesignProblem
 
 Arrays = dict[str, NDArray[np.float32]]
 Values = dict[str, ArrayLike]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from envs.base import BarrierEnv
-from envs.recorder import Recorder
+from rigdda.envs.base import BarrierEnv
+from rigdda.envs.recorder import Recorder
 
 
 class BarrierPlacement(BarrierEnv):
@@ -16,8 +16,8 @@ class BarrierPlacement(BarrierEnv):
         where it is, a barrier that may not stand where the action says goes to the nearest
         place where it may.
     Observation
-        Dict of 1-D float32 arrays, see `envs.observation`: that of `BarrierDesign`, and what the
-        barriers that stand take and let past. It depends on the site and on what stands, not on
+        Dict of 1-D float32 arrays, see `rigdda.envs.observation`: that of `BarrierDesign`, and what
+        the barriers that stand take and let past. It depends on the site and on what stands, not on
         the episode's releases.
     Reward
         The fall of Z that the step caused over Z of nothing, a float. Every step is scored on the

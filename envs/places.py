@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from envs.fidelity import FIDELITIES
-from envs.problem import DesignProblem
-from envs.slots import KINDS, Slots, named
 from rigdda import BadInput, Site, check, sites
+from rigdda.envs.fidelity import FIDELITIES
+from rigdda.envs.problem import DesignProblem
+from rigdda.envs.slots import KINDS, Slots, named
 
 Place = str | os.PathLike[str] | Site
 """Name of a built-in or generated site, a TOML file, a site, or what `drawn_from` knows."""

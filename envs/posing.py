@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import msgspec
 
-from envs import fidelity
-from envs.targets import Targets
 from rigdda import BadInput, Site, check
 from rigdda.barriers import KINDS as ALL_KINDS
+from rigdda.envs import fidelity
+from rigdda.envs.targets import Targets
 from rigdda.model.place import BarrierZone
 
 MOST_BARRIERS = 100

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from envs import encoding, ensemble, estimator, plan, posing, reuse
-from envs.building import Room
-from envs.evaluation import Evaluation
-from envs.memory import fingerprint
-from envs.samples import Sample
-from envs.targets import Targets
 from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
+from rigdda.envs import encoding, ensemble, estimator, plan, posing, reuse
+from rigdda.envs.building import Room
+from rigdda.envs.evaluation import Evaluation
+from rigdda.envs.memory import fingerprint
+from rigdda.envs.samples import Sample
+from rigdda.envs.targets import Targets
 from rigdda.model.place import BarrierZone
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ class DesignProblem:
     """Which barriers to put where on a site, so that a year costs least.
 
     Z [EUR per metre of road and year] = what the barriers cost a year + expected harm on the road +
-    expected repair, see `envs.estimator`.
+    expected repair, see `rigdda.envs.estimator`.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class DesignProblem:
     targets : Targets, optional
         What is asked of the design events beside a low cost.
     fidelity : {"full", "fast"}
-        At "fast" a cheaper site stands for it, see `envs.fidelity`.
+        At "fast" a cheaper site stands for it, see `rigdda.envs.fidelity`.
     zone : (start, end), optional
         Chainages between which barriers may stand [m], inside the site's own zone; the attribute
         is that zone so narrowed.
@@ -98,7 +98,7 @@ class DesignProblem:
         return np.full(self.size, -1.0), np.full(self.size, 1.0)
 
     def decode(self, vector: ArrayLike) -> Layout:
-        """Return the layout that a (size,) vector stands for, see `envs.encoding`.
+        """Return the layout that a (size,) vector stands for, see `rigdda.envs.encoding`.
 
         Every vector has one, that may be built; entries beyond [-1, 1] are clipped.
 
@@ -144,7 +144,7 @@ class DesignProblem:
         return {name: count[name] for name in self.site.event_names}
 
     def plan(self, seeds: Sequence[int]) -> tuple[str, ...]:
-        """Return the event of each release, see `envs.plan`; a part of the seeds has a part."""
+        """Return the event of each release: of a part of the seeds, a part (`rigdda.envs.plan`)."""
         return plan.events(self._known.shares, posing.seeds("seeds", seeds))
 
     @property

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import rigdda
-from envs.evaluation import Evaluation
 from rigdda import BadInput, Site
 from rigdda.barriers import describe
+from rigdda.envs.evaluation import Evaluation
 
 Trigger = Callable[[int], bool]
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import gymnasium
 
 ENVIRONMENTS = {
-    "rigdda/BarrierDesign-v0": ("envs.design:BarrierDesign", "envs.vector:BarrierDesignVector"),
+    "rigdda/BarrierDesign-v0": (
+        "rigdda.envs.design:BarrierDesign",
+        "rigdda.envs.vector:BarrierDesignVector",
+    ),
     "rigdda/BarrierPlacement-v0": (
-        "envs.placement:BarrierPlacement",
-        "envs.vector:BarrierPlacementVector",
+        "rigdda.envs.placement:BarrierPlacement",
+        "rigdda.envs.vector:BarrierPlacementVector",
     ),
 }
 """Entry points of every environment, alone and batched, imported when it is made first."""

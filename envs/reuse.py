@@ -12,12 +12,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import rigdda
-from envs import untouched
-from envs.crew import Workers
-from envs.memory import Memory, fingerprint
-from envs.samples import Sample
 from rigdda import Layout, Mesh, Outcome, Site
 from rigdda.barriers import Built
+from rigdda.envs import untouched
+from rigdda.envs.crew import Workers
+from rigdda.envs.memory import Memory, fingerprint
+from rigdda.envs.samples import Sample
 
 Job = tuple[Site, Layout, int, str]
 """A site, what stands on it, the seed of a release and the name of its event."""

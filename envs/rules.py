@@ -8,8 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from envs.gaps import Span, check_gaps, room
-from envs.sizes import SLENDER, TOLERANCE, limits
 from rigdda import (
     BadInput,
     Barrier,
@@ -23,6 +21,8 @@ from rigdda import (
     check,
 )
 from rigdda.barriers import MeshOption, as_layout, earthworks
+from rigdda.envs.gaps import Span, check_gaps, room
+from rigdda.envs.sizes import SLENDER, TOLERANCE, limits
 from rigdda.model.place import BarrierZone
 
 Floats = NDArray[np.float64]

@@ -11,9 +11,9 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
-from envs.batching import stack
-from envs.vector import BarrierVector
 from rigdda import BadInput
+from rigdda.envs.batching import stack
+from rigdda.envs.vector import BarrierVector
 
 
 class Bridge(VecEnv):
@@ -113,7 +113,7 @@ class Bridge(VecEnv):
 
 
 def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
-    """Return a batched environment for Stable-Baselines3; see `envs.sb3_vec_env`."""
+    """Return a batched environment for Stable-Baselines3; see `rigdda.envs.sb3_vec_env`."""
     batch = gymnasium.make_vec(
         id, num_envs=num_envs, vectorization_mode="vector_entry_point", **keywords
     )

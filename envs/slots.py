@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from envs import encoding
-from envs.posing import KINDS as USUAL
-from envs.problem import DesignProblem
 from rigdda import BadInput, Layout, Site, check
 from rigdda.barriers import KINDS as ALL
+from rigdda.envs import encoding
+from rigdda.envs.posing import KINDS as USUAL
+from rigdda.envs.problem import DesignProblem
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from envs.intervals import Estimate
 from rigdda import check
+from rigdda.envs.intervals import Estimate
 
 MET, MISSED, UNDECIDED = "met", "missed", "undecided"
 """What targets are: the upper bounds of all probabilities are low enough; the lower bound of one is

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from envs import reuse
-from envs.crew import Workers
-from envs.envelope import FIRST, barrier_free
-from envs.evaluation import Evaluation
-from envs.problem import DesignProblem
-from envs.reuse import Sample
 from rigdda import Layout, Outcome
+from rigdda.envs import reuse
+from rigdda.envs.crew import Workers
+from rigdda.envs.envelope import FIRST, barrier_free
+from rigdda.envs.evaluation import Evaluation
+from rigdda.envs.problem import DesignProblem
+from rigdda.envs.reuse import Sample
 
 
 class Ask(NamedTuple):

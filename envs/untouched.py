@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from envs.memory import Memory
 from rigdda import BarrierOutcome, Ditch, Embankment, Fence, GravityWall, Outcome, Site
 from rigdda.barriers import Built, Earthwork, earthworks
+from rigdda.envs.memory import Memory
 from rigdda.model.roughness import REACH
 from rigdda.model.settings import EARTH
 

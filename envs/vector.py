@@ -12,15 +12,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from envs import batching, encoding
-from envs.base import BarrierEnv, Info, Observation, Step
-from envs.batching import Options
-from envs.crew import Crew
-from envs.design import BarrierDesign
-from envs.placement import BarrierPlacement
-from envs.recorder import Recorder
-from envs.trial import look_ahead, simulate
 from rigdda import BadInput, check
+from rigdda.envs import batching, encoding
+from rigdda.envs.base import BarrierEnv, Info, Observation, Step
+from rigdda.envs.batching import Options
+from rigdda.envs.crew import Crew
+from rigdda.envs.design import BarrierDesign
+from rigdda.envs.placement import BarrierPlacement
+from rigdda.envs.recorder import Recorder
+from rigdda.envs.trial import look_ahead, simulate
 
 MOST_COPIES = 100_000
 """Most copies; what is above is taken for a slip of the pen."""

@@ -5,9 +5,9 @@ Run it: `python examples/study.py`. It prints one line a class, and where a year
 
 from __future__ import annotations
 
-from envs import DesignProblem, Evaluation
 from rigdda import Fence
 from rigdda.barriers import FENCE_CLASSES
+from rigdda.envs import DesignProblem, Evaluation
 
 
 def study(

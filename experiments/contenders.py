@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from agents.menu import Menu
-from agents.seeds import release_seeds
-from envs import DesignProblem
 from rigdda import Barrier, Layout
+from rigdda.agents.menu import Menu
+from rigdda.agents.seeds import release_seeds
+from rigdda.envs import DesignProblem
 
 KEPT = 0.3
 """Share of the candidates that goes on to the next round."""

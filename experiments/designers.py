@@ -19,11 +19,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from agents import extra
-from agents.designing import BUDGET
-from agents.store import Store, mechanics
-from agents.verify import verify
-from envs import DesignProblem, Evaluation
 from experiments import reference
 from experiments.script import (
     BLUE,
@@ -39,7 +34,12 @@ from experiments.script import (
     write,
 )
 from rigdda import BadInput, Layout, sites
+from rigdda.agents import extra
+from rigdda.agents.designing import BUDGET
+from rigdda.agents.store import Store, mechanics
+from rigdda.agents.verify import verify
 from rigdda.barriers import describe
+from rigdda.envs import DesignProblem, Evaluation
 
 COLOURS = {
     "race": RED, "random": GREY, "constant": "black", "rule": ORANGE, "cma": BLUE, "tpe": GREEN,

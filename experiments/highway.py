@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from msgspec.structs import replace as changed
 
-from envs.picture import draw as draw_frame
 from experiments.bench.cases import RUN_OUT
 from rigdda import Run, Site, release
 from rigdda.barriers import Layout
+from rigdda.envs.picture import draw as draw_frame
 from rigdda.errors import SoftContacts
 from rigdda.geometry import polygon_properties
 from rigdda.results.outcome import Outcome

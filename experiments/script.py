@@ -19,8 +19,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from envs.intervals import quantile
 from experiments.made_by import KERNELS, kernels_hash, made_by
+from rigdda.envs.intervals import quantile
 from rigdda.files import atomic
 
 RESULTS = Path("experiments/results")

@@ -23,12 +23,12 @@ import click
 import msgspec
 import numpy as np
 
-import envs
-from envs import DesignProblem
-from envs.registration import ENVIRONMENTS
-from envs.trial import Ask, simulate
+import rigdda.envs
 from experiments.script import folder, options, write
 from rigdda import Layout, Site, sites
+from rigdda.envs import DesignProblem
+from rigdda.envs.registration import ENVIRONMENTS
+from rigdda.envs.trial import Ask, simulate
 
 BATCHES = ((1, False), (8, False), (64, False), (64, True), (1, False))
 """Copies, and whether they are simulated in processes."""
@@ -68,7 +68,7 @@ def measure(
     name: str, site: Site, copies: int, processes: int | None, episodes: int, seed: int
 ) -> dict[str, Any]:
     """Return what one batch did; in processes the first step, which starts them, counts not."""
-    env = envs.sb3_vec_env(name, copies, site=site, releases=1, processes=processes)
+    env = rigdda.envs.sb3_vec_env(name, copies, site=site, releases=1, processes=processes)
     env.seed(seed)
     env.action_space.seed(seed)
     env.reset()

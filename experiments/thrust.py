@@ -19,12 +19,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from msgspec.structs import replace
 
-from agents.menu import HEIGHTS
-from envs.sizes import SLENDER
 from experiments.script import BLUE, GREEN, RED, Number, draw, main
 from experiments.study import Row, tabulate
 from rigdda import Barrier, Embankment, Fence, GravityWall, Site
+from rigdda.agents.menu import HEIGHTS
 from rigdda.barriers import FENCE_CLASSES, describe
+from rigdda.envs.sizes import SLENDER
 from rigdda.release import release_many
 
 SITES = {"shu-hwa": 83.6, "quick": 23.0}

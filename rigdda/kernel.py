@@ -32,7 +32,9 @@ from rigdda.errors import Error
 def sources() -> list[bytes]:
     """Return the sources that hold kernels or their constants."""
     found, data = [], ("constants.py", "records.py", "arrays.py")
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    here = Path(__file__).parent
+    folders = (here / "dynamics", here / "model")
+    for path in sorted([*here.glob("*.py"), *(p for f in folders for p in f.rglob("*.py"))]):
         source = path.read_bytes()
         if b"rigdda.kernel import" in source or path.name in data:
             found.append(source)

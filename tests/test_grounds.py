@@ -4,7 +4,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from envs import DesignProblem
 from rigdda import (
     BadInput,
     DoubtfulInput,
@@ -18,6 +17,7 @@ from rigdda import (
     release_outcome,
 )
 from rigdda.batch import Batch
+from rigdda.envs import DesignProblem
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.place import Motion
 from rigdda.model.realisation import FARTHEST

@@ -21,11 +21,11 @@ from matplotlib.figure import Figure
 from msgspec.structs import replace
 from scipy.optimize import brentq
 
-from agents.fit import Floats
-from agents.parameters import Parameter, with_values
-from agents.run_outs import Model, run_outs
 from experiments.script import BLUE, GREEN, ORANGE, RED, Number, draw, say, write
 from rigdda import Site
+from rigdda.agents.fit import Floats
+from rigdda.agents.parameters import Parameter, with_values
+from rigdda.agents.run_outs import Model, run_outs
 
 HERE = Path(__file__).parent
 

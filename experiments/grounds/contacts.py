@@ -20,8 +20,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from agents.fit import Floats
 from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
+from rigdda.agents.fit import Floats
 from rigdda.dynamics.constants import APART
 from rigdda.model.realisation import FARTHEST
 from rigdda.model.roughness import Roughness

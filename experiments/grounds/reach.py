@@ -8,8 +8,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from envs.intervals import mid_p
 from rigdda import Site, Surface, release_many
+from rigdda.envs.intervals import mid_p
 from rigdda.model.grounds import GROUNDS
 
 SLOPE = Path(__file__).parent / "slope.toml"

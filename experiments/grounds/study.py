@@ -19,10 +19,6 @@ import msgspec
 import numpy as np
 from matplotlib.figure import Figure
 
-from agents import run_outs
-from agents.fit import Floats
-from agents.fit_trials import explore
-from agents.prediction import scores
 from experiments import tschamut
 from experiments.catch_bench.study import FITTED, PREDICTED, below, within
 from experiments.grounds import contacts, reach
@@ -30,6 +26,10 @@ from experiments.grounds.contacts import MASSES, early_contacts, lumped_share, m
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
 from experiments.tschamut.study import runs
 from rigdda import Site, Surface
+from rigdda.agents import run_outs
+from rigdda.agents.fit import Floats
+from rigdda.agents.fit_trials import explore
+from rigdda.agents.prediction import scores
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.place import Rebound, Scatter
 

@@ -11,9 +11,9 @@ from typing import Self
 
 import numpy as np
 
-from agents.fit import Floats
-from agents.parameters import Parameter
 from rigdda import Site
+from rigdda.agents.fit import Floats
+from rigdda.agents.parameters import Parameter
 
 PYTHON = "PLATROCK_PYTHON"
 """Environment variable that names the Python which has PlatRock; without it, it is left out."""

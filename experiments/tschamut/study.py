@@ -25,13 +25,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from agents import fit, fit_results, run_outs
-from agents.fit import Fit, Floats
-from agents.parameters import Parameter, parse, with_values
-from agents.prediction import seen
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, interval, say, write
 from experiments.tschamut.platrock import PARAMETERS, PYTHON, PlatRock
 from rigdda import Site, release
+from rigdda.agents import fit, fit_results, run_outs
+from rigdda.agents.fit import Fit, Floats
+from rigdda.agents.parameters import Parameter, parse, with_values
+from rigdda.agents.prediction import seen
 
 HERE = Path(__file__).parent
 
@@ -92,7 +92,7 @@ def runs(
 
 
 def table(model: str, fitted: Fit, observed: dict[str, Floats], seconds: float) -> list[dict]:
-    """Return the rows of `agents.fit_results.rows` with the model and its processor time [s]."""
+    """Return rows as `rigdda.agents.fit_results.rows` does, with model and processor time [s]."""
     return [{"model": model, "cpu_s": seconds} | row for row in fit_results.rows(fitted, observed)]
 
 

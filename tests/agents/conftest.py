@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from valley import SITE, Valley, seen
 
-from envs import DesignProblem
 from rigdda import Site
+from rigdda.envs import DesignProblem
 
 
 @pytest.fixture(scope="session")
@@ -21,5 +21,5 @@ def problem(site: Site) -> DesignProblem:
 
 @pytest.fixture
 def valley(site: Site, monkeypatch: pytest.MonkeyPatch) -> Valley:
-    monkeypatch.setattr("agents.crossings.ensemble", seen)
+    monkeypatch.setattr("rigdda.agents.crossings.ensemble", seen)
     return Valley(site)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 from valley import SITE, Valley
 
-from agents import constant
-from agents.constant import CONSTANTS, place
-from agents.menu import Menu
-from envs import DesignProblem
 from rigdda import Fence
+from rigdda.agents import constant
+from rigdda.agents.constant import CONSTANTS, place
+from rigdda.agents.menu import Menu
 from rigdda.barriers import KINDS
+from rigdda.envs import DesignProblem
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "mesh"])

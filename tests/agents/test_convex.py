@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from valley import SITE
 
-from agents import convex
-from agents.catalogue import Catalogue, tabulate, whole
-from agents.crossings import CROSSING, Ensemble, ensemble
-from agents.menu import Menu
-from agents.programme import GAP, choose
-from envs import DesignProblem
 from rigdda import Ditch, Fence, GravityWall, Mesh, Site
+from rigdda.agents import convex
+from rigdda.agents.catalogue import Catalogue, tabulate, whole
+from rigdda.agents.crossings import CROSSING, Ensemble, ensemble
+from rigdda.agents.menu import Menu
+from rigdda.agents.programme import GAP, choose
+from rigdda.envs import DesignProblem
 
 
 def least_by_trying_all(table: Catalogue, slots: int) -> float:

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from valley import SITE, Valley
 
-import agents
-from agents import DESIGNERS
-from agents.protocol import DesignResult, Ledger
-from agents.ranking import MISSED, final_score, score, value
-from agents.searching import Plan, search
-from agents.seeds import STREAMS, release_seeds
-from agents.starts import starts
-from agents.verify import verify
-from envs import DesignProblem
-from envs.targets import Targets
+import rigdda.agents
 from rigdda import BadInput, Barrier, Fence, Layout, Outcome
+from rigdda.agents import DESIGNERS
+from rigdda.agents.protocol import DesignResult, Ledger
+from rigdda.agents.ranking import MISSED, final_score, score, value
+from rigdda.agents.searching import Plan, search
+from rigdda.agents.seeds import STREAMS, release_seeds
+from rigdda.agents.starts import starts
+from rigdda.agents.verify import verify
 from rigdda.barriers import KINDS
+from rigdda.envs import DesignProblem
+from rigdda.envs.targets import Targets
 
 SEARCHES = ("cma", "pareto", "race", "random", "tpe")
 FIXED = ("constant", "rule")
@@ -30,7 +30,7 @@ ALL = (*SEARCHES, "convex", *FIXED)
 
 
 def design(name: str, problem: DesignProblem, simulations: int, seed: int = 0) -> DesignResult:
-    found: DesignResult = getattr(agents, name).design(problem, simulations, seed)
+    found: DesignResult = getattr(rigdda.agents, name).design(problem, simulations, seed)
     return found
 
 
@@ -98,7 +98,7 @@ def test_a_search_goes_on_from_its_starts(
         ledger.starts |= {first, ()}
         return [first, ()]
 
-    monkeypatch.setattr(f"agents.{name}.starts", starts)
+    monkeypatch.setattr(f"rigdda.agents.{name}.starts", starts)
     found = design(name, valley, 3000)
     assert found.origin == "search"
     gain = valley.truth(first) - valley.truth((Fence(20.0, 3.0, energy_class=250),))
@@ -190,12 +190,12 @@ def test_an_unsound_budget_or_seed_is_refused(
     name: str, simulations: float, seed: float, valley: Valley
 ) -> None:
     with pytest.raises(BadInput, match="whole number"):
-        getattr(agents, name).design(valley, simulations, seed)
+        getattr(rigdda.agents, name).design(valley, simulations, seed)
 
 
 def test_every_designer_has_a_name() -> None:
     assert set(DESIGNERS) == {*ALL, "ppo"}
-    assert agents.names.DEFAULT in DESIGNERS
+    assert rigdda.agents.names.DEFAULT in DESIGNERS
     assert {"fence", "ditch", "embankment"} <= set(KINDS)
 
 
@@ -211,4 +211,4 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 
 def test_a_site_is_no_problem() -> None:
     with pytest.raises(BadInput, match="DesignProblem"):
-        agents.race.design(SITE, simulations=10)
+        rigdda.agents.race.design(SITE, simulations=10)

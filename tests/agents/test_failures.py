@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 import rigdda
-from agents import cli
-from agents.terminal import Stopped, folder_for, kept
 from rigdda import BadInput, Diverged, Run, Site
+from rigdda.agents import cli
+from rigdda.agents.terminal import Stopped, folder_for, kept
 from rigdda.files import atomic
 
 
@@ -46,7 +46,7 @@ def test_a_design_that_stops_keeps_its_evaluations_and_goes_on(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from envs import DesignProblem
+    from rigdda.envs import DesignProblem
 
     options = ["--designer", "random", "--budget", "40", "--verify", "12"]
     arguments = ["design", "quick", *options, "--out", "o"]

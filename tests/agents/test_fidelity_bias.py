@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents import fidelity_bias
-from agents.cli import main
-from agents.seeds import release_seeds
-from envs import DesignProblem, fidelity
 from rigdda import BadInput, Site
+from rigdda.agents import fidelity_bias
+from rigdda.agents.cli import main
+from rigdda.agents.seeds import release_seeds
+from rigdda.envs import DesignProblem, fidelity
 
 
 def test_fast_has_fewer_larger_blocks_and_a_longer_step() -> None:

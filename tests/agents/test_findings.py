@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 from valley import SITE, Barren, Valley
 
-from agents import findings
-from agents.largest import tried, unheld
-from agents.menu import Menu
-from agents.protocol import DesignResult, History
-from envs import DesignProblem, Evaluation
+from rigdda.agents import findings
+from rigdda.agents.largest import tried, unheld
+from rigdda.agents.menu import Menu
+from rigdda.agents.protocol import DesignResult, History
+from rigdda.envs import DesignProblem, Evaluation
 
 
 def test_what_costs_as_little_a_year_and_less_to_build_is_named(problem: DesignProblem) -> None:

@@ -7,12 +7,12 @@ import csv
 import numpy as np
 import pytest
 
-from agents import fit, fit_trials, prediction
-from agents.cli import main
-from agents.parameters import Parameter, check_parameters, parse, with_values
-from agents.prediction import scores
-from agents.run_outs import read, run_outs
 from rigdda import BadInput, Site
+from rigdda.agents import fit, fit_trials, prediction
+from rigdda.agents.cli import main
+from rigdda.agents.parameters import Parameter, check_parameters, parse, with_values
+from rigdda.agents.prediction import scores
+from rigdda.agents.run_outs import read, run_outs
 from rigdda.model.place import Rebound
 
 SITE = Site.load("verge")

@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 from valley import SITE, Valley
 
-from agents import pareto
-from agents.pareto import front, residual
-from envs import Evaluation
 from rigdda import BadInput, Fence
+from rigdda.agents import pareto
+from rigdda.agents.pareto import front, residual
+from rigdda.envs import Evaluation
 
 VALLEY = Valley(SITE)
 

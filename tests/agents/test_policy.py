@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
-from agents import policy
-from agents.features import NAMES, WIDTH, features
-from agents.network import Network
-from agents.policy import ANCHOR, SLOTS, decide
-from envs import DesignProblem
-from envs.fields import FIELDS
-from envs.observation import observe
 from rigdda import BadInput, Site
+from rigdda.agents import policy
+from rigdda.agents.features import NAMES, WIDTH, features
+from rigdda.agents.network import Network
+from rigdda.agents.policy import ANCHOR, SLOTS, decide
+from rigdda.envs import DesignProblem
+from rigdda.envs.fields import FIELDS
+from rigdda.envs.observation import observe
 
 
 def network(outputs: np.ndarray, inputs: int = WIDTH) -> Network:
@@ -53,7 +53,7 @@ def test_it_decides_without_torch_or_a_search(tmp_path: Path) -> None:
     saying((1.0, 0.5, 0.0, 0.0, "ditch")).save(file)
     code = (
         "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
-        "from envs import DesignProblem; from agents import policy\n"
+        "from rigdda.envs import DesignProblem; from rigdda.agents import policy\n"
         f"found = policy.using(policy.load({str(file)!r}))(DesignProblem('quick'), 8)\n"
         "assert found.simulations == 8 and len(found.history.entries) == 1\n"
         "assert [b.kind for b in found.layout] == ['ditch']\n"

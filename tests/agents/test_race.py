@@ -9,16 +9,16 @@ import pytest
 from msgspec.structs import replace
 from valley import SITE, Barren, Valley
 
-from agents import race, random
-from agents.arms import Arm, allocation, behind
-from agents.bounds import on_bound
-from agents.menu import Menu, spread
-from agents.protocol import Entry
-from agents.store import Release, Store
-from envs import DesignProblem
-from envs.targets import Targets
 from rigdda import Ditch, Fence, GravityWall, Site
+from rigdda.agents import race, random
+from rigdda.agents.arms import Arm, allocation, behind
+from rigdda.agents.bounds import on_bound
+from rigdda.agents.menu import Menu, spread
+from rigdda.agents.protocol import Entry
+from rigdda.agents.store import Release, Store
 from rigdda.barriers import KINDS
+from rigdda.envs import DesignProblem
+from rigdda.envs.targets import Targets
 
 
 def least(valley: Valley) -> float:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from valley import SITE
 
-from agents.crossings import CROSSING, Ensemble
-from agents.menu import Menu
-from agents.rule import demands, ritchie, rule
-from envs import DesignProblem
 from rigdda import Ditch, Embankment, Fence, Site
+from rigdda.agents.crossings import CROSSING, Ensemble
+from rigdda.agents.menu import Menu
+from rigdda.agents.rule import demands, ritchie, rule
 from rigdda.barriers import FENCE_CLASSES
+from rigdda.envs import DesignProblem
 
 STATIONS = np.array([14.0, 20.0, 27.0])
 SPEED, MASS, ENERGY, FREEBOARD = 1.122, 1.02, 1.2, 0.5

@@ -9,11 +9,11 @@ import msgspec
 import pytest
 from valley import SITE, Valley
 
-import agents
-from agents.store import Release, Store
-from envs import DesignProblem
-from envs.targets import Targets
+import rigdda.agents
 from rigdda import Fence, Layout
+from rigdda.agents.store import Release, Store
+from rigdda.envs import DesignProblem
+from rigdda.envs.targets import Targets
 
 FENCE = (Fence(20.0, 2.0, energy_class=500),)
 PAIR = (Fence(16.2, 2.0, energy_class=100), Fence(25.0, 1.5, energy_class=250))
@@ -96,7 +96,7 @@ def test_another_question_is_simulated(valley: Valley, tmp_path: Path) -> None:
 def test_a_killed_search_goes_on_where_it_stopped(
     name: str, tail: bytes, valley: Valley, tmp_path: Path
 ) -> None:
-    design = getattr(agents, name).design
+    design = getattr(rigdda.agents, name).design
     file = tmp_path / "store.jsonl"
     whole = design(valley, 150, store=Store(file))
     lines = file.read_bytes().splitlines(keepends=True)

@@ -14,11 +14,11 @@ import pytest
 from test_command_line import refused, rig, rows, run
 
 import rigdda
-from agents import studies, study_file
-from agents.tables import _interval, write_rows
-from envs.estimator import stratified
-from envs.intervals import upper_bound
 from rigdda import Site
+from rigdda.agents import studies, study_file
+from rigdda.agents.tables import _interval, write_rows
+from rigdda.envs.estimator import stratified
+from rigdda.envs.intervals import upper_bound
 
 EXAMPLES = Path(rigdda.__file__).parents[1] / "examples"
 STUDY = """

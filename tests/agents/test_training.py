@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from test_command_line import refused, rig, run
 
-from agents import policy, ppo, training
-from agents.features import WIDTH
-from agents.network import Network
-from agents.policy import SLOTS, decide
-from envs import DesignProblem
 from rigdda import sites
+from rigdda.agents import policy, ppo, training
+from rigdda.agents.features import WIDTH
+from rigdda.agents.network import Network
+from rigdda.agents.policy import SLOTS, decide
+from rigdda.envs import DesignProblem
 
 SMALL = ("--sites", 2, "--episodes", 16)
 

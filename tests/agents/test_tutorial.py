@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import rigdda
-from agents.cli import cli
+from rigdda.agents.cli import cli
 
 TEXT = (Path(rigdda.__file__).parents[1] / "docs/tutorial.md").read_text()
 COMMANDS = re.findall(r"^(?:.*`)?(rigdda [a-z]+.*?)(?:`.*)?$", TEXT, re.MULTILINE)

@@ -12,11 +12,11 @@ import msgspec
 import numpy as np
 
 import rigdda
-from agents import crossings
-from envs import DesignProblem, Evaluation, ensemble
-from envs.estimator import judge
-from envs.samples import Sample
 from rigdda import Barrier, Layout, Outcome, Site
+from rigdda.agents import crossings
+from rigdda.envs import DesignProblem, Evaluation, ensemble
+from rigdda.envs.estimator import judge
+from rigdda.envs.samples import Sample
 
 BEST, WIDE = 20.0, 4.0
 """Where a barrier catches most, and how far from there it still does [m]."""

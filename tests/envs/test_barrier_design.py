@@ -16,9 +16,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import data_equivalence
 
 import rigdda
-from envs import DesignProblem
-from envs.design import BarrierDesign
 from rigdda import BadInput, Fence, sites
+from rigdda.envs import DesignProblem
+from rigdda.envs.design import BarrierDesign
 
 CUT = cut()
 TERMS: dict[str, Any] = {"max_barriers": 2, "kinds": ("fence",), "releases": 10}
@@ -195,7 +195,7 @@ def test_an_episode_has_one_step(env: BarrierDesign) -> None:
 def test_only_a_time_limit_truncates() -> None:
     for limit, truncated in ((1, True), (2, False)):
         env = gymnasium.make(
-            "envs:rigdda/BarrierDesign-v0",
+            "rigdda.envs:rigdda/BarrierDesign-v0",
             site=CUT,
             max_barriers=2,
             kinds=("fence",),

@@ -13,10 +13,10 @@ from cases import cut
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import data_equivalence
 
-from envs import DesignProblem
-from envs.design import BarrierDesign
-from envs.placement import BarrierPlacement
 from rigdda import BadInput
+from rigdda.envs import DesignProblem
+from rigdda.envs.design import BarrierDesign
+from rigdda.envs.placement import BarrierPlacement
 
 CUT = cut()
 TERMS: dict[str, Any] = {"max_barriers": 3, "kinds": ("fence", "ditch"), "releases": 2}
@@ -99,7 +99,7 @@ def test_an_absent_barrier_ends_the_episode(env: BarrierPlacement) -> None:
 
 def test_only_a_time_limit_truncates() -> None:
     for limit, truncated in ((1, True), (3, False)):
-        name = "envs:rigdda/BarrierPlacement-v0"
+        name = "rigdda.envs:rigdda/BarrierPlacement-v0"
         terms = TERMS | {"max_episode_steps": limit}
         env = gymnasium.make(name, site=CUT, **terms)
         env.reset(seed=0)

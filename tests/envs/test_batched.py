@@ -19,10 +19,10 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-import envs
-from envs.crew import Crew
-from envs.registration import ENVIRONMENTS
+import rigdda.envs
 from rigdda import BadInput, Site, sites
+from rigdda.envs.crew import Crew
+from rigdda.envs.registration import ENVIRONMENTS
 
 CUT = cut()
 COPIES = 3
@@ -129,7 +129,7 @@ def test_a_crew_shares_jobs_out_evenly_and_keeps_them_at_home() -> None:
 
 
 LEFT_ALONE = """
-from envs.crew import Crew
+from rigdda.envs.crew import Crew
 from test_batched import worker
 
 if __name__ == "__main__":
@@ -247,7 +247,7 @@ def test_the_bridge_says_what_the_batch_says() -> None:
     """Observations, rewards, ends, what was seen last and why an episode ended."""
     pytest.importorskip("stable_baselines3")
     name, terms = "rigdda/BarrierPlacement-v0", {"site": CUT, "releases": 1}
-    bridge = envs.sb3_vec_env(name, COPIES, **terms, max_episode_steps=2)
+    bridge = rigdda.envs.sb3_vec_env(name, COPIES, **terms, max_episode_steps=2)
     plain = batch(name, CUT, max_episode_steps=2)
     bridge.seed(3)
     seen, info = plain.reset(seed=3)
@@ -275,7 +275,7 @@ def test_the_bridge_says_what_the_batch_says() -> None:
 @every
 def test_ppo_learns_on_copies(name: str) -> None:
     ppo = pytest.importorskip("stable_baselines3").PPO
-    env = envs.sb3_vec_env(name, COPIES, site=CUT, releases=1)
+    env = rigdda.envs.sb3_vec_env(name, COPIES, site=CUT, releases=1)
     model = ppo("MultiInputPolicy", env, n_steps=6, batch_size=9, n_epochs=2, gamma=1.0, seed=0)
     before = [p.detach().clone() for p in model.policy.parameters()]
     model.learn(36)

@@ -15,11 +15,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from envs import compare, ensemble, plan
-from envs.memory import Memory
-from envs.problem import DesignProblem
-from envs.targets import Targets
 from rigdda import BadInput, Ditch, Fence, Outcome, Site, Wall
+from rigdda.envs import compare, ensemble, plan
+from rigdda.envs.memory import Memory
+from rigdda.envs.problem import DesignProblem
+from rigdda.envs.targets import Targets
 
 EVENTS = ("small", "block", "low", "group")
 FENCE = (Fence(12.0, 2.0, energy_class=250),)

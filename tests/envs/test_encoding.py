@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from envs import encoding
-from envs.problem import DesignProblem
 from rigdda import BadInput, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall, sites
+from rigdda.envs import encoding
+from rigdda.envs.problem import DesignProblem
 
 ALL = ("fence", "ditch", "embankment", "gravity_wall", "wall", "mesh")
 PROBLEM = DesignProblem(cases.cut(), 3, ALL)

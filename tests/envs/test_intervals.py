@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from envs import estimator, intervals
-from envs.accounts import Account
-from envs.evaluation import Facts
-from envs.intervals import Known, Mean, cost, estimate, mid_p, pair, student_interval, total
+from rigdda.envs import estimator, intervals
+from rigdda.envs.accounts import Account
+from rigdda.envs.evaluation import Facts
+from rigdda.envs.intervals import Known, Mean, cost, estimate, mid_p, pair, student_interval, total
 
 
 def test_none_of_n_has_three_over_n_as_its_upper_end() -> None:

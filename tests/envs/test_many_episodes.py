@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from cases import cut
 
-from envs import reuse, untouched
-from envs.registration import ENVIRONMENTS
+from rigdda.envs import reuse, untouched
+from rigdda.envs.registration import ENVIRONMENTS
 
 EPISODES, COPIES = 1000, 8
 

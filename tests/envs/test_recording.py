@@ -11,11 +11,11 @@ from cases import cut
 from rerun.chunk import RrdReader
 
 import rigdda
-from envs import DesignProblem
-from envs.design import BarrierDesign
-from envs.placement import BarrierPlacement
 from rigdda import BadInput
 from rigdda.barriers import describe
+from rigdda.envs import DesignProblem
+from rigdda.envs.design import BarrierDesign
+from rigdda.envs.placement import BarrierPlacement
 
 CUT = cut()
 FENCE = {"kinds": ("fence",)}

@@ -11,7 +11,7 @@ import pytest
 from cases import cut
 from gymnasium.utils.env_checker import check_env
 
-from envs.registration import ENVIRONMENTS
+from rigdda.envs.registration import ENVIRONMENTS
 
 CUT = cut()
 every = pytest.mark.parametrize("name", ENVIRONMENTS)

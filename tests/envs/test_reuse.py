@@ -9,10 +9,10 @@ import msgspec
 import pytest
 
 import rigdda
-from envs import reuse, untouched
-from envs.memory import Memory, fingerprint
-from envs.samples import Sample
 from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Outcome, Site
+from rigdda.envs import reuse, untouched
+from rigdda.envs.memory import Memory, fingerprint
+from rigdda.envs.samples import Sample
 
 SEEDS = range(24)
 

@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from envs.problem import DesignProblem
 from rigdda import (
     BadInput,
     Ditch,
@@ -22,6 +21,7 @@ from rigdda import (
     Wall,
     release,
 )
+from rigdda.envs.problem import DesignProblem
 
 KINDS = ("fence", "ditch", "embankment", "gravity_wall", "wall", "mesh")
 

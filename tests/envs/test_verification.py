@@ -6,8 +6,8 @@ from collections import defaultdict
 
 import pytest
 
-from envs.problem import DesignProblem
 from rigdda import Fence, Layout
+from rigdda.envs.problem import DesignProblem
 
 TRUE, SMALL, REPEATS = 20_000, 300, 100
 

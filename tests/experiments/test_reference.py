@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from agents.bounds import on_bound
-from agents.constant import CONSTANTS
-from envs import DesignProblem
 from experiments.reference import BEST, SINGLE, layout_of
 from rigdda import sites
+from rigdda.agents.bounds import on_bound
+from rigdda.agents.constant import CONSTANTS
+from rigdda.envs import DesignProblem
 
 RECORDED = Path(__file__).parents[2] / "experiments" / "results" / "reference.csv"
 Row = dict[str, str]

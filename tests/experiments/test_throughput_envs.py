@@ -8,7 +8,7 @@ import os
 import pytest
 from click.testing import CliRunner
 
-from envs.registration import ENVIRONMENTS
+from rigdda.envs.registration import ENVIRONMENTS
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rigdda import BadInput, Site, check, release_many
 from rigdda.files import read as read_text
-from rigdda.lumped import lumped
+from rigdda.lumped_mass import lumped
 
 Floats = NDArray[np.float64]
 Model = Literal["blocks", "lumped"]

@@ -27,7 +27,7 @@ from experiments.script import (
 )
 from experiments.study import Row, tabulate
 from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Settings, Site
-from rigdda.release import release_many
+from rigdda.releases import release_many
 
 
 def benches(upper: float, lower: float) -> Layout:

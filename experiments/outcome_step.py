@@ -21,7 +21,7 @@ from rigdda.model.joints import JointSet
 from rigdda.model.place import BarrierZone, Motion, Road
 from rigdda.model.slope import Slope
 from rigdda.model.source import Source
-from rigdda.release import release_many
+from rigdda.releases import release_many
 
 RAMP = Site(
     name="ramp",

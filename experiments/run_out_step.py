@@ -21,7 +21,7 @@ from rigdda import Event, Site, Surface
 from rigdda.model.place import BarrierZone, Motion, Road
 from rigdda.model.slope import Slope
 from rigdda.model.source import Source
-from rigdda.release import release_many
+from rigdda.releases import release_many
 
 HEIGHT = 40.0
 """Height of the slope, and chainage of its toe [m]."""

@@ -25,7 +25,7 @@ from rigdda import Barrier, Embankment, Fence, GravityWall, Site
 from rigdda.agents.menu import HEIGHTS
 from rigdda.barriers import FENCE_CLASSES, describe
 from rigdda.envs.sizes import SLENDER
-from rigdda.release import release_many
+from rigdda.releases import release_many
 
 SITES = {"shu-hwa": 83.6, "quick": 23.0}
 """Sites with a mass, and where the barriers stand [m]: at the toe, and on a bench."""

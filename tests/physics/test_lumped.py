@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rigdda import BadInput, Ditch, Embankment, GravityWall, Site, Terrain, lumped
 from rigdda.dynamics.lumped import trajectories
-from rigdda.lumped import felt
+from rigdda.lumped_mass import felt
 
 G = 9.81
 

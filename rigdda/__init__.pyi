@@ -1,0 +1,87 @@
+# Names of the package by the module that defines them: `__init__.py` imports each when it is first
+# used, and type checkers read them here.
+
+from . import limit_equilibrium, sites
+from .barriers import (
+    Barrier,
+    Ditch,
+    Embankment,
+    Fence,
+    GravityWall,
+    Layout,
+    Mesh,
+    MeshOption,
+    Wall,
+)
+from .barriers.files import load_layout, save_layout
+from .dynamics.many import simulate_many
+from .dynamics.run import Run
+from .dynamics.simulation import Simulation
+from .errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
+from .lumped_mass import Points, lumped
+from .model import grounds
+from .model.block import Block
+from .model.economy import Bill, Consequences, Prices
+from .model.events import Drawn, Event
+from .model.loads import BodyForce, LineLoad, PointLoad
+from .model.scene import Scene
+from .model.settings import Settings
+from .model.site import Site
+from .model.source import Source
+from .model.supports import Bolt, FixedPoint
+from .model.surface import Surface
+from .model.terrain import Terrain
+from .releases import release, release_many, release_outcome
+from .results.barrier_outcome import BarrierOutcome
+from .results.outcome import Outcome
+
+__version__: str
+
+__all__ = [
+    "BadInput",
+    "Barrier",
+    "BarrierOutcome",
+    "Bill",
+    "Block",
+    "BodyForce",
+    "Bolt",
+    "Consequences",
+    "Ditch",
+    "Diverged",
+    "DoubtfulInput",
+    "Drawn",
+    "Embankment",
+    "Error",
+    "Event",
+    "Fence",
+    "FixedPoint",
+    "GravityWall",
+    "Layout",
+    "LineLoad",
+    "Mesh",
+    "MeshOption",
+    "Outcome",
+    "PointLoad",
+    "Points",
+    "Prices",
+    "Run",
+    "Scene",
+    "Settings",
+    "Simulation",
+    "Site",
+    "SoftContacts",
+    "Source",
+    "Surface",
+    "Terrain",
+    "Wall",
+    "grounds",
+    "limit_equilibrium",
+    "load_layout",
+    "lumped",
+    "release",
+    "release_many",
+    "release_outcome",
+    "save_layout",
+    "simulate_many",
+    "sites",
+]

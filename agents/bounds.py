@@ -6,7 +6,7 @@ from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh,
 from rigdda.agents.menu import Menu
 from rigdda.envs import DesignProblem
 from rigdda.envs.encoding import CLASSES
-from rigdda.envs.sizes import MIN_HEIGHT
+from rigdda.envs.siting import MIN_HEIGHT
 
 NEAR = 0.05
 """Distance from a bound at which a length lies on it [m]."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Literal
 
@@ -90,10 +89,8 @@ def fit(
 @count_option("--sites", 2, 512, "Random sites to train on.")
 @count_option("--episodes", 0, 49152, "Episodes.")
 @seed_option("Seed of all that is random.", SEED)
-@click.option("--processes", type=click.IntRange(1, 64), default=min(os.cpu_count() or 1, 64),
-              help="Processes that simulate.  [default: one a core]")  # fmt: skip
 @out_option("train")
-def train(sites: int, episodes: int, seed: int, processes: int, out: Path | None) -> None:
+def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
     """Train a policy that designs a layout for a site from what it sees of it, without a search.
 
     Writes policy.safetensors, which `rigdda evaluate --policy` takes, and logs for TensorBoard.
@@ -104,7 +101,7 @@ def train(sites: int, episodes: int, seed: int, processes: int, out: Path | None
     terms = training.Terms(sites, episodes, seed)
     folder = folder_for(out, "train", *training.FILES)
     with kept(folder), progress(terms.episodes) as tick:
-        trained = training.train(terms, folder, processes, lambda done: tick(done, "PPO"))
+        trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
     click.echo(
         f"share that layouts take off Z on {terms.beside} sites beside the training sites: before "
         f"{trained.before:.3f}, after {trained.after:.3f}; policy.safetensors is in {folder}"

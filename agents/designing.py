@@ -93,7 +93,7 @@ def _pose(
 ) -> DesignProblem:
     """Return the problem that was asked."""
     from rigdda.envs import DesignProblem
-    from rigdda.envs.targets import Targets
+    from rigdda.envs.problem import Targets
 
     asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None}
     if target is not None or failure is not None:

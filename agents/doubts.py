@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rigdda import BadInput, Layout, Mesh, Site
 from rigdda.barriers import KINDS
-from rigdda.envs.building import Room
+from rigdda.envs.siting import Room
 
 
 def unbuildable(site: Site, layout: Layout) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.envs.fields import FIELDS
+from rigdda.envs.observation import FIELDS
 
 NAMES = tuple(name for name in FIELDS if name not in ("layout", "spent"))
 """Arrays of an observation, in the order in which they are put together."""

@@ -13,8 +13,8 @@ from rigdda.agents import constant, rule
 from rigdda.agents.seeds import release_seeds
 from rigdda.agents.tables import empty_table, write_rows
 from rigdda.agents.wording import euros, short, span
-from rigdda.envs import DesignProblem, Evaluation, fidelity
-from rigdda.envs.evaluation import Interval
+from rigdda.envs import DesignProblem, Evaluation, problem
+from rigdda.envs.cost import Interval
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -85,7 +85,7 @@ def compare(site: Site, releases: int, seed: int, tick: Callable[[int, str], Non
     out, done = [], 0
     for name, layout in layouts(site, seed).items():
         found = {}
-        for level in fidelity.FIDELITIES:
+        for level in problem.FIDELITIES:
             tick(done, f"{level}: {name}")
             found[level] = DesignProblem(site, fidelity=level).evaluate(layout, seeds)
             done += releases

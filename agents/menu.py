@@ -17,7 +17,7 @@ from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Mesh,
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.envs import DesignProblem
 from rigdda.envs.encoding import CLASSES
-from rigdda.envs.sizes import MIN_HEIGHT, SLENDER
+from rigdda.envs.siting import MIN_HEIGHT, SLENDER
 
 Floats = NDArray[np.float64]
 

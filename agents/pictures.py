@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdda.envs import Evaluation
-from rigdda.envs.picture import GROUND, ROAD
+from rigdda.envs.rendering import GROUND, ROAD
 from rigdda.files import atomic
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from rigdda.agents.protocol import Designer, DesignResult, Ledger, Progress
 from rigdda.agents.store import Store
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import observe
-from rigdda.envs.slots import KINDS, Slots
+from rigdda.envs.site_sampling import KINDS, Slots
 
 SLOTS = Slots(KINDS, 3)
 """Barriers that a policy decides on, of any kind that a problem allows."""

@@ -151,15 +151,15 @@ class Featured(VecEnvWrapper):
         return np.stack([scaled(one, self.mean, self.scale) for one in plain])
 
 
-def pool(names: Sequence[str], fidelity: str, processes: int | None = None) -> VecEnv:
+def pool(names: Sequence[str], fidelity: str) -> VecEnv:
     """Return one copy of `BarrierDesign` for each site, of one release an episode.
 
     Every copy keeps its site, so that what is seen of it is simulated once. Releases are simulated
-    in threads over all cores, or in so many processes.
+    in threads over all cores.
     """
     copies = sb3_vec_env(
         "rigdda/BarrierDesign-v0", len(names), site=names[0], kinds=SLOTS.kinds,
-        max_barriers=SLOTS.count, releases=1, fidelity=fidelity, processes=processes,
+        max_barriers=SLOTS.count, releases=1, fidelity=fidelity,
     )  # fmt: skip
     for i, name in enumerate(names):
         copies.get_attr("venue", i)[0].settle(name)

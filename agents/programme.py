@@ -19,7 +19,7 @@ import numpy as np
 
 from rigdda import Layout
 from rigdda.agents.catalogue import Catalogue, Floats
-from rigdda.envs.building import MIN_GAP
+from rigdda.envs.siting import MIN_GAP
 
 
 @dataclass(frozen=True, slots=True)

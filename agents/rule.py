@@ -25,7 +25,7 @@ from rigdda.agents.protocol import DesignResult, Ledger, Progress
 from rigdda.agents.store import Store
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.envs import DesignProblem
-from rigdda.envs.building import MIN_HEIGHT
+from rigdda.envs.siting import MIN_HEIGHT
 
 QUANTILE = 0.95
 

@@ -23,9 +23,7 @@ from rigdda.agents.store import mechanics
 from rigdda.agents.study_file import Study
 from rigdda.agents.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from rigdda.agents.wording import euros, span, standing
-from rigdda.envs.accounts import Account, learn
-from rigdda.envs.estimator import stratified
-from rigdda.envs.evaluation import Facts
+from rigdda.envs.cost import Account, Facts, learn, stratified
 
 if TYPE_CHECKING:
     from rich.table import Table

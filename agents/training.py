@@ -25,10 +25,9 @@ from rigdda.agents.policy import SLOTS, decide
 from rigdda.agents.seeds import release_seeds
 from rigdda.agents.store import mechanics
 from rigdda.envs import DesignProblem
-from rigdda.envs.crew import Crew
 from rigdda.envs.envelope import barrier_free
 from rigdda.envs.observation import observe
-from rigdda.envs.places import pose
+from rigdda.envs.site_sampling import pose
 from rigdda.files import atomic
 
 Tick = Callable[[int], None]
@@ -90,8 +89,8 @@ class Trained:
     after: float
 
 
-def train(terms: Terms, out: Path, processes: int, tick: Tick) -> Trained:
-    """Train a policy in so many processes, or go on with a training that was stopped.
+def train(terms: Terms, out: Path, tick: Tick) -> Trained:
+    """Train a policy, or go on with a training that was stopped.
 
     Raises
     ------
@@ -104,10 +103,9 @@ def train(terms: Terms, out: Path, processes: int, tick: Tick) -> Trained:
     _same(terms, out)
     names = sites.split(SPLIT)
     pool = [problem(name) for name in names[: terms.sites]]
-    with closing(Crew(processes)) as crew:
-        barrier_free([posed.site for posed in pool], crew)
+    barrier_free([posed.site for posed in pool])
     mean, scale = scaling(np.stack([see(posed) for posed in pool]))
-    copies = ppo.Featured(ppo.pool(names[: terms.sites], FIDELITY, processes), mean, scale)
+    copies = ppo.Featured(ppo.pool(names[: terms.sites], FIDELITY), mean, scale)
     with closing(copies):
         model = ppo.learner(copies, terms.seed, out)
         notes = _notes(terms)

@@ -9,10 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rigdda.envs.comparison import Difference, compare
-from rigdda.envs.evaluation import Evaluation
-from rigdda.envs.problem import DesignProblem
+from rigdda.envs.cost import Evaluation
+from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.registration import register
-from rigdda.envs.targets import Targets
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Outcome, Site
 from rigdda.envs import ensemble
-from rigdda.envs.accounts import Account, account
-from rigdda.envs.evaluation import Facts
+from rigdda.envs.cost import Account, Facts, account
 from rigdda.envs.intervals import Known, Mean, cost
 from rigdda.envs.problem import DesignProblem
 

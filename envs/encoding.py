@@ -31,9 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Fence, Layout, Mesh
 from rigdda.barriers import FENCE_CLASSES, Built
-from rigdda.envs.building import Room
-from rigdda.envs.gaps import Span
-from rigdda.envs.sizes import MIN_HEIGHT, TOLERANCE
+from rigdda.envs.siting import MIN_HEIGHT, TOLERANCE, Room, Span
 from rigdda.model.place import BarrierZone
 
 Floats = NDArray[np.float64]

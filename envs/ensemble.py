@@ -19,12 +19,9 @@ import numpy as np
 
 import rigdda
 from rigdda import Outcome, Site
-from rigdda.envs import reuse
-from rigdda.envs.accounts import account, learn
-from rigdda.envs.estimator import judge
-from rigdda.envs.evaluation import Evaluation, Facts
-from rigdda.envs.memory import Memory
-from rigdda.envs.samples import Sample
+from rigdda.envs import outcome_cache
+from rigdda.envs.cost import Evaluation, Facts, account, judge, learn
+from rigdda.envs.outcome_cache import Memory, Sample
 from rigdda.files import atomic
 from rigdda.kernel import cache_directory
 
@@ -107,7 +104,7 @@ def _simulate(site: Site, executor: Executor | None) -> Ensemble:
 
 def _releases(site: Site, seeds: Mapping[str, range], executor: Executor | None) -> Sample:
     jobs = [(site, (), seed, name) for name, drawn in seeds.items() for seed in drawn]
-    return reuse.outcomes(jobs, executor)
+    return outcome_cache.outcomes(jobs, executor)
 
 
 def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import islice
@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Run, Simulation, Site
-from rigdda.envs.crew import Workers
-from rigdda.envs.memory import Memory, fingerprint
+from rigdda.envs.outcome_cache import Memory, fingerprint
 from rigdda.geometry import polygon_properties
 
 Floats = NDArray[np.float64]
@@ -106,10 +105,10 @@ def envelope(site: Site) -> Envelope:
     return barrier_free([site])[0]
 
 
-def barrier_free(sites: Sequence[Site], workers: Workers | None = None) -> list[Envelope]:
+def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> list[Envelope]:
     """Return the barrier-free envelope of every site; the unknown ones are simulated together.
 
-    In threads over all cores, or in `workers`.
+    In threads over all cores, or in `executor`.
 
     Raises
     ------
@@ -120,7 +119,7 @@ def barrier_free(sites: Sequence[Site], workers: Workers | None = None) -> list[
     known = memory.recall(keys)
     new = {key: site for key, site in zip(keys, sites, strict=True) if key not in known}
     jobs = {key: _jobs(site) for key, site in new.items()}
-    with nullcontext(workers) if workers else ThreadPoolExecutor() as pool:
+    with nullcontext(executor) if executor else ThreadPoolExecutor() as pool:
         transits = pool.map(_transit, [job for own in jobs.values() for job in own])
         fresh = {
             key: _summary(new[key], own, list(islice(transits, len(own))))

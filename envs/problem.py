@@ -1,24 +1,246 @@
-"""Barrier design as an optimisation problem: vectors, layouts, and what a layout is worth."""
+"""What is asked of a layout beside a low cost, and whether it meets that.
+
+Fidelity of simulations: a site as it is, or a cheaper one that stands for it.
+
+Checks of what a design problem is posed with.
+
+How the releases of an evaluation spread over the events of a site.
+
+Barrier design as an optimisation problem: vectors, layouts, and what a layout is worth.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
-from rigdda.envs import encoding, ensemble, estimator, plan, posing, reuse
-from rigdda.envs.building import Room
-from rigdda.envs.evaluation import Evaluation
-from rigdda.envs.memory import fingerprint
-from rigdda.envs.samples import Sample
-from rigdda.envs.targets import Targets
+from rigdda.barriers import KINDS as ALL_KINDS
+from rigdda.envs import cost, encoding, ensemble, outcome_cache
+from rigdda.envs.cost import Evaluation
+from rigdda.envs.intervals import Estimate
+from rigdda.envs.outcome_cache import Sample, fingerprint
+from rigdda.envs.siting import Room
 from rigdda.model.place import BarrierZone
+
+MET, MISSED, UNDECIDED = "met", "missed", "undecided"
+"""What targets are: the upper bounds of all probabilities are low enough; the lower bound of one is
+too high; there are too few releases to say."""
+
+
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """Greatest probabilities in every design event, asked of one-sided 95 % bounds.
+
+    Parameters
+    ----------
+    reach : float, optional
+        Of a block that comes onto the road.
+    failure : float, optional
+        Of a barrier that fails.
+
+    Raises
+    ------
+    BadInput
+        If one is not between 0 and 1.
+    """
+
+    reach: float | None = None
+    failure: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("reach", "failure"):
+            value = getattr(self, name)
+            if value is not None:
+                number = check.number(f"targets.{name}", value, 0.0, 1.0, open_low=True)
+                object.__setattr__(self, name, number)
+
+    def state(
+        self,
+        events: Iterable[str],
+        reach: Mapping[str, Estimate],
+        failure: Mapping[str, Estimate],
+    ) -> str | None:
+        """Return "met", "missed" or "undecided" over the design events, None if nothing is asked.
+
+        Parameters
+        ----------
+        events : iterable of str
+            The design events.
+        reach, failure : mapping of str to Estimate
+            What was seen in each event.
+        """
+        states = {
+            decide(seen[event], greatest)
+            for seen, greatest in ((reach, self.reach), (failure, self.failure))
+            if greatest is not None
+            for event in events
+        }
+        return next((state for state in (MISSED, UNDECIDED, MET) if state in states), None)
+
+
+def decide(seen: Estimate, greatest: float) -> str:
+    """Return whether a probability is at most `greatest`: "met", "missed" or "undecided"."""
+    if seen.bound <= greatest:
+        return MET
+    return MISSED if seen.floor > greatest else UNDECIDED
+
+
+FIDELITIES = ("fast", "full")
+
+COARSER = 1.5
+"""How much larger the mean area of blocks cut by joints is at fidelity "fast"; so their number
+is two thirds. With twice the area the debris on quick is too high by 5 % of the mass."""
+
+FAST_DT = 1.25e-2
+"""Time step at fidelity "fast", if the site's is shorter [s]."""
+
+
+def site_at_fidelity(site: Site, fidelity: str) -> Site:
+    """Return the site to simulate.
+
+    "full": as it is; "fast": with fewer, larger blocks of jointed masses and a longer step. Other
+    blocks stay as they are. The bias and the gain are measured by `rigdda fidelity` and told in
+    docs/fidelity.md.
+
+    Raises
+    ------
+    BadInput
+        If there is no such fidelity.
+    """
+    if check.one_of("fidelity", fidelity, FIDELITIES) == "full":
+        return site
+    replace, motion = msgspec.structs.replace, site.motion
+    sources = tuple(
+        replace(s, block_area=min(COARSER * s.block_area, s.area)) if s.polygon else s
+        for s in site.sources
+    )
+    return replace(site, sources=sources, motion=replace(motion, dt=max(motion.dt, FAST_DT)))
+
+
+MOST_BARRIERS = 100
+"""Most slots of a layout; a site has room for a few."""
+
+KINDS = ("fence", "ditch", "embankment", "gravity_wall")
+"""Kinds of barrier that are designed if none are named, and mesh where a site has options. Not the
+rigid wall, which nothing moves: it is for experiments."""
+
+
+def checked_site(site: object, cheaper: str) -> Site:
+    """Return a site at a fidelity."""
+    if isinstance(site, str | os.PathLike):
+        site = Site.load(site)
+    if not isinstance(site, Site):
+        raise BadInput("site", site, "give a name, a TOML file or a rigdda.Site")
+    return site_at_fidelity(site, cheaper)
+
+
+def checked_zone(site: Site, zone: object) -> BarrierZone:
+    """Return the zone of a site, or the part of it between two chainages."""
+    own = site.barrier_zone
+    if zone is None:
+        return own
+    start, end = check.interval("zone", zone, own.start, own.end)
+    if start == end:
+        raise BadInput("zone", zone, "give two chainages, the first one less than the other")
+    return msgspec.structs.replace(own, start=start, end=end)
+
+
+def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the kinds of barrier to choose from."""
+    if kinds is None:
+        return (*KINDS, "mesh") if site.meshes else KINDS
+    if not isinstance(kinds, Sequence) or isinstance(kinds, str):
+        raise BadInput("kinds", kinds, "give a sequence of names")
+    names = tuple(check.one_of("kinds", kind, ALL_KINDS) for kind in kinds)
+    if not names or len(set(names)) < len(names):
+        raise BadInput("kinds", kinds, "name each kind once")
+    if "mesh" in names and not site.meshes:
+        raise BadInput("kinds", kinds, f"leave mesh out: {site.name} has no options of it")
+    return names
+
+
+def checked_targets(site: Site, targets: Targets | None) -> Targets:
+    """Return what is asked of a layout: nothing by default."""
+    if targets is None:
+        return Targets()
+    if not isinstance(targets, Targets):
+        raise BadInput("targets", targets, "give envs.Targets(reach=..., failure=...)")
+    if not any(event.design for event in site.events):
+        raise BadInput("targets", targets, f"mark an event of {site.name} with design = true")
+    return targets
+
+
+def checked_seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int, ...]:
+    """Return seeds as a tuple of at least so many, all different."""
+    try:
+        drawn = tuple(check.integer(f"{name}[{i}]", seed, 0) for i, seed in enumerate(seeds))
+    except TypeError:
+        raise BadInput(name, seeds, "give a sequence of whole numbers") from None
+    if len(drawn) < least:
+        raise BadInput(name, drawn, "give at least one")
+    if len(set(drawn)) < len(drawn):
+        raise BadInput(name, drawn, "give each once: the same seed gives the same release")
+    return drawn
+
+
+def is_vector(layout: object) -> bool:
+    """Tell whether what is to be evaluated begins with a number."""
+    return isinstance(layout, Sequence) and len(layout) > 0 and isinstance(layout[0], int | float)
+
+
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+"""Points this far apart on a circle of length 1 spread evenly, however many there are."""
+
+
+def events_of_seeds(shares: Mapping[str, float], seeds: Sequence[int]) -> tuple[str, ...]:
+    """Return the event of each release; the first ones' do not depend on how many follow.
+
+    With at least two releases an event on the average, each event has one, then one more, and then
+    as many as its share asks for. With fewer, each draws its event with its share as the chance:
+    one number, drawn from the first seed, and steps of `GOLDEN` from it, so that every release
+    has the right chances and together they are spread evenly.
+
+    Parameters
+    ----------
+    shares : mapping of str to float
+        Share of each event; they add up to 1.
+    seeds : sequence of int
+        Seeds of the releases.
+    """
+    names = tuple(shares)
+    if len(seeds) >= 2 * len(names):
+        return tuple(names[i] for i in _order(tuple(shares.values()), len(seeds)))
+    edges = np.cumsum(list(shares.values()))[:-1]
+    first = np.random.default_rng([int(seeds[0]), len(names), 2**31]).random()
+    place = (first + GOLDEN * np.arange(len(seeds))) % 1.0
+    return tuple(names[i] for i in np.searchsorted(edges, place, side="right"))
+
+
+@lru_cache(maxsize=256)
+def _order(shares: tuple[float, ...], releases: int) -> tuple[int, ...]:
+    """Return the place of the event of each release."""
+    number = len(shares)
+    out = [*range(number), *range(number)]
+    counts = [2] * number
+    while len(out) < releases:
+        lacks = [
+            share * (len(out) + 1) - count for share, count in zip(shares, counts, strict=True)
+        ]
+        most = lacks.index(max(lacks))
+        counts[most] += 1
+        out.append(most)
+    return tuple(out)
+
 
 Floats = NDArray[np.float64]
 Ask = tuple[Sequence[Barrier], Mapping[str, Sequence[int]]]
@@ -29,7 +251,7 @@ class DesignProblem:
     """Which barriers to put where on a site, so that a year costs least.
 
     Z [EUR per metre of road and year] = what the barriers cost a year + expected harm on the road +
-    expected repair, see `rigdda.envs.estimator`.
+    expected repair, see `rigdda.envs.cost`.
 
     Parameters
     ----------
@@ -43,7 +265,7 @@ class DesignProblem:
     targets : Targets, optional
         What is asked of the design events beside a low cost.
     fidelity : {"full", "fast"}
-        At "fast" a cheaper site stands for it, see `rigdda.envs.fidelity`.
+        At "fast" a cheaper site stands for it, see `rigdda.envs.problem`.
     zone : (start, end), optional
         Chainages between which barriers may stand [m], inside the site's own zone; the attribute
         is that zone so narrowed.
@@ -69,13 +291,13 @@ class DesignProblem:
         fidelity: str = "full",
         zone: tuple[float, float] | None = None,
     ):
-        where = posing.site(site, fidelity)
-        limits = posing.zone(where, zone)
+        where = checked_site(site, fidelity)
+        limits = checked_zone(where, zone)
         values = {
             "site": where,
-            "max_barriers": check.integer("max_barriers", max_barriers, 1, posing.MOST_BARRIERS),
-            "kinds": posing.kinds(where, kinds),
-            "targets": posing.targets(where, targets),
+            "max_barriers": check.integer("max_barriers", max_barriers, 1, MOST_BARRIERS),
+            "kinds": checked_kinds(where, kinds),
+            "targets": checked_targets(where, targets),
             "fidelity": fidelity,
             "zone": limits,
             "place": Room(where, limits),
@@ -144,8 +366,8 @@ class DesignProblem:
         return {name: count[name] for name in self.site.event_names}
 
     def plan(self, seeds: Sequence[int]) -> tuple[str, ...]:
-        """Return the event of each release: of a part of the seeds, a part (`rigdda.envs.plan`)."""
-        return plan.events(self._known.shares, posing.seeds("seeds", seeds))
+        """Return the event of each release; a part of the seeds has a part of them."""
+        return events_of_seeds(self._known.shares, checked_seeds("seeds", seeds))
 
     @property
     def _known(self) -> ensemble.Ensemble:
@@ -174,10 +396,10 @@ class DesignProblem:
         Diverged
             If a simulation diverges.
         """
-        standing, drawn = self._standing(layout), posing.seeds("seeds", seeds)
-        pairs = zip(drawn, plan.events(self._known.shares, drawn), strict=True)
+        standing, drawn = self._standing(layout), checked_seeds("seeds", seeds)
+        pairs = zip(drawn, events_of_seeds(self._known.shares, drawn), strict=True)
         jobs = [(self.site, standing, seed, event) for seed, event in pairs]
-        return self.judge(standing, reuse.outcomes(jobs, executor), drawn)
+        return self.judge(standing, outcome_cache.outcomes(jobs, executor), drawn)
 
     def sample(
         self,
@@ -202,10 +424,10 @@ class DesignProblem:
             check.mapping("seeds", chosen, Sequence, "sequences of whole numbers")
             for event, seeds in chosen.items():
                 self.site.event(event)
-                drawn = posing.seeds(f"seeds[{event!r}]", seeds, 0)
+                drawn = checked_seeds(f"seeds[{event!r}]", seeds, 0)
                 jobs += [(self.site, standing, seed, event) for seed in drawn]
             ends.append(len(jobs))
-        return reuse.outcomes(jobs, executor).split(ends)
+        return outcome_cache.outcomes(jobs, executor).split(ends)
 
     def judge(
         self, layout: Layout, outcomes: Sequence[Outcome], seeds: Sequence[int] = ()
@@ -221,7 +443,7 @@ class DesignProblem:
             If there are no outcomes, or none of an event that happens.
         """
         known = self._known
-        found = estimator.judge(self.site, layout, outcomes, known.facts, known.shares)
+        found = cost.judge(self.site, layout, outcomes, known.facts, known.shares)
         without = known.nothing.debris
         return replace(
             found,
@@ -245,6 +467,6 @@ class DesignProblem:
 
     def _standing(self, layout: Sequence[Barrier] | ArrayLike) -> Layout:
         """Return the layout of a vector, or one that was checked."""
-        if isinstance(layout, np.ndarray) or posing.is_vector(layout):
+        if isinstance(layout, np.ndarray) or is_vector(layout):
             return self.decode(layout)  # type: ignore[arg-type]
         return self.check(layout)  # type: ignore[arg-type]  # it says what is wrong

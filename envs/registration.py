@@ -6,11 +6,11 @@ import gymnasium
 
 ENVIRONMENTS = {
     "rigdda/BarrierDesign-v0": (
-        "rigdda.envs.design:BarrierDesign",
+        "rigdda.envs.environments:BarrierDesign",
         "rigdda.envs.vector:BarrierDesignVector",
     ),
     "rigdda/BarrierPlacement-v0": (
-        "rigdda.envs.placement:BarrierPlacement",
+        "rigdda.envs.environments:BarrierPlacement",
         "rigdda.envs.vector:BarrierPlacementVector",
     ),
 }

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 from rigdda import BadInput
-from rigdda.envs.batching import stack
-from rigdda.envs.vector import BarrierVector
+from rigdda.envs.vector import BarrierVector, stacked
 
 
 class Bridge(VecEnv):
@@ -45,7 +44,7 @@ class Bridge(VecEnv):
         self._reset_seeds()
         self._reset_options()
         self.reset_infos = [info for _, info in starts]
-        return stack([seen for seen, _ in starts])
+        return stacked([seen for seen, _ in starts])
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take actions to be stepped with."""
@@ -66,7 +65,7 @@ class Bridge(VecEnv):
             rewards.append(reward)
             dones.append(start is not None)
             infos.append(info)
-        return stack(shown), np.array(rewards, dtype=np.float32), np.array(dones), infos
+        return stacked(shown), np.array(rewards, dtype=np.float32), np.array(dones), infos
 
     def close(self) -> None:
         """Release the environment."""

@@ -1,9 +1,12 @@
-"""Batched environments: copies of one environment whose releases are simulated together."""
+"""What a batch is given and gives: seeds, options and actions of all copies, and observations.
+
+Batched environments: copies of one environment whose releases are simulated together.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,14 +16,91 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from rigdda import BadInput, check
-from rigdda.envs import batching, encoding
-from rigdda.envs.base import BarrierEnv, Info, Observation, Step
-from rigdda.envs.batching import Options
-from rigdda.envs.crew import Crew
-from rigdda.envs.design import BarrierDesign
-from rigdda.envs.placement import BarrierPlacement
-from rigdda.envs.recorder import Recorder
-from rigdda.envs.trial import look_ahead, simulate
+from rigdda.envs import encoding
+from rigdda.envs.environments import (
+    BarrierDesign,
+    BarrierEnv,
+    BarrierPlacement,
+    Info,
+    Observation,
+    Step,
+    look_ahead,
+    simulate,
+)
+from rigdda.envs.rendering import Recorder
+
+MASK = "reset_mask"
+"""Option of `reset` that says which copies start anew."""
+
+Options = Mapping[str, Any] | None
+
+
+def reset_mode(given: AutoresetMode | str) -> AutoresetMode:
+    """Return the mode of a name.
+
+    Raises
+    ------
+    BadInput
+        If there is none.
+    """
+    try:
+        return AutoresetMode(given)
+    except ValueError:
+        names = ", ".join(mode.value for mode in AutoresetMode)
+        raise BadInput("autoreset_mode", given, f"choose one of {names}") from None
+
+
+def reset_mask(options: Options, copies: int) -> tuple[NDArray[np.bool_] | None, Options]:
+    """Return which copies start anew, None for all, and the other options.
+
+    Raises
+    ------
+    BadInput
+        If the option `reset_mask` is not one boolean a copy, or none is true.
+    """
+    if not isinstance(options, Mapping) or MASK not in options:  # others are checked by each copy
+        return None, options
+    chosen = np.asarray(options[MASK])
+    if chosen.shape != (copies,) or chosen.dtype != np.bool_ or not chosen.any():
+        mend = f"give {copies} booleans, one of them true at least"
+        raise BadInput(MASK, options[MASK], mend)
+    return chosen, {name: value for name, value in options.items() if name != MASK}
+
+
+def copy_seeds(seed: int | Sequence[int | None] | None, copies: int) -> list[int | None]:
+    """Return the seed of every copy, None for one that goes on with its random numbers.
+
+    Raises
+    ------
+    BadInput
+        If they are not whole numbers >= 0, one a copy.
+    """
+    if seed is None:
+        return [None] * copies
+    if isinstance(seed, int | np.integer):
+        first = check.integer("seed", seed, 0)
+        return [first + i for i in range(copies)]
+    if number_of_rows(seed) != copies:
+        raise BadInput("seed", seed, f"give one number, or {copies}, one a copy")
+    return [
+        None if one is None else check.integer(f"seed[{i}]", one, 0) for i, one in enumerate(seed)
+    ]
+
+
+def number_of_rows(values: Any) -> int | None:
+    """Return the length of what should have one entry a copy, None if it has none."""
+    try:
+        return len(values)
+    except TypeError:
+        return None
+
+
+def stacked(seen: Sequence[Any]) -> Any:
+    """Return the observations of all copies, each array with the copies as its first axis."""
+    if isinstance(seen[0], np.ndarray):
+        return np.stack(seen)
+    return {name: np.stack([one[name] for one in seen]) for name in seen[0]}
+
 
 MOST_COPIES = 100_000
 """Most copies; what is above is taken for a slip of the pen."""
@@ -32,7 +112,7 @@ Batch = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], di
 
 
 class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
-    """Copies of one environment that step together, in threads over all cores or in processes.
+    """Copies of one environment that step together, in threads over all cores.
 
     Each copy gives exactly what it would give alone: copy i of `reset(seed=s)` is the environment
     after `reset(seed=s + i)`. `reset(options={"site": ...})` is for every copy.
@@ -43,9 +123,6 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         Number of copies.
     max_episode_steps : int, optional
         Steps after which an episode is truncated, as by a TimeLimit.
-    processes : int, optional
-        Processes that simulate instead of threads. A script that asks for them guards its main
-        part with `if __name__ == "__main__"`.
     autoreset_mode : AutoresetMode or its value
         What follows the end of a copy's episode. SAME_STEP: the next begins in the same step, the
         last observation and info are `final_obs` and `final_info` of the infos. NEXT_STEP: it
@@ -69,7 +146,6 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         self,
         num_envs: int = 1,
         max_episode_steps: int | None = None,
-        processes: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         record: str | os.PathLike[str] | None = None,
         **keywords: Any,
@@ -78,9 +154,8 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         if max_episode_steps is not None:
             check.integer("max_episode_steps", max_episode_steps, 1)
         self.limit = max_episode_steps
-        self.mode = batching.mode(autoreset_mode)
+        self.mode = reset_mode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.mode}
-        self._crew = None if processes is None else Crew(processes)
         folder = None if record is None else Recorder(record).folder
         folders = [folder and folder / f"copy-{i}" for i in range(num_envs)]
         self.copies = [self.single(record=folder, **keywords) for folder in folders]
@@ -106,11 +181,11 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
 
         Options: `site` as the keyword, for these episodes; `reset_mask`: (num_envs,) booleans.
         """
-        mask, own = batching.mask(options, self.num_envs)
+        mask, own = reset_mask(options, self.num_envs)
         infos: dict[str, Any] = {}
         for i, (_, info) in self.start(seed, [own] * self.num_envs, mask).items():
             infos = self._add_info(infos, info, i)
-        return batching.stack(self._seen), infos
+        return stacked(self._seen), infos
 
     def step(self, actions: NDArray[np.float32]) -> Batch:
         """Take a step in every copy, (num_envs, width) actions."""
@@ -125,7 +200,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
             if start is not None:
                 _, info = start
             infos = self._add_info(infos, info, i)
-        return batching.stack(self._seen), rewards, terminated, truncated, infos
+        return stacked(self._seen), rewards, terminated, truncated, infos
 
     def start(
         self,
@@ -134,7 +209,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         mask: NDArray[np.bool_] | None = None,
     ) -> dict[int, Start]:
         """Start an episode in every copy, or in those of a mask; return what each says."""
-        seeds = batching.seeds(seed, self.num_envs)
+        seeds = copy_seeds(seed, self.num_envs)
         given = [None] * self.num_envs if options is None else options
         chosen = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
         if len(chosen) < self.num_envs and not self._seen:
@@ -150,7 +225,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         rows = self._checked(actions)
         resting = self._ended.copy()
         live = np.flatnonzero(~resting).tolist()
-        answers = simulate([self.copies[i].ask(rows[i]) for i in live], self._crew)
+        answers = simulate([self.copies[i].ask(rows[i]) for i in live])
         told = {i: self.copies[i].tell(a) for i, a in zip(live, answers, strict=True)}
         self._elapsed[live] += 1
         cut = self._elapsed == self.limit
@@ -164,7 +239,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
 
     def _checked(self, actions: NDArray[np.float32]) -> dict[int, NDArray[np.float64]]:
         """Return the action of every copy whose episode goes on."""
-        given = batching.rows(actions)
+        given = number_of_rows(actions)
         if given != self.num_envs:
             found = actions if given is None else f"{given} rows"
             raise BadInput("actions", found, f"give {self.num_envs} rows, one a copy")
@@ -172,9 +247,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
             raise ResetNeeded("call reset() before the first step")
         if self.mode is AutoresetMode.DISABLED and self._ended.any():
             ended = np.flatnonzero(self._ended).tolist()
-            raise ResetNeeded(
-                f"copies {ended} have ended: reset them with the option {batching.MASK}"
-            )
+            raise ResetNeeded(f"copies {ended} have ended: reset them with the option {MASK}")
         width = self.copies[0].width
         return {
             i: encoding.vector(f"actions[{i}]", row, width)
@@ -189,7 +262,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         for i in chosen:
             self.copies[i].draw(seeds[i], options[i])
         sights = [(self.copies[i].problem, self.copies[i].sights) for i in chosen]
-        looked = look_ahead(sights, self._crew)
+        looked = look_ahead(sights)
         starts = {i: self.copies[i].start(seen) for i, seen in zip(chosen, looked, strict=True)}
         self._seen = self._seen or [seen for seen, _ in starts.values()]
         for i, (seen, _) in starts.items():
@@ -197,9 +270,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         return starts
 
     def close_extras(self, **_: Any) -> None:
-        """Close every copy, and end the processes."""
-        if self._crew is not None:
-            self._crew.close()
+        """Close every copy."""
         for copy in self.copies:
             copy.close()
 

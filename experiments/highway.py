@@ -13,7 +13,7 @@ from msgspec.structs import replace as changed
 from experiments.bench.cases import RUN_OUT
 from rigdda import Run, Site, release
 from rigdda.barriers import Layout
-from rigdda.envs.picture import draw as draw_frame
+from rigdda.envs.rendering import draw as draw_frame
 from rigdda.errors import SoftContacts
 from rigdda.geometry import polygon_properties
 from rigdda.results.outcome import Outcome

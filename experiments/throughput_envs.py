@@ -1,11 +1,11 @@
 """Episodes a second of the environments, and the variance of their reward.
 
 Batches as Stable-Baselines3 steps them play 256 episodes or more (16 with --quick) of random
-actions of one release each, in threads and in as many processes as there are cores; no two batches
-share a seed, so that none finds what another has simulated. On the site quick with its groups and
+actions of one release each, in threads over all cores; no two batches share a seed, so that none
+finds what another has simulated. On the site quick with its groups and
 its jointed mass, and on it with single blocks alone. `times_before`: episodes a second of processor
 time, which other jobs disturb less, over those of 64 copies at commit 78de9db, when every episode
-was one release of the mass of quick at fidelity "fast"; not told in processes.
+was one release of the mass of quick at fidelity "fast".
 
 Variance: of the reward of one release against the site's mean of nothing, and against nothing in
 the same release as it was before; means over random layouts, and of the best of them, on quick and
@@ -27,11 +27,11 @@ import rigdda.envs
 from experiments.script import folder, options, write
 from rigdda import Layout, Site, sites
 from rigdda.envs import DesignProblem
+from rigdda.envs.environments import Ask, simulate
 from rigdda.envs.registration import ENVIRONMENTS
-from rigdda.envs.trial import Ask, simulate
 
-BATCHES = ((1, False), (8, False), (64, False), (64, True), (1, False))
-"""Copies, and whether they are simulated in processes."""
+BATCHES = (1, 8, 64, 1)
+"""Copies of each batch; one alone is measured twice."""
 
 EPISODES = 256
 
@@ -64,11 +64,9 @@ def play(env: Any, episodes: int) -> tuple[int, int]:
     return ended, steps
 
 
-def measure(
-    name: str, site: Site, copies: int, processes: int | None, episodes: int, seed: int
-) -> dict[str, Any]:
-    """Return what one batch did; in processes the first step, which starts them, counts not."""
-    env = rigdda.envs.sb3_vec_env(name, copies, site=site, releases=1, processes=processes)
+def measure(name: str, site: Site, copies: int, episodes: int, seed: int) -> dict[str, Any]:
+    """Return what one batch did."""
+    env = rigdda.envs.sb3_vec_env(name, copies, site=site, releases=1)
     env.seed(seed)
     env.action_space.seed(seed)
     env.reset()
@@ -77,32 +75,30 @@ def measure(
     ended, steps = play(env, episodes)
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
     env.close()
-    comparable = not processes and len(site.events) > 1  # before, an episode was one of a mass
+    comparable = len(site.events) > 1  # before, an episode was one of a mass
     return {
         "environment": name,
         "copies": copies,
-        "processes": processes or 0,
         "cores": os.cpu_count(),
         "episodes": ended,
         "steps": steps,
         "seconds": round(wall, 3),
         "episodes_per_second": round(ended / wall, 3),
         "steps_per_second": round(steps / wall, 3),
-        "episodes_per_processor_second": None if processes else round(ended / busy, 3),
+        "episodes_per_processor_second": round(ended / busy, 3),
         "times_before": round(ended / busy / BEFORE[name], 2) if comparable else None,
     }
 
 
 def throughput(episodes: int) -> list[dict[str, Any]]:
     """Return the rows of all batches."""
-    measure("rigdda/BarrierPlacement-v0", places()["quick"], 2, None, 4, 0)  # compiles
+    measure("rigdda/BarrierPlacement-v0", places()["quick"], 2, 4, 0)  # compiles
     rows: list[dict[str, Any]] = []
     for label, site in places().items():
         for name in ENVIRONMENTS:
-            for copies, crew in BATCHES:
-                workers = os.cpu_count() if crew else None
+            for copies in BATCHES:
                 seed = 1000 * (len(rows) + 1)
-                row = {"site": label} | measure(name, site, copies, workers, episodes, seed)
+                row = {"site": label} | measure(name, site, copies, episodes, seed)
                 rows.append(row)
                 click.echo(row)
     return rows

@@ -24,7 +24,7 @@ from experiments.study import Row, tabulate
 from rigdda import Barrier, Embankment, Fence, GravityWall, Site
 from rigdda.agents.menu import HEIGHTS
 from rigdda.barriers import FENCE_CLASSES, describe
-from rigdda.envs.sizes import SLENDER
+from rigdda.envs.siting import SLENDER
 from rigdda.releases import release_many
 
 SITES = {"shu-hwa": 83.6, "quick": 23.0}

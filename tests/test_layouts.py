@@ -194,7 +194,7 @@ def test_replays_show_every_kind(released, tmp_path):
 
 
 def test_pictures_show_every_kind(released, seed):
-    from rigdda.envs.picture import picture
+    from rigdda.envs.rendering import picture
 
     run, _ = released
     image = picture(run, (QUICK.road.start, QUICK.road.end), "all")

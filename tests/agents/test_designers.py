@@ -20,7 +20,7 @@ from rigdda.agents.starts import starts
 from rigdda.agents.verify import verify
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
-from rigdda.envs.targets import Targets
+from rigdda.envs.problem import Targets
 
 SEARCHES = ("cma", "pareto", "race", "random", "tpe")
 FIXED = ("constant", "rule")

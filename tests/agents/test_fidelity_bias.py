@@ -13,18 +13,18 @@ from rigdda import BadInput, Site
 from rigdda.agents import fidelity_bias
 from rigdda.agents.cli import main
 from rigdda.agents.seeds import release_seeds
-from rigdda.envs import DesignProblem, fidelity
+from rigdda.envs import DesignProblem, problem
 
 
 def test_fast_has_fewer_larger_blocks_and_a_longer_step() -> None:
     site = Site.load("quick")
-    fast = fidelity.at(site, "fast")
+    fast = problem.site_at_fidelity(site, "fast")
     fewer, more = (len(s.realise(seed=0, event="mass").blocks) for s in (fast, site))
-    assert fewer == pytest.approx(more / fidelity.COARSER, rel=0.25)
-    assert fast.motion.dt == max(fidelity.FAST_DT, site.motion.dt)
-    assert fidelity.at(site, "full") is site
+    assert fewer == pytest.approx(more / problem.COARSER, rel=0.25)
+    assert fast.motion.dt == max(problem.FAST_DT, site.motion.dt)
+    assert problem.site_at_fidelity(site, "full") is site
     with pytest.raises(BadInput, match="fidelity = 'coarse': choose one of fast, full"):
-        fidelity.at(site, "coarse")
+        problem.site_at_fidelity(site, "coarse")
 
 
 def test_the_bias_is_that_of_the_evaluations() -> None:

@@ -16,8 +16,7 @@ from rigdda.agents.features import NAMES, WIDTH, features
 from rigdda.agents.network import Network
 from rigdda.agents.policy import ANCHOR, SLOTS, decide
 from rigdda.envs import DesignProblem
-from rigdda.envs.fields import FIELDS
-from rigdda.envs.observation import observe
+from rigdda.envs.observation import FIELDS, observe
 
 
 def network(outputs: np.ndarray, inputs: int = WIDTH) -> Network:

@@ -18,7 +18,7 @@ from rigdda.agents.protocol import Entry
 from rigdda.agents.store import Release, Store
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
-from rigdda.envs.targets import Targets
+from rigdda.envs.problem import Targets
 
 
 def least(valley: Valley) -> float:

@@ -13,7 +13,7 @@ import rigdda.agents
 from rigdda import Fence, Layout
 from rigdda.agents.store import Release, Store
 from rigdda.envs import DesignProblem
-from rigdda.envs.targets import Targets
+from rigdda.envs.problem import Targets
 
 FENCE = (Fence(20.0, 2.0, energy_class=500),)
 PAIR = (Fence(16.2, 2.0, energy_class=100), Fence(25.0, 1.5, energy_class=250))

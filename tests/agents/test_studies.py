@@ -17,7 +17,7 @@ import rigdda
 from rigdda import Site
 from rigdda.agents import studies, study_file
 from rigdda.agents.tables import _interval, write_rows
-from rigdda.envs.estimator import stratified
+from rigdda.envs.cost import stratified
 from rigdda.envs.intervals import upper_bound
 
 EXAMPLES = Path(rigdda.__file__).parents[1] / "examples"

@@ -180,7 +180,7 @@ def test_a_training_that_is_done_is_not_done_again(
     shutil.copytree(trained[0], folder)
     before = (folder / "policy.safetensors").read_bytes()
     seen: list[int] = []
-    training.train(training.Terms(2, 16, 0), folder, 1, lambda done, *_: seen.append(done))
+    training.train(training.Terms(2, 16, 0), folder, lambda done, *_: seen.append(done))
     assert seen == [] and (folder / "policy.safetensors").read_bytes() == before
 
 

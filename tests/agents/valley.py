@@ -15,8 +15,8 @@ import rigdda
 from rigdda import Barrier, Layout, Outcome, Site
 from rigdda.agents import crossings
 from rigdda.envs import DesignProblem, Evaluation, ensemble
-from rigdda.envs.estimator import judge
-from rigdda.envs.samples import Sample
+from rigdda.envs.cost import judge
+from rigdda.envs.outcome_cache import Sample
 
 BEST, WIDE = 20.0, 4.0
 """Where a barrier catches most, and how far from there it still does [m]."""

@@ -18,7 +18,7 @@ from gymnasium.utils.env_checker import data_equivalence
 import rigdda
 from rigdda import BadInput, Fence, sites
 from rigdda.envs import DesignProblem
-from rigdda.envs.design import BarrierDesign
+from rigdda.envs.environments import BarrierDesign
 
 CUT = cut()
 TERMS: dict[str, Any] = {"max_barriers": 2, "kinds": ("fence",), "releases": 10}

@@ -15,8 +15,7 @@ from gymnasium.utils.env_checker import data_equivalence
 
 from rigdda import BadInput
 from rigdda.envs import DesignProblem
-from rigdda.envs.design import BarrierDesign
-from rigdda.envs.placement import BarrierPlacement
+from rigdda.envs.environments import BarrierDesign, BarrierPlacement
 
 CUT = cut()
 TERMS: dict[str, Any] = {"max_barriers": 3, "kinds": ("fence", "ditch"), "releases": 2}

@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import copy
-import os
 import pickle
-import subprocess
-import sys
-import time
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -21,7 +16,6 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import rigdda.envs
 from rigdda import BadInput, Site, sites
-from rigdda.envs.crew import Crew
 from rigdda.envs.registration import ENVIRONMENTS
 
 CUT = cut()
@@ -96,85 +90,6 @@ def test_a_reset_may_name_the_site_of_all_copies() -> None:
 
 
 @every
-def test_processes_give_what_threads_give(name: str) -> None:
-    """Two episodes bit for bit, and a copy of the environment has processes of its own."""
-    threads, processes = batch(name, CUT), batch(name, CUT, processes=2)
-    assert data_equivalence(threads.reset(seed=3), processes.reset(seed=3), exact=True)
-    threads.action_space.seed(1)
-    ended = np.zeros(COPIES, int)
-    while ended.min() < 2:
-        actions = threads.action_space.sample()
-        one, other = threads.step(actions), processes.step(actions)
-        assert data_equivalence(list(one), list(other), exact=True)
-        ended += one[2]
-    clone = pickle.loads(pickle.dumps(processes))
-    actions = threads.action_space.sample()
-    one, other = processes.step(actions), clone.step(actions)
-    assert data_equivalence(list(one), list(other), exact=True)
-    for env in (processes, clone):
-        env.close()
-
-
-def test_a_crew_shares_jobs_out_evenly_and_keeps_them_at_home() -> None:
-    crew = Crew(2)
-    try:
-        jobs = [(CUT, (), seed, "small") for seed in (5, 6, 7, 8)]
-        first = list(crew.map(worker, jobs))
-        assert len(set(first)) == 2 and sorted(map(first.count, set(first))) == [2, 2]
-        assert list(crew.map(worker, jobs)) == first
-        one = list(crew.map(worker, [(CUT, (), 5, "small")] * 4))
-        assert sorted(map(one.count, set(one))) == [2, 2]
-    finally:
-        crew.close()
-
-
-LEFT_ALONE = """
-from rigdda.envs.crew import Crew
-from test_batched import worker
-
-if __name__ == "__main__":
-    crew = Crew(2)  # held on to: the processes of a crew that nothing holds end with it
-    print(*crew.map(worker, [(None, (), 1), (None, (), 2)]), flush=True)
-    input()
-"""
-
-
-def test_a_crew_ends_with_what_started_it(tmp_path: Path) -> None:
-    """Even where that is killed and cannot close it."""
-    script = tmp_path / "script.py"
-    script.write_text(LEFT_ALONE)
-    folders = os.pathsep.join([str(Path(__file__).parent), *sys.path])
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    parent = subprocess.Popen(
-        [sys.executable, script], env=os.environ | {"PYTHONPATH": folders}, **pipes
-    )
-    try:
-        workers = [int(word) for word in parent.stdout.readline().split()]
-        assert len(set(workers)) == 2 and all(map(runs, workers))
-    finally:  # or what is left running fails the tests that follow
-        parent.kill()
-        parent.communicate()
-    until = time.monotonic() + 30.0
-    while any(map(runs, workers)) and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not any(map(runs, workers))
-
-
-def runs(process: int) -> bool:
-    """Return whether a process of that number runs."""
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-def worker(job: object) -> int:
-    """Return the process that a job is in."""
-    return os.getpid()
-
-
-@every
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
 def test_a_copy_goes_on_like_the_original(name: str, clone: Any) -> None:
     env = batch(name, CUT)
@@ -212,7 +127,7 @@ def test_bad_input_is_refused_and_changes_nothing() -> None:
     other.reset(seed=4)
     assert data_equivalence(list(env.step(actions)), list(other.step(actions)), exact=True)
     for keywords in (
-        {"num_envs": 0}, {"num_envs": 10**9}, {"max_episode_steps": 0}, {"processes": 0},
+        {"num_envs": 0}, {"num_envs": 10**9}, {"max_episode_steps": 0},
     ):  # fmt: skip
         with pytest.raises(BadInput, match=r"= (0|10{9}): give a whole number of at least 1"):
             gymnasium.make_vec("rigdda/BarrierDesign-v0", site=CUT, **keywords)

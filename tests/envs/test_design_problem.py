@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput, Ditch, Fence, Outcome, Site, Wall
-from rigdda.envs import compare, ensemble, plan
-from rigdda.envs.memory import Memory
-from rigdda.envs.problem import DesignProblem
-from rigdda.envs.targets import Targets
+from rigdda.envs import compare, ensemble
+from rigdda.envs.outcome_cache import Memory
+from rigdda.envs.problem import DesignProblem, Targets, events_of_seeds
 
 EVENTS = ("small", "block", "low", "group")
 FENCE = (Fence(12.0, 2.0, energy_class=250),)
@@ -113,7 +112,7 @@ def test_a_few_releases_are_unbiased_and_even() -> None:
     for releases in (1, 3, 5):
         count: Counter[str] = Counter()
         for _ in range(3000):
-            drawn = plan.events(shares, rng.integers(2**31, size=releases).tolist())
+            drawn = events_of_seeds(shares, rng.integers(2**31, size=releases).tolist())
             count.update(drawn)
             if releases == 5:
                 assert 1 <= drawn.count("a") <= 4

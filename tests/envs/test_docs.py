@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rigdda.envs.fields import BOUND, FIELDS, LOOKED
+from rigdda.envs.observation import BOUND, FIELDS, LOOKED
 
 DOCS = Path(__file__).parents[2] / "docs"
 ROW = re.compile(

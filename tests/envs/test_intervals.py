@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rigdda.envs import estimator, intervals
-from rigdda.envs.accounts import Account
-from rigdda.envs.evaluation import Facts
+from rigdda.envs import cost as costs
+from rigdda.envs import intervals
+from rigdda.envs.cost import Account, Facts
 from rigdda.envs.intervals import Known, Mean, cost, estimate, mid_p, pair, student_interval, total
 
 
@@ -131,6 +131,6 @@ def test_harm_without_a_block_on_the_road_is_rare_harm() -> None:
     harm = np.array([900.0] + [0.0] * 15)
     none, failed = np.zeros(16, dtype=bool), np.eye(1, 16, dtype=bool)[0]
     own = Account(np.full(16, "block"), harm, np.zeros(16), np.zeros(16), none, failed)
-    mean = estimator._means(own, known, 0.0)[0]
+    mean = costs._means(own, known, 0.0)[0]
     assert mean.interval == cost(harm, harm > 0.0, known.harm).interval
     assert mean.high > 3.0 * mean.value

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from cases import cut
 
-from rigdda.envs import reuse, untouched
+from rigdda.envs import outcome_cache
 from rigdda.envs.registration import ENVIRONMENTS
 
 EPISODES, COPIES = 1000, 8
@@ -31,7 +31,7 @@ def play(env: Any, episodes: int) -> None:
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_a_thousand_random_episodes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is remembered on purpose is made small, so that it is full from the start."""
-    for memory in (reuse.free, untouched.memory):
+    for memory in (outcome_cache.bare_outcomes, outcome_cache.standing_layouts):
         monkeypatch.setattr(memory, "room", 16)
     env = gymnasium.make_vec(name, num_envs=COPIES, site=cut(), releases=1)
     env.reset(seed=0)

@@ -12,10 +12,9 @@ from cases import FREE, HARMLESS, cut
 import rigdda
 from rigdda import Site, sites
 from rigdda.envs import DesignProblem
-from rigdda.envs.base import SCORED_SEEDS
 from rigdda.envs.envelope import FIRST, STATIONS, barrier_free, envelope, largest, stations
-from rigdda.envs.fields import BOUND, FIELDS
-from rigdda.envs.observation import observe, space
+from rigdda.envs.environments import SCORED_SEEDS
+from rigdda.envs.observation import BOUND, FIELDS, observe, space
 
 CUT = cut()
 SEEN_AT_SITES = 30

@@ -14,8 +14,7 @@ import rigdda
 from rigdda import BadInput
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem
-from rigdda.envs.design import BarrierDesign
-from rigdda.envs.placement import BarrierPlacement
+from rigdda.envs.environments import BarrierDesign, BarrierPlacement
 
 CUT = cut()
 FENCE = {"kinds": ("fence",)}

@@ -64,5 +64,5 @@ def test_ppo_takes_200_steps(name: str) -> None:
 
 def test_heavy_packages_are_imported_when_they_are_used() -> None:
     heavy = {"torch", "stable_baselines3", "matplotlib", "rerun"}
-    code = f"import sys, envs, envs.design; sys.exit(not {heavy!r}.isdisjoint(sys.modules))"
+    code = f"import sys, rigdda.envs.environments; sys.exit(not {heavy!r}.isdisjoint(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -1,10 +1,19 @@
-"""What may be built where on a site."""
+"""How large barriers that are designed may be.
+
+How far barriers that are designed stand from one another.
+
+What may be built where on a site.
+
+Where on a site a barrier may stand that is nearest to where it should.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,9 +30,68 @@ from rigdda import (
     check,
 )
 from rigdda.barriers import MeshOption, as_layout, earthworks
-from rigdda.envs.gaps import Span, check_gaps, room
-from rigdda.envs.sizes import SLENDER, TOLERANCE, limits
 from rigdda.model.place import BarrierZone
+
+MIN_HEIGHT = 0.5
+"""Least height of a barrier that is designed, and depth of a ditch [m]."""
+
+SLENDER = 0.4
+"""Least thickness over height of a gravity wall [-]: it stands by its weight, also in the wind and
+on ground that gives."""
+
+TOLERANCE = 1e-9
+"""Rounding that is forgiven at limits: share of the limit, and of 1 [m]."""
+
+
+def limits(zone: BarrierZone, barrier: Barrier) -> dict[str, tuple[float, float]]:
+    """Return the fields of a barrier that the zone limits, with least and greatest value [m]."""
+    if isinstance(barrier, Ditch):
+        return {"depth": (0.0, zone.max_depth), "width": (zone.min_width, zone.max_width)}
+    own: dict[str, tuple[float, float]] = {"height": (0.0, zone.max_height)}
+    if isinstance(barrier, Embankment):
+        return own | {"width": (zone.min_thickness, zone.max_thickness)}
+    if isinstance(barrier, Fence):
+        return own
+    return own | {"thickness": (zone.min_thickness, zone.max_thickness)}
+
+
+Span = tuple[float, float]
+
+MIN_GAP = 0.5
+"""Least distance between the works of two barriers [m]."""
+
+
+def room(barrier: Barrier, works: Span) -> Span:
+    """Return the chainages that a barrier needs: its works, and where a fence gives way to [m]."""
+    start, end = works
+    gives = barrier.elongation if isinstance(barrier, Fence) else None
+    return start, end + (gives or 0.0)
+
+
+def meet(one: Span, two: Span) -> bool:
+    """Tell whether two barriers are nearer than `MIN_GAP`."""
+    return one[0] < two[1] + MIN_GAP - TOLERANCE and two[0] < one[1] + MIN_GAP - TOLERANCE
+
+
+def check_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> None:
+    """Check that no two barriers meet.
+
+    Parameters
+    ----------
+    rooms : sequence of (str, Barrier, (start, end))
+        What messages call each, each, and the room that it needs [m].
+
+    Raises
+    ------
+    BadInput
+        If two do.
+    """
+    ordered = sorted(rooms, key=lambda item: item[2])
+    for (_, before, one), (where, barrier, two) in pairwise(ordered):
+        if meet(one, two):
+            mend = f"put it {MIN_GAP:g} m beyond {one[1]:g}, up to where the {before.words} needs"
+            raise BadInput(f"{where}.x", barrier.x, mend)
+
 
 Floats = NDArray[np.float64]
 
@@ -241,3 +309,109 @@ class Rules:
         friction = min(self.site.surfaces[name].friction_deg for name in names)
         steepest = float(np.degrees(np.arctan2(rise, run)).max())
         return steepest, min(STEEPEST["gravity_wall"], friction)
+
+
+MIN_FLOOR = 1.0
+"""Least width of the floor of a ditch that is designed [m]: a machine empties it, and what falls
+into a notch stops it up."""
+
+STEP = 0.25
+"""Distance of the places that are looked at for a barrier that does not fit [m]."""
+
+NEAR_ZERO = 1e-3
+"""Flatter ground than this is not looked at for its inclination [-]."""
+
+
+class Room(Rules):
+    """Where there is room for barriers: the rules of what may be built, and places that obey them.
+
+    Parameters as of `Rules`.
+    """
+
+    def mesh(self, option: int) -> Mesh:
+        """Return an option of the site's meshes, in the middle of the rock that it holds."""
+        low, high = self.held(self.site.meshes[option])
+        return Mesh(0.5 * (low + high), self.site.meshes[option].name)
+
+    def put(self, barrier: Barrier, x: float) -> Barrier | None:
+        """Return a barrier moved to `x`; a ditch with the sides that it needs there.
+
+        It is as deep as these sides allow; None if that is less than `MIN_HEIGHT`. A gravity wall
+        is as thick as its height needs, as high as the greatest thickness allows.
+        """
+        if isinstance(barrier, GravityWall):
+            tall = min(barrier.height, self.zone.max_thickness / SLENDER)
+            thick = max(barrier.thickness, SLENDER * tall)
+            return msgspec.structs.replace(barrier, x=x, height=tall, thickness=thick)
+        if not isinstance(barrier, Ditch):
+            return msgspec.structs.replace(barrier, x=x)
+        end = x + barrier.width
+        high, low = self.level(np.array([x, end])).tolist()
+        side = self.site.ditch_side(x, barrier.width)
+        deepest = 0.5 * ((barrier.width - MIN_FLOOR) / side - abs(high - low))
+        depth = min(barrier.depth, deepest)
+        if depth < MIN_HEIGHT - TOLERANCE:
+            return None
+        return msgspec.structs.replace(barrier, x=x, depth=depth, side_slope=side)
+
+    def nearest(self, barrier: Barrier, taken: Sequence[Span]) -> tuple[Barrier, Span] | None:
+        """Return a barrier moved as little as need be to where it may stand, and its works.
+
+        Parameters
+        ----------
+        barrier : Barrier
+            Where and what it should be.
+        taken : sequence of (start, end)
+            The room of what stands already [m].
+
+        Returns
+        -------
+        (Barrier, (start, end)) or None
+            None if there is none every `STEP`.
+        """
+        found = self._try(barrier, barrier.x, taken)
+        if found is not None:
+            return found
+        for x in self._places(self.put(barrier, barrier.x) or barrier, taken):
+            found = self._try(barrier, x, taken)
+            if found is not None:
+                return found
+        return None
+
+    def _try(
+        self, barrier: Barrier, x: float, taken: Sequence[Span]
+    ) -> tuple[Barrier, Span] | None:
+        there = self.put(barrier, x)
+        if there is None:
+            return None
+        span = room(there, self.works(there))
+        if any(meet(span, other) for other in taken):
+            return None
+        try:
+            self.check("barrier", there)
+        except BadInput:
+            return None
+        return there, span
+
+    def _places(self, barrier: Barrier, taken: Sequence[Span]) -> list[float]:
+        """Return where it may stand as far as is seen without building it, the nearest first."""
+        length = barrier.extent
+        give = room(barrier, (0.0, length))[1]  # with what it needs downhill
+        last = self.site.road.start - give if isinstance(barrier, Fence) else math.inf
+        ends = [(low, min(high - length, last)) for low, high in self.parts]
+        ends = [(low, high) for low, high in ends if low <= high]
+        if not ends:
+            return []
+        edges = [x for pair in ends for x in pair] + self._x.tolist()
+        edges += [x for low, high in taken for x in (low - MIN_GAP - give, high + MIN_GAP)]
+        x = np.concatenate([*(np.arange(low, high, STEP) for low, high in ends), edges])
+        x = x[np.any([(x >= low) & (x <= high) for low, high in ends], axis=0)]
+        steepest = STEEPEST.get(barrier.kind)
+        if steepest is not None:
+            rise = np.abs(self.level(x) - self.level(x + length))
+            x = x[rise <= length * math.tan(math.radians(steepest)) + NEAR_ZERO]
+            if not isinstance(barrier, Embankment):  # whose works end farther down
+                x = x[self.beside(x, x + length, steepest) >= MACHINE - TOLERANCE]
+        for low, high in taken:
+            x = x[(x >= high + MIN_GAP - TOLERANCE) | (x + give <= low - MIN_GAP + TOLERANCE)]
+        return x[np.argsort(np.abs(x - barrier.x), kind="stable")].tolist()

@@ -1,4 +1,8 @@
-"""From releases to the cost of a year and its parts, with intervals.
+"""What a layout is worth on some releases: its cost a year and the parts of it, with intervals.
+
+What releases of a layout cost, one by one, and what those of an event tell of it.
+
+From releases to the cost of a year and its parts, with intervals.
 
     Z = sum_b capital_b (annuity + upkeep_b) + sum_k rate_k E[harm_k + repair_k]
 
@@ -11,20 +15,189 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Layout, Outcome, Site
 from rigdda.barriers.fence import PANEL
-from rigdda.envs.accounts import Account, account
-from rigdda.envs.evaluation import Evaluation, Facts
-from rigdda.envs.intervals import Estimate, Known, Mean, cost, estimate, pair, total
+from rigdda.envs.intervals import Estimate, Interval, Known, Mean, cost, estimate, pair, total
 from rigdda.model.economy import capitals
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """What a layout is worth on some releases.
+
+    Parameters
+    ----------
+    layout : tuple of Barrier
+        The barriers.
+    seeds : tuple of int
+        Seed of each release, in the order of `outcomes`; empty where they are not kept.
+    objective, ci : float, (float, float)
+        Z and its 95 % interval [EUR per metre of road and year]. Of fewer than two releases an
+        event, it and what is told of harm and debris may be negative, see `rigdda.envs.cost`.
+    capital, harm, repair : float
+        The parts of Z: what the barriers cost a year, what rock on the road costs, what mending and
+        emptying the barriers costs.
+    harm_ci, repair_ci : (float, float)
+        Their 95 % intervals.
+    cost : float
+        Price of the layout [EUR per metre of road].
+    debris, debris_ci : float, (float, float)
+        Expected volume that comes onto the road [m3 per metre of road and year].
+    debris_share : float
+        The same over what comes onto it without barriers [-]; 0 where nothing does.
+    reach, failure : dict of str to Estimate
+        For each event the probability that a block comes onto the road, and that a barrier fails.
+    by_event : dict of str to float
+        What each event adds to Z, harm and repair [EUR per metre of road and year].
+    targets : {"met", "missed", "undecided"} or None
+        Whether the layout meets what is asked of it; None if nothing is.
+    outcomes : tuple of Outcome
+        One for each release; empty where they are not kept.
+    releases, simulated : int
+        Releases that it rests on, and how many of these were simulated for it; what the others
+        give was known. The latter is not compared.
+    seconds : float
+        Processor time of the simulations [s]; not compared.
+    """
+
+    layout: Layout
+    seeds: tuple[int, ...]
+    objective: float
+    ci: Interval
+    capital: float
+    harm: float
+    harm_ci: Interval
+    repair: float
+    repair_ci: Interval
+    cost: float
+    debris: float
+    debris_ci: Interval
+    debris_share: float
+    reach: dict[str, Estimate]
+    failure: dict[str, Estimate]
+    by_event: dict[str, float]
+    targets: str | None
+    outcomes: tuple[Outcome, ...]
+    releases: int
+    simulated: int = field(default=0, compare=False)
+    seconds: float = field(default=0.0, compare=False)
+
+    @property
+    def typical(self) -> tuple[int, str]:
+        """Seed and event of a release that stands for the others.
+
+        Of the event that adds most to Z the one that brings nearly the event's mean volume onto the
+        road, the first of equals.
+
+        Raises
+        ------
+        BadInput
+            If the evaluation was made without its seeds, or its outcomes are not kept.
+        """
+        if not self.outcomes or len(self.seeds) != len(self.outcomes):
+            raise BadInput("seeds", self.seeds, "evaluate with the seeds of the releases")
+        seen = {outcome.event for outcome in self.outcomes}
+        event = max(seen, key=lambda name: (self.by_event[name], name))
+        own = [i for i, outcome in enumerate(self.outcomes) if outcome.event == event]
+        volume = np.array([self.outcomes[i].road_volume for i in own])
+        return self.seeds[own[int(np.argmin(np.abs(volume - volume.mean())))]], event
+
+    def gain(self, nothing: Evaluation) -> float:
+        """Return the fall of Z over Z of nothing, see `DesignProblem.reward`."""
+        if nothing.objective > 0.0:
+            return (nothing.objective - self.objective) / nothing.objective
+        if self.objective > 0.0:
+            return -1.0
+        return 1.0 - self.debris_share if nothing.debris else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What is known of an event from releases without barriers.
+
+    Parameters
+    ----------
+    releases, reached : int
+        How many there were, and in how many a block came onto the road.
+    harm, volume : Known
+        Harm [EUR] and volume [m3] where one did; where none ever did, of all that is released.
+    blocks : float
+        Mean number of blocks.
+    """
+
+    releases: int
+    reached: int
+    harm: Known
+    volume: Known
+    blocks: float
+
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """What each of some releases of one layout costs, in arrays (n,)."""
+
+    event: NDArray[np.str_]
+    harm: Floats
+    repair: Floats
+    volume: Floats
+    reached: Bools
+    failed: Bools
+
+    def of(self, which: Bools) -> Account:
+        """Return the account of some of the releases."""
+        return Account(
+            self.event[which],
+            self.harm[which],
+            self.repair[which],
+            self.volume[which],
+            self.reached[which],
+            self.failed[which],
+        )
+
+
+def account(site: Site, layout: Layout, outcomes: Sequence[Outcome]) -> Account:
+    """Return what each release costs."""
+    bills = [site.bill(layout, outcome) for outcome in outcomes]
+    return Account(
+        event=np.array([outcome.event for outcome in outcomes]),
+        harm=np.array([bill.harm for bill in bills]),
+        repair=np.array([bill.repair for bill in bills]),
+        volume=np.array([outcome.road_volume for outcome in outcomes]),
+        reached=np.array([outcome.reached for outcome in outcomes], dtype=bool),
+        failed=np.array([any(b.failed for b in o.barriers) for o in outcomes], dtype=bool),
+    )
+
+
+def learn(site: Site, own: Account, released: Floats, blocks: float) -> Facts:
+    """Return what some releases of an event tell of it.
+
+    If none came onto the road it is as if all rock had come: none of n is not never.
+
+    Parameters
+    ----------
+    own : Account
+        What they cost.
+    released : (n,) array
+        Volume that each released [m3].
+    blocks : float
+        Mean number of blocks.
+    """
+    harm, volume = own.harm[own.reached], own.volume[own.reached]
+    if not len(harm):
+        volume = released
+        harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
+    count = len(own.harm), int(own.reached.sum())
+    return Facts(*count, Known.of(harm), Known.of(volume), blocks)
+
 
 REPAIR_VARIATION = 0.2
 """Coefficient of variation of what the repair of a failed barrier costs [-]: widths of events

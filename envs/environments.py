@@ -1,15 +1,22 @@
-"""What all environments share: an episode, in halves around each simulation.
+"""Trials: what environments ask to be simulated, all of a batch at once.
+
+What all environments share: an episode, in halves around each simulation.
 
 `draw` and `ask` say what an episode is about and what to simulate, `start` and `tell` take what
 that gave. So one environment simulates its own releases and a batched one those of all copies
 together.
+
+The environment in which a whole layout is designed in one step.
+
+The environment in which barriers are placed one by one.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from concurrent.futures import Executor
+from typing import Any, ClassVar, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -18,14 +25,102 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 import rigdda
-from rigdda import BadInput, Run, check
-from rigdda.envs import encoding, observation
-from rigdda.envs.evaluation import Evaluation
-from rigdda.envs.picture import picture
-from rigdda.envs.places import Place, Venue
-from rigdda.envs.recorder import Recorder, Shown, Trigger
-from rigdda.envs.reuse import Sample
-from rigdda.envs.trial import Answer, Ask, look_ahead, plain, simulate
+from rigdda import BadInput, Layout, Outcome, Run, check
+from rigdda.envs import encoding, observation, outcome_cache
+from rigdda.envs.cost import Evaluation
+from rigdda.envs.envelope import FIRST, barrier_free
+from rigdda.envs.outcome_cache import Sample
+from rigdda.envs.problem import DesignProblem
+from rigdda.envs.rendering import Recorder, Shown, Trigger, picture
+from rigdda.envs.site_sampling import Place, Venue
+
+
+class Ask(NamedTuple):
+    """A layout to evaluate on the releases of `seeds`, and to look at in `looks` of every event."""
+
+    problem: DesignProblem
+    layout: Layout
+    seeds: tuple[int, ...]
+    looks: int
+
+
+class Answer(NamedTuple):
+    """What an ask gave.
+
+    `evaluation`: of the releases of the seeds, None without seeds. `looked`: outcomes of others,
+    that are never scored, the same for all layouts of a site.
+    """
+
+    evaluation: Evaluation | None
+    looked: Sample
+
+
+def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> list[Answer | None]:
+    """Simulate every ask, their releases together over all cores, or in `executor`.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `DesignProblem.evaluate` does.
+    """
+    jobs: list[outcome_cache.Job] = []
+    ends = [0]
+    for ask in asks:
+        if ask is not None:
+            events = ask.problem.plan(ask.seeds) if ask.seeds else ()
+            drawn = [*zip(ask.seeds, events, strict=True), *_looks(ask)]
+            jobs += [(ask.problem.site, ask.layout, seed, event) for seed, event in drawn]
+            ends += [len(jobs) - len(drawn) + len(ask.seeds), len(jobs)]
+    parts = iter(outcome_cache.outcomes(jobs, executor).split(ends))
+    return [None if ask is None else _answer(ask, next(parts), next(parts)) for ask in asks]
+
+
+def _looks(ask: Ask) -> list[tuple[int, str]]:
+    """Return seed and event of the releases in which a layout is looked at."""
+    seeds = range(FIRST, FIRST + ask.looks)
+    return [(seed, name) for name in ask.problem.site.event_names for seed in seeds]
+
+
+def _answer(ask: Ask, scored: Sample, looked: Sample) -> Answer:
+    judged = ask.problem.judge(ask.layout, scored, ask.seeds) if ask.seeds else None
+    return Answer(judged, looked)
+
+
+def look_ahead(
+    sights: Sequence[tuple[DesignProblem, int]], executor: Executor | None = None
+) -> list[Sample]:
+    """Look at the sites of new episodes, all together: at their envelopes, and in releases.
+
+    Parameters
+    ----------
+    sights : sequence of (DesignProblem, int)
+        Of each episode its problem, and the releases of every event to look at without barriers.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    barrier_free([problem.site for problem, _ in sights], executor)
+    answers = simulate([Ask(problem, (), (), looks) for problem, looks in sights], executor)
+    return [answer.looked for answer in answers if answer is not None]
+
+
+def plain(outcomes: Sequence[Outcome]) -> tuple[dict[str, Any], ...]:
+    """Return what outcomes say of the road and of the barriers, as plain numbers."""
+    return tuple(
+        {
+            "event": outcome.event,
+            "reached": outcome.reached,
+            "road_volume": outcome.road_volume,
+            "released_volume": outcome.released_volume,
+            "debris_fraction": outcome.debris_fraction,
+            "max_energy_on_road": outcome.max_energy_on_road,
+            "failed": sum(barrier.failed for barrier in outcome.barriers),
+        }
+        for outcome in outcomes
+    )
+
 
 Action = NDArray[np.floating[Any]]
 Observation = dict[str, NDArray[np.float32]] | NDArray[np.float32]
@@ -241,3 +336,112 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
     def _record(self, recorder: Recorder) -> None:
         """Write the replay of the episode that has ended."""
         raise NotImplementedError
+
+
+class BarrierDesign(BarrierEnv):
+    """Design all barriers of a site at once: an episode is one step.
+
+    Action
+        Box(-1, 1, (size,), float32): for each barrier presence (above 0), station, height, size
+        or class, then one score for each kind if there are several, as `DesignProblem.decode`
+        reads them; size is 4 max_barriers for one kind, else (4 + kinds) max_barriers.
+    Observation
+        Dict of 1-D float32 arrays, see `rigdda.envs.observation`, or these as one array if `flat`.
+        It depends on the site and on what stands, not on the episode's releases.
+    Reward
+        (Z of nothing - Z of the layout) / Z of nothing, a float. Z of nothing is the site's cached
+        mean, Z of the layout that of the episode's releases.
+    Termination
+        After one step. Truncated by a TimeLimit only.
+    Info
+        At reset without barriers, at step with the layout: `site` (name), `layout` (tuple of
+        Barrier), `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
+        (floats), `outcomes`: plain numbers of each release, none at reset.
+    Randomness
+        `reset` draws the seeds of the episode's releases and, if there is a choice, the site;
+        `reset(seed=...)` fixes all that follows.
+
+    Parameters
+    ----------
+    site : str, path or Site
+        As `DesignProblem` takes it; "train", "validation" or "test": another site of the split in
+        every episode; "random" is "train". `reset(options={"site": ...})` takes the same.
+    max_barriers, kinds, fidelity
+        See `DesignProblem`. Where every episode draws its site, all kinds by default; mesh is
+        not offered where a site has none.
+    releases : int
+        Random releases over which an episode averages.
+    flat : bool
+        Whether observations are one array.
+    record : path, optional
+        Folder for a replay of each episode: the release that stands for the others.
+    record_trigger : callable, optional
+        Whether to record an episode, by its number from 0; None: every one.
+    render_mode : {"rgb_array"}, optional
+        Pictures of the end of that release.
+
+    Raises
+    ------
+    BadInput
+        If a keyword is unsound or, in `step`, the action.
+    """
+
+    looks = False
+
+    @property
+    def width(self) -> int:
+        """Numbers in an action."""
+        return self.slots.size
+
+    def _record(self, recorder: Recorder) -> None:
+        recorder.write(self._episode, self.shown, self._stages, self._rewards)
+
+
+class BarrierPlacement(BarrierEnv):
+    """Place one barrier a step, seeing what came down before: up to `max_barriers` steps.
+
+    Action
+        Box(-1, 1, (width,), float32): one slot, as `DesignProblem.decode` reads it: presence,
+        station, height, size or class, then one score for each kind if there are several. What
+        stands is what `BarrierDesign` would build of all the episode's actions: what stands stays
+        where it is, a barrier that may not stand where the action says goes to the nearest
+        place where it may.
+    Observation
+        Dict of 1-D float32 arrays, see `rigdda.envs.observation`: that of `BarrierDesign`, and what
+        the barriers that stand take and let past. It depends on the site and on what stands, not on
+        the episode's releases.
+    Reward
+        The fall of Z that the step caused over Z of nothing, a float. Every step is scored on the
+        same releases, those of the episode, so that its rewards add up to
+        (Z of nothing - Z of the layout) / Z of nothing.
+    Termination
+        When a step adds no barrier or the last slot is used. Truncated by a TimeLimit only.
+    Info
+        As of `BarrierDesign`, for what stands.
+    Randomness
+        `reset` draws the seeds of the episode's releases and, if there is a choice, the site;
+        `reset(seed=...)` fixes all that follows.
+
+    Parameters
+    ----------
+    site, max_barriers, kinds, releases, fidelity, flat, record_trigger, render_mode
+        See `BarrierDesign`.
+    record : path, optional
+        Folder for a replay of each episode: the release that stands for the others in the end,
+        after each placement.
+
+    Raises
+    ------
+    BadInput
+        If a keyword is unsound or, in `step`, the action.
+    """
+
+    looks = True
+
+    @property
+    def width(self) -> int:
+        """Numbers in an action."""
+        return self.slots.width
+
+    def _record(self, recorder: Recorder) -> None:
+        recorder.write_placements(self._episode, self.shown, self._stages, self._rewards)

@@ -1,0 +1,397 @@
+"""Memory of what was simulated: the latest results of this process, shared by its threads.
+
+Outcomes of releases with what it took to simulate them.
+
+Outcomes of layouts that no block of a release comes near: they follow from those without.
+
+A block that came to rest uphill of a barrier counts as held by it where it lies below the line that
+rises from the top of the barrier, see `rigdda.Outcome`. Where it lies is known of a single block.
+
+Outcomes of releases, many at once; what need not be simulated again is not.
+
+A release without barriers whose blocks never come to where a layout stands is that of the layout,
+too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import time
+from collections import OrderedDict
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from threading import Lock
+from typing import Generic, NamedTuple, TypeVar
+
+import msgspec
+import numpy as np
+
+import rigdda
+from rigdda import (
+    BarrierOutcome,
+    Ditch,
+    Embankment,
+    Fence,
+    GravityWall,
+    Layout,
+    Mesh,
+    Outcome,
+    Site,
+)
+from rigdda.barriers import Built, Earthwork, earthworks
+from rigdda.model.roughness import REACH
+from rigdda.model.settings import EARTH
+
+K = TypeVar("K", bound=Hashable)
+V = TypeVar("V")
+
+
+def fingerprint(site: Site) -> bytes:
+    """Return a key for a site: a hash of the whole of it as JSON, in which numbers are exact."""
+    return hashlib.sha256(msgspec.json.encode(site)).digest()[:16]
+
+
+class Memory(Generic[K, V]):
+    """Values by key, the latest `room` of them.
+
+    Parameters
+    ----------
+    room : int
+        How many values are kept.
+    """
+
+    def __init__(self, room: int):
+        self.room = room
+        self._kept: OrderedDict[K, V] = OrderedDict()
+        self._lock = Lock()
+
+    def recall(self, keys: Iterable[K]) -> dict[K, V]:
+        """Return the known ones of some keys with their values."""
+        known = {}
+        with self._lock:
+            for key in keys:
+                if key in self._kept:
+                    self._kept.move_to_end(key)
+                    known[key] = self._kept[key]
+        return known
+
+    def remember(self, values: Mapping[K, V]) -> None:
+        """Keep values by key and forget the oldest beyond `room`."""
+        with self._lock:
+            self._kept.update(values)
+            while len(self._kept) > self.room:
+                self._kept.popitem(last=False)
+
+
+class Sample(tuple[Outcome, ...]):
+    """Outcomes of releases, and what they took.
+
+    Attributes
+    ----------
+    ran : tuple of bool
+        Whether each was simulated; of equal releases one was.
+    seconds : float
+        Processor time of the simulations [s].
+    """
+
+    ran: tuple[bool, ...]
+    seconds: float
+
+    def __new__(
+        cls, outcomes: Iterable[Outcome] = (), ran: Sequence[bool] = (), seconds: float = 0.0
+    ) -> Sample:
+        """Make one; without `ran` nothing was simulated."""
+        made = super().__new__(cls, outcomes)
+        made.ran = tuple(ran) if ran else (False,) * len(made)
+        made.seconds = seconds
+        return made
+
+    def __getnewargs__(self) -> tuple[tuple[Outcome, ...], tuple[bool, ...], float]:
+        """Return what makes it anew."""
+        return tuple(self), self.ran, self.seconds
+
+    def __add__(self, other: object) -> Sample:
+        """Return both, one after the other."""
+        if not isinstance(other, Sample):
+            return NotImplemented
+        both = (*self, *other), (*self.ran, *other.ran)
+        return Sample(*both, self.seconds + other.seconds)
+
+    @property
+    def simulated(self) -> int:
+        """How many were simulated."""
+        return sum(self.ran)
+
+    def split(self, ends: Sequence[int]) -> list[Sample]:
+        """Return the parts between ends, the time shared out by what was simulated."""
+        each = self.seconds / max(self.simulated, 1)
+        parts = [(self[a:b], self.ran[a:b]) for a, b in pairwise(ends)]
+        return [Sample(outcomes, ran, each * sum(ran)) for outcomes, ran in parts]
+
+
+MARGIN = 0.1
+"""Distance from a barrier beyond which blocks are sure not to touch it, at ends of steps [m]."""
+
+LARGEST = 1.5
+"""Upper bound of the radius of a block over the root of its area [-]."""
+
+UNIT = 1.0
+"""Width of an event for which resistances are kept [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """A barrier of a layout where it stands.
+
+    Parameters
+    ----------
+    start, end : float
+        Chainages between which blocks may touch it that do so within a step and go back [m]: the
+        reach of a release is taken at the ends of steps.
+    face, top : float
+        Where the line begins below which it holds what lies uphill [m]; -inf of what holds nothing
+        there.
+    bears : float
+        Thrust that it bears in an event of `UNIT` width, without scatter of friction [N/m].
+    """
+
+    start: float
+    end: float
+    face: float
+    top: float
+    bears: float
+
+
+standing_layouts: Memory[tuple[bytes, tuple[Built, ...]], tuple[Standing, ...]] = Memory(1 << 12)
+"""What stands of a layout on a site."""
+
+
+def misses(site: Site, key: bytes, layout: tuple[Built, ...], outcome: Outcome) -> bool:
+    """Tell whether the blocks of a release stay clear of a layout.
+
+    Parameters
+    ----------
+    site, key : Site, bytes
+        The site and its `fingerprint`.
+    layout : tuple of Built
+        What stands.
+    outcome : Outcome
+        Of the release, with or without the layout.
+    """
+    low, high = outcome.reach
+    stands = _standing(site, key, layout) if layout else ()
+    return all(high < b.start or low > b.end for b in stands)
+
+
+def inferred_outcome(
+    site: Site, key: bytes, layout: tuple[Built, ...], without: Outcome
+) -> Outcome | None:
+    """Return the outcome of a layout that follows from one without barriers.
+
+    None if it does not, or is not known without simulating it; see `misses`.
+    """
+    if not layout:
+        return without
+    if not misses(site, key, layout, without):
+        return None
+    stands = _standing(site, key, layout)
+    holds = [_holds(site, barrier, without) for barrier in stands]
+    if None in holds or (site.friction_varies and not _known_to_bear(layout)):
+        return None
+    share = 1.0 if any(holds) else 0.0
+    return replace(
+        without,
+        held_fraction=share * without.slope_fraction,
+        slope_fraction=(1.0 - share) * without.slope_fraction,
+        barriers=tuple(
+            _idle(barrier.for_width(without.width), barrier, there, bool(held))
+            for barrier, there, held in zip(layout, stands, holds, strict=True)
+        ),
+    )
+
+
+def _holds(site: Site, barrier: Standing, without: Outcome) -> bool | None:
+    """Tell whether a barrier holds a block that came to rest uphill of it; None if in doubt."""
+    low, high = without.reach
+    if without.slope_fraction == 0.0 or low > barrier.face or barrier.face == -math.inf:
+        return False
+    rise = math.tan(math.radians(min(s.friction_deg for s in site.surfaces.values())))
+    points, at = site.profile.points, without.run_out
+    alone = at[0] == at[2] and without.slope_fraction == 1.0
+    inner = points[(points[:, 0] > low) & (points[:, 0] < high), 0]
+    x = np.array([at[0]] if alone else [low, *inner, high])
+    over = barrier.top + rise * (barrier.face - x) - np.interp(x, *points.T)
+    if site.pit_spacing > 0.0:
+        return None  # it may lie in a pit
+    if not site.friction_varies and (over <= 0.0).all():
+        return False
+    radius = LARGEST * math.sqrt(without.released_volume / without.width)
+    if not site.friction_varies and alone and over[0] > 2.0 * radius:
+        return True
+    return None
+
+
+def _known_to_bear(layout: Sequence[Built]) -> bool:
+    """Tell whether what a layout bears does not depend on friction."""
+    return all(isinstance(barrier, Fence | Ditch) for barrier in layout)
+
+
+def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[Standing, ...]:
+    """Return what stands of a layout."""
+    known = standing_layouts.recall([(key, layout)]).get((key, layout))
+    if known is None:
+        drawn = site.draw(0, site.event_names[0])
+        built = site.built(layout, UNIT)
+        usual = drawn._replace(
+            blocks=drawn.blocks[:1], friction_deg=0.0, strengths=(), roughness=None
+        )
+        scene = site.scene(usual, built)
+        _, moved = earthworks(site.profile, layout, site.soil)
+        known = tuple(
+            _stands(site, barrier, moved.get(barrier), scene.resistance(i))
+            for i, barrier in enumerate(layout)
+        )
+        standing_layouts.remember({(key, layout): known})
+    return known
+
+
+def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) -> Standing:
+    """Return where a barrier stands, with the corners of the earth moved for it."""
+    if moved is None:
+        assert not isinstance(barrier, Earthwork)
+        moved = barrier.outline(site.profile)
+    (start, _), (end, top) = moved.min(axis=0).tolist(), moved.max(axis=0).tolist()
+    face = start
+    if isinstance(barrier, Embankment):
+        face += barrier.side_slope * barrier.height
+    face = -math.inf if isinstance(barrier, Ditch) else face
+    # half of what a corner moves in a step that has all the energy of a fall from the top: its
+    # speed is at most twice that of the fall
+    drop = float(np.ptp(site.profile.points[:, 1]))
+    near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop) + REACH * site.pit_spacing
+    return Standing(start - near, end + near, face, top, bears)
+
+
+def _idle(built: Built, barrier: Built, there: Standing, holds: bool) -> BarrierOutcome:
+    """Return what happens to a barrier that no block comes near."""
+    bears = there.bears
+    if isinstance(built, Fence):
+        bears = built.braking_force
+    elif isinstance(built, GravityWall | Embankment):
+        unit = barrier.for_width(UNIT)
+        assert isinstance(unit, GravityWall | Embankment)
+        bears *= built.density / unit.density
+    return BarrierOutcome(
+        hits=0,
+        max_energy=0.0,
+        total_energy=0.0,
+        absorbed_energy=0.0,
+        impact_heights=(),
+        overtopped=0,
+        failed=False,
+        caught=1.0 if holds else 0.0,
+        state="stands",
+        displacement=0.0,
+        road_area=0.0,
+        thrust=0.0,
+        resistance=bears,
+        left_height=0.0 if isinstance(built, Ditch) else built.height,
+    )
+
+
+Job = tuple[Site, Layout, int, str]
+"""A site, what stands on it, the seed of a release and the name of its event."""
+
+
+class Key(NamedTuple):
+    """A release: on which site, with what but mesh, and which one."""
+
+    site: bytes
+    layout: tuple[Built, ...]
+    seed: int
+    event: str
+
+
+bare_outcomes: Memory[Key, Outcome] = Memory(1 << 16)
+"""Outcomes without barriers, about 1 kB each."""
+
+
+def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
+    """Return the outcome of every job; equal jobs are simulated once.
+
+    Parameters
+    ----------
+    jobs : sequence of (Site, Layout, int, str)
+        Releases.
+    executor : Executor, optional
+        Where to simulate; None: in threads over all cores.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `rigdda.release` does.
+    """
+    prints = {id(site): fingerprint(site) for site, *_ in jobs}
+    keys = [
+        Key(prints[id(site)], tuple(b for b in layout if not isinstance(b, Mesh)), seed, event)
+        for site, layout, seed, event in jobs
+    ]
+    known = _recall(keys, jobs)
+    new = {key: job for key, job in zip(keys, jobs, strict=True) if key not in known}
+    found, seconds = _simulate(list(new.values()), executor)
+    fresh = dict(zip(new, found, strict=True))
+    _remember(fresh, new)
+    known |= fresh
+    ran = []
+    for key in keys:
+        ran.append(key in new)
+        new.pop(key, None)
+    return Sample([known[key] for key in keys], ran, seconds)
+
+
+def _simulate(jobs: list[Job], executor: Executor | None) -> tuple[list[Outcome], float]:
+    """Return outcomes and the processor time that they took [s]."""
+    if executor is not None:
+        timed = list(executor.map(_timed, jobs))
+        return [outcome for outcome, _ in timed], sum(seconds for _, seconds in timed)
+    start = time.process_time()
+    found = rigdda.release_many(jobs) if jobs else []
+    return found, time.process_time() - start
+
+
+def _timed(job: Job) -> tuple[Outcome, float]:
+    """Return an outcome and its processor time; at module level, for process pools to find it."""
+    start = time.process_time()
+    (outcome,) = rigdda.release_many([job])
+    return outcome, time.process_time() - start
+
+
+def _recall(keys: Sequence[Key], jobs: Sequence[Job]) -> dict[Key, Outcome]:
+    """Return the outcomes that follow from what was simulated before."""
+    sites = {key.site: job[0] for key, job in zip(keys, jobs, strict=True)}
+    wanted = set(keys)
+    bare = bare_outcomes.recall({key._replace(layout=()) for key in wanted})
+    known: dict[Key, Outcome] = {}
+    for key in wanted:
+        without = bare.get(key._replace(layout=()))
+        if without is not None:
+            found = inferred_outcome(sites[key.site], key.site, key.layout, without)
+            if found is not None:
+                known[key] = found
+    return known
+
+
+def _remember(fresh: Mapping[Key, Outcome], jobs: Mapping[Key, Job]) -> None:
+    """Keep what later releases may follow from."""
+    bare = {}
+    for key, outcome in fresh.items():
+        # a wall that moved before may be struck where it did not stand
+        struck = any(barrier.hits for barrier in outcome.barriers)
+        if not struck and misses(jobs[key][0], key.site, key.layout, outcome):
+            lies = outcome.slope_fraction + outcome.held_fraction
+            alone = replace(outcome, barriers=(), held_fraction=0.0, slope_fraction=lies)
+            bare[key._replace(layout=())] = alone
+    bare_outcomes.remember(bare)

@@ -1,20 +1,18 @@
-"""Designers of barrier layouts and the command line.
+"""Designers of barrier layouts, the command line, studies, fits and reports.
 
-Each designer is a module with `design(problem, simulations, seed=0, progress=None, store=None)`
-that returns a `DesignResult`; `rigdda.agents.NAME` imports it when it is first used.
+`rigdda.agents.NAME` imports the designer of that name when it is first used.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
 from types import ModuleType
 
-from rigdda.agents.names import DESIGNERS
+from rigdda.agents.designers import DESIGNERS, module
 
 __all__ = ["DESIGNERS"]
 
 
 def __getattr__(name: str) -> ModuleType:
     if name in DESIGNERS:
-        return import_module(f"rigdda.agents.{name}")
-    raise AttributeError(f"module 'agents' has no attribute {name!r}")
+        return module(name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigdda import BadInput
-from rigdda.agents.tables import applies_not, empty_table, write_rows
+from rigdda.agents.reports.tables import applies_not, empty_table, write_rows
 from rigdda.validation import CASES, Case, Convergence, Result, converge, evaluate
 from rigdda.validation.convergence import STEPS
 from rigdda.validation.flight import CASES as FLIGHT

@@ -1,6 +1,6 @@
 """The command line: `rigdda sites | simulate | design | study | train | evaluate | ...`.
 
-Start-up imports click only; a command imports what it needs.
+A command imports what it needs when it runs, so that help is there at once.
 """
 
 from __future__ import annotations
@@ -11,13 +11,32 @@ import sys
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from rigdda.agents.commands import evaluate, fit, study, train, validate
-from rigdda.agents.designing import design
-from rigdda.agents.options import count_option, layout_option, out_option, read_layout, seed_option
-from rigdda.agents.terminal import Stopped, fail, folder_for, kept, note, once, progress, show
+from rigdda.agents.designers import DEFAULT, DESIGNERS
+from rigdda.agents.limits import SEED
+from rigdda.agents.terminal import (
+    Stopped,
+    count_option,
+    fail,
+    folder_for,
+    kept,
+    layout_option,
+    note,
+    once,
+    out_option,
+    progress,
+    read_layout,
+    seed_option,
+    show,
+)
+
+if TYPE_CHECKING:
+    from rigdda.agents.design_study import Study
+    from rigdda.agents.designers.store import Store
+    from rigdda.envs import DesignProblem
 
 BAD_PATH = (
     FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError, PermissionError,
@@ -72,15 +91,11 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (design, fit, study, train, evaluate, validate):
-    cli.add_command(command)
-
-
 @cli.command()
 def sites() -> None:
     """List the built-in sites: families, events with their rates, where barriers may stand."""
     import rigdda
-    from rigdda.agents import tables
+    from rigdda.agents.reports import tables
 
     show(tables.sites(map(rigdda.Site.load, rigdda.sites.names())))
 
@@ -111,7 +126,8 @@ def simulate(
     of the block just before it touches; a barrier absorbs what its forces take from all blocks.
     """
     import rigdda
-    from rigdda.agents import doubts, job, section, tables
+    from rigdda.agents import jobs
+    from rigdda.agents.reports import findings, pictures, tables
 
     where, barriers = rigdda.Site.load(site), read_layout(layout)
     seeds = range(seed, seed + releases)
@@ -120,19 +136,19 @@ def simulate(
         folder = folder_for(out, f"simulate-{where.name}", "points.csv")
         tables.write_points(folder / "points.csv", seeds, points)
         show(tables.points(points))
-        note(doubts.unfitted(where))
-        note(doubts.of_layout(where, barriers, event))
+        note(findings.unfitted(where))
+        note(findings.of_layout(where, barriers, event))
         click.echo(f"{releases} releases of points; points.csv is in {folder}")
         return
     where.realise(barriers, seed, event)  # what cannot be built is said before a folder is made
     folder = folder_for(out, f"simulate-{where.name}", "outcomes.csv", "run.npz", "section.png")
     with kept(folder), progress(releases) as tick:
-        run, outcomes = job.simulate(where, barriers, seeds, event, tick)
+        run, outcomes = jobs.simulate(where, barriers, seeds, event, tick)
         tables.write_outcomes(folder / "outcomes.csv", seeds, outcomes)
         run.save(folder / "run.npz")
-        section.released(folder / "section.png", where, barriers, seeds, event)
+        pictures.released(folder / "section.png", where, barriers, seeds, event)
     show(tables.outcomes(barriers, outcomes))
-    note(doubts.of_layout(where, barriers, event))
+    note(findings.of_layout(where, barriers, event))
     click.echo(f"{releases} releases; outcomes.csv, run.npz and section.png are in {folder}")
 
 
@@ -147,15 +163,15 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
     Compares Z and the processor time of a release, for no barrier, the constant and what the
     engineering rule builds. Writes fidelity.csv.
     """
-    from rigdda.agents import fidelity_bias as job
+    from rigdda.agents import fidelity_bias
     from rigdda.envs import DesignProblem
 
     where = DesignProblem(site).site
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
     with kept(folder), progress(6 * releases) as tick:
-        found = job.compare(where, releases, seed, tick)
-    job.write(folder / "fidelity.csv", where, found)
-    show(job.table(found))
+        found = fidelity_bias.compare(where, releases, seed, tick)
+    fidelity_bias.write(folder / "fidelity.csv", where, found)
+    show(fidelity_bias.table(found))
     click.echo(f"{releases} releases of each; fidelity.csv is in {folder}")
 
 
@@ -171,8 +187,8 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     For a site, writes episode.rrd and prints its path; for a run, FILE.rrd beside it.
     """
     import rigdda
-    from rigdda.agents import doubts
-    from rigdda.agents.wording import short, standing
+    from rigdda.agents.reports import findings
+    from rigdda.agents.reports.wording import short, standing
     from rigdda.results.marks import Marks
     from rigdda.results.viewer import open_viewer
 
@@ -193,11 +209,306 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
         run, outcome = rigdda.release(where, barriers, seed, event)
     came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
     notes = {"event": outcome.event, "seed": str(seed), "comes onto the road": came}
-    if words := doubts.of_layout(where, barriers, event):
+    if words := findings.of_layout(where, barriers, event):
         notes["doubt"] = words
     road, labels = (where.road.start, where.road.end), tuple(map(short, standing(barriers)))
     run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels))
     click.echo(folder / "episode.rrd")
+
+
+BUDGET = 20_000
+"""Default budget of a search: about a minute for a built-in site on two cores."""
+
+RELEASES = 3_000
+"""Default number of releases that each layout is verified on: Z to some per cent."""
+
+CASES = 4
+"""Layouts that are verified: nothing, the rule's, the constant, the found one."""
+
+Kinds = tuple[str, ...] | None
+
+
+def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
+    """Return the names in a list with commas or spaces between them."""
+    return None if value is None else tuple(value.replace(",", " ").split())
+
+
+@cli.command()
+@click.argument("site")
+@click.option("--designer", type=click.Choice(DESIGNERS), default=DEFAULT, show_default=True,
+              help="How to search.")  # fmt: skip
+@click.option("--kinds", callback=_kinds, metavar="KIND,...",
+              help="Kinds to choose from: fence, ditch, embankment, gravity_wall, mesh, wall.  "
+              "[default: all but wall]")  # fmt: skip
+@click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Meet this: P that a block of a design event reaches the road.")  # fmt: skip
+@click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Meet this: P that a barrier fails in a design event.")  # fmt: skip
+@click.option("--zone", type=float, nargs=2, metavar="A B",
+              help="Barriers may stand from A to B [m].  [default: the site's]")  # fmt: skip
+@count_option("--budget", 2, BUDGET, "Releases that the search may simulate.")
+@count_option("--verify", 10, RELEASES, "Unseen releases that each layout is verified on.")
+@seed_option("Seed of the search and of its releases.", SEED)
+@out_option("design-SITE")
+def design(
+    site: str,
+    designer: str,
+    kinds: Kinds,
+    target: float | None,
+    failure: float | None,
+    zone: tuple[float, float] | None,
+    budget: int,
+    verify: int,
+    seed: int,
+    out: Path | None,
+) -> None:
+    """Design the barriers of SITE (a name or a TOML file) and verify them on unseen releases.
+
+    Least Z: capital and upkeep, harm on the road, and repair, in EUR per metre of road and year.
+    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. Layouts that a
+    killed or former run has evaluated are in evaluations.jsonl and are not simulated again; a
+    folder that holds a design of another problem (problem.json) is refused.
+    """
+    from rigdda.agents import jobs
+    from rigdda.agents.designers.store import FILE, claim
+    from rigdda.agents.reports.folder import FILES, write
+
+    problem = _pose(site, kinds, target, failure, zone)
+    folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
+    claim(folder, problem, *FILES)
+    with kept(folder):
+        with progress(budget + CASES * verify) as tick:
+            done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
+            tick(budget + CASES * verify, "pictures")
+            write(done, folder, seed)
+    _tell(done, store, verify, folder)
+
+
+def _pose(
+    site: str,
+    kinds: Kinds,
+    target: float | None,
+    failure: float | None,
+    zone: tuple[float, float] | None,
+) -> DesignProblem:
+    """Return the problem that was asked."""
+    from rigdda.envs import DesignProblem
+    from rigdda.envs.problem import Targets
+
+    asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None}
+    if target is not None or failure is not None:
+        asked["targets"] = Targets(target, failure)
+    return DesignProblem(site, **asked)
+
+
+def _tell(done: Study, store: Store, verify: int, folder: Path) -> None:
+    """Print the tables, the layout to order, what limits it, and what it took."""
+    from rigdda.agents.reports import findings, tables
+    from rigdda.agents.reports.folder import FILES
+    from rigdda.agents.reports.wording import order
+
+    chosen, result = done.chosen.evaluation, done.result
+    click.echo(
+        "Z and its parts in EUR per metre of road and year; to build in EUR per metre;\n"
+        "rule: UNI 11211-4; debris: of what comes onto the road without barriers"
+    )
+    show(tables.costs(done))
+    chances = tables.chances(done)
+    if chances is not None:
+        click.echo("chances in each design event, with their 95 % upper bounds")
+        show(chances)
+    else:
+        click.echo("no design events: the site names none (design = true)")
+    from_start = " (what the search began with)" if result.origin == "start" else ""
+    click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
+    for barrier in chosen.layout:
+        click.echo(f"  {order(barrier, done.problem.site)}")
+    cases = [(case.name, case.evaluation) for case in done.cases]
+    lines = [findings.limits(result, cases, done.left)]
+    lines += [
+        *findings.cheaper(cases),
+        *findings.failing(done.problem.site, chosen),
+        findings.undecided(done.problem, chosen),
+    ]
+    for line in filter(None, lines):
+        click.echo(line)
+    resumed = f"; {store.resumed:,} taken from a former run" if store.resumed else ""
+    click.echo(
+        f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
+        f"verification: {verify:,} unseen ones each{resumed}\n"
+        f"{', '.join(FILES)} are in {folder}"
+    )
+
+
+@cli.command()
+@click.argument("file", metavar="STUDY.toml")
+@seed_option("Seed of the first release; the others follow it.")
+@out_option("study-NAME")
+def study(file: str, seed: int, out: Path | None) -> None:
+    """Simulate every layout of STUDY.toml in the same releases: one row each in study.csv.
+
+    The file names a `site`, how many `releases` of each event, and `layouts`: tables with a `name`
+    and either `barriers`, as in a layout file, or the `file` that holds them. A study that was
+    killed goes on from its study.csv.
+    """
+    from rigdda.agents import studies
+    from rigdda.agents.reports import findings
+
+    asked = studies.load(file)
+    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
+    with kept(folder), progress(asked.size) as tick:
+        resumed = studies.run(asked, seed, folder / "study.csv", tick)
+    click.echo("Z and its parts in EUR per metre of road and year; to build in EUR per metre")
+    show(studies.table(asked, folder / "study.csv"))
+    for name, layout in asked.layouts.items():
+        if words := findings.unbuildable(asked.site, layout):
+            note(f"the layout {name!r} {words}")
+    words = f", {resumed} taken from a former run" if resumed else ""
+    click.echo(f"{asked.size:,} releases{words}; study.csv is in {folder}")
+
+
+@cli.command()
+@click.argument("site")
+@click.argument("observed", type=click.Path(dir_okay=False, path_type=Path))
+@click.option("--parameters", "names", multiple=True, required=True, metavar="PATH[=LOW:HIGH]",
+              help="A number of the site file to fit, such as surfaces.soil.restitution; repeat "
+              "it, four at most are wise.")  # fmt: skip
+@click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
+              show_default=True, help="What computes run-outs.")  # fmt: skip
+@count_option("--budget", 8, 160, "Sets of values that are computed.")
+@count_option("--releases", 10, 150, "Releases of each event with each set.")
+@seed_option("Seed of the search and of the first release.", SEED)
+@out_option("fit-SITE")
+def fit(
+    site: str,
+    observed: Path,
+    names: tuple[str, ...],
+    model: Literal["blocks", "lumped"],
+    budget: int,
+    releases: int,
+    seed: int,
+    out: Path | None,
+) -> None:
+    """Fit numbers of SITE (a name or a TOML file) to run-outs in OBSERVED, a CSV file.
+
+    Its columns are event and run_out_m, the chainage at which the block stopped. Prints the fitted
+    numbers with 95 % intervals, or "not identified" where the interval is nearly as long as the
+    range that was given, and what they predict of runs that were left out. Writes site.toml (SITE
+    with them), fit.csv and fit.png.
+    """
+    import rigdda
+    from rigdda.agents import fit as job
+    from rigdda.agents.reports import tables
+
+    where = rigdda.Site.load(site)
+    seen, parameters = job.read(observed, where), [job.parse(name) for name in names]
+    folder = folder_for(out, f"fit-{where.name}", "site.toml", "fit.csv", "fit.png")
+    with kept(folder), progress(budget) as tick:
+        found = job.fit(where, seen, parameters, budget, releases, seed, tick, model)
+        found.site.save(folder / "site.toml")
+        job.write(folder / "fit.csv", found, seen)
+        job.draw(folder / "fit.png", found, seen)
+    show(tables.fit(job.rows(found, seen)))
+    click.echo(f"up to {budget} sets of values; site.toml, fit.csv and fit.png are in {folder}")
+
+
+@cli.command()
+@count_option("--sites", 2, 512, "Random sites to train on.")
+@count_option("--episodes", 0, 49152, "Episodes.")
+@seed_option("Seed of all that is random.", SEED)
+@out_option("train")
+def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
+    """Train a policy that designs a layout for a site from what it sees of it, without a search.
+
+    Writes policy.safetensors, which `rigdda evaluate --policy` takes, and logs for TensorBoard.
+    A training that was killed goes on where it stopped. Needs the extra rl.
+    """
+    from rigdda.agents import training
+
+    terms = training.Terms(sites, episodes, seed)
+    folder = folder_for(out, "train", *training.FILES)
+    with kept(folder), progress(terms.episodes) as tick:
+        trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
+    click.echo(
+        f"share that layouts take off Z on {terms.beside} sites beside the training sites: before "
+        f"{trained.before:.3f}, after {trained.after:.3f}; policy.safetensors is in {folder}"
+    )
+
+
+@cli.command()
+@click.option("--designer", "names", type=click.Choice(DESIGNERS), multiple=True,
+              default=("rule", "race"), show_default=True,
+              help="What to try beside constant and random; repeatable.")  # fmt: skip
+@click.option("--policy", type=click.Path(), help="What `train` wrote, to be tried as well.")
+@click.option("--split", type=click.Choice(("train", "validation", "test")), default="test",
+              show_default=True, help="Sites to learn from, to choose by, or unseen.")  # fmt: skip
+@count_option("--budget", 2, 3_000, "Releases that each designer may simulate on a site.")
+@count_option("--sites", 1, 6, "Sites of the split; six are one of each family.")
+@count_option("--verify", 10, 2_000, "Unseen releases that each layout is verified on.")
+@seed_option("Seed of the searches and of their releases.", SEED)
+@out_option("evaluate")
+def evaluate(
+    names: tuple[str, ...],
+    policy: str | None,
+    split: str,
+    budget: int,
+    sites: int,
+    verify: int,
+    seed: int,
+    out: Path | None,
+) -> None:
+    """Try designers on generated sites: how far each is behind the best, in EUR a year.
+
+    Prints means over the sites with 95 % intervals; writes scores.csv. Layouts that a killed or
+    former run has evaluated are not simulated again.
+    """
+    from rigdda.agents import contest, designers
+    from rigdda.agents.designers.store import Store
+    from rigdda.agents.policy import load, using
+    from rigdda.agents.reports import tables
+
+    tried = dict.fromkeys(("constant", "random", *names))
+    entrants = {name: designers.module(name).design for name in tried}
+    if policy is not None:
+        entrants["policy"] = using(load(policy))
+    posed = contest.pose(split, sites)
+    folder = folder_for(out, "evaluate", "evaluations.jsonl", "scores.csv")
+    store = Store(folder / "evaluations.jsonl")
+    with kept(folder), progress(len(posed) * len(entrants)) as tick:
+        scores = contest.hold(posed, entrants, budget, verify, seed, store, tick)
+    tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
+    click.echo("EUR per metre of road and year; best: of these designers on each site")
+    show(contest.table(scores))
+    resumed = f", {store.resumed:,} releases taken from a former run" if store.resumed else ""
+    click.echo(f"{len(posed)} sites of {split}, verified on {verify:,} releases each{resumed}; "
+               f"scores.csv is in {folder}")  # fmt: skip
+
+
+@cli.command()
+@click.option("--only", multiple=True, metavar="NAME",
+              help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
+@click.option("--slow", is_flag=True, help="Run the cases that take long as well.")
+@seed_option("Seed of the random shapes, speeds and offsets.")
+@out_option("validate")
+def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path | None) -> None:
+    """Compare computed motions with closed forms, and the observed order of convergence.
+
+    Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
+    last column of the table is processor time per simulated time, in microseconds a second.
+    """
+    from rigdda.agents import accuracy
+
+    cases = accuracy.choose(only, slow)
+    folder = folder_for(out, "validate", "validate.csv", "convergence.csv")
+    with kept(folder), progress(accuracy.runs(cases)) as tick:
+        results, studies = accuracy.validate(cases, seed, folder, tick)
+    show(accuracy.table(results))
+    if studies:
+        show(accuracy.convergence_table(studies))
+    missed = [f"{r.case} ({r.check.quantity})" for r in results if not r.passed]
+    if missed:
+        raise Stopped(f"{len(missed)} of {len(results)} miss their bars: {', '.join(missed)}", 1)
+    click.echo(f"{len(results)} figures within their bars; the tables are in {folder}")
 
 
 if __name__ == "__main__":

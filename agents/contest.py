@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdda import check, sites
-from rigdda.agents.protocol import Designer
-from rigdda.agents.store import Store
-from rigdda.agents.tables import empty_table
-from rigdda.agents.verify import verify
-from rigdda.agents.wording import euros, percent, span
+from rigdda.agents.designers.protocol import Designer, verify
+from rigdda.agents.designers.store import Store
+from rigdda.agents.reports.tables import empty_table
+from rigdda.agents.reports.wording import euros, percent, span
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.intervals import student_interval
 

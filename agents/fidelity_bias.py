@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigdda import Layout, Site
-from rigdda.agents import constant, rule
-from rigdda.agents.seeds import release_seeds
-from rigdda.agents.tables import empty_table, write_rows
-from rigdda.agents.wording import euros, short, span
+from rigdda.agents.designers import constant, rule
+from rigdda.agents.designers.protocol import release_seeds
+from rigdda.agents.reports.tables import empty_table, write_rows
+from rigdda.agents.reports.wording import euros, short, span
 from rigdda.envs import DesignProblem, Evaluation, problem
 from rigdda.envs.cost import Interval
 

@@ -1,32 +1,320 @@
-"""Fit a site to run-outs that were observed there: which numbers of its file explain them best.
-
-Computed run-outs are a sample of what the site may do, an observed one is a single draw of what it
-did. The two are compared by the continuous ranked probability score (Gneiting and Raftery 2007),
-the mean distance of observed from computed ones less half of their own mean distance [m]. It is
-least in expectation for the distribution that the observed run-outs came from.
-
-About half of the budget, a power of two, is spread over the box of parameters (Sobol), the rest
-follows CMA-ES from the best of them; all releases have the same seeds. The best ones are computed
-again on fresh seeds, to choose without luck. Intervals and the cross-validation choose among all
-that were computed, by resampled or left-out observed runs. CMA-ES was led by all runs, so that the
-validation is a little too good; what it chooses is computed again on fresh seeds, too.
-"""
+"""Fit a site to observed run-outs: which numbers of its file explain them best."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
+import cma
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import qmc
 
-from rigdda import BadInput, Site
-from rigdda.agents.fit_trials import Candidate, Compute, Trials, explore
-from rigdda.agents.parameters import Parameter, check_parameters, with_values
-from rigdda.agents.prediction import Quality, quality
-from rigdda.agents.run_outs import Model, run_outs
+from rigdda import BadInput, Site, check, release_many
+from rigdda.agents.reports.tables import write_rows
+from rigdda.files import read as read_text
+from rigdda.lumped_mass import lumped
+from rigdda.model.place import Rebound
+
+RANGES = {
+    "scatter.friction_deg": (0.0, 10.0),
+    "friction_deg": (15.0, 65.0),
+    "restitution": (0.0, 0.8),
+    "damping": (0.0, 3.0),
+    "friction_sd_deg": (0.0, 10.0),
+    "restitution_sd": (0.0, 0.2),
+    "damping_sd": (0.0, 1.0),
+    "roughness": (0.0, 0.2),
+    "normal": (0.0, 0.8),
+    "tangential": (0.4, 1.0),
+}
+"""Limits of a parameter that comes without, by its path or by the last name of that."""
+
+
+class Parameter(NamedTuple):
+    """A number of a site file that is fitted, such as `surfaces.soil.restitution`."""
+
+    path: str
+    low: float
+    high: float
+
+
+def parse(text: str) -> Parameter:
+    """Return a parameter written as PATH or PATH=LOW:HIGH.
+
+    Raises
+    ------
+    BadInput
+        If it is written otherwise, or has no limits and no usual ones.
+    """
+    path, given, limits = text.partition("=")
+    if not given:
+        usual = RANGES.get(path, RANGES.get(path.rpartition(".")[2]))
+        if usual is None:
+            raise BadInput("--parameters", text, f"give limits: {path}=LOW:HIGH")
+        return Parameter(path, *usual)
+    found = re.fullmatch(r"([^:]+):([^:]+)", limits)
+    try:
+        low, high = map(float, found.groups() if found else ())
+    except ValueError:
+        raise BadInput("--parameters", text, f"write {path}=LOW:HIGH") from None
+    if not -math.inf < low < high < math.inf:
+        raise BadInput("--parameters", text, f"write {path}=LOW:HIGH, LOW below HIGH")
+    return Parameter(path, low, high)
+
+
+TELLING = {"blocks": ("surfaces", "motion", "scatter"), "lumped": ("lumped", "scatter")}
+"""Tables of a site file whose numbers the run-outs of a model depend on."""
+
+
+def check_parameters(parameters: Sequence[Parameter], model: str) -> None:
+    """Check that the run-outs of a model can tell parameters, each named once.
+
+    Raises
+    ------
+    BadInput
+        If not.
+    """
+    for i, parameter in enumerate(parameters):
+        if parameter.path in (other.path for other in parameters[:i]):
+            raise BadInput("--parameters", parameter.path, "name each number once")
+        if parameter.path.partition(".")[0] not in TELLING[model]:
+            known = ", ".join(f"{name}.*" for name in TELLING[model])
+            mend = f"run-outs of the model {model} tell nothing of it: choose from {known}"
+            raise BadInput("--parameters", parameter.path, mend)
+
+
+def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[float]) -> Site:
+    """Return a site with other values of some numbers.
+
+    Raises
+    ------
+    BadInput
+        If there is no such number, or the site is not sound with the value.
+    """
+    tables = msgspec.to_builtins(site)
+    for parameter, value in zip(parameters, values, strict=True):
+        *tops, last = parameter.path.split(".")
+        table: Any = tables
+        for top in tops:
+            if top in site.surfaces and table is tables.get("lumped"):
+                table.setdefault(top, {})
+            table = table.get(top) if isinstance(table, dict) else None
+        own = Rebound.__struct_fields__ if tops[:1] == ["lumped"] else ()
+        known = isinstance(table, dict) and (last in table or last in own)
+        if not known or isinstance(table.get(last, 0.0), str | dict | list | tuple | bool):
+            mend = "name a number of the site file, such as surfaces.soil.restitution"
+            raise BadInput("--parameters", parameter.path, mend)
+        table[last] = float(value)
+    try:
+        return msgspec.convert(tables, Site)
+    except msgspec.ValidationError as error:
+        bad = error.__cause__
+        if not isinstance(bad, BadInput):
+            raise BadInput("--parameters", parameters[0].path, str(error)) from None
+        given = [p.path for p, value in zip(parameters, values, strict=True) if value == bad.value]
+        where = next((name for name in given if name.endswith(f".{bad.field}")), bad.field)
+        raise BadInput(where, bad.value, bad.mend) from None
+
 
 Floats = NDArray[np.float64]
+Model = Literal["blocks", "lumped"]
+
+
+def read(path: Path, site: Site) -> dict[str, Floats]:
+    """Return the observed run-outs [m], as chainages of the site, of each event.
+
+    Raises
+    ------
+    BadInput
+        If the file is no table with `run_out_m` and, where the site has several, `event`, or a
+        run-out is beyond the road, where computed ones are cut.
+    """
+    if not path.is_file():
+        raise BadInput("observed", str(path), "name a CSV file with event and run_out_m")
+    found: dict[str, list[float]] = {}
+    only = site.event_names[0] if len(site.events) == 1 else ""
+    for field, row in _rows(path, only):
+        event = row.get("event") or only
+        if event not in site.event_names:
+            raise BadInput(f"{field} event", event, "choose " + " or ".join(site.event_names))
+        found.setdefault(event, []).append(_run_out(f"{field} run_out_m", row["run_out_m"], site))
+    if sum(map(len, found.values())) < 3:
+        raise BadInput("observed", str(path), "give three observed runs or more")
+    return {event: np.array(values) for event, values in found.items()}
+
+
+def _rows(path: Path, only: str) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield what to call each row of a table, and its cells; `only` is the only event, if so."""
+    table = csv.reader(io.StringIO(read_text("observed", path), newline=""))
+    try:
+        names, *rows = [row for row in table if any(row)] or [[]]
+    except csv.Error as error:
+        raise BadInput("observed", str(path), f"mend its line {table.line_num}: {error}") from None
+    if "run_out_m" not in names or not ("event" in names or only):
+        mend = "head its columns event and run_out_m"
+        raise BadInput("observed", ", ".join(names), mend)
+    if len(set(names)) < len(names):
+        raise BadInput("observed", ", ".join(names), "head each column with a name of its own")
+    for i, row in enumerate(rows):
+        if len(row) != len(names):
+            mend = f"give {len(names)} cells, one a heading; a number has a decimal point"
+            raise BadInput(f"observed row {i + 1}", ",".join(row), mend)
+        yield f"observed row {i + 1}", dict(zip(names, row, strict=True))
+
+
+def _run_out(field: str, text: str, site: Site) -> float:
+    """Return the run-out of a row of observations [m]."""
+    try:
+        value = float(text if "_" not in text else "")  # Python takes 4_0 for 40
+    except ValueError:
+        raise BadInput(field, text, "give a number") from None
+    check.number(field, value, site.slope.points[0][0], site.slope.points[-1][0])
+    if value > site.road.end:
+        mend = f"put road.end beyond it: computed run-outs are cut there, at {site.road.end:g} m"
+        raise BadInput(field, value, mend)
+    return value
+
+
+def run_outs(site: Site, model: Model, events: Sequence[str], seeds: range) -> dict[str, Floats]:
+    """Return the computed run-outs of each event [m]: of a group, of its last block."""
+    if model == "lumped":
+        found = {event: lumped(site, (), seeds, event) for event in events}
+        return {e: np.array([p.run_out[p.release == k].max() for k in range(len(seeds))])
+                for e, p in found.items()}  # fmt: skip
+    outcomes = release_many([(site, (), seed, event) for event in events for seed in seeds])
+    each = np.array([outcome.run_out[2] for outcome in outcomes]).reshape(len(events), len(seeds))
+    return dict(zip(events, each, strict=True))
+
+
+QUANTILES = (0.05, 0.5, 0.95)
+
+
+class Quality(NamedTuple):
+    """How a prediction meets what was observed; run-outs in m."""
+
+    score: float
+    mean: float
+    quantiles: tuple[float, ...]
+    means: Mapping[str, float]
+    stopped: float
+    """Share that stops uphill of the toe of the slope [-]."""
+
+
+def scores(computed: Floats, observed: Floats) -> Floats:
+    """Return the continuous ranked probability score of each observed run [m]."""
+    x = np.sort(computed)
+    n = len(x)
+    spread = (2.0 * np.arange(1, n + 1) - n - 1) @ x / n**2  # half of the mean distance
+    return np.abs(x[None, :] - observed[:, None]).mean(axis=1) - spread
+
+
+def quality(
+    observed: Mapping[str, Floats], predicted: Sequence[Floats], score: float, toe: float
+) -> Quality:
+    """Return the figures of a prediction: the computed run-outs for each observed run."""
+    events = [event for event in observed for _ in observed[event]]
+    every = np.concatenate(predicted)
+    weight = np.concatenate([np.full(len(p), 1.0 / len(p)) for p in predicted]) / len(predicted)
+    order = np.argsort(every)
+    share = np.cumsum(weight[order])
+    quantiles = tuple(float(every[order][np.searchsorted(share, q)]) for q in QUANTILES)
+    each = list(zip(predicted, events, strict=True))
+    means = {name: float(np.mean([p.mean() for p, e in each if e == name])) for name in observed}
+    stopped = float(weight[every < toe].sum())
+    return Quality(score, float(weight @ every), quantiles, means, stopped)
+
+
+def seen(observed: Mapping[str, Floats], toe: float) -> Quality:
+    """Return the figures of what was observed."""
+    every = np.concatenate(list(observed.values()))
+    quantiles = tuple(float(q) for q in np.quantile(every, QUANTILES))
+    means = {event: float(values.mean()) for event, values in observed.items()}
+    return Quality(0.0, float(every.mean()), quantiles, means, float((every < toe).mean()))
+
+
+Compute = Callable[[Floats, range], Mapping[str, Floats]]
+
+
+class Candidate(NamedTuple):
+    """Values of the parameters, and the computed run-outs of each event [m]."""
+
+    values: Floats
+    run_outs: Mapping[str, Floats]
+
+
+class Trials:
+    """Sets of values that were tried, with the scores that they give each observed run.
+
+    Parameters
+    ----------
+    observed, parameters, compute
+        See `search`.
+
+    Attributes
+    ----------
+    tried : list of Candidate
+        In the order in which they were computed.
+    table : list of (runs,) array
+        Scores of each [m].
+    """
+
+    def __init__(
+        self, observed: Mapping[str, Floats], parameters: Sequence[Parameter], compute: Compute
+    ):
+        self._observed, self._compute = observed, compute
+        self._low = np.array([p.low for p in parameters])
+        self._range = np.array([p.high for p in parameters]) - self._low
+        self.tried: list[Candidate] = []
+        self.table: list[Floats] = []
+
+    def values(self, place: Floats) -> Floats:
+        """Return the values at a place of the unit cube, (P,)."""
+        return self._low + self._range * np.clip(place, 0.0, 1.0)
+
+    def compute(self, values: Floats, seeds: range) -> tuple[Candidate, Floats]:
+        """Return what values give, and the scores of the observed runs."""
+        found = self._compute(values, seeds)
+        each = [scores(found[event], self._observed[event]) for event in self._observed]
+        return Candidate(values, found), np.concatenate(each)
+
+    def add(self, place: Floats, seeds: range) -> float:
+        """Try a place of the unit cube; return its mean score [m]."""
+        candidate, each = self.compute(self.values(place), seeds)
+        self.tried.append(candidate)
+        self.table.append(each)
+        return float(each.mean())
+
+    def best(self, count: int) -> list[Candidate]:
+        """Return the candidates of the least mean scores, the best first."""
+        order = np.argsort([each.mean() for each in self.table])[:count]
+        return [self.tried[i] for i in order]
+
+
+def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed: int) -> None:
+    """Score places of the unit cube, (dimensions,): spread over it, then about the best of them.
+
+    `score` takes a place and returns what is to be least; places come by Sobol, then by CMA-ES.
+    """
+    spread = 1 << max(2, round(math.log2(budget / 2)))
+    places = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(spread)
+    best = places[int(np.argmin([score(place) for place in places]))]
+    own = seed % (2**32 - 1) + 1  # of 0 cma would take the time
+    options = {"bounds": [0, 1], "seed": own, "verbose": -9, "maxfevals": budget - spread}
+    evolution = cma.CMAEvolutionStrategy(best, 0.15, options)
+    done = spread
+    while budget - done >= evolution.popsize and not evolution.stop():
+        asked = evolution.ask()
+        evolution.tell(asked, [score(np.asarray(place)) for place in asked])
+        done += len(asked)
+
+
 Tick = Callable[[int, str], None]
 
 FINALISTS, MORE = 8, 4
@@ -201,3 +489,78 @@ def _validate(
         for i in out:
             predicted[i] = candidate.run_outs[events[i]]
     return predicted, left_out
+
+
+NOT_IDENTIFIED = 0.7
+"""Length of a 95 % interval over the range that was given, from which on the observed run-outs tell
+nothing of a parameter [-]. An interval that they do not narrow is .95 of the range."""
+
+
+def identified(fitted: Fit) -> list[bool]:
+    """Return whether the observed run-outs tell each parameter from the others of its range."""
+    ends = zip(fitted.parameters, fitted.low, fitted.high, strict=True)
+    return [high - low < NOT_IDENTIFIED * (p.high - p.low) for p, low, high in ends]
+
+
+def rows(fitted: Fit, observed: Mapping[str, Floats]) -> list[dict[str, Any]]:
+    """Return the parameters and what they give beside what was observed, a row each."""
+    ends = (fitted.parameters, fitted.best.values, fitted.low, fitted.high, identified(fitted))
+    out: list[dict[str, Any]] = [
+        {
+            "what": p.path,
+            "unit": "",
+            "fitted": v,
+            "low": a,
+            "high": b,
+            "observed": "",
+            "left_out": "",
+            "identified": "yes" if told else "no",
+        }
+        for p, v, a, b, told in zip(*ends, strict=True)
+    ]
+    own, left, real = fitted.fitted, fitted.validated, seen(observed, fitted.site.slope.toe)
+
+    def add(what: str, unit: str, pick: Callable[[Quality], float]) -> None:
+        row = {"what": what, "unit": unit, "fitted": pick(own), "low": "", "high": ""}
+        out.append(row | {"observed": pick(real), "left_out": pick(left), "identified": ""})
+
+    add("score", "m", lambda q: q.score)
+    add("mean run-out", "m", lambda q: q.mean)
+    for k, share in enumerate(QUANTILES):
+        add(f"{share:.0%} of run-outs", "m", lambda q, k=k: q.quantiles[k])  # type: ignore[misc]
+    for event in observed:
+        add(f"mean run-out, {event}", "m", lambda q, e=event: q.means[e])  # type: ignore[misc]
+    add("stops on the slope", "-", lambda q: q.stopped)
+    return out
+
+
+def write(path: Path, fitted: Fit, observed: Mapping[str, Floats]) -> None:
+    """Write `rows` as CSV."""
+    write_rows(path, rows(fitted, observed))
+
+
+def draw(path: Path, fitted: Fit, observed: Mapping[str, Floats]) -> None:
+    """Write a PNG: cumulative run-out observed and computed, all runs and each event."""
+    from matplotlib.figure import Figure
+
+    from rigdda.agents.reports.pictures import save
+
+    names = ["all", *observed] if len(observed) > 1 else list(observed)
+    figure = Figure(figsize=(3.2 * len(names) + 0.6, 3.6), layout="constrained")
+    for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
+        events = list(observed) if name == "all" else [name]
+        real = np.concatenate([observed[e] for e in events])
+        weight = [len(observed[e]) / len(real) for e in events]
+        grid = np.linspace(min(0.0, real.min()), 1.25 * real.max(), 400)
+        share = sum(w * (fitted.best.run_outs[e][:, None] <= grid).mean(axis=0)
+                    for w, e in zip(weight, events, strict=True))  # fmt: skip
+        half = 1.96 * np.sqrt(share * (1.0 - share) / len(real))
+        axes.fill_between(grid, np.clip(share - half, 0, 1), np.clip(share + half, 0, 1),
+                          color="#1c5aa0", alpha=0.2, lw=0)  # fmt: skip
+        axes.plot(grid, share, color="#1c5aa0", label="computed, 95 % of samples as small")
+        axes.step(np.sort(real), np.arange(1, len(real) + 1) / len(real), where="post",
+                  color="#c0392b", label=f"observed, {len(real)}")  # fmt: skip
+        axes.set(xlabel="run-out [m]", title=name, ylim=(0, 1))
+    figure.axes[0].set_ylabel("share of runs")
+    figure.axes[0].legend(frameon=False, fontsize=8, loc="upper left")
+    save(figure, path)

@@ -18,12 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, __version__, check, sites
-from rigdda.agents import extra, limits
-from rigdda.agents.features import features
-from rigdda.agents.network import Network
-from rigdda.agents.policy import SLOTS, decide
-from rigdda.agents.seeds import release_seeds
-from rigdda.agents.store import mechanics
+from rigdda.agents import designers, limits
+from rigdda.agents.designers.protocol import release_seeds
+from rigdda.agents.designers.store import mechanics
+from rigdda.agents.policy import SLOTS, Network, decide, features
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import barrier_free
 from rigdda.envs.observation import observe
@@ -99,7 +97,7 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     Diverged
         If a simulation diverges.
     """
-    ppo = extra.module("ppo")
+    ppo = designers.module("ppo")
     _same(terms, out)
     names = sites.split(SPLIT)
     pool = [problem(name) for name in names[: terms.sites]]

@@ -1,14 +1,7 @@
-"""What a layout is worth on some releases: its cost a year and the parts of it, with intervals.
+"""From releases to the cost of a year and its parts, with intervals.
 
-What releases of a layout cost, one by one, and what those of an event tell of it.
-
-From releases to the cost of a year and its parts, with intervals.
-
-    Z = sum_b capital_b (annuity + upkeep_b) + sum_k rate_k E[harm_k + repair_k]
-
-over barriers b and events k [EUR per metre of road and year]. Releases are stratified by event:
-each event's mean counts with its rate, however many releases it has. Where there are too few
-releases for that, each has drawn its event with a known chance; it then counts with rate / chance.
+What each release costs (`account`), what the releases of an event tell of it (`learn`), and the
+evaluation of a layout: expected harm, repair and capital, and the chances in design events.
 """
 
 from __future__ import annotations

@@ -1,14 +1,7 @@
-"""Trials: what environments ask to be simulated, all of a batch at once.
+"""The environments: a layout designed in one step, or barriers placed one by one.
 
-What all environments share: an episode, in halves around each simulation.
-
-`draw` and `ask` say what an episode is about and what to simulate, `start` and `tell` take what
-that gave. So one environment simulates its own releases and a batched one those of all copies
-together.
-
-The environment in which a whole layout is designed in one step.
-
-The environment in which barriers are placed one by one.
+What both share is an episode, in halves around each simulation: what an environment asks to be
+simulated, all of a batch at once, and what it makes of the answer.
 """
 
 from __future__ import annotations

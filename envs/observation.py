@@ -1,12 +1,4 @@
-"""The arrays of an observation: sizes, scales and what is in them.
-
-What a designer sees of a site: 1-D float32 arrays of about unit spread over sites.
-
-`rigdda.envs.observation` says what is in them: logarithms of what spreads over orders of magnitude,
-each array less its centre over its spread, so that one policy can read many sites. What lies beyond
-the bounds is clipped. A field is here if it differs between sites; what is the same at all of them
-tells nothing.
-"""
+"""What a designer sees of a site: 1-D float32 arrays of about unit spread over sites."""
 
 from __future__ import annotations
 

@@ -1,16 +1,8 @@
-"""Memory of what was simulated: the latest results of this process, shared by its threads.
+"""Outcomes of releases, many at once; what need not be simulated again is not.
 
-Outcomes of releases with what it took to simulate them.
-
-Outcomes of layouts that no block of a release comes near: they follow from those without.
-
-A block that came to rest uphill of a barrier counts as held by it where it lies below the line that
-rises from the top of the barrier, see `rigdda.Outcome`. Where it lies is known of a single block.
-
-Outcomes of releases, many at once; what need not be simulated again is not.
-
-A release without barriers whose blocks never come to where a layout stands is that of the layout,
-too.
+A release without barriers none of whose blocks comes near a layout is that of the layout, too. A
+block that came to rest uphill of a barrier counts as held by it where it lies below the line that
+rises from the top of the barrier, see `rigdda.Outcome`; where it lies is known of a single block.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
-"""What is asked of a layout beside a low cost, and whether it meets that.
+"""Barrier design as an optimisation problem: vectors, layouts, and what a layout is worth.
 
-Fidelity of simulations: a site as it is, or a cheaper one that stands for it.
-
-Checks of what a design problem is posed with.
-
-How the releases of an evaluation spread over the events of a site.
-
-Barrier design as an optimisation problem: vectors, layouts, and what a layout is worth.
+Targets ask something of a layout beside a low cost. Fidelity says whether a site is simulated as it
+is or by a cheaper one that stands for it. Releases of an evaluation spread over the events of the
+site.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Pictures of a release: slope, road, barriers and blocks. Matplotlib is imported on use.
+"""Pictures of releases and replays of episodes.
 
-Replays of episodes, one .rrd file each. The replay writer is imported when it is used.
+Matplotlib and the replay writer are imported when they are used.
 """
 
 from __future__ import annotations

@@ -1,11 +1,4 @@
-"""How large barriers that are designed may be.
-
-How far barriers that are designed stand from one another.
-
-What may be built where on a site.
-
-Where on a site a barrier may stand that is nearest to where it should.
-"""
+"""What may be built where on a site: rules, sizes, clear distances, nearest possible places."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What a batch is given and gives: seeds, options and actions of all copies, and observations.
-
-Batched environments: copies of one environment whose releases are simulated together.
-"""
+"""Batched environments: copies of one environment whose releases are simulated together."""
 
 from __future__ import annotations
 

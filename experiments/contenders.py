@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from rigdda import Barrier, Layout
-from rigdda.agents.menu import Menu
-from rigdda.agents.seeds import release_seeds
+from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.protocol import release_seeds
 from rigdda.envs import DesignProblem
 
 KEPT = 0.3

@@ -34,10 +34,10 @@ from experiments.script import (
     write,
 )
 from rigdda import BadInput, Layout, sites
-from rigdda.agents import extra
-from rigdda.agents.designing import BUDGET
-from rigdda.agents.store import Store, mechanics
-from rigdda.agents.verify import verify
+from rigdda.agents import designers
+from rigdda.agents.cli import BUDGET
+from rigdda.agents.designers.protocol import verify
+from rigdda.agents.designers.store import Store, mechanics
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem, Evaluation
 
@@ -100,7 +100,7 @@ class Contest:
     def row(self, name: str, budget: int, seed: int) -> dict[str, Any]:
         """Let a designer search; return what it found."""
         say(f"{self.site}: {name}, {budget} releases, seed {seed}")
-        found = extra.module(name).design(self.problem, budget, seed)
+        found = designers.module(name).design(self.problem, budget, seed)
         least, nothing, e = map(self.verify, (self.best, (), found.layout))
         gain = nothing.objective - least.objective
         return {

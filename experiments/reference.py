@@ -2,9 +2,9 @@
 
 `python -m experiments.reference [--quick] [--out DIR]`. All singles of every kind and size over 24
 stations race first, then promising pairs, then neighbours of the best. The best of every kind, the
-best for single blocks alone and the constants of `rigdda.agents.constant` are verified on fresh
-releases, until half the 95 % interval of the best is below 1 % of Z of nothing. Of layouts that
-differ by less than that the one with fewest barriers is the best.
+best for single blocks alone and the constants of `rigdda.agents.designers.constant` are verified on
+fresh releases, until half the 95 % interval of the best is below 1 % of Z of nothing. Of layouts
+that differ by less than that the one with fewest barriers is the best.
 
 Writes reference.csv, a row a layout, and reference.png. Goes on where it was stopped: a site whose
 rows were made by the kernels of today is not computed again.
@@ -25,10 +25,10 @@ from msgspec.structs import replace
 from experiments.contenders import contenders, kinds_of
 from experiments.script import BLUE, GREY, RED, Number, draw, main, say, write
 from rigdda import Layout, Site, sites
-from rigdda.agents.constant import CONSTANTS, constant, place
-from rigdda.agents.menu import Menu
-from rigdda.agents.store import Store, mechanics
-from rigdda.agents.verify import verify
+from rigdda.agents.designers.constant import CONSTANTS, constant, place
+from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.protocol import verify
+from rigdda.agents.designers.store import Store, mechanics
 from rigdda.barriers import describe, from_table, to_tables
 from rigdda.envs import DesignProblem, Evaluation
 

@@ -22,7 +22,7 @@ from msgspec.structs import replace
 from experiments.script import BLUE, GREEN, RED, Number, draw, main
 from experiments.study import Row, tabulate
 from rigdda import Barrier, Embankment, Fence, GravityWall, Site
-from rigdda.agents.menu import HEIGHTS
+from rigdda.agents.designers.menu import HEIGHTS
 from rigdda.barriers import FENCE_CLASSES, describe
 from rigdda.envs.siting import SLENDER
 from rigdda.releases import release_many

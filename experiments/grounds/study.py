@@ -26,10 +26,8 @@ from experiments.grounds.contacts import MASSES, early_contacts, lumped_share, m
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
 from experiments.tschamut.study import runs
 from rigdda import Site, Surface
-from rigdda.agents import run_outs
-from rigdda.agents.fit import Floats
-from rigdda.agents.fit_trials import explore
-from rigdda.agents.prediction import scores
+from rigdda.agents import fit
+from rigdda.agents.fit import Floats, explore, scores
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.place import Rebound, Scatter
 
@@ -90,10 +88,10 @@ class Field:
         What computes.
     """
 
-    def __init__(self, model: run_outs.Model):
+    def __init__(self, model: fit.Model):
         self.model = model
         self.slope = Site.load(TSCHAMUT / "site.toml")
-        self.seen = run_outs.read(TSCHAMUT / "observed.csv", self.slope)
+        self.seen = fit.read(TSCHAMUT / "observed.csv", self.slope)
         self.bench = below(FACE)
         self.kept = observed()[:, 2]
         self.names = tuple(RANGES[model])
@@ -125,7 +123,7 @@ class Field:
     def widths(self, values: Floats, seeds: range) -> Floats:
         """Return how far from the toe of the mine bench blocks stop [m]."""
         site = self.site(self.bench, "rock", values)
-        (found,) = run_outs.run_outs(site, self.model, ["block"], seeds).values()
+        (found,) = fit.run_outs(site, self.model, ["block"], seeds).values()
         return found - site.slope.toe
 
     def misfit(self, case: str, values: Floats, seeds: range) -> float:

@@ -12,8 +12,7 @@ from typing import Self
 import numpy as np
 
 from rigdda import Site
-from rigdda.agents.fit import Floats
-from rigdda.agents.parameters import Parameter
+from rigdda.agents.fit import Floats, Parameter
 
 PYTHON = "PLATROCK_PYTHON"
 """Environment variable that names the Python which has PlatRock; without it, it is left out."""

@@ -28,14 +28,12 @@ from matplotlib.figure import Figure
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, interval, say, write
 from experiments.tschamut.platrock import PARAMETERS, PYTHON, PlatRock
 from rigdda import Site, release
-from rigdda.agents import fit, fit_results, run_outs
-from rigdda.agents.fit import Fit, Floats
-from rigdda.agents.parameters import Parameter, parse, with_values
-from rigdda.agents.prediction import seen
+from rigdda.agents import fit
+from rigdda.agents.fit import Fit, Floats, Parameter, parse, seen, with_values
 
 HERE = Path(__file__).parent
 
-MODELS: dict[run_outs.Model, tuple[str, ...]] = {
+MODELS: dict[fit.Model, tuple[str, ...]] = {
     "blocks": (
         "surfaces.soil.friction_deg=15:65",
         "surfaces.soil.restitution=0:0.8",
@@ -78,22 +76,20 @@ BAR = 5.0
 """Greatest distance of the means [m]."""
 
 
-def runs(
-    site: Site, model: run_outs.Model, events: Sequence[str], seeds: range
-) -> dict[str, Floats]:
+def runs(site: Site, model: fit.Model, events: Sequence[str], seeds: range) -> dict[str, Floats]:
     """Return the computed run-outs of the releases that start [m], by block.
 
     A block that stays where it was put down is no run of the tests. Of a plate that is flat on a
     slope less steep than its friction up to one release in ten is none.
     """
-    found = run_outs.run_outs(site, model, events, seeds)
+    found = fit.run_outs(site, model, events, seeds)
     started = {event: values[values > STARTED] for event, values in found.items()}
     return {event: started[event] if len(started[event]) else found[event] for event in found}
 
 
 def table(model: str, fitted: Fit, observed: dict[str, Floats], seconds: float) -> list[dict]:
-    """Return rows as `rigdda.agents.fit_results.rows` does, with model and processor time [s]."""
-    return [{"model": model, "cpu_s": seconds} | row for row in fit_results.rows(fitted, observed)]
+    """Return rows as `rigdda.agents.fit.rows` does, with model and processor time [s]."""
+    return [{"model": model, "cpu_s": seconds} | row for row in fit.rows(fitted, observed)]
 
 
 def behind(model: str, left_out: Floats, blocks: Floats, seconds: float) -> dict[str, Any]:
@@ -163,7 +159,7 @@ def predict(path: Path, site: Site, events: Sequence[str], count: int) -> None:
 def run(quick: bool, out: Path) -> Number:
     """Fit the models, predict, and write tables and the picture."""
     site = Site.load(HERE / "site.toml")
-    observed = run_outs.read(HERE / "observed.csv", site)
+    observed = fit.read(HERE / "observed.csv", site)
     budget, releases, count = (
         (QUICK_BUDGET, QUICK_RELEASES, QUICK_PREDICTED) if quick else (BUDGET, RELEASES, PREDICTED)
     )
@@ -186,7 +182,7 @@ def run(quick: bool, out: Path) -> Number:
             values: Floats,
             seeds: range,
             of: Sequence[Parameter] = parameters,
-            by: run_outs.Model = model,
+            by: fit.Model = model,
         ) -> dict[str, Floats]:
             return runs(with_values(site, of, list(values)), by, list(observed), seeds)
 

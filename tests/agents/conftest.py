@@ -21,5 +21,5 @@ def problem(site: Site) -> DesignProblem:
 
 @pytest.fixture
 def valley(site: Site, monkeypatch: pytest.MonkeyPatch) -> Valley:
-    monkeypatch.setattr("rigdda.agents.crossings.ensemble", seen)
+    monkeypatch.setattr("rigdda.agents.designers.catalogue.ensemble", seen)
     return Valley(site)

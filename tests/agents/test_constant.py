@@ -6,9 +6,9 @@ import pytest
 from valley import SITE, Valley
 
 from rigdda import Fence
-from rigdda.agents import constant
-from rigdda.agents.constant import CONSTANTS, place
-from rigdda.agents.menu import Menu
+from rigdda.agents.designers import constant
+from rigdda.agents.designers.constant import CONSTANTS, place
+from rigdda.agents.designers.menu import Menu
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
 

@@ -9,11 +9,17 @@ import pytest
 from valley import SITE
 
 from rigdda import Ditch, Fence, GravityWall, Mesh, Site
-from rigdda.agents import convex
-from rigdda.agents.catalogue import Catalogue, tabulate, whole
-from rigdda.agents.crossings import CROSSING, Ensemble, ensemble
-from rigdda.agents.menu import Menu
-from rigdda.agents.programme import GAP, choose
+from rigdda.agents.designers import convex
+from rigdda.agents.designers.catalogue import (
+    CROSSING,
+    Catalogue,
+    Ensemble,
+    ensemble,
+    tabulate,
+    whole,
+)
+from rigdda.agents.designers.convex import GAP, choose
+from rigdda.agents.designers.menu import Menu
 from rigdda.envs import DesignProblem
 
 
@@ -119,7 +125,7 @@ def test_optima_are_layouts_that_may_be_built(site: Site) -> None:
     problem = DesignProblem(site)
     menu = Menu(problem)
     seeds = {name: tuple(range(12)) for name in site.event_names}
-    found = convex.optima(problem, ensemble(site, seeds, menu.stations), menu)
+    found = convex.best_choices(problem, ensemble(site, seeds, menu.stations), menu)
     assert found and len(found) == len({choice.layout for choice in found})
     assert all(problem.fits(choice.layout) for choice in found)
     assert all(choice.bound <= choice.objective + 1e-6 for choice in found)

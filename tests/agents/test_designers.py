@@ -12,12 +12,20 @@ from valley import SITE, Valley
 import rigdda.agents
 from rigdda import BadInput, Barrier, Fence, Layout, Outcome
 from rigdda.agents import DESIGNERS
-from rigdda.agents.protocol import DesignResult, Ledger
-from rigdda.agents.ranking import MISSED, final_score, score, value
-from rigdda.agents.searching import Plan, search
-from rigdda.agents.seeds import STREAMS, release_seeds
-from rigdda.agents.starts import starts
-from rigdda.agents.verify import verify
+from rigdda.agents.designers.convex import starts
+from rigdda.agents.designers.protocol import (
+    MISSED,
+    STREAMS,
+    DesignResult,
+    Ledger,
+    Plan,
+    final_score,
+    release_seeds,
+    score,
+    search,
+    value,
+    verify,
+)
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
 from rigdda.envs.problem import Targets
@@ -195,7 +203,7 @@ def test_an_unsound_budget_or_seed_is_refused(
 
 def test_every_designer_has_a_name() -> None:
     assert set(DESIGNERS) == {*ALL, "ppo"}
-    assert rigdda.agents.names.DEFAULT in DESIGNERS
+    assert rigdda.agents.designers.DEFAULT in DESIGNERS
     assert {"fence", "ditch", "embankment"} <= set(KINDS)
 
 
@@ -211,4 +219,4 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 
 def test_a_site_is_no_problem() -> None:
     with pytest.raises(BadInput, match="DesignProblem"):
-        rigdda.agents.race.design(SITE, simulations=10)
+        rigdda.agents.designers.race.design(SITE, simulations=10)

@@ -12,7 +12,7 @@ import pytest
 from rigdda import BadInput, Site
 from rigdda.agents import fidelity_bias
 from rigdda.agents.cli import main
-from rigdda.agents.seeds import release_seeds
+from rigdda.agents.designers.protocol import release_seeds
 from rigdda.envs import DesignProblem, problem
 
 

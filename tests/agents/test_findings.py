@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 from valley import SITE, Barren, Valley
 
-from rigdda.agents import findings
-from rigdda.agents.largest import tried, unheld
-from rigdda.agents.menu import Menu
-from rigdda.agents.protocol import DesignResult, History
+from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.protocol import DesignResult, History
+from rigdda.agents.jobs import tried, unheld
+from rigdda.agents.reports import findings
 from rigdda.envs import DesignProblem, Evaluation
 
 

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput, Site
-from rigdda.agents import fit, fit_trials, prediction
+from rigdda.agents import fit
 from rigdda.agents.cli import main
-from rigdda.agents.parameters import Parameter, check_parameters, parse, with_values
-from rigdda.agents.prediction import scores
-from rigdda.agents.run_outs import read, run_outs
+from rigdda.agents.fit import (
+    Parameter,
+    check_parameters,
+    parse,
+    read,
+    run_outs,
+    scores,
+    with_values,
+)
 from rigdda.model.place import Rebound
 
 SITE = Site.load("verge")
@@ -45,7 +51,7 @@ def test_values_are_found_again_with_what_they_predict():
     # a point that bounces on a short verge hardly slides: friction is left open, and said to be
     assert found.best.values[0] == pytest.approx(exact[0], abs=0.03)
     assert found.high[0] - found.low[0] < 0.1 and found.high[1] - found.low[1] > 5.0
-    there = prediction.seen(observed, SITE.slope.toe)
+    there = fit.seen(observed, SITE.slope.toe)
     for quality in (found.fitted, found.validated):
         assert quality.mean == pytest.approx(there.mean, abs=1.0)
         assert quality.score < 1.05 * scores(observed["block"], observed["block"]).mean() + 1.0
@@ -126,7 +132,7 @@ def test_every_seed_may_be_given() -> None:
             places += place.tolist()
             return float(np.square(place - 0.3).sum())
 
-        fit_trials.explore(score, 2, 24, 2**32 - 1)
+        fit.explore(score, 2, 24, 2**32 - 1)
         seen.append(places)
     assert seen[0] == seen[1] and len(seen[0]) == 44
 

@@ -9,8 +9,8 @@ import pytest
 from valley import SITE, Valley
 
 from rigdda import BadInput, Fence
-from rigdda.agents import pareto
-from rigdda.agents.pareto import front, residual
+from rigdda.agents.designers import pareto
+from rigdda.agents.designers.pareto import front, residual
 from rigdda.envs import Evaluation
 
 VALLEY = Valley(SITE)

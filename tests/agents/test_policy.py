@@ -12,9 +12,7 @@ from safetensors.numpy import save_file
 
 from rigdda import BadInput, Site
 from rigdda.agents import policy
-from rigdda.agents.features import NAMES, WIDTH, features
-from rigdda.agents.network import Network
-from rigdda.agents.policy import ANCHOR, SLOTS, decide
+from rigdda.agents.policy import ANCHOR, NAMES, SLOTS, WIDTH, Network, decide, features
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import FIELDS, observe
 

@@ -10,12 +10,11 @@ from msgspec.structs import replace
 from valley import SITE, Barren, Valley
 
 from rigdda import Ditch, Fence, GravityWall, Site
-from rigdda.agents import race, random
-from rigdda.agents.arms import Arm, allocation, behind
-from rigdda.agents.bounds import on_bound
-from rigdda.agents.menu import Menu, spread
-from rigdda.agents.protocol import Entry
-from rigdda.agents.store import Release, Store
+from rigdda.agents.designers import race, random
+from rigdda.agents.designers.menu import Menu, on_bound, spread
+from rigdda.agents.designers.protocol import Entry
+from rigdda.agents.designers.racing import Arm, allocation, behind
+from rigdda.agents.designers.store import Release, Store
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
 from rigdda.envs.problem import Targets

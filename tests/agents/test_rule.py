@@ -7,9 +7,9 @@ import pytest
 from valley import SITE
 
 from rigdda import Ditch, Embankment, Fence, Site
-from rigdda.agents.crossings import CROSSING, Ensemble
-from rigdda.agents.menu import Menu
-from rigdda.agents.rule import demands, ritchie, rule
+from rigdda.agents.designers.catalogue import CROSSING, Ensemble
+from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.rule import demands, ritchie, rule
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.envs import DesignProblem
 

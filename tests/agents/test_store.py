@@ -11,7 +11,7 @@ from valley import SITE, Valley
 
 import rigdda.agents
 from rigdda import Fence, Layout
-from rigdda.agents.store import Release, Store
+from rigdda.agents.designers.store import Release, Store
 from rigdda.envs import DesignProblem
 from rigdda.envs.problem import Targets
 

@@ -15,8 +15,8 @@ from test_command_line import refused, rig, rows, run
 
 import rigdda
 from rigdda import Site
-from rigdda.agents import studies, study_file
-from rigdda.agents.tables import _interval, write_rows
+from rigdda.agents import studies
+from rigdda.agents.reports.tables import _interval, write_rows
 from rigdda.envs.cost import stratified
 from rigdda.envs.intervals import upper_bound
 
@@ -96,7 +96,7 @@ def test_a_killed_study_goes_on_and_ends_the_same(folder: Path) -> None:
 
 
 def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> None:
-    asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
+    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
     assert studies.run(asked, 0, file, lambda *_: None) == 0
     whole = file.read_bytes()
     file.write_bytes(whole[:-9])
@@ -106,7 +106,7 @@ def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> N
     with file.open(newline="") as lines:
         assert {row["seed"] for row in csv.DictReader(lines)} == set("234567")
     (folder / "chute.toml").write_text((folder / "chute.toml").read_text().replace("28.0", "29.0"))
-    assert studies.run(study_file.load(folder / "study.toml"), 2, file, lambda *_: None) == 0
+    assert studies.run(studies.load(folder / "study.toml"), 2, file, lambda *_: None) == 0
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_a_row_cut_off_or_of_another_study_is_simulated_again(folder: Path) -> N
     ],
 )
 def test_a_damaged_row_is_simulated_again(column: str, value: str, folder: Path) -> None:
-    asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
+    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
     studies.run(asked, 0, file, lambda *_: None)
     whole, table = file.read_bytes(), rows(file)
     first = 6 * len(asked.site.events)  # the first of the layout with one barrier
@@ -140,7 +140,7 @@ def test_a_damaged_row_is_simulated_again(column: str, value: str, folder: Path)
 def test_a_file_that_an_editor_has_saved_keeps_its_rows(folder: Path) -> None:
     text = STUDY.replace('"one"', '"line\\nbreak, \\"größer\\"\\r"')
     (folder / "study.toml").write_text(text, encoding="utf-8")
-    asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
+    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
     assert studies.run(asked, 0, file, lambda *_: None) == 0
     whole = file.read_bytes()
     studies.table(asked, file)
@@ -197,7 +197,7 @@ def example(name: str) -> ModuleType:
 
 def test_a_study_s_table_is_what_the_problem_says(folder: Path, site: Site) -> None:
     """Z of a study is that of `DesignProblem.judge` of the same outcomes, intervals nearly."""
-    asked, file = study_file.load(folder / "study.toml"), folder / "study.csv"
+    asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
     studies.run(asked, 0, file, lambda *_: None)
     table = rows(file)
     layout = asked.layouts["one"]
@@ -219,7 +219,7 @@ def test_the_example_in_python_says_that_stronger_fences_fail_less() -> None:
 
 
 def test_the_example_by_file_is_sound() -> None:
-    asked = study_file.load(EXAMPLES / "study.toml")
+    asked = studies.load(EXAMPLES / "study.toml")
     assert len(asked.layouts) == 4 and asked.size == 4 * 3 * 40
 
 

@@ -13,10 +13,9 @@ import pytest
 from test_command_line import refused, rig, run
 
 from rigdda import sites
-from rigdda.agents import policy, ppo, training
-from rigdda.agents.features import WIDTH
-from rigdda.agents.network import Network
-from rigdda.agents.policy import SLOTS, decide
+from rigdda.agents import policy, training
+from rigdda.agents.designers import ppo
+from rigdda.agents.policy import SLOTS, WIDTH, Network, decide
 from rigdda.envs import DesignProblem
 
 SMALL = ("--sites", 2, "--episodes", 16)

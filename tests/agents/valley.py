@@ -13,7 +13,7 @@ import numpy as np
 
 import rigdda
 from rigdda import Barrier, Layout, Outcome, Site
-from rigdda.agents import crossings
+from rigdda.agents.designers import catalogue
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.cost import judge
 from rigdda.envs.outcome_cache import Sample
@@ -89,11 +89,11 @@ class Valley(DesignProblem):
 
 def seen(
     site: Site, seeds: Mapping[str, Sequence[int]], stations: Sequence[float]
-) -> crossings.Ensemble:
+) -> catalogue.Ensemble:
     """Return crossings that say of standing barriers what holds in the valley."""
     x = np.asarray(stations, dtype=np.float64)
     jobs = [(i, seed) for i, own in enumerate(seeds.values()) for seed in own]
-    table = np.zeros((len(jobs), len(x) + 1), dtype=crossings.CROSSING)
+    table = np.zeros((len(jobs), len(x) + 1), dtype=catalogue.CROSSING)
     table["release"] = np.arange(len(jobs))[:, None]
     table["station"] = np.arange(len(x) + 1)
     table["time"] = np.arange(len(x) + 1)
@@ -102,7 +102,7 @@ def seen(
     dice = [np.random.default_rng([seed, i]).random(len(x)) for i, seed in jobs]
     table["height"][:, :-1] = HEIGHT * np.array(dice) / stopped
     event = np.array([i for i, _ in jobs])
-    return crossings.Ensemble(x, table.ravel(), event, np.ones(len(jobs)))
+    return catalogue.Ensemble(x, table.ravel(), event, np.ones(len(jobs)))
 
 
 KNOWN: dict[type, ensemble.Ensemble] = {}

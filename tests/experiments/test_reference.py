@@ -9,8 +9,8 @@ import pytest
 
 from experiments.reference import BEST, SINGLE, layout_of
 from rigdda import sites
-from rigdda.agents.bounds import on_bound
-from rigdda.agents.constant import CONSTANTS
+from rigdda.agents.designers.constant import CONSTANTS
+from rigdda.agents.designers.menu import on_bound
 from rigdda.envs import DesignProblem
 
 RECORDED = Path(__file__).parents[2] / "experiments" / "results" / "reference.csv"

@@ -1,0 +1,32 @@
+"""Designers of barrier layouts, a module each, by name.
+
+Each has `design(problem, simulations, seed=0, progress=None, store=None)`, which returns a
+`DesignResult`, see `rigdda.agents.designers.protocol`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from rigdda import BadInput, check
+
+DEFAULT = "race"
+"""The designer that is used if none is named."""
+
+DESIGNERS = ("cma", "constant", "convex", "pareto", "ppo", "race", "random", "rule", "tpe")
+
+
+def module(name: str) -> ModuleType:
+    """Return the module of a designer.
+
+    Raises
+    ------
+    BadInput
+        If there is none of that name, or it needs what is not installed.
+    """
+    try:
+        return import_module(f"{__name__}.{check.one_of('designer', name, DESIGNERS)}")
+    except ModuleNotFoundError as error:
+        mend = f"install {error.name}: pip install 'rigdda[rl]'"
+        raise BadInput("designer", name, mend) from None

@@ -1,0 +1,323 @@
+"""What every barrier of the menu is estimated to be worth, from one barrier-free ensemble.
+
+The ensemble is what passes each chainage of the site without barriers; several designers use it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import (
+    Barrier,
+    Ditch,
+    Embankment,
+    Fence,
+    GravityWall,
+    Mesh,
+    Simulation,
+    Site,
+    Wall,
+)
+from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.protocol import Ledger, release_seeds
+from rigdda.barriers.base import ELEMENT
+from rigdda.barriers.fence import PANEL
+from rigdda.barriers.gravity_wall import SLID
+from rigdda.envs import DesignProblem
+from rigdda.geometry import polygon_properties
+
+Floats = NDArray[np.float64]
+
+
+RELEASES = 60
+"""Releases of an event in an ensemble: three of them are beyond the 95 % quantile."""
+SHARE = 16
+"""The ensemble takes at most one part in so many of a budget."""
+
+CROSSING = np.dtype(
+    [
+        ("release", "i4"),
+        ("station", "i4"),
+        ("block", "i4"),
+        ("time", "f8"),
+        ("height", "f8"),
+        ("radius", "f8"),
+        ("speed", "f8"),
+        ("energy", "f8"),
+        ("mass", "f8"),
+        ("volume", "f8"),
+    ]
+)
+"""The first crossing of a station by a block. time: since the release [s]; height: of the centroid
+above the ground [m]; radius: circumscribed, about the centroid [m]; speed [m/s]; energy of
+translation and rotation [J], mass [kg] and volume [m3]: of the block over its width."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ensemble:
+    """Crossings of R barrier-free releases.
+
+    Parameters
+    ----------
+    stations : (K,) array
+        Chainages across the barrier zone [m].
+    crossings : (E,) structured array
+        Those at stations, see `CROSSING`; station K is the road's uphill edge.
+    event : (R,) array of int
+        Which event of the site a release is of.
+    width : (R,) array
+        Width of each release [m].
+    """
+
+    stations: Floats
+    crossings: NDArray[np.void]
+    event: NDArray[np.int64]
+    width: Floats
+
+    def at(self, station: int) -> NDArray[np.void]:
+        """Return the crossings of one station."""
+        return self.crossings[self.crossings["station"] == station]
+
+    def of(self, events: Sequence[int]) -> NDArray[np.void]:
+        """Return the crossings of some events."""
+        return self.crossings[np.isin(self.event[self.crossings["release"]], events)]
+
+    def reach_road(self) -> NDArray[np.bool_]:
+        """Return for each crossing whether its block reaches the road, (E,)."""
+        block = self.crossings["release"].astype(np.int64) << 32 | self.crossings["block"]
+        road = self.crossings["station"] == len(self.stations)
+        return np.isin(block, block[road])
+
+    def weights(self, rates: Sequence[float]) -> Floats:
+        """Return how often each release stands for, (R,) [1/year per m], from rates of events."""
+        count = np.bincount(self.event, minlength=len(rates))
+        return np.array(rates)[self.event] / np.maximum(count, 1)[self.event]
+
+
+def ensemble_seeds(site: Site, seed: int, simulations: int) -> dict[str, tuple[int, ...]]:
+    """Return the release seeds by event of the ensemble for a search of so many simulations."""
+    names = site.event_names
+    each = min(RELEASES, max(1, simulations // (SHARE * len(names))))
+    few = names[: max(1, simulations // SHARE)]
+    return {name: release_seeds("ensemble", seed, each) for name in few}
+
+
+def ensemble_for(ledger: Ledger, stations: Floats) -> Ensemble:
+    """Return the ensemble that a designer looks at, charged to its budget."""
+    seeds = ensemble_seeds(ledger.problem.site, ledger.seed, ledger.budget)
+    ledger.used += sum(map(len, seeds.values()))
+    return ensemble(ledger.problem.site, seeds, stations)
+
+
+def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -> Ensemble:
+    """Return the crossings of barrier-free releases, simulated over all cores in threads.
+
+    The last few ensembles are kept in memory.
+
+    Parameters
+    ----------
+    seeds : mapping of str to sequence of int
+        Release seeds by name of event.
+    stations : (K,) array
+        Chainages to watch, ascending [m].
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    asked = tuple((name, tuple(drawn)) for name, drawn in seeds.items())
+    return _ensemble(msgspec.json.encode(site), asked, tuple(np.asarray(stations).tolist()))
+
+
+@lru_cache(maxsize=4)
+def _ensemble(
+    text: bytes, seeds: tuple[tuple[str, tuple[int, ...]], ...], stations: tuple[float, ...]
+) -> Ensemble:
+    site = msgspec.json.decode(text, type=Site)
+    lines = (*stations, site.road.start)
+    jobs = [(name, seed) for name, drawn in seeds for seed in drawn]
+
+    def one(job: tuple[int, tuple[str, int]]) -> tuple[NDArray[np.void], float]:
+        release, (event, seed) = job
+        scene = site.realise((), seed, event)
+        width = site.draw(seed, event).width
+        duration = site.motion.duration
+        run = Simulation(scene, site.settings(scene), lines).run(duration, every=duration)
+        area, radius = np.array([_area_and_radius(b.vertices) for b in scene.blocks]).T
+        density = np.array([b.density for b in scene.blocks])
+        out = np.zeros(len(run.events), dtype=CROSSING)
+        out["release"] = release
+        out["station"], out["block"] = run.events["target"], run.events["block"]
+        for name in ("time", "height", "speed"):
+            out[name] = run.events[name]
+        out["energy"] = run.events["energy"] * width
+        out["radius"], out["volume"] = radius[out["block"]], area[out["block"]] * width
+        out["mass"] = density[out["block"]] * out["volume"]
+        return out, width
+
+    with ThreadPoolExecutor() as pool:
+        parts = list(pool.map(one, enumerate(jobs)))
+    crossings, widths = zip(*parts, strict=True)
+    number = {name: i for i, name in enumerate(site.event_names)}
+    event = np.array([number[name] for name, _ in jobs])
+    return Ensemble(np.array(stations), np.concatenate(crossings), event, np.array(widths))
+
+
+def _area_and_radius(vertices: NDArray[np.float64]) -> tuple[float, float]:
+    """Return area [m2] and circumscribed radius about the centroid [m] of an (n, 2) polygon."""
+    area, centre, _ = polygon_properties(vertices)
+    return area, float(np.hypot(*(vertices - centre).T).max())
+
+
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s2]."""
+BASE = 0.6
+"""Friction of its base [-]."""
+BOUNCE = 0.2
+"""Share of the energy that a block keeps when it lands in a ditch: assumed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Catalogue:
+    """Numbers of what may be built: R releases, J barriers.
+
+    Parameters
+    ----------
+    barriers : list of J barriers
+        Those that may be built.
+    weight : (R,) array
+        How often what a release stands for happens [1/year per m].
+    base : (R,) array
+        Harm of a release without barriers [EUR].
+    relief : (R, J) array
+        What a barrier takes off it [EUR].
+    annual : (J,) array
+        What a barrier costs a year, its expected repair included [EUR per m].
+    span : (J, 2) array
+        Chainages between which it stands [m].
+    """
+
+    barriers: list[Barrier]
+    weight: Floats
+    base: Floats
+    relief: Floats
+    annual: Floats
+    span: Floats
+
+    @property
+    def objective(self) -> Floats:
+        """Estimated Z of each barrier alone, (J,) [EUR per m and year]."""
+        return self.annual + self.weight @ (self.base[:, None] - self.relief)
+
+    def take(self, chosen: Sequence[int] | NDArray[np.int64]) -> Catalogue:
+        """Return the catalogue of some barriers."""
+        i = np.asarray(chosen, dtype=np.int64)
+        barriers = [self.barriers[j] for j in i.tolist()]
+        relief, annual = self.relief[:, i], self.annual[i]
+        return Catalogue(barriers, self.weight, self.base, relief, annual, self.span[i])
+
+
+def tabulate(problem: DesignProblem, ensemble: Ensemble, barriers: list[Barrier]) -> Catalogue:
+    """Return the catalogue of barriers that a problem allows."""
+    site = problem.site
+    weight = ensemble.weights([site.rate(name, ()) for name in site.event_names])
+    effects = Effects(site, ensemble)
+    relief = np.zeros((len(weight), len(barriers)))
+    annual = np.zeros(len(barriers))
+    for j, barrier in enumerate(barriers):
+        harm, mended = effects.of(barrier)
+        relief[:, j] = effects.base - harm
+        capital = site.capital((barrier,)) if mended.any() else 0.0
+        annual[j] = site.annual((barrier,)) + capital * float(weight @ mended)
+    span = np.array([[b.x, b.x + b.extent] for b in barriers]).reshape(-1, 2)
+    return Catalogue(barriers, weight, effects.base, relief, annual, span)
+
+
+def whole(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> Catalogue:
+    """Return the catalogue of everything on a menu."""
+    barriers = [b for kind in problem.kinds for b in menu.lone(kind)]
+    return tabulate(problem, ensemble, barriers)
+
+
+class Effects:
+    """What single barriers do to the releases of an ensemble."""
+
+    def __init__(self, site: Site, ensemble: Ensemble):
+        self.site, self.ensemble = site, ensemble
+        count = len(ensemble.event)
+        order = np.lexsort((ensemble.crossings["time"], ensemble.crossings["release"]))
+        table, risky = ensemble.crossings[order], ensemble.reach_road()[order]
+        stations = range(len(ensemble.stations))
+        self._at = [table[table["station"] == k] for k in stations]
+        self._risky = [risky[table["station"] == k] for k in stations]
+        road = ensemble.at(len(ensemble.stations))
+        volume = np.bincount(road["release"], road["volume"], minlength=count)
+        self._volume = volume.astype(np.float64)
+        self.base = self._harm(self._volume)
+
+    def of(self, barrier: Barrier) -> tuple[Floats, Floats]:
+        """Return harm [EUR] and length of barrier to be mended [m] of every release, each (R,)."""
+        if isinstance(barrier, Mesh):
+            site = self.site
+            factor = [site.rate(name, (barrier,)) / max(site.rate(name, ()), 1e-300)
+                      for name in site.event_names]  # fmt: skip
+            return self.base * np.array(factor)[self.ensemble.event], np.zeros_like(self.base)
+        k = int(np.argmin(np.abs(self.ensemble.stations - barrier.x)))
+        table, risky = self._at[k], self._risky[k]
+        stopped, broken = self._stopped(barrier, table)
+        volume = table["volume"] * (stopped & risky)
+        taken = np.bincount(table["release"], volume, minlength=len(self.base))
+        left = self._volume - taken
+        gone = left <= 1e-9 * self._volume
+        harm = self._harm(np.where(gone, 0.0, left).astype(np.float64))
+        failed = np.bincount(table["release"], broken, minlength=len(self.base)) > 0
+        mended: Floats = np.where(failed, np.maximum(self.ensemble.width, barrier.repaired), 0.0)
+        return harm, mended
+
+    def _stopped(self, barrier: Barrier, table: NDArray[np.void]) -> tuple[Any, Any]:
+        """Return which crossings a barrier stops, and which break it, each (E,) of bool."""
+        none = np.zeros(len(table), dtype=bool)
+        if isinstance(barrier, Ditch):
+            return self._lands(barrier, table), none
+        assert isinstance(barrier, Fence | GravityWall | Embankment | Wall)
+        low = table["height"] <= barrier.height
+        width = self.ensemble.width[table["release"]]
+        if isinstance(barrier, Fence):
+            assert barrier.energy_class is not None
+            capacity = 1e3 * barrier.energy_class * width / np.minimum(width, PANEL)
+            stands = _sums(table["release"], table["energy"] * low) <= capacity
+            return low & stands, low & ~stands
+        if isinstance(barrier, GravityWall):
+            wall = barrier.density * barrier.height * barrier.thickness
+            mass = wall * np.maximum(width, ELEMENT)
+            speed = table["mass"] * table["speed"] / (table["mass"] + mass)
+            return low, low & (speed**2 > 2.0 * BASE * GRAVITY * SLID)
+        return low, none
+
+    def _lands(self, ditch: Ditch, table: NDArray[np.void]) -> Any:
+        """Return which crossings end in a ditch: they fall into it, and do not leap out."""
+        fall = np.maximum(table["height"] - table["radius"], 0.0) + ditch.depth
+        lands = table["speed"] * np.sqrt(2.0 * fall / GRAVITY) <= ditch.width
+        leap = BOUNCE * table["speed"] ** 2 / (2.0 * GRAVITY)
+        return lands & (leap <= ditch.depth)
+
+    def _harm(self, volume: Floats) -> Floats:
+        """Return the harm of volumes on the road, 0 of none [EUR]."""
+        harms = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
+        return np.where(volume > 0.0, harms, 0.0)
+
+
+def _sums(release: NDArray[np.int32], values: Floats) -> Floats:
+    """Return the running sum of values within each release; they are in order."""
+    total = np.cumsum(values)
+    first = np.searchsorted(release, release)
+    return total - total[first] + values[first]

@@ -1,0 +1,245 @@
+"""Barriers by mixed-integer linear programming on one barrier-free ensemble.
+
+The best choices of one, two and three barriers are sought, as a catalogue estimates them
+(`rigdda.agents.designers.catalogue`). With z[j] = 1 for barrier j, and h_r the harm that release r
+still does,
+
+    minimise    annual.z + weight.h
+    subject to  h_r >= base_r - sum_j relief[r, j] z[j],  h_r >= 0
+                sum z <= max_barriers, and none where another stands
+
+The sum of reliefs is more than two barriers take off together, so a second programme scales them
+down; its layouts are the more careful ones. The estimate does not know what a barrier does to the
+flow further down, so the simulation has the last word.
+
+These optima, the engineering rule, its fence lower and weaker (the rule does not know what it
+costs), the best constant and no barrier at all are the layouts that every search tries first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigdda import Fence, Layout
+from rigdda.agents.designers.catalogue import Catalogue, Ensemble, Floats, ensemble_for, whole
+from rigdda.agents.designers.constant import constant
+from rigdda.agents.designers.menu import STEP, Menu
+from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, Proposals, search
+from rigdda.agents.designers.rule import rule
+from rigdda.agents.designers.store import Store
+from rigdda.barriers import FENCE_CLASSES
+from rigdda.envs import DesignProblem
+from rigdda.envs.encoding import CLASSES
+from rigdda.envs.siting import MIN_GAP
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """An optimum of the programme.
+
+    Parameters
+    ----------
+    layout : tuple of Barrier
+        What is built, downhill.
+    objective : float
+        Its Z as the programme sees it [EUR per m and year].
+    bound : float
+        That of the programme's linear relaxation: none is better.
+    """
+
+    layout: Layout
+    objective: float
+    bound: float
+
+
+def choose(catalogue: Catalogue, slots: int, share: float = 1.0) -> Choice:
+    """Return the best choice of at most `slots` barriers.
+
+    Parameters
+    ----------
+    share : float
+        Share of each relief that counts.
+    """
+    if not catalogue.barriers:
+        nothing = float(catalogue.weight @ catalogue.base)
+        return Choice((), nothing, nothing)
+    bound, _ = _solve(catalogue, slots, share, boolean=False)
+    value, z = _solve(catalogue, slots, share, boolean=True)
+    built = [catalogue.barriers[j] for j in np.flatnonzero(z > 0.5).tolist()]
+    return Choice(tuple(sorted(built, key=lambda b: b.x)), value, min(bound, value))
+
+
+def _solve(catalogue: Catalogue, slots: int, share: float, boolean: bool) -> tuple[float, Floats]:
+    """Return the least objective and its z (J,), whole numbers or between 0 and 1."""
+    import cvxpy as cp
+
+    useful = np.flatnonzero(catalogue.weight * catalogue.base > 0.0)
+    scale = max(float(catalogue.weight @ catalogue.base), 1e-12)
+    z = cp.Variable(len(catalogue.barriers), boolean=boolean)
+    left = cp.Variable(len(useful), nonneg=True)  # of a release's share of the harm [-]
+    weigh = (catalogue.weight * catalogue.base)[useful] / scale
+    part = share * catalogue.relief[useful] / catalogue.base[useful, None]
+    goal = (catalogue.annual / scale) @ z + weigh @ left
+    rules = [left >= 1.0 - part @ z, cp.sum(z) <= slots, z >= 0, z <= 1]
+    clashes = _clashes(catalogue)
+    if len(clashes):
+        rules.append(clashes @ z <= 1)
+    problem = cp.Problem(cp.Minimize(goal), rules)
+    with suppress(ValueError, cp.SolverError):
+        problem.solve(solver=cp.HIGHS, mip_rel_gap=GAP)
+    if z.value is None:  # nothing built is always a solution
+        return scale, np.zeros(len(catalogue.barriers))
+    return scale * float(problem.value), np.asarray(z.value, dtype=np.float64)
+
+
+GAP = 0.01
+"""Relative gap at which an optimum is good enough: the estimates are worse."""
+
+
+def _clashes(catalogue: Catalogue) -> Floats:
+    """Return which barriers stand at, or just beyond, the start of each other one, (n, J)."""
+    start, end = catalogue.span.T
+    starts = np.unique(start)
+    over = (start <= starts[:, None]) & (starts[:, None] < end + MIN_GAP)
+    kinds = np.array([b.kind == "mesh" for b in catalogue.barriers])
+    over &= ~kinds
+    rows = np.concatenate([over, kinds[None]])  # one mesh at most
+    return np.unique(rows[rows.sum(axis=1) > 1], axis=0).astype(np.float64)
+
+
+CAREFUL = (1.0, 0.8, 0.5)
+"""Shares of the estimated reliefs that count."""
+TABLE = 120
+"""Barriers of the catalogue that the programme chooses from: the best of every kind at every place,
+by what they are worth alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConvexResult(DesignResult):
+    """The layout that does best in simulation, and all optima that were simulated.
+
+    Parameters
+    ----------
+    choices : tuple of Choice
+        Optima of the programme, each with the bound of its relaxation.
+    """
+
+    choices: tuple[Choice, ...]
+
+
+def design(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> ConvexResult:
+    """Return the programme's layout that does best in simulation.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If the budget is below 2 or the seed out of range; if a simulation diverges.
+    """
+    ledger, menu = Ledger(problem, simulations, seed, progress, store), Menu(problem)
+    ensemble = ensemble_for(ledger, menu.stations)
+    choices = best_choices(problem, ensemble, menu)
+    layouts = [*(choice.layout for choice in choices), rule(problem, ensemble, menu)]
+    ledger.starts |= set(layouts)
+    found = search(ledger, _propose(layouts))
+    own = {name: getattr(found, name) for name in DesignResult.__dataclass_fields__}
+    return ConvexResult(**own, choices=choices)
+
+
+def _propose(layouts: list[Layout]) -> Proposals:
+    """Yield the layouts and, so that the result is never worse, no barrier."""
+    for layout in dict.fromkeys([*layouts, ()]):  # noqa: UP028, a list cannot be sent values
+        yield layout
+
+
+def best_choices(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> tuple[Choice, ...]:
+    """Return the optima of different layouts, of few barriers first."""
+    catalogue = promising(whole(problem, ensemble, menu))
+    found: dict[Layout, Choice] = {}
+    for slots, share in _ladder(problem):
+        choice = choose(catalogue, slots, share)
+        if problem.fits(choice.layout):
+            found.setdefault(choice.layout, choice)
+    return tuple(found.values())
+
+
+def _ladder(problem: DesignProblem) -> Iterator[tuple[int, float]]:
+    """Yield how many barriers may be built and what share of reliefs counts."""
+    for slots in range(1, min(problem.max_barriers, 3) + 1):
+        for share in CAREFUL:
+            yield slots, share
+
+
+def promising(catalogue: Catalogue) -> Catalogue:
+    """Return the barriers of a catalogue that come into question.
+
+    Of every kind, the best at every station, as many of the best of these as of another kind.
+    """
+    best: dict[tuple[str, float], int] = {}
+    order = np.argsort(catalogue.objective, kind="stable").tolist()
+    for j in order:
+        barrier = catalogue.barriers[j]
+        best.setdefault((barrier.kind, 0.0 if barrier.kind == "mesh" else barrier.x), j)
+    kinds: dict[str, list[int]] = {}
+    for (kind, _), j in best.items():
+        kinds.setdefault(kind, []).append(j)
+    each = TABLE // max(1, len(kinds))
+    chosen = [j for group in kinds.values() for j in group[:each]]
+    return catalogue.take(sorted(chosen))
+
+
+CHEAPER = ((0, 1), (1, 0), (1, 1), (0, 2))
+"""Steps of height and of class by which the rule's fence is tried smaller."""
+
+
+def starts(ledger: Ledger) -> list[Layout]:
+    """Return the different layouts that an ensemble suggests, the most promising first."""
+    menu = Menu(ledger.problem)
+    ensemble = ensemble_for(ledger, menu.stations)
+    ledger.known = tuple(unsearched(ledger.problem, ensemble, menu))
+    optima = [choice.layout for choice in best_choices(ledger.problem, ensemble, menu)]
+    found = list(dict.fromkeys([*optima, *known(ledger.problem, ensemble, menu), ()]))
+    ledger.starts |= set(found)
+    return found
+
+
+def unsearched(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> list[Layout]:
+    """Return the layouts that every search must beat: the rule's and the best constant."""
+    layouts = rule(problem, ensemble, menu), constant(problem, menu)
+    return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]
+
+
+def known(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> list[Layout]:
+    """Return the layouts that need no search: the rule's, it smaller, and the best constant."""
+    one = rule(problem, ensemble, menu)
+    smaller = [_smaller(one, *steps) for steps in CHEAPER]
+    layouts = [one, constant(problem, menu), *smaller]
+    return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]
+
+
+def offered(ledger: Ledger) -> Proposals:
+    """Yield what `starts` suggests."""
+    for layout in starts(ledger):  # noqa: UP028, a list cannot be sent values
+        yield layout
+
+
+def _smaller(layout: Layout, lower: int, weaker: int) -> Layout:
+    """Return a layout whose fences are lower and of a lower class by some steps."""
+    out = []
+    for b in layout:
+        if isinstance(b, Fence) and b.energy_class is not None:
+            name = CLASSES[max(0, CLASSES.index(b.energy_class) - weaker)]
+            row = FENCE_CLASSES[name]
+            tall = min(max(row.lowest, b.height - lower * STEP), row.height)
+            b = Fence(b.x, tall, energy_class=name)
+        out.append(b)
+    return tuple(out)

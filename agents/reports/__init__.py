@@ -1,0 +1,1 @@
+"""Reports of designs: tables, findings in words, pictures."""

@@ -1,0 +1,87 @@
+"""What a design leaves in its folder beside its evaluations: layout, pictures, replay."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import rigdda
+from rigdda import Layout, Site
+from rigdda.agents.design_study import SHED, Case, Study
+from rigdda.agents.designers.protocol import release_seeds
+from rigdda.agents.reports import findings, pictures
+from rigdda.agents.reports.pictures import BLOCKS, Flights, Panel, fly, section
+from rigdda.agents.reports.wording import euros, short, span, standing
+from rigdda.results.marks import Marks
+
+FILES = (
+    "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png", "episode.rrd",
+)  # fmt: skip
+
+
+SEEN = 50
+"""Releases among which one is looked for that reaches the road without barriers."""
+
+
+def write(done: Study, out: Path, seed: int) -> None:
+    """Write `layout.toml`, `section.png`, `cost.png` and `episode.rrd` of a study into `out`.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    rigdda.save_layout(done.chosen.evaluation.layout, out / "layout.toml")
+    _section(done, out / "section.png", seed)
+    tried = [entry.evaluation for entry in done.result.history.stage("search")]
+    points = [pictures.Point.of(case.name, case.evaluation) for case in done.cases]
+    reference = pictures.Point(SHED, done.problem.site.shed(), 0.0, (0.0, 0.0))
+    pictures.cost(out / "cost.png", tried, [*points, reference])
+    _replay(done, out / "episode.rrd", seed)
+
+
+def _section(done: Study, path: Path, seed: int) -> None:
+    """Write the picture of the slope before and after."""
+    site, chosen = done.problem.site, done.chosen
+    nothing = _all(site, (), seed)
+    panels = [Panel(f"Without barriers: {_words(done.nothing)}", (), nothing)]
+    layout = chosen.evaluation.layout
+    if layout:
+        panels.append(Panel(f"With the layout: {_words(chosen)}", layout, _all(site, layout, seed)))
+    section(path, site, done.problem.zone, panels, nothing)
+
+
+def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:
+    """Return releases of every event of a site."""
+    seeds, stations = release_seeds("ensemble", seed, BLOCKS), pictures.stations_of(site)
+    return [fly(site, layout, event.name, seeds, stations) for event in site.events]
+
+
+def _words(case: Case) -> str:
+    e = case.evaluation
+    return f"Z = {euros(e.objective)} ({span(e.ci)}) EUR per metre and year"
+
+
+def _replay(done: Study, path: Path, seed: int) -> None:
+    """Write the replay of the layout in a release that reaches the road without it.
+
+    Of the event that makes most of the risk without barriers.
+    """
+    site, nothing, chosen = done.problem.site, done.nothing, done.chosen
+    event = findings.worst(nothing.evaluation) or site.event_names[0]
+    seeds = release_seeds("verification", seed, SEEN)
+    before = done.problem.sample((), {event: seeds})
+    drawn = next((s for s, o in zip(seeds, before, strict=True) if o.reached), seeds[0])
+    layout = chosen.evaluation.layout
+    run, outcome = rigdda.release(site, layout, drawn, event)
+    risk = nothing.evaluation.by_event[event]
+    notes = {
+        "layout": "; ".join(map(short, layout)) or "no barrier",
+        "event": f"{event}, {euros(risk)} EUR per metre and year without barriers",
+        "release": f"seed {drawn}, {outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3 "
+        "come onto the road",
+        "without barriers": _words(nothing),
+        "with the layout": _words(chosen),
+    }
+    labels = tuple(short(barrier) for barrier in standing(layout))
+    road = site.road.start, site.road.end
+    run.to_rerun(path, Marks(road, notes, f"{site.name}: {chosen.name}", labels))

@@ -1,0 +1,503 @@
+"""Pictures of a slope for who must decide, and of cost against risk.
+
+The section shows what comes down, how high, how hard, and what stands.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import Barrier, Ditch, Fence, Layout, Run, Simulation, Site
+from rigdda.agents.reports.wording import short, standing
+from rigdda.barriers import Earthwork, earthworks
+from rigdda.envs import Evaluation
+from rigdda.envs.rendering import GROUND, ROAD
+from rigdda.files import atomic
+from rigdda.geometry import polygon_properties
+from rigdda.model.place import BarrierZone
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
+
+Floats = NDArray[np.float64]
+
+QUANTILE = 0.95
+"""Of the envelopes."""
+
+LEAST = 20
+"""Blocks that must come by for a 95 % quantile to say anything."""
+
+BLOCKS = 60
+"""Blocks of an event that are looked at, in whole releases."""
+
+STATIONS = 60
+"""Chainages of an envelope."""
+
+EVERY = 0.05
+"""Interval of the points of a way [s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flights:
+    """Releases of one event.
+
+    Parameters
+    ----------
+    event : str
+        Its name.
+    releases : int
+        How many.
+    ways : tuple of (n, 2) array
+        Where the centroid of each block was [m].
+    run : Run
+        The first release.
+    stations : (K,) array
+        Chainages of the envelopes [m], ascending.
+    height : (K,) array
+        95 % quantile of how high above the ground the tops of blocks come by, as centroid and
+        circumscribed radius [m]; NaN where less than 20 come by.
+    energy : (K,) array
+        The same of their energy, of translation and rotation [J], each as wide as the root of its
+        area.
+    """
+
+    event: str
+    releases: int
+    ways: tuple[Floats, ...]
+    run: Run
+    stations: Floats
+    height: Floats
+    energy: Floats
+
+
+def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int], stations: Floats) -> Flights:
+    """Simulate releases of an event, over all cores in threads.
+
+    Of the seeds the first are taken, until `BLOCKS` blocks have come down.
+
+    Raises
+    ------
+    BadInput
+        If the layout does not stand on the slope.
+    Diverged
+        If a simulation diverges.
+    """
+    barriers = standing(layout)
+    first = _run(site, barriers, event, seeds[0], stations)
+    more = seeds[1 : max(1, -(-BLOCKS // len(first.scene.blocks)))]
+    with ThreadPoolExecutor() as pool:
+        rest = pool.map(lambda seed: _run(site, barriers, event, seed, stations), more)
+        runs = [first, *rest]
+    height, energy = _passage_envelopes(runs, len(stations))
+    ways = tuple(run.poses[:, i, :2] for run in runs for i in range(run.poses.shape[1]))
+    return Flights(event, len(runs), ways, first, stations, height, energy)
+
+
+def _run(site: Site, layout: Layout, event: str, seed: int, stations: Floats) -> Run:
+    scene = site.realise(layout, seed, event)
+    simulation = Simulation(scene, site.settings(scene), tuple(stations.tolist()))
+    return simulation.run(site.motion.duration, EVERY)
+
+
+def stations_of(site: Site) -> Floats:
+    """Return the chainages of the envelopes: from the highest source to the road's far edge [m]."""
+    left = max(site.slope.points[0][0], min(start for start, _ in map(reach, sources(site))))
+    return np.linspace(left, site.road.end, STATIONS + 1)[1:]
+
+
+def sources(site: Site) -> list[Floats]:
+    """Return the corners of each source [m]: closed, or the ground in a band."""
+    ground, out = site.profile, []
+    for source in site.sources:
+        if source.band is None:
+            pieces = (np.array(piece, dtype=np.float64) for _, piece in source.pieces())
+            out += [np.concatenate([piece, piece[:1]]) for piece in pieces]
+        else:
+            start, end = source.band
+            x = [start, *(x for x, _ in site.slope.points if start < x < end), end]
+            out.append(np.array([(at, ground.height(at)) for at in x]))
+    return out
+
+
+def reach(corners: Floats) -> tuple[float, float]:
+    """Return the least and the greatest chainage of corners [m]."""
+    return float(corners[:, 0].min()), float(corners[:, 0].max())
+
+
+def _passage_envelopes(runs: Sequence[Run], stations: int) -> tuple[Floats, Floats]:
+    """Return the 95 % quantiles of heights [m] and of energies [J] at each station."""
+    height, energy = np.full(stations, np.nan), np.full(stations, np.nan)
+    sizes = [np.array([_size(block.vertices) for block in run.scene.blocks]) for run in runs]
+    for k in range(stations):
+        tops, works = [], []
+        for run, size in zip(runs, sizes, strict=True):
+            crossed = run.crossings(k)
+            radius, width = size[crossed["block"]].T
+            tops.append(crossed["height"] + radius)
+            works.append(crossed["energy"] * width)
+        if sum(map(len, tops)) >= LEAST:
+            height[k] = np.quantile(np.concatenate(tops), QUANTILE)
+            energy[k] = np.quantile(np.concatenate(works), QUANTILE)
+    return height, energy
+
+
+def _size(vertices: Floats) -> tuple[float, float]:
+    """Return a block's circumscribed radius about its centroid and the root of its area [m]."""
+    area, centre, _ = polygon_properties(vertices)
+    return float(np.hypot(*(vertices - centre).T).max()), float(np.sqrt(area))
+
+
+__all__ = ["BARRIER", "DPI", "FONT", "GROUND", "ROAD", "ZONE", "Point", "colours", "cost", "save"]
+
+BARRIER, ZONE, TRIED, EQUAL = "#14213d", "#9dc3e6", "#9aa5b1", "#c8ccd0"
+EVENTS = ("#0072b2", "#d0312d", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b4fb0", "#6b4226")
+"""Colours of events, told apart by the colour-blind as far as eight can be."""
+
+MARKERS = ("o", "^", "s", "D", "P", "X")
+FONT: dict[Any, Any] = {"font.size": 11, "axes.spines.top": False, "axes.spines.right": False}
+DPI = 120
+
+SHEDS = 1.6
+"""A reference dearer than this many times all else is told at the edge, not drawn to scale."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """What a named layout costs, in EUR per metre of road and year.
+
+    Parameters
+    ----------
+    name : str
+        What it is.
+    capital : float
+        What its capital costs a year.
+    risk : float
+        Expected harm and repair of a year.
+    interval : (float, float)
+        95 % interval of `risk`.
+    """
+
+    name: str
+    capital: float
+    risk: float
+    interval: tuple[float, float]
+
+    @classmethod
+    def of(cls, name: str, evaluation: Evaluation) -> Point:
+        """Return the point of an evaluation; its capital is known, so all doubt is of the risk."""
+        risk, capital = evaluation.harm + evaluation.repair, evaluation.capital
+        low, high = (max(end - capital, 0.0) for end in evaluation.ci)
+        return cls(name, capital, risk, (min(low, risk), max(high, risk)))
+
+
+def colours(count: int) -> list[str]:
+    """Return the colours of so many events of a site, in its order."""
+    return [EVENTS[i % len(EVENTS)] for i in range(count)]
+
+
+def cost(
+    path: str | os.PathLike[str], tried: Sequence[Evaluation], points: Sequence[Point]
+) -> None:
+    """Write a PNG of what layouts cost a year against the risk that they leave.
+
+    Parameters
+    ----------
+    path : path
+        The PNG.
+    tried : sequence of Evaluation
+        What a search evaluated, each by few releases.
+    points : sequence of Point
+        Verified layouts and references, with intervals; Z is the same along the thin lines.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    near = [point for point in points if point.capital <= _reach(points)]
+    right = 1.15 * max([point.capital for point in near] + [1.0])
+    top = 1.2 * max(point.interval[1] for point in points)
+    with rc_context(FONT):
+        figure = Figure((9.0, 6.2), dpi=DPI, layout="constrained")
+        axes = figure.subplots()
+        _equal(axes, right, top)
+        axes.plot([e.capital for e in tried], [e.harm + e.repair for e in tried], ".", color=TRIED,
+                  markersize=4, alpha=0.6, zorder=2,
+                  label=_searched(tried))  # fmt: skip
+        for i, point in enumerate(near):
+            _named(axes, point, MARKERS[i % len(MARKERS)], EVENTS[i % len(EVENTS)])
+        for point in points:
+            if point not in near:
+                axes.annotate(
+                    f"{point.name}: {point.capital:,.0f} a year, {point.risk:,.0f} of risk",
+                    (0.995, 0.01), xycoords="axes fraction", ha="right", va="bottom", fontsize=10,
+                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8},
+                )  # fmt: skip
+        axes.set(xlim=(-0.02 * right, right), ylim=(0.0, top))
+        axes.set(xlabel="capital and upkeep [EUR per metre of road and year]",
+                 ylabel="harm and repair to expect [EUR per metre of road and year]")  # fmt: skip
+        figure.legend(loc="outside lower center", ncols=2, frameon=False)
+        save(figure, path)
+
+
+def _searched(tried: Sequence[Evaluation]) -> str:
+    """Return what the points of a search are, and half their median 95 % interval.
+
+    The best of many is too good by about as much.
+    """
+    words = f"{len(tried):,} layouts of the search, by few releases"
+    if not tried:
+        return words
+    half = float(np.median([0.5 * (e.ci[1] - e.ci[0]) for e in tried]))
+    return f"{words}, ± {half:,.0f}"
+
+
+def _reach(points: Sequence[Point]) -> float:
+    """Return the dearest capital that is drawn to scale [EUR per metre and year]."""
+    least = min(point.capital + point.risk for point in points)
+    return SHEDS * max(least, *(p.risk for p in points), sorted(p.capital for p in points)[-2])
+
+
+def _equal(axes: Axes, right: float, top: float) -> None:
+    """Draw lines of equal Z, which is the sum of both axes, and write their value."""
+    from matplotlib.ticker import MaxNLocator
+
+    levels = [z for z in MaxNLocator(9).tick_values(0.0, right + top) if 0.0 < z < right + top]
+    for z in levels:
+        axes.plot([0.0, z], [z, 0.0], color=EQUAL, linewidth=0.8, zorder=1)
+        x = z - 0.985 * top if z > top else 0.0
+        if x < 0.9 * right:
+            axes.annotate(f"Z = {z:,.0f}", (x, z - x), xytext=(3, 2), textcoords="offset points",
+                          fontsize=8, color="#80868b", zorder=1, va="bottom")  # fmt: skip
+
+
+def _named(axes: Axes, point: Point, marker: str, colour: str) -> None:
+    """Draw a named layout with the interval of its risk."""
+    spread = np.abs(np.array(point.interval) - point.risk)[:, None]
+    axes.errorbar(point.capital, point.risk, spread, fmt=marker, color=colour, markersize=9,
+                  capsize=4, linewidth=1.6, zorder=4,
+                  label=f"{point.name}: Z = {point.capital + point.risk:,.0f}")  # fmt: skip
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure as PNG, whole or not at all."""
+    with atomic(path) as part:
+        figure.savefig(part, format="png")
+
+
+DRAWN = 30
+"""Ways of an event that are drawn: with more the eye sees no less, and no more."""
+
+APART = 8.0
+"""Distance of two barriers below which their labels are put one below the other [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """One slope of the picture: its title, what stands, and releases of every event."""
+
+    title: str
+    layout: Layout
+    flights: Sequence[Flights]
+
+
+def section(
+    path: str | os.PathLike[str],
+    site: Site,
+    zone: BarrierZone,
+    panels: Sequence[Panel],
+    envelopes: Sequence[Flights],
+) -> None:
+    """Write the PNG of a slope.
+
+    Parameters
+    ----------
+    path : path
+        The PNG.
+    site : Site
+        Where.
+    zone : BarrierZone
+        Where barriers may stand.
+    panels : sequence of Panel
+        Slopes, side by side or one above the other, to scale.
+    envelopes : sequence of Flights
+        Releases without barriers, of which heights and energies are shown.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    window = _window(site)
+    left, right, bottom, top = window
+    ratio = (top - bottom) / (right - left)
+    width = 13.0 if ratio > 0.3 else 11.0
+    rows, columns = (1, len(panels)) if ratio > 0.3 else (len(panels), 1)
+    tall = min(width / columns * ratio, 7.0)
+    with rc_context(FONT):
+        figure = Figure((width, rows * (tall + 0.5) + 4.8), dpi=DPI, layout="constrained")
+        parts: Any = figure.subfigures(2, height_ratios=[rows * (tall + 0.5) + 0.4, 4.4])
+        upper, lower = parts
+        grid = upper.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        for axes, panel in zip(grid.flat, panels, strict=True):
+            _slope(axes, site, zone, panel, bottom)
+            axes.set(xlim=(left, right), ylim=(bottom, top))
+            axes.label_outer()
+        heights, energies = lower.subplots(1, 2, sharex=True)
+        heights.set_xlim(left, right)
+        for axes in (heights, energies):
+            axes.axvspan(zone.start, zone.end, color=ZONE, alpha=0.25, lw=0)
+        _envelopes(heights, energies, site, panels[-1].layout, envelopes)
+        _key(lower, site, envelopes)
+        save(figure, path)
+
+
+def released(
+    path: str | os.PathLike[str],
+    site: Site,
+    layout: Layout,
+    seeds: Sequence[int],
+    event: str | None = None,
+) -> None:
+    """Write the PNG of releases with a layout, of one event or of all.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `rigdda.agents.reports.pictures.fly` does.
+    """
+    names = site.event_names if event is None else (event,)
+    stations = stations_of(site)
+    nothing = [fly(site, (), name, seeds, stations) for name in names]
+    after = [fly(site, layout, name, seeds, stations) for name in names] if layout else nothing
+    count = sum(flights.releases for flights in after)
+    title = f"{site.name}: {count} releases, by event" if event is None else f"{event}: {count}"
+    section(path, site, site.barrier_zone, [Panel(title, layout, after)], nothing)
+
+
+def _window(site: Site) -> tuple[float, float, float, float]:
+    """Return left, right, bottom, top of what matters: from the source to beyond the road [m]."""
+    x, y = np.array(site.slope.points).T
+    pieces = sources(site)
+    start = min(reach(piece)[0] for piece in pieces)
+    high = max(float(piece[:, 1].max()) for piece in pieces)
+    way = site.road.end - start
+    left, right = max(start - 0.05 * way, x[0]), min(site.road.end + 0.06 * way, x[-1])
+    low = float(y[(x >= left) & (x <= right)].min())
+    return left, right, low - 0.1 * (high - low), high + 0.05 * (high - low)
+
+
+def _slope(axes: Axes, site: Site, zone: BarrierZone, panel: Panel, bottom: float) -> None:
+    """Draw one slope: its ground, zone, road and sources, the ways of blocks, what stands."""
+    built, moved = earthworks(site.profile, standing(panel.layout), site.slope.surface)
+    x, y = built.points.T
+    axes.fill_between(x, y, bottom, color=GROUND, linewidth=0, zorder=2)
+    axes.plot(*_along(site, zone.start, zone.end), color=ZONE, linewidth=5, zorder=2.5,
+              solid_capstyle="butt")  # fmt: skip
+    axes.plot(*_along(site, site.road.start, site.road.end), color=ROAD, linewidth=5, zorder=3,
+              solid_capstyle="butt")  # fmt: skip
+    for flights, colour in zip(panel.flights, colours(len(panel.flights)), strict=True):
+        for way in flights.ways[:: max(1, len(flights.ways) // DRAWN)]:
+            axes.plot(*way.T, color=colour, linewidth=0.6, alpha=0.55, zorder=4)
+    for corners in sources(site):
+        axes.plot(*corners.T, color="black", linewidth=2.0, zorder=4.5)
+    _barriers(axes, site, panel, moved)
+    axes.set_aspect("equal")
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.set_title(panel.title, loc="left", fontsize=11)
+
+
+def _along(site: Site, start: float, end: float) -> tuple[Floats, Floats]:
+    """Return the ground between two chainages, x and y [m]."""
+    inner = [x for x, _ in site.slope.points if start < x < end]
+    at = np.array([start, *inner, end])
+    return at, np.array([site.profile.height(x) for x in at])
+
+
+def _barriers(axes: Axes, site: Site, panel: Panel, moved: Mapping[Barrier, Floats]) -> None:
+    """Draw what stands and say what it is, in the ground, where nothing else is drawn."""
+    outlines = [
+        moved[b] if isinstance(b, Earthwork) else b.outline(site.profile)
+        for b in standing(panel.layout)
+    ]
+    for i, (barrier, outline) in enumerate(zip(standing(panel.layout), outlines, strict=True)):
+        dug = isinstance(barrier, Ditch)
+        axes.fill(*outline.T, facecolor="white" if dug else BARRIER, edgecolor=BARRIER,
+                  linewidth=1.4 if dug else 2.0, zorder=5)  # fmt: skip
+        foot = outline[np.argmin(outline[:, 0])]
+        axes.annotate(
+            short(barrier).replace(", ", ",\n"),
+            foot,
+            xytext=(-34, -16 - 36 * _near(outlines[:i], outline)),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            color=BARRIER,
+            fontweight="bold",
+            zorder=7,
+            arrowprops={"arrowstyle": "-", "color": BARRIER, "linewidth": 0.9, "shrinkB": 0},
+        )
+    for i, mesh in enumerate(set(panel.layout) - set(standing(panel.layout))):
+        axes.text(0.98, 0.93 - 0.09 * i, short(mesh), ha="right", color=BARRIER,
+                  fontweight="bold", transform=axes.transAxes, zorder=7)  # fmt: skip
+
+
+def _near(others: Sequence[Floats], outline: Floats) -> int:
+    """Return how many barriers before one are so near that their labels would meet it."""
+    x, y = outline.mean(axis=0)
+    return sum(abs(o[:, 0].mean() - x) < APART and abs(o[:, 1].mean() - y) < APART for o in others)
+
+
+def _envelopes(
+    heights: Axes, energies: Axes, site: Site, layout: Layout, envelopes: Sequence[Flights]
+) -> None:
+    """Draw how high and how hard blocks come by, and the barriers by height and class."""
+    for flights, colour in zip(envelopes, colours(len(envelopes)), strict=True):
+        heights.plot(flights.stations, flights.height, color=colour, linewidth=1.6)
+        energies.plot(flights.stations, flights.energy / 1e3, color=colour, linewidth=1.6)
+    for axes in (heights, energies):
+        axes.axvspan(site.road.start, site.road.end, color=ROAD, alpha=0.2, lw=0)
+        axes.grid(alpha=0.25)
+        axes.set_xlabel("x [m]")
+    for barrier in standing(layout):
+        if not isinstance(barrier, Ditch):
+            heights.plot([barrier.x] * 2, [0.0, barrier.height], color=BARRIER, linewidth=4,
+                         solid_capstyle="butt")  # fmt: skip
+        else:
+            heights.axvline(barrier.x, color=BARRIER, linewidth=1, linestyle=":")
+        if isinstance(barrier, Fence) and barrier.energy_class is not None:
+            energies.plot(barrier.x, barrier.energy_class, "D", color=BARRIER, markersize=8)
+        else:
+            energies.axvline(barrier.x, color=BARRIER, linewidth=1, linestyle=":")
+    if any((flights.energy > 0.0).any() for flights in envelopes):  # else there is nothing to see
+        energies.set_yscale("log")
+    heights.set_ylim(bottom=0.0)
+    heights.set_title("Without barriers: 95 % of block tops pass below [m above ground]",
+                      loc="left", fontsize=10)  # fmt: skip
+    energies.set_title("Without barriers: 95 % of blocks come with less energy [kJ]",
+                       loc="left", fontsize=10)  # fmt: skip
+
+
+def _key(figure: FigureBase, site: Site, envelopes: Sequence[Flights]) -> None:
+    """Say what colours mean, below the picture."""
+    from matplotlib.lines import Line2D
+
+    lines = []
+    for flights, colour in zip(envelopes, colours(len(envelopes)), strict=True):
+        label = f"{flights.event}, {site.event(flights.event).rate:g} a year per 100 m"
+        lines.append(Line2D([], [], color=colour, linewidth=2, label=label))
+    lines += [
+        Line2D([], [], color="black", linewidth=3, label="rock starts here"),
+        Line2D([], [], color=ZONE, linewidth=6, label="barriers may stand"),
+        Line2D([], [], color=ROAD, linewidth=6, label="road"),
+        Line2D([], [], color=BARRIER, marker="D", linewidth=4, label="barrier: height, class"),
+    ]
+    figure.legend(handles=lines, loc="outside lower center", ncols=min(4, len(lines)),
+                  frameon=False)  # fmt: skip

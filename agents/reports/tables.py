@@ -1,0 +1,314 @@
+"""Results as tables: rows of CSV files and what the command line prints."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import (
+    Embankment,
+    Fence,
+    GravityWall,
+    Layout,
+    Outcome,
+    Points,
+    Site,
+)
+from rigdda.agents.design_study import SHED, Study, design_events
+from rigdda.agents.designers.protocol import Entry
+from rigdda.agents.reports.wording import euros, percent, short, span, standing
+from rigdda.barriers import Earthwork, to_tables
+from rigdda.envs.intervals import Estimate, estimate, mid_p, student_interval
+from rigdda.files import atomic
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+OUTCOME = {
+    "road_volume": ("volume that comes onto the road", "m3", 1.0),
+    "debris_fraction": ("share of the rock that comes onto it", "%", 100.0),
+    "debris_on_road": ("debris on the road at the end", "m2", 1.0),
+    "max_energy_on_road": ("largest energy on the road", "kJ/m", 1e-3),
+    "slope_fraction": ("at the end on the slope", "%", 100.0),
+    "held_fraction": ("at the end behind barriers", "%", 100.0),
+    "road_fraction": ("at the end on the road", "%", 100.0),
+    "beyond_fraction": ("at the end beyond the road", "%", 100.0),
+}
+"""Field of an outcome: words, unit and factor for printing."""
+
+HIT = {
+    "hits": ("hits", "-", 1.0),
+    "max_energy": ("largest energy of a hit", "kJ/m", 1e-3),
+    "total_energy": ("energy of all hits", "kJ/m", 1e-3),
+    "absorbed_energy": ("energy absorbed", "kJ/m", 1e-3),
+    "thrust": ("largest thrust, mean over a second", "kN/m", 1e-3),
+    "overtopped": ("blocks that passed", "-", 1.0),
+    "caught": ("share of the rock at rest behind or in it", "%", 100.0),
+    "failed": ("failed", "%", 100.0),
+    "displacement": ("displacement", "m", 1.0),
+}
+"""The same of a barrier."""
+
+ONLY = {
+    "failed": (Fence, GravityWall, Embankment),
+    "thrust": (Fence, GravityWall, Embankment),
+    "displacement": (GravityWall,),
+}
+"""Kinds of which alone a field of a barrier says anything."""
+
+
+class EvaluationsFile:
+    """A CSV file with one row an evaluated layout, written as they come.
+
+    Money is in EUR per metre of road and year, `cost` in EUR per metre; `barriers` is a JSON list
+    of tables as in a layout file. Usable as a context manager.
+    """
+
+    FIELDS = (
+        "simulations", "stage", "releases", "objective", "objective_low", "objective_high",
+        "capital", "harm", "repair", "cost", "debris", "debris_share", "targets", "seconds",
+        "barriers",
+    )  # fmt: skip
+
+    def __init__(self, path: str | os.PathLike[str]):
+        self._file = Path(path).open("w", newline="", encoding="utf-8")
+        self._rows = csv.writer(self._file)
+        self._rows.writerow(self.FIELDS)
+
+    def __enter__(self) -> EvaluationsFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def add(self, entry: Entry) -> None:
+        """Write one row and flush it."""
+        e = entry.evaluation
+        row = (
+            entry.simulations, entry.stage, e.releases, e.objective, *e.ci, e.capital, e.harm,
+            e.repair, e.cost, e.debris, e.debris_share, e.targets or "", e.seconds,
+            json.dumps(to_tables(e.layout)),
+        )  # fmt: skip
+        self._rows.writerow(row)
+        self._file.flush()
+
+
+def write_outcomes(
+    path: str | os.PathLike[str], seeds: Sequence[int], outcomes: Sequence[Outcome]
+) -> None:
+    """Write a CSV file with one row a release: its seed, its outcome, what each barrier took."""
+    rows = []
+    for seed, outcome in zip(seeds, outcomes, strict=True):
+        rows.append({"seed": seed} | outcome_row(outcome))
+    write_rows(path, rows)
+
+
+def outcome_row(outcome: Outcome) -> dict[str, Any]:
+    """Return an outcome, and what each barrier took, as columns of a CSV file."""
+    row: dict[str, Any] = {"event": outcome.event, "width": outcome.width}
+    row |= {"released_volume": outcome.released_volume, "reached": outcome.reached}
+    row |= {name: getattr(outcome, name) for name in OUTCOME}
+    row |= zip(("run_out_50", "run_out_95", "run_out_100"), outcome.run_out, strict=True)
+    for i, barrier in enumerate(outcome.barriers):
+        row |= {f"barrier_{i}_{name}": getattr(barrier, name) for name in HIT}
+    return row
+
+
+def write_rows(
+    path: str | os.PathLike[str],
+    rows: Sequence[dict[str, Any]],
+    fields: Sequence[str] | None = None,
+) -> None:
+    """Write a CSV file with one row a dictionary.
+
+    `fields` are the columns, by default the keys of the first row; a row may lack some.
+    """
+    with atomic(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, rows[0] if fields is None else fields, restval="")
+        table.writeheader()
+        table.writerows({k: "" if applies_not(v) else v for k, v in row.items()} for row in rows)
+
+
+def applies_not(value: Any) -> bool:
+    """Return whether a value is not a number: what does not apply is an empty cell."""
+    return isinstance(value, float) and math.isnan(value)
+
+
+def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
+    """Return the table of means over releases."""
+    table = empty_table(("", "mean", "95 % interval"))
+
+    def add(words: str, unit: str, factor: float, values: list[float], low: float = 0.0) -> None:
+        sample = factor * np.array(values, dtype=np.float64)
+        ends = _interval(sample, low, unit == "%")
+        table.add_row(f"{words} [{unit}]", f"{sample.mean():.4g}", _span(ends, ".4g"))
+
+    chance = estimate(sum(outcome.reached for outcome in results), len(results))
+    ends = 100.0 * chance.low, 100.0 * chance.high
+    head = "a block comes onto the road [%]"
+    table.add_row(head, f"{100.0 * chance.probability:.4g}", _span(ends, ".4g"))
+    for name, (words, unit, factor) in OUTCOME.items():
+        add(words, unit, factor, [getattr(outcome, name) for outcome in results])
+    run_out = [outcome.run_out[1] for outcome in results]
+    add("run-out of 95 % of the rock", "m", 1.0, run_out, -math.inf)
+    for i, barrier in enumerate(standing(layout)):
+        table.add_section()
+        table.add_row(f"{short(barrier)}, at {barrier.x:.1f} m")
+        for name, (words, unit, factor) in HIT.items():
+            if isinstance(barrier, Earthwork) and name not in ("overtopped", "caught", *ONLY):
+                continue
+            if not isinstance(barrier, ONLY.get(name, object)):
+                continue
+            add(f"  {words}", unit, factor, [getattr(o.barriers[i], name) for o in results])
+    return table
+
+
+def _interval(sample: NDArray[np.float64], low: float, percent: bool) -> Sequence[float]:
+    """Return the 95 % interval of a mean that is at least `low`, and at most 100 if in percent.
+
+    A share that is none or all in every release is at most the chance that it is not none.
+    """
+    if percent and np.isin(sample, (0.0, 100.0)).all():
+        return [100.0 * end for end in mid_p(int(np.count_nonzero(sample)), len(sample))]
+    ends = np.clip(student_interval(sample), low, 100.0 if percent else None)
+    return [float(end) for end in ends]
+
+
+def sites(found: Iterable[Site]) -> Table:
+    """Return the table of sites: what they are, and the events that come down."""
+    table = empty_table(("site", "family", "height [m]", "events (1/year per 100 m)", "zone [m]"))
+    for site in found:
+        heights = [y for _, y in site.slope.points]
+        zone = site.barrier_zone
+        events = ", ".join(f"{event.name} {event.rate:g}" for event in site.events)
+        table.add_row(
+            site.name,
+            site.family or "-",
+            f"{max(heights) - min(heights):.0f}",
+            shorten(events, 160, placeholder=" ..."),
+            f"{zone.start:g} to {zone.end:g}",
+        )
+    return table
+
+
+def empty_table(head: Sequence[str]) -> Table:
+    """Return an empty table: words on the left, numbers to the right."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for i, name in enumerate(head):
+        left = i == 0 or name in WORDS
+        table.add_column(name, justify="left" if left else "right")
+    return table
+
+
+WORDS = ("description", "family", "layout", "events (1/year per 100 m)")
+"""Columns of words."""
+
+
+def _span(interval: Iterable[float], form: str) -> str:
+    """Return an interval in words; a single value has none."""
+    low, high = interval
+    return f"{low:{form}} to {high:{form}}" if math.isfinite(high - low) else "-"
+
+
+def fit(rows: Sequence[dict[str, Any]]) -> Table:
+    """Return the table of a fit, at most 80 characters wide."""
+
+    def number(value: Any) -> str:
+        return f"{value:.3g}" if isinstance(value, float) else ""
+
+    out = empty_table(("what", "fitted", "95 %", "left out", "observed"))
+    for row in rows:
+        unit = f" [{row['unit']}]" if row["unit"] not in ("", "-") else ""
+        ends = f"{row['low']:.3g} to {row['high']:.3g}" if row["low"] != "" else ""
+        ends = "not identified" if row["identified"] == "no" else ends
+        cells = (number(row[name]) for name in ("left_out", "observed"))
+        out.add_row(row["what"] + unit, number(row["fitted"]), ends, *cells)
+    return out
+
+
+def write_points(path: Path, seeds: Sequence[int], points: Points) -> None:
+    """Write a CSV file with a row a block of the lumped-mass model; where it stops in m."""
+    each = zip(*(column.tolist() for column in (*points, points.energy)), strict=True)
+    names = ("mass_kg", "run_out_m", "speed_m_s", "height_m", "energy_j")
+    rows = [{"seed": seeds[k], **dict(zip(names, row, strict=True))} for k, *row in each]
+    write_rows(path, rows)
+
+
+def points(found: Points) -> Table:
+    """Return what releases of the lumped-mass model do, one figure a row."""
+    out = empty_table(("what", "mean", "95 % of blocks"))
+    reached, weight = found.reached, found.mass / found.mass.sum()
+    out.add_row("debris that reaches the road [-]", f"{float(weight @ reached):.3f}", "")
+    columns = {"run-out [m]": found.run_out, "energy at the road [kJ/m]": 1e-3 * found.energy}
+    columns["height at the road [m]"] = found.height
+    for what, values in columns.items():
+        known = values[~np.isnan(values)]
+        if len(known):
+            out.add_row(what, f"{known.mean():.3g}", f"{np.quantile(known, 0.95):.3g}")
+    return out
+
+
+def costs(study: Study) -> Table:
+    """Return the table of what each layout costs, at most 80 characters wide.
+
+    Money is in EUR per metre of road and year, but for the last column but one: EUR per metre.
+    Debris is what comes onto the road, of what comes without barriers.
+    """
+    head = ("layout", "Z (95 %)", "capital", "harm", "repair", "to build", "debris")
+    table = empty_table(head)
+    whole = study.nothing.evaluation.debris
+    for case in study.cases:
+        e = case.evaluation
+        table.add_row(
+            case.name,
+            f"{euros(e.objective)} ({span(e.ci)})",
+            euros(e.capital),
+            euros(e.harm),
+            euros(e.repair),
+            euros(e.cost),
+            percent(e.debris / whole) if whole else "-",
+        )
+    site = study.problem.site
+    annual = euros(site.shed())
+    table.add_row(SHED, annual, annual, "0", "0", euros(site.prices.shed), "0 %")
+    return table
+
+
+def chances(study: Study) -> Table | None:
+    """Return the table of what may happen in each design event; None if the site has none.
+
+    Each probability with its one-sided 95 % upper bound.
+    """
+    events = design_events(study.problem.site)
+    if not events:
+        return None
+    table = empty_table(("design event", "layout", "reaches road", "barrier fails", "of"))
+    for event in events:
+        for i, case in enumerate(study.cases):
+            e = case.evaluation
+            reach = e.reach[event]
+            fails = _chance(e.failure[event]) if e.layout else "-"
+            name = "" if i else event
+            table.add_row(name, case.name, _chance(reach), fails, f"{reach.releases:,}")
+        table.add_section()
+    return table
+
+
+def _chance(estimate: Estimate) -> str:
+    """Return a probability with its upper bound in words."""
+    if not estimate.releases:
+        return "-"
+    return f"{percent(estimate.probability)} (<= {percent(estimate.bound)})"

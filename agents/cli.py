@@ -189,7 +189,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     import rigdda
     from rigdda.agents.reports import findings
     from rigdda.agents.reports.wording import short, standing
-    from rigdda.results.marks import Marks
+    from rigdda.results.replay import Marks
     from rigdda.results.viewer import open_viewer
 
     file = Path(target)

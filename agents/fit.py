@@ -20,7 +20,7 @@ from rigdda import BadInput, Site, check, release_many
 from rigdda.agents.reports.tables import write_rows
 from rigdda.files import read as read_text
 from rigdda.lumped_mass import lumped
-from rigdda.model.place import Rebound
+from rigdda.model.site_tables import Rebound
 
 RANGES = {
     "scatter.friction_deg": (0.0, 10.0),

@@ -23,9 +23,9 @@ from rigdda.agents.designers.store import mechanics
 from rigdda.agents.reports.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from rigdda.agents.reports.wording import euros, span, standing
 from rigdda.barriers import from_table
+from rigdda.check import mistyped
 from rigdda.envs.cost import Account, Facts, learn, stratified
 from rigdda.files import read
-from rigdda.mistyped import mistyped
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import BadInput, Barrier, Fence, Layout, Mesh
 from rigdda.barriers import FENCE_CLASSES, Built
 from rigdda.envs.siting import MIN_HEIGHT, TOLERANCE, Room, Span
-from rigdda.model.place import BarrierZone
+from rigdda.model.site_tables import BarrierZone
 
 Floats = NDArray[np.float64]
 

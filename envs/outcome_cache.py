@@ -34,8 +34,8 @@ from rigdda import (
     Site,
 )
 from rigdda.barriers import Built, Earthwork, earthworks
-from rigdda.model.roughness import REACH
 from rigdda.model.settings import EARTH
+from rigdda.model.terrain import REACH
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")

@@ -26,7 +26,7 @@ from rigdda.envs.cost import Evaluation
 from rigdda.envs.intervals import Estimate
 from rigdda.envs.outcome_cache import Sample, fingerprint
 from rigdda.envs.siting import Room
-from rigdda.model.place import BarrierZone
+from rigdda.model.site_tables import BarrierZone
 
 MET, MISSED, UNDECIDED = "met", "missed", "undecided"
 """What targets are: the upper bounds of all probabilities are low enough; the lower bound of one is

@@ -155,7 +155,7 @@ class Recorder:
         rewards : sequence of float
             Of each step.
         """
-        from rigdda.results.marks import Marks
+        from rigdda.results.replay import Marks
 
         end, site = stages[-1], shown.site
         run, _ = rigdda.release(site, end.layout, shown.seed, shown.event)

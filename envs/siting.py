@@ -23,7 +23,7 @@ from rigdda import (
     check,
 )
 from rigdda.barriers import MeshOption, as_layout, earthworks
-from rigdda.model.place import BarrierZone
+from rigdda.model.site_tables import BarrierZone
 
 MIN_HEIGHT = 0.5
 """Least height of a barrier that is designed, and depth of a ditch [m]."""

@@ -27,8 +27,7 @@ from experiments.pile import pile, system
 from experiments.script import BLUE, ORANGE, RED, Number, cpu_time, draw, main, say, write
 from rigdda import Settings
 from rigdda.dynamics.arrays import Matrix, Scratch
-from rigdda.dynamics.linear.pcg import solve_pcg
-from rigdda.dynamics.linear.sor import solve_sor
+from rigdda.dynamics.solvers import solve_pcg, solve_sor
 from rigdda.kernel import entry_kernel
 
 STIFFNESS = (0.1, 1.0, 10.0)

@@ -18,8 +18,7 @@ from experiments.script import BLUE, RED, Number, draw, interval, main
 from experiments.study import Row, tabulate
 from rigdda import Settings, Site, Surface
 from rigdda.model.joints import JointSet
-from rigdda.model.place import BarrierZone, Motion, Road
-from rigdda.model.slope import Slope
+from rigdda.model.site_tables import BarrierZone, Motion, Road, Slope
 from rigdda.model.source import Source
 from rigdda.releases import release_many
 

@@ -26,9 +26,9 @@ import rigdda.envs  # noqa: F401  registers the environments
 from experiments.made_by import KERNELS, kernels_hash, made_by
 from experiments.script import RESULTS, put, say, write
 from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Simulation, Site
-from rigdda.batch import Batch
 from rigdda.envs import DesignProblem
 from rigdda.model.settings import Settings
+from rigdda.releases import Batch
 from rigdda.validation.case import evaluate
 from rigdda.validation.suite import CASES
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rigdda import Block, PointLoad, Scene, Settings, Simulation, Terrain
 from rigdda.dynamics.arrays import Matrix, Scratch, Work
-from rigdda.dynamics.assembly.island import assemble_island
+from rigdda.dynamics.equations import assemble_island
 from rigdda.dynamics.islands import find_islands, pair_blocks
 from rigdda.dynamics.records import CONTACTS, Bodies, Contacts
 from rigdda.geometry import polygon_properties

@@ -17,7 +17,7 @@ import numpy as np
 
 from experiments.script import Number, main, say, write
 from rigdda import Embankment, Fence, Layout, Site, sites
-from rigdda.batch import Batch
+from rigdda.releases import Batch
 from rigdda.results.outcome import judge
 
 SITE, TARGET = "bench", 0.5

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from experiments.script import BLUE, GREEN, ORANGE, RED, Number, draw, interval, main
 from experiments.study import Row, tabulate
 from rigdda import Event, Site, Surface
-from rigdda.model.place import BarrierZone, Motion, Road
-from rigdda.model.slope import Slope
+from rigdda.model.site_tables import BarrierZone, Motion, Road, Slope
 from rigdda.model.source import Source
 from rigdda.releases import release_many
 

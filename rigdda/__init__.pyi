@@ -13,27 +13,24 @@ from .barriers import (
     MeshOption,
     Wall,
 )
-from .barriers.files import load_layout, save_layout
-from .dynamics.many import simulate_many
+from .barriers.layout import load_layout, save_layout
 from .dynamics.run import Run
-from .dynamics.simulation import Simulation
+from .dynamics.simulation import Simulation, simulate_many
 from .errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from .lumped_mass import Points, lumped
 from .model import grounds
 from .model.block import Block
 from .model.economy import Bill, Consequences, Prices
-from .model.events import Drawn, Event
-from .model.loads import BodyForce, LineLoad, PointLoad
+from .model.loads import BodyForce, Bolt, FixedPoint, LineLoad, PointLoad
 from .model.scene import Scene
 from .model.settings import Settings
 from .model.site import Site
+from .model.site_tables import Drawn, Event
 from .model.source import Source
-from .model.supports import Bolt, FixedPoint
 from .model.surface import Surface
 from .model.terrain import Terrain
 from .releases import release, release_many, release_outcome
-from .results.barrier_outcome import BarrierOutcome
-from .results.outcome import Outcome
+from .results.outcome import BarrierOutcome, Outcome
 
 __version__: str
 

@@ -1,11 +1,18 @@
-"""Small checks shared by the dataclasses that describe a scene."""
+"""Small checks shared by the dataclasses that describe a scene.
+
+Fields of frozen records, set to what they are once they are checked.
+
+Values of another type than a field of a file asks for: where they are, and what to write.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -198,3 +205,124 @@ def one_of(field: str, value: Any, choices: Iterable[str]) -> str:
     if not isinstance(value, str) or value not in known:
         raise BadInput(field, value, "choose one of " + ", ".join(known))
     return value
+
+
+def set_number(
+    record: object,
+    name: str,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    open_low: bool = False,
+    field: str = "",
+) -> None:
+    """Set a field of a frozen dataclass or struct to its value as a float, see `check.number`.
+
+    `field` is what an error calls it, `name` by default. A whole number or one of numpy's in its
+    place would be another type to the kernels, which would be compiled again, and to files.
+    """
+    value = number(field or name, getattr(record, name), low, high, open_low=open_low)
+    _set(record, name, value)
+
+
+def set_booleans(record: object, *names: str) -> None:
+    """Set fields of a frozen dataclass, each to its value as a bool.
+
+    Raises
+    ------
+    BadInput
+        If one is neither True nor False.
+    """
+    for name in names:
+        _set(record, name, boolean(name, getattr(record, name)))
+
+
+def set_integers(what: str, record: object, *names: str) -> None:
+    """Set fields of a frozen dataclass, each to its value as a whole number of at least 0.
+
+    Raises
+    ------
+    BadInput
+        If one is not such a number.
+    """
+    for name in names:
+        _set(record, name, integer(f"{what}: {name}", getattr(record, name), 0))
+
+
+def set_vectors(what: str, record: object, *names: str) -> None:
+    """Set fields of a frozen dataclass, each to its value as two finite numbers.
+
+    Raises
+    ------
+    BadInput
+        If one is not two finite numbers.
+    """
+    for name in names:
+        object.__setattr__(record, name, vector(f"{what}: {name}", getattr(record, name)))
+
+
+def _set(record: object, name: str, value: Any) -> None:
+    if isinstance(record, msgspec.Struct):
+        msgspec.structs.force_setattr(record, name, value)
+    else:
+        object.__setattr__(record, name, value)
+
+
+TOLD = re.compile(r"Expected `(?P<asked>[^`]+)`, got `(?P<given>[^`]+)` - at `\$(?P<path>[^`]*)`")
+"""What msgspec says of such a value; in the path keys of tables with names of their own are
+`[...]`."""
+
+STEP = re.compile(r"\.(?P<name>\w+)|\[(?P<place>\d+)\]|\[\.\.\.\]")
+
+WORDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "a text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a table",
+}
+KINDS = {bool: "bool", int: "int", float: "float", str: "str", list: "array", dict: "object"}
+
+Tables = Any
+"""What a TOML or JSON file holds: tables, lists and values."""
+
+
+def mistyped(told: str, tables: Tables) -> BadInput | None:
+    """Return the error of a value of another type, None if msgspec told of something else.
+
+    Parameters
+    ----------
+    told : str
+        Text of a `msgspec.ValidationError`.
+    tables : dict
+        What the file holds.
+    """
+    found = TOLD.fullmatch(told)
+    if found is None:
+        return None
+    steps = [(match["name"], match["place"]) for match in STEP.finditer(found["path"])]
+    where = _find(tables, steps, found["given"])
+    if where is None:
+        return None
+    asked = [WORDS.get(kind, kind) for kind in found["asked"].split(" | ") if kind != "null"]
+    return BadInput(where[0].lstrip("."), where[1], "give " + " or ".join(asked))
+
+
+def _find(
+    value: Tables, steps: list[tuple[str | None, str | None]], given: str
+) -> tuple[str, Tables] | None:
+    """Return the path of a value of a type and the value, the first one where names are open."""
+    if not steps:
+        return ("", value) if KINDS.get(type(value)) == given else None
+    (name, place), rest = steps[0], steps[1:]
+    inner: list[tuple[str, Tables]] = []
+    if isinstance(value, dict):
+        inner = [(f".{key}", v) for key, v in value.items() if name in (None, key)]
+    elif isinstance(value, list):
+        inner = [(f"[{i}]", v) for i, v in enumerate(value) if place in (None, str(i))]
+    for path, one in inner:
+        found = _find(one, rest, given)
+        if found is not None:
+            return path + found[0], found[1]
+    return None

@@ -17,8 +17,7 @@ import shapely
 from numpy.typing import NDArray
 
 from rigdda.barriers import Barrier, Earthwork, Mesh, as_layout, earthworks
-from rigdda.batch import as_site
-from rigdda.dynamics.lumped import (
+from rigdda.dynamics.point_mass import (
     FRICTION,
     HEIGHT,
     NORMAL,
@@ -29,12 +28,12 @@ from rigdda.dynamics.lumped import (
 )
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
-from rigdda.model.composition import check_known
-from rigdda.model.events import Drawn
-from rigdda.model.place import Rebound
+from rigdda.model.scene import check_known
 from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
+from rigdda.model.site_tables import Drawn, Rebound
 from rigdda.model.terrain import Terrain
+from rigdda.releases import as_site
 
 Floats = NDArray[np.float64]
 
@@ -195,7 +194,7 @@ def _follow(
     Returns
     -------
     (n, 3) array
-        What `rigdda.dynamics.lumped.trajectories` finds.
+        What `rigdda.dynamics.point_mass.trajectories` finds.
     """
     grounds: dict[bytes, tuple[Floats, tuple[str, ...]]] = {}
     members: dict[bytes, list[int]] = {}

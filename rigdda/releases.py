@@ -1,19 +1,382 @@
-"""Releases: a site with a layout, simulated for a seed."""
+"""Releases of a single block of a site with a layout, by how they end.
+
+Most releases are of a single block, and it comes down in less than a millisecond. What all of them
+share is prepared once: the ground, where barriers stand, how surfaces meet.
+
+Many releases of one site with one layout, which share what does not depend on the seed.
+
+Releases: a site with a layout, simulated for a seed.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rigdda import check
-from rigdda.barriers import Barrier, Layout, as_layout
-from rigdda.batch import EVERY, Batch, Job, as_site, outcomes, simulation
+from rigdda.barriers import (
+    Barrier,
+    Built,
+    Embankment,
+    Fence,
+    GravityWall,
+    Layout,
+    Mesh,
+    as_layout,
+    section,
+)
+from rigdda.barriers.base import Reach, sliding_resistance, surfaces_below
+from rigdda.dynamics.monitors import chainages
 from rigdda.dynamics.run import Run
+from rigdda.dynamics.simulation import Simulation
+from rigdda.dynamics.single_block import MOST_CORNERS, Descent, SingleBlock
+from rigdda.dynamics.template import Template
 from rigdda.errors import BadInput, DoubtfulInput, Error
+from rigdda.geometry import clearly_convex, polygon_properties
+from rigdda.model.interfaces import Meetings
+from rigdda.model.scene import Scene
+from rigdda.model.settings import Settings, longest_step_of_single
 from rigdda.model.site import Site
-from rigdda.results.outcome import Outcome, measure
+from rigdda.model.site_tables import Drawn
+from rigdda.results.outcome import (
+    STANDS,
+    BarrierEnding,
+    Ending,
+    Outcome,
+    ending,
+    judge,
+    leave,
+    log_of,
+    measure,
+    stations,
+    steepest_deposit,
+    watch,
+)
+
+NEVER: NDArray[np.float64] = np.zeros(0)
+"""Times of the frames that are kept on the way: none."""
+
+
+class Standing(NamedTuple):
+    """A barrier where it stands, as it is for all releases."""
+
+    reach: Reach
+    """Where it holds rock, but for how steeply a deposit rises."""
+    area: float
+    """Area of its outline [m2]."""
+    base: list[tuple[int, int]]
+    """Pairs of surfaces on which an embankment may slide."""
+    road_area: float
+    """Its area beyond the uphill edge of the road [m2]."""
+
+
+def can_share(site: Site, scene: Scene) -> bool:
+    """Return whether releases of single blocks can share what a scene of one of them has.
+
+    Its ground must be the same in all, no gravity wall may stand in it, and contacts must rebound
+    as their restitution says.
+    """
+    surfaces = (*site.surfaces.values(), *(pair.surface for pair in site.interfaces))
+    return (
+        scene.roughness is None
+        and scene.smooth_ground is not None
+        and not any(isinstance(barrier, GravityWall) for barrier in scene.barriers)
+        and all(surface.restitution is not None for surface in surfaces)
+    )
+
+
+class SingleReleases:
+    """Releases of a single block of a site with a layout.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    layout : list of Barrier
+        What stands, without mesh.
+    scene : Scene
+        That of one release with this layout, for which `can_share` holds.
+    """
+
+    def __init__(self, site: Site, layout: list[Built], scene: Scene):
+        self._site, self._layout, self._scene = site, layout, scene
+        names = list(scene.surfaces)
+        fences = any(isinstance(barrier, Fence) for barrier in layout)
+        self._meetings = Meetings(site, scene.barrier_surface if fences else None)
+        self._gravity = -scene.gravity_vector[1]
+        self._lines = stations(site, scene.barriers)
+        self._leave = leave(site, scene)
+        self._standing = [self._stand(i, names) for i in range(len(layout))]
+        self._blocks: dict[float, SingleBlock] = {}  # by the step [s]
+
+    def _stand(self, index: int, names: list[str]) -> Standing:
+        """Return how a barrier stands; `names` are those of the surfaces in their order."""
+        scene, barrier = self._scene, self._scene.barriers[index]
+        outline, base = scene.outline(index), []
+        if isinstance(barrier, Embankment):
+            assert scene.terrain is not None
+            own = names.index(scene.fill)
+            base = [(own, names.index(n)) for n in surfaces_below(scene.terrain, outline)]
+        return Standing(
+            reach=barrier.holds(outline, scene.ground, 0.0),
+            area=section(outline),
+            base=base,
+            road_area=barrier.area_beyond(self._site.road.start, outline),
+        )
+
+    def ending(self, drawn: Drawn) -> Ending | None:
+        """Return how a release of a single block ends.
+
+        None where it takes a scene to tell, see `SingleBlock.run`.
+        """
+        (block,) = drawn.blocks
+        if block.fixed or len(block.vertices) > MOST_CORNERS:
+            return None
+        site, meetings = self._site, self._meetings
+        meetings.draw(drawn)
+        area = polygon_properties(block.vertices)[0]
+        most = longest_step_of_single(area, self._gravity)
+        dt = site.motion.dt / max(1, math.ceil(site.motion.dt / most))
+        arrays = self._blocks.get(dt)
+        if arrays is None:
+            if not clearly_convex(block.vertices):
+                return None
+            arrays = self._packed(drawn, dt)
+        barriers = [barrier.for_width(drawn.width) for barrier in self._layout]
+        resistances = [self._resistance(i, barrier) for i, barrier in enumerate(barriers)]
+        bodies = [barriers[i] for i in self._scene.bodies]
+        forces = [barrier.braking_force for barrier in bodies if isinstance(barrier, Fence)]
+        limits = [
+            bears if isinstance(barrier, Embankment) else math.inf
+            for bears, barrier in zip(resistances, barriers, strict=True)
+        ]
+        steps = max(1, round(site.motion.duration / dt))
+        found = arrays.run(block, meetings, forces, limits, steps)
+        if found is None:
+            return None
+        return self._ending(found, area, block.density, barriers, resistances)
+
+    def _packed(self, drawn: Drawn, dt: float) -> SingleBlock:
+        """Return new arrays for single blocks that are computed in a step [s]."""
+        scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
+        lines, settings = chainages(self._lines), Settings(dt=dt)
+        found = SingleBlock(scene, settings, lines, watch(self._site), self._leave)
+        self._blocks[dt] = found
+        return found
+
+    def _resistance(self, index: int, barrier: Built) -> float:
+        """Return the thrust that a barrier bears in the last release that was drawn [N/m]."""
+        standing = self._standing[index]
+        if not isinstance(barrier, Embankment):
+            return barrier.resistance(self._scene, NEVER)
+        friction = min(float(self._meetings.friction_deg[pair]) for pair in standing.base)
+        return sliding_resistance(self._gravity, barrier.density, standing.area, friction)
+
+    def _ending(
+        self,
+        found: Descent,
+        area: float,
+        density: float,
+        barriers: list[Built],
+        resistances: list[float],
+    ) -> Ending:
+        """Return how a release ended, by what came of its block and what barriers bear."""
+        log = log_of(found.events, len(barriers), 1, self._lines)
+        rise = steepest_deposit([self._meetings.least_friction_deg])
+        moved = [0.0] * len(barriers)
+        for i, way in zip(self._scene.bodies, found.moved, strict=True):
+            moved[i] = way
+        return Ending(
+            areas=[area],
+            masses=[density * area],
+            starts=[found.start],
+            places=[found.place],
+            speeds=[math.hypot(*found.velocity)],
+            log=log,
+            extent=found.extent,
+            road_energy=found.energy,
+            time=found.time,
+            barriers=[
+                BarrierEnding(
+                    barrier=barrier,
+                    states=[(0.0, STANDS), *barrier.changes(NEVER, NEVER, log.failed[i])],
+                    reach=moved_reach(barrier, standing.reach, moved[i])._replace(rise=rise),
+                    absorbed=found.absorbed[i],
+                    thrust=found.thrust[i],
+                    resistance=resistances[i],
+                    displacement=abs(moved[i]),
+                    road_area=standing.road_area,
+                )
+                for i, (barrier, standing) in enumerate(zip(barriers, self._standing, strict=True))
+            ],
+        )
+
+
+def moved_reach(barrier: Built, reach: Reach, moved: float) -> Reach:
+    """Return where a barrier holds rock after it has given way so far downhill [m]."""
+    if moved == 0.0:
+        return reach
+    sunk = barrier.height - barrier.left_height(abs(moved)) if isinstance(barrier, Fence) else 0.0
+    return reach._replace(end=reach.end + moved, top=reach.top - sunk)
+
+
+EVERY = 0.05
+"""Interval of the frames of a run from which states of barriers are judged [s]."""
+
+MOST_BLOCKS = 32
+"""Most blocks of a scene whose arrays are kept: packing more takes little beside simulating them.
+There are about as many kinds of them as numbers of blocks and of corners."""
+
+Result = TypeVar("Result")
+
+Job = tuple[Site, Sequence[Barrier], int, str | None]
+"""A site, a layout, a seed and the name of an event, None for one that the seed draws."""
+
+
+def as_site(site: Site) -> Site:
+    """Return a site.
+
+    Raises
+    ------
+    BadInput
+        If it is none.
+    """
+    if not isinstance(site, Site):
+        raise BadInput("site", site, "give a site: rigdda.Site.load(name) gives one")
+    return site
+
+
+class Batch:
+    """Releases of a site with a layout, one after the other.
+
+    The ground and what stands on it are built once, by the first release. Later ones of a single
+    block go without a scene, see `SingleReleases`. Of others the blocks are checked and written
+    into the arrays of the last one, with what is drawn of the ground. Outcomes are those of
+    `rigdda.release`, whatever the order.
+
+    Parameters
+    ----------
+    site : Site
+        Where.
+    layout : sequence of Barrier
+        What stands.
+    """
+
+    def __init__(self, site: Site, layout: Sequence[Barrier]):
+        self._site, self._layout = as_site(site), as_layout(layout)
+        self._standing = [b for b in self._layout if not isinstance(b, Mesh)]
+        self._watch = watch(site)
+        self._base: tuple[Scene, Drawn] | None = None
+        self._single: SingleReleases | None = None
+        self._templates: dict[tuple[int, int, float, int], Template] = {}
+
+    def outcome(self, seed: int, event: str | None = None) -> Outcome:
+        """Return the outcome of one release. Raises as `rigdda.release` does."""
+        (found,) = self.outcomes([(seed, event)])
+        if isinstance(found, Error):
+            raise found
+        return found
+
+    def outcomes(self, releases: Sequence[tuple[int, str | None]]) -> list[Outcome | Error]:
+        """Return the outcomes of some releases, seeds and events, or what went wrong with them.
+
+        All are drawn, then all are run, then all are judged, so that what each of these needs stays
+        in the processor's caches: what is done beside the steps takes a tenth less time.
+        """
+        drawn = [_tried(self._site.draw, seed, event) for seed, event in releases]
+        ended = [d if isinstance(d, Error) else _tried(self._drawn_ending, d) for d in drawn]
+        return [e if isinstance(e, Error) else judge(self._site, *e) for e in ended]
+
+    def _drawn_ending(self, drawn: Drawn) -> tuple[Ending, str, float]:
+        """Return how a release ended, the name of its event and its width [m]."""
+        return self.ending(drawn), drawn.event, drawn.width
+
+    def ending(self, drawn: Drawn) -> Ending:
+        """Return how a release of what was drawn ends. Raises as `rigdda.release` does."""
+        if len(drawn.blocks) == 1 and self._single is not None:
+            ended = self._single.ending(drawn)
+            if ended is not None:
+                return ended
+        duration = self._site.motion.duration
+        # a wall that slid or overturned on the way may come to stand again
+        moving = any(isinstance(barrier, GravityWall) for barrier in self._standing)
+        run = self.simulation(self.scene(drawn)).run(duration, EVERY if moving else duration)
+        return ending(run, stations(self._site, run.scene.barriers), self._site.road.start)
+
+    def scene(self, drawn: Drawn) -> Scene:
+        """Return the scene of what was drawn, on the ground and with the barriers of the first."""
+        if self._base is None:
+            scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
+            self._base = scene, drawn
+            if can_share(self._site, scene):
+                self._single = SingleReleases(self._site, self._standing, scene)
+            return scene
+        base, first = self._base
+        surfaces, interfaces = base.surfaces, base.interfaces
+        if (drawn.friction_deg, drawn.strengths) != (first.friction_deg, first.strengths):
+            surfaces, interfaces = self._site.strength(drawn)
+        barriers = [b.for_width(drawn.width) for b in self._standing]
+        return base.with_rock(drawn.blocks, surfaces, interfaces, barriers, drawn.roughness)
+
+    def simulation(self, scene: Scene) -> Simulation:
+        """Return the simulation of such a scene; that of the one before is of no more use."""
+        if len(scene.blocks) > MOST_BLOCKS:
+            return simulation(self._site, scene)
+        settings = self._site.settings(scene)
+        corners = max(len(b.vertices) for b in scene.blocks)
+        ground = len(scene.ground.points) if scene.ground is not None else 0
+        key = len(scene.blocks), corners, settings.dt, ground
+        template = self._templates.get(key)
+        if template is None or not template.fits(scene):
+            lines = chainages(stations(self._site, scene.barriers))
+            beyond = leave(self._site, scene)
+            template = Template(scene, settings, lines, self._watch, beyond)
+            self._templates[key] = template
+        return Simulation(scene, settings, template=template)
+
+
+def simulation(site: Site, scene: Scene) -> Simulation:
+    """Return a simulation of a scene of a site that watches what its outcome needs."""
+    lines = stations(site, scene.barriers)
+    return Simulation(scene, site.settings(scene), lines, watch(site), leave(site, scene))
+
+
+def _tried(function: Callable[..., Result], *arguments: Any) -> Result | Error:
+    """Return what a function returns, or the error that it raises."""
+    try:
+        return function(*arguments)
+    except Error as error:
+        return error
+
+
+def outcomes(
+    jobs: Sequence[Job], parts: Iterable[Sequence[int]]
+) -> list[tuple[int, Outcome | Error]]:
+    """Return the outcomes of the jobs at some places, or what went wrong, each with its place.
+
+    Several threads may share `parts`, an iterator. The jobs of a part have the same site and
+    layout, and parts with the same ones are to follow one another.
+    """
+    found: list[tuple[int, Outcome | Error]] = []
+    batch, of = None, None
+    for places in parts:
+        site, layout, _, _ = jobs[places[0]]
+        try:
+            if batch is None or of is None or of[0] is not site or of[1] != layout:
+                batch, of = Batch(site, layout), (site, layout)
+        except Error as error:
+            found += [(place, error) for place in places]
+            continue
+        found += zip(places, batch.outcomes([jobs[place][2:] for place in places]), strict=True)
+    return found
+
 
 MANY = 0.05
 """Share of some releases that may be cut off without a warning: one late block in a hundred."""

@@ -16,14 +16,13 @@ from rigdda import (
     release,
     release_outcome,
 )
-from rigdda.batch import Batch
 from rigdda.envs import DesignProblem
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
-from rigdda.model.place import Motion
 from rigdda.model.realisation import FARTHEST
-from rigdda.model.roughness import REACH, Roughness
+from rigdda.model.site_tables import Motion
 from rigdda.model.surface import Interface
-from rigdda.model.terrain import Terrain
+from rigdda.model.terrain import REACH, Roughness, Terrain
+from rigdda.releases import Batch
 from rigdda.validation.scenes import box
 
 replace = msgspec.structs.replace

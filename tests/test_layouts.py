@@ -23,9 +23,8 @@ from rigdda import (
     save_layout,
 )
 from rigdda.barriers import KINDS, describe
-from rigdda.results.marks import Marks
-from rigdda.results.outcome import stations
-from rigdda.results.states import states
+from rigdda.results.outcome import states, stations
+from rigdda.results.replay import Marks
 
 QUICK = Site.load("quick")
 LAYOUT = (

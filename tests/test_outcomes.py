@@ -11,8 +11,8 @@ from physics.helpers import FLAT, box, rock
 
 from rigdda import Ditch, Fence, Scene, Settings, Simulation, Site, Surface, Terrain, Wall
 from rigdda.geometry import polygon_properties
-from rigdda.model.place import Motion, Scatter
 from rigdda.model.settings import longest_step
+from rigdda.model.site_tables import Motion, Scatter
 from rigdda.results.outcome import measure, stations, watch
 
 QUICK = Site.load("quick")

@@ -25,9 +25,8 @@ from rigdda.model.scene import Scene
 from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
 from rigdda.results import replay, viewer
-from rigdda.results.marks import Marks
-from rigdda.results.plots import PLOTS
-from rigdda.results.states import states
+from rigdda.results.outcome import states
+from rigdda.results.replay import PLOTS, Marks
 from rigdda.results.viewer import open_viewer
 
 GRAVITY = 9.81

@@ -19,7 +19,7 @@ from rigdda import (
     Site,
     Wall,
 )
-from rigdda.model.slope import Stretch
+from rigdda.model.site_tables import Stretch
 
 QUICK = Site.load("quick")
 PRICES = QUICK.prices

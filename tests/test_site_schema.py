@@ -21,9 +21,8 @@ from rigdda import (
     Wall,
     sites,
 )
-from rigdda.model import boulders
-from rigdda.model.place import Motion
-from rigdda.model.slope import Slope, Stretch
+from rigdda.model import loose_blocks
+from rigdda.model.site_tables import Motion, Slope, Stretch
 from rigdda.model.surface import Interface
 
 QUICK = Site.load("quick")
@@ -223,7 +222,7 @@ def test_blocks_of_a_band_are_as_the_event_says():
         vx, vy, spin = block.velocity
         assert 0.2 <= vx <= 1.0 and vy == 0.0 and abs(spin) <= 0.5
         left, _, right, _ = rock.bounds
-        reach = boulders.reach(source, event)
+        reach = loose_blocks.reach(source, event)
         assert source.band[0] - reach < left < right < source.band[1] + reach
     assert least <= min(areas) * (1 + 1e-9) and max(areas) <= greatest * (1 + 1e-9)
     for middle in (0.5, 1.0):  # N(> V) ~ V^-b, truncated

@@ -21,7 +21,7 @@ from rigdda.envs import Evaluation
 from rigdda.envs.rendering import GROUND, ROAD
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
-from rigdda.model.place import BarrierZone
+from rigdda.model.site_tables import BarrierZone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

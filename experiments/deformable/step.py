@@ -11,10 +11,10 @@ from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
 from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
 from rigdda.dynamics.arrays import Matrix, Monitors, Outlines, Totals, Work, World
-from rigdda.dynamics.correction import place_edges
 from rigdda.dynamics.detection import copy_index, detect
 from rigdda.dynamics.island_step import accumulate_force
 from rigdda.dynamics.islands import find_islands, pair_blocks
+from rigdda.dynamics.post_correction import place_edges
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,
     CONTACTS,

@@ -24,7 +24,7 @@ from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
 from rigdda.agents.fit import Floats
 from rigdda.dynamics.constants import APART
 from rigdda.model.realisation import FARTHEST
-from rigdda.model.roughness import Roughness
+from rigdda.model.terrain import Roughness
 
 SEEN = Path(__file__).parent / "chant_sura_contacts.csv"
 

@@ -29,7 +29,7 @@ from rigdda import Site, Surface
 from rigdda.agents import fit
 from rigdda.agents.fit import Floats, explore, scores
 from rigdda.model.grounds import GROUNDS
-from rigdda.model.place import Rebound, Scatter
+from rigdda.model.site_tables import Rebound, Scatter
 
 TSCHAMUT = Path(tschamut.__file__).parent
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from experiments.bench.cases import RUN_OUT
 from rigdda import Site
-from rigdda.model.events import Drawn
+from rigdda.model.site_tables import Drawn
 from rigdda.model.surface import Surface
 
 TSCHAMUT = Path(__file__).parent.parent / "tschamut" / "site.toml"

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from experiments.outcome_cost.cases import Case
 from rigdda import Scene, Settings, Simulation
-from rigdda.batch import Batch
 from rigdda.lumped_mass import lumped
+from rigdda.releases import Batch
 from rigdda.validation.scenes import masses
 
 Floats = NDArray[np.float64]

@@ -4,7 +4,7 @@ Walls, gravity walls and fences stand on the ground; ditches and embankments cha
 the face. The x of each is the chainage where it begins for a block that comes down the slope.
 """
 
-from rigdda.barriers.base import section
+from rigdda.barriers.base import Standing, section
 from rigdda.barriers.ditch import Ditch
 from rigdda.barriers.embankment import Embankment
 from rigdda.barriers.fence import FENCE_CLASSES, Fence, FenceClass
@@ -22,7 +22,6 @@ from rigdda.barriers.layout import (
     to_tables,
 )
 from rigdda.barriers.mesh import Mesh, MeshOption
-from rigdda.barriers.standing import Standing
 from rigdda.barriers.wall import Wall
 
 __all__ = [

@@ -1,4 +1,7 @@
-"""What every barrier has."""
+"""What every barrier has.
+
+What barriers share that stand on the ground.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import fields
+from rigdda import check
+from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
+from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:
     from rigdda.model.scene import Scene
@@ -106,13 +111,13 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
 
     def _check(self, *lengths: str) -> None:
         """Check and set where it is and its lengths."""
-        fields.set_number(self, "x", field=f"{self.words} x")
+        check.set_number(self, "x", field=f"{self.words} x")
         for name in lengths:
             self._check_number(name, THINNEST, LARGEST)
 
     def _check_number(self, name: str, low: float, high: float = math.inf) -> None:
         """Check and set a field."""
-        fields.set_number(self, name, low, high, open_low=low == 0.0, field=f"{self.words} {name}")
+        check.set_number(self, name, low, high, open_low=low == 0.0, field=f"{self.words} {name}")
 
     def _with(self, **values: float | None) -> Self:
         """Return it with other values, which are known to be sound and are not checked."""
@@ -161,3 +166,53 @@ def sliding_resistance(gravity: float, density: float, area: float, friction_deg
     angle of friction [deg].
     """
     return gravity * density * area * math.tan(math.radians(friction_deg))
+
+
+FOUNDATION = 1.0
+"""Depth to which walls and fences reach below the lowest ground under them [m]."""
+
+
+class Standing(BarrierBase, frozen=True):
+    """A barrier that stands on the ground: two vertical faces and a level top."""
+
+    height: float
+
+    @property
+    def thickness(self) -> float:
+        """Extent downhill of `x` [m], a field of every kind."""
+        raise NotImplementedError
+
+    @property
+    def end(self) -> float:
+        """Chainage beyond which a block has passed it where it stood at the start [m]."""
+        return self.x + self.thickness
+
+    @property
+    def extent(self) -> float:
+        """Length that it takes up along the slope, on level ground [m]."""
+        return self.thickness
+
+    def left_height(self, displacement: float) -> float:
+        """Return its height [m]."""
+        return self.height
+
+    def outline(self, ground: Terrain) -> Floats:
+        """Return the (4, 2) corners, the foot in `ground`.
+
+        Raises
+        ------
+        BadInput
+            If it does not stand on the ground.
+        """
+        x, y = self._under(ground)
+        foot, top = float(y.min()) - FOUNDATION, float(y.max()) + self.height
+        return np.array([[x[0], foot], [x[-1], foot], [x[-1], top], [x[0], top]])
+
+    def _under(self, ground: Terrain) -> tuple[Floats, Floats]:
+        """Return chainages and elevations of the ground's corners under it, its faces included."""
+        inner = {float(x) for x in ground.points[:, 0] if self.x < x < self.end}
+        x = np.array([self.x, *sorted(inner), self.end])
+        try:
+            return x, np.array([ground.height(at) for at in x])
+        except BadInput as bad:
+            raise BadInput(f"{self.words} x", self.x, bad.mend) from None

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 import msgspec
 
-from rigdda.barriers.base import Floats
-from rigdda.barriers.standing import FOUNDATION, Standing
+from rigdda.barriers.base import FOUNDATION, Floats, Standing
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.model.terrain import Terrain
 

@@ -10,8 +10,7 @@ import msgspec
 import numpy as np
 import shapely
 
-from rigdda.barriers.base import ELEMENT, Drawn, Floats, base_friction
-from rigdda.barriers.standing import Standing
+from rigdda.barriers.base import ELEMENT, Drawn, Floats, Standing, base_friction
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:

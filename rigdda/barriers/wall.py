@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rigdda.barriers.base import Floats
-from rigdda.barriers.standing import Standing
+from rigdda.barriers.base import Floats, Standing
 
 if TYPE_CHECKING:
     from rigdda.model.site import Site

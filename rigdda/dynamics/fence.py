@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Monitors, Outlines
 from rigdda.dynamics.constants import OPEN, RETIRED
-from rigdda.dynamics.correction import set_body_coordinates
 from rigdda.dynamics.monitors import FAILED, write_event
 from rigdda.dynamics.motion import retire
+from rigdda.dynamics.post_correction import set_body_coordinates
 from rigdda.dynamics.records import EVENTS, Bodies, Contacts, Parameters
 from rigdda.kernel import kernel, stage
 

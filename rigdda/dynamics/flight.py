@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Ground, Islands, Monitors, Outlines
 from rigdda.dynamics.constants import ASLEEP, AWAKE, LONGEST_FLIGHT, RETIRED
-from rigdda.dynamics.correction import place_corners
 from rigdda.dynamics.island_step import check_body, fall
 from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.motion import top_speed
+from rigdda.dynamics.post_correction import place_corners
 from rigdda.dynamics.records import Bodies, Body, Contacts, Ints, Parameters, Polygons
 from rigdda.kernel import kernel
 

@@ -7,8 +7,6 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, Totals, Work, World
-from rigdda.dynamics.assembly.inertia import inertia_force, inertia_stiffness
-from rigdda.dynamics.assembly.island import damping_of, load_moment
 from rigdda.dynamics.constants import (
     BOLT,
     LATELY,
@@ -21,11 +19,13 @@ from rigdda.dynamics.constants import (
     STICK,
 )
 from rigdda.dynamics.contact.joint import joint_breaks
-from rigdda.dynamics.correction import move_corners, place_corners
+from rigdda.dynamics.equations import damping_of, inertia_force, inertia_stiffness, load_moment
 from rigdda.dynamics.islands import pair_blocks
-from rigdda.dynamics.monitors import barrier_contact, note_hits
+from rigdda.dynamics.monitors import barrier_contact, note_hits, press
 from rigdda.dynamics.motion import retire, top_speed
 from rigdda.dynamics.open_close import solve_states, take_solution
+from rigdda.dynamics.position_correction import push_out
+from rigdda.dynamics.post_correction import move_corners, place_corners
 from rigdda.dynamics.records import (
     EVENTS,
     RELAXED,
@@ -38,7 +38,6 @@ from rigdda.dynamics.records import (
     Interfaces,
     Parameters,
 )
-from rigdda.dynamics.recovery import push_out
 from rigdda.dynamics.relaxation import relax, start_slots
 from rigdda.dynamics.rows import (
     BRAKE,
@@ -58,7 +57,6 @@ from rigdda.dynamics.rows import (
     is_elastic,
     pack_rows,
 )
-from rigdda.dynamics.thrust import press
 from rigdda.kernel import inlined, kernel, stage
 
 

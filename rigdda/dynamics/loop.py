@@ -21,9 +21,7 @@ from rigdda.dynamics.constants import (
     TERRAIN,
 )
 from rigdda.dynamics.monitors import FAILED
-from rigdda.dynamics.pack import Arrays
-from rigdda.dynamics.pack.ground import pack_ground
-from rigdda.dynamics.pack.space import empty_contacts, empty_work
+from rigdda.dynamics.packing import Arrays, empty_contacts, empty_work, pack_ground
 from rigdda.dynamics.readings import contact_table, divergence
 from rigdda.dynamics.records import CONTACTS, COUNTERS, EVENTS, LEDGER, STEPS, Contacts
 from rigdda.dynamics.step import advance

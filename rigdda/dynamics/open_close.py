@@ -1,4 +1,9 @@
-"""Open-close iteration: solve an island as a whole for states with which all its forces agree.
+"""States of contacts: open, stick, slip, from the forces of the current iterate.
+
+A closed contact must press, an open one must not overlap, a sticking one must stay within its
+friction limit, a slipping one must slip against its friction.
+
+Open-close iteration: solve an island as a whole for states with which all its forces agree.
 
 Which state a contact has `states` says. Islands at rest are solved like this, and all in static
 mode; what moves is relaxed, see `relaxation`, and so is what does not settle.
@@ -6,32 +11,113 @@ mode; what moves is relaxed, see `relaxation`, and so is what does not settle.
 
 from __future__ import annotations
 
+import math
+
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands, Matrix, Rows, Scratch, Work
-from rigdda.dynamics.assembly.island import (
+from rigdda.dynamics.constants import BLOCK_PCG, BOLT, DIRECT, OPEN, PIN, SETTLED, SLIP, SOR, STICK
+from rigdda.dynamics.contact.joint import joint_breaks
+from rigdda.dynamics.equations import (
+    add_force,
+    along,
     assemble_blocks,
     assemble_island,
     damping_of,
     load_moment,
+    normal_row,
+    relative_displacement,
+    shear_row,
 )
-from rigdda.dynamics.assembly.springs import add_force, along, normal_row, shear_row
-from rigdda.dynamics.constants import BLOCK_PCG, DIRECT, OPEN, SOR
-from rigdda.dynamics.linear.direct import solve_block
-from rigdda.dynamics.linear.pcg import solve_pcg
-from rigdda.dynamics.linear.skyline import profile, solve_skyline
-from rigdda.dynamics.linear.sor import solve_sor
 from rigdda.dynamics.records import (
     ITERATIONS,
     SOLVER_ITERATIONS,
     SOLVES,
     Bodies,
+    Contact,
     Contacts,
     Parameters,
 )
 from rigdda.dynamics.rows import FIELD, NOW, TURN, WORK, WORK_ON_A, X, Y
-from rigdda.dynamics.states import update_states
+from rigdda.dynamics.solvers import profile, solve_block, solve_pcg, solve_skyline, solve_sor
 from rigdda.kernel import inlined, kernel
+
+
+@inlined
+def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[float, float]:
+    """Return the normal force of a contact, and its shear force if it stuck [N]."""
+    dn, ds = relative_displacement(c, d, i, j)
+    normal = c.kappa * (c.bias - (2.0 * dn - dt * c.un))
+    shear = c.accumulated_shear - c.kappa * (2.0 * ds - dt * c.us)
+    return normal, shear
+
+
+@kernel
+def next_state_of_link(c: Contact, normal: float, shear: float) -> bool:
+    """Let a bolt yield, or no more: SLIP stands for yielding; a pin holds whatever its force."""
+    c.normal, c.shear = max(normal, -c.tension), 0.0 if c.kind == BOLT else shear
+    before = c.state
+    c.state = SLIP if normal < -c.tension else STICK
+    return c.state != before
+
+
+@kernel
+def next_friction(c: Contact, shear: float) -> bool:
+    """Let a closed contact whose normal force is set stick or slip: a return mapping."""
+    state, limit = c.state, c.friction * c.normal
+    c.shear = min(max(shear, -limit), limit)
+    if abs(shear) <= limit:
+        c.state = STICK
+        return state != STICK
+    change = abs(c.shear - c.lag) if state == SLIP else math.inf
+    c.state = SLIP
+    c.lag = c.shear
+    return change > SETTLED * limit
+
+
+@inlined
+def next_state(c: Contact, normal: float, shear: float, breaks: bool) -> bool:
+    """Move a contact to the state that its forces ask for; returns whether it changed.
+
+    `breaks` tells whether these forces have broken the joint that it is on.
+    """
+    if c.kind == BOLT or c.kind == PIN:
+        return next_state_of_link(c, normal, shear)
+    if c.state == OPEN:
+        if normal > 0.0:
+            c.state = STICK
+        return normal > 0.0
+    if c.bond > 0.0:
+        c.normal, c.shear = normal, shear
+        return False
+    if breaks and normal >= 0.0:
+        return True
+    if normal < 0.0:
+        c.state = OPEN
+        return True
+    c.normal = normal
+    return next_friction(c, shear)
+
+
+@inlined
+def update_states(
+    contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int, p: Parameters
+) -> bool:
+    """Move every contact of an island to its next state; returns whether one changed."""
+    changed = False
+    for item in range(low, high if p.bonded else low):
+        c = contacts[islands.contact_item[item]]
+        if c.bond > 0.0:
+            j = islands.slot[c.b] if c.pair >= 0 else -1
+            c.normal, c.shear = spring_forces(c, d, islands.slot[c.a], j, p.dt)
+    for item in range(low, high):
+        c = contacts[islands.contact_item[item]]
+        i = islands.slot[c.a]
+        j = islands.slot[c.b] if c.pair >= 0 else -1
+        normal, shear = spring_forces(c, d, i, j, p.dt)
+        breaks = c.bond > 0.0 and joint_breaks(contacts, islands, low, high, item)
+        changed = next_state(c, normal, shear, breaks) or changed
+    return changed
 
 
 @kernel

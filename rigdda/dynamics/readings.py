@@ -18,7 +18,7 @@ from rigdda.dynamics.constants import (
     SLEEP_SPEED,
 )
 from rigdda.dynamics.contact.links import pull_of_bolts
-from rigdda.dynamics.pack import Arrays
+from rigdda.dynamics.packing import Arrays
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,
     ITERATIONS,

@@ -37,7 +37,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands, Rows
-from rigdda.dynamics.assembly.island import damping_of, load_moment
 from rigdda.dynamics.constants import (
     AT_ONCE,
     IMPACT_STEPS,
@@ -45,6 +44,7 @@ from rigdda.dynamics.constants import (
     SETTLED,
     SUBSTEPS,
 )
+from rigdda.dynamics.equations import damping_of, load_moment
 from rigdda.dynamics.records import Bodies, Body, Floats, Parameters
 from rigdda.dynamics.rows import (
     AIM,

@@ -17,12 +17,11 @@ from rigdda.barriers import Fence, GravityWall
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.errors import BadInput
 from rigdda.files import atomic
-from rigdda.model.scene import Scene
-from rigdda.model.scene_json import scene_from_json, scene_to_json
+from rigdda.model.scene import Scene, scene_from_json, scene_to_json
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:
-    from rigdda.results.marks import Marks
+    from rigdda.results.replay import Marks
 
 EVENT = np.dtype(
     [

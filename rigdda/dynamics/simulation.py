@@ -1,10 +1,14 @@
-"""The facade: a scene in motion."""
+"""The facade: a scene in motion.
+
+Many scenes at once.
+"""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +17,8 @@ from rigdda import check
 from rigdda.dynamics.constants import PLAIN
 from rigdda.dynamics.frames import frame_of, no_frames, pieces, tracked
 from rigdda.dynamics.loop import Loop
-from rigdda.dynamics.pack import Arrays, pack
-from rigdda.dynamics.pack.again import Template
+from rigdda.dynamics.monitors import chainages
+from rigdda.dynamics.packing import Arrays, pack
 from rigdda.dynamics.readings import (
     Diagnostics,
     Energy,
@@ -26,7 +30,7 @@ from rigdda.dynamics.readings import (
     support_forces,
 )
 from rigdda.dynamics.run import Run
-from rigdda.dynamics.stations import chainages
+from rigdda.dynamics.template import Template
 from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
@@ -252,3 +256,28 @@ class Simulation:
             np.stack([rock["low"], rock["high"]], axis=1),
             barrier_poses,
         )
+
+
+def simulate_many(
+    scenes: Sequence[Scene],
+    settings: Settings | None = None,
+    duration: float = 25.0,
+    every: float = 0.05,
+    stations: Sequence[float] = (),
+    watch: tuple[float, float] | None = None,
+) -> list[Run]:
+    """Run independent scenes over all cores, in threads; each gives what running it alone gives.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `Simulation` and `Simulation.run` do.
+    """
+    lines = tuple(chainages(stations))
+
+    def one(scene: Scene) -> Run:
+        return Simulation(scene, settings, lines, watch).run(duration, every)
+
+    each = check.sequence("scenes", scenes, Scene, "rigdda.Scene")
+    with ThreadPoolExecutor() as pool:
+        return list(pool.map(one, each))

@@ -2,8 +2,8 @@
 
 To describe a block and its surroundings anew in Python takes as long as to compute how it comes
 down. Here kernels write the block, and how surfaces meet, into the arrays of a scene like it, and
-read what came of it. The arrays are to the bit what `rigdda.dynamics.pack.pack` gives for a scene
-of that block, as far as they are read.
+read what came of it. The arrays are to the bit what `rigdda.dynamics.packing.pack` gives for a
+scene of that block, as far as they are read.
 """
 
 from __future__ import annotations
@@ -15,21 +15,132 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.constants import AWAKE
+from rigdda.dynamics.arrays import Outlines
+from rigdda.dynamics.constants import AWAKE, MARGIN_RATIO, PENETRATION_RATIO
 from rigdda.dynamics.frames import no_frames
 from rigdda.dynamics.loop import Loop
-from rigdda.dynamics.pack import pack
-from rigdda.dynamics.pack.again import together
-from rigdda.dynamics.pack.bodies import fences
-from rigdda.dynamics.pack.single import MOST_CORNERS, with_room
-from rigdda.dynamics.pack.single import read_single_directly as read_single
-from rigdda.dynamics.pack.single import start_single_directly as start_single
-from rigdda.dynamics.records import TARGET
+from rigdda.dynamics.packing import fences, pack, write_bodies
+from rigdda.dynamics.records import TARGET, Bodies, Interfaces
+from rigdda.dynamics.template import together
 from rigdda.errors import Diverged
+from rigdda.geometry import is_sound
+from rigdda.kernel import Direct, kernel, short_kernel
 from rigdda.model.block import Block
-from rigdda.model.meetings import Meetings
+from rigdda.model.interfaces import Meetings
+from rigdda.model.overlap import surely_on_ground
 from rigdda.model.scene import Scene
 from rigdda.model.settings import EARTH, Settings
+
+MOST_CORNERS = 12
+"""Most corners of such a block: blocks of a band have no more."""
+
+
+def with_room(outlines: Outlines) -> Outlines:
+    """Return outlines, the first one of a single block, with room for one of `MOST_CORNERS`."""
+    corner, local = outlines.corner, outlines.local
+    more = max(0, MOST_CORNERS - corner.shape[1])
+    wide = np.pad(corner.view(np.ndarray), ((0, 0), (0, more)))
+    wide["number"][0] = np.arange(wide.shape[1])
+    wide_local = np.pad(local.view(np.ndarray), ((0, 0), (0, more)))
+    return Outlines(outlines.polygon, wide.view(np.recarray), wide_local.view(np.recarray))
+
+
+@short_kernel
+def start_single(
+    corners: NDArray, traits: NDArray, chain: NDArray, boxes: NDArray, friction_deg: NDArray,
+    restitution: NDArray, damping: NDArray, stations: NDArray, gravity: float, bodies: Bodies,
+    outlines: Outlines, interfaces: Interfaces, rock: NDArray, parameters: NDArray,
+) -> tuple[bool, float]:  # fmt: skip
+    """Write a block and how surfaces meet into arrays that are otherwise as at the start.
+
+    Parameters
+    ----------
+    corners : (n, 2) array
+        Corners of the block [m].
+    traits : (1, 6) array
+        Its other properties, see `pack.bodies.Trait`.
+    chain : (m, 2) array
+        Corners of the ground [m].
+    boxes : (K, 4) array
+        Least x and y, greatest x and y of each barrier that is a body [m].
+    friction_deg, restitution, damping : arrays
+        How each two surfaces meet, see `Meetings` [deg, -, 1/s].
+    stations : (K,) array
+        Chainages that are watched [m].
+    gravity : float
+        Acceleration that gives the block its weight [m/s2].
+    bodies, outlines, interfaces, rock, parameters : arrays
+        What is written.
+
+    Returns
+    -------
+    clear : bool
+        Whether the block is surely convex and clear of the ground and of barriers.
+    start : float
+        Chainage of its centroid [m].
+    """
+    if not is_sound(corners) or not surely_on_ground(chain, corners) or _near(corners, boxes):
+        return False, 0.0
+    bodies[0].count = outlines.polygon[0].count = len(corners)
+    write_bodies(corners, traits, bodies, outlines)
+    body, watched = bodies[0], rock[0]
+    watched.low, watched.high = body.x - body.radius, body.x + body.radius
+    passed = 0
+    while passed < len(stations) and stations[passed] <= body.x:
+        passed += 1
+    watched.next = passed
+    _set_interfaces(friction_deg, restitution, damping, interfaces)
+    size = math.sqrt(body.mass / traits[0, 0])
+    for k in range(len(parameters)):
+        p = parameters[k]
+        p.block_weight = body.mass * gravity
+        p.penetration, p.margin = PENETRATION_RATIO * size, MARGIN_RATIO * size
+    return True, body.x
+
+
+start_single_directly = Direct(start_single)
+
+
+@kernel
+def _near(corners: NDArray, boxes: NDArray) -> bool:
+    """Return whether the bounding box of a block meets that of a barrier."""
+    left, right, low, high = math.inf, -math.inf, math.inf, -math.inf
+    for k in range(len(corners)):
+        left, right = min(left, corners[k, 0]), max(right, corners[k, 0])
+        low, high = min(low, corners[k, 1]), max(high, corners[k, 1])
+    for i in range(len(boxes)):
+        beside = left > boxes[i, 2] or right < boxes[i, 0]
+        if not beside and low <= boxes[i, 3] and high >= boxes[i, 1]:
+            return True
+    return False
+
+
+@kernel
+def _set_interfaces(
+    friction_deg: NDArray, restitution: NDArray, damping: NDArray, interfaces: Interfaces
+) -> None:
+    """Write how surfaces meet, but what no release draws; fences come last, without friction."""
+    for i in range(len(interfaces)):
+        for j in range(len(interfaces)):
+            interface = interfaces[i, j]
+            interface.damping = damping[i, j]
+            if i < len(restitution) and j < len(restitution):
+                interface.friction = math.tan(math.radians(friction_deg[i, j]))
+                interface.restitution = restitution[i, j]
+
+
+@short_kernel
+def read_single(
+    bodies: Bodies, rock: NDArray
+) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float], float]:
+    """Return place [m], velocity [m/s], extent [m] and energy [J] of a block, see `Descent`."""
+    body, watched = bodies[0], rock[0]
+    extent = watched.low, watched.high
+    return (body.x, body.y), (body.vx, body.vy), extent, watched.energy
+
+
+read_single_directly = Direct(read_single)
+
 
 ABSORBED, THRUST = (list(TARGET.fields or ()).index(name) for name in ("absorbed", "thrust"))
 """Places of these fields in a record of a barrier."""
@@ -146,7 +257,7 @@ class SingleBlock:
         corners = self._corners[: len(block.vertices)]
         corners[:] = block.vertices
         self._traits[0] = (block.density, *block.velocity, self._surfaces[block.surface], AWAKE)
-        clear, start = start_single.call(
+        clear, start = start_single_directly.call(
             corners, self._traits, self._chain, self._boxes, meetings.friction_deg,
             meetings.restitution, meetings.damping, self._stations, self._gravity, a.bodies,
             a.outlines, a.interfaces, a.monitors.rock, a.parameters,
@@ -157,7 +268,7 @@ class SingleBlock:
             loop.advance(steps, self._no_frames)
         except Diverged:
             return None
-        place, velocity, extent, energy = read_single.call(a.bodies, a.monitors.rock)
+        place, velocity, extent, energy = read_single_directly.call(a.bodies, a.monitors.rock)
         barriers = self._target.tolist()
         return Descent(
             start,

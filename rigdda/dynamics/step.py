@@ -22,7 +22,7 @@ from rigdda.dynamics.flight import fly, keep_touch, land, take_off
 from rigdda.dynamics.frames import keep_frame
 from rigdda.dynamics.island_step import step_island
 from rigdda.dynamics.islands import find_islands
-from rigdda.dynamics.monitors import is_over, note_passage
+from rigdda.dynamics.monitors import is_over, note_passage, press_asleep, watch_thrust
 from rigdda.dynamics.records import (
     CONTACT_TOTAL,
     CONTACTS,
@@ -35,7 +35,6 @@ from rigdda.dynamics.records import (
 )
 from rigdda.dynamics.shaking import set_field
 from rigdda.dynamics.sleep import watch_quiet
-from rigdda.dynamics.thrust import press_asleep, watch_thrust
 from rigdda.kernel import entry_kernel, kernel, stage, variable
 
 

@@ -1,13 +1,113 @@
-"""Loads on blocks: the paper's point load, line load and body force."""
+"""The motion of the ground, as a history of its acceleration.
+
+Supports of blocks: the paper's fixed point and rock bolt.
+
+What they do is computed in `rigdda.dynamics.contact.links`.
+
+Loads on blocks: the paper's point load, line load and body force.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rigdda import fields
+from rigdda import check
+from rigdda.errors import BadInput
+
+
+def history(value: ArrayLike) -> NDArray[np.float64]:
+    """Return a history of ground acceleration as a read-only (m, 3) array."""
+    try:
+        history = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        history = np.zeros(0)
+    if history.ndim != 2 or history.shape[1:] != (3,) or len(history) < 2:
+        raise BadInput("base_motion", value, "give at least two rows (time, ax, ay)")
+    if not np.isfinite(history).all():
+        raise BadInput("base_motion", "NaN or infinity", "give finite numbers")
+    if (np.diff(history[:, 0]) < 0.0).any() or history[0, 0] < 0.0:
+        raise BadInput("base_motion", "times", "give times from 0 on that never fall")
+    history.setflags(write=False)
+    return history
+
+
+@dataclass(frozen=True, slots=True)
+class FixedPoint:
+    """A point of a block that stays where it is; the block may turn about it.
+
+    Parameters
+    ----------
+    block : int
+        Index of the block.
+    point : (x, y)
+        The point at the start [m].
+
+    Raises
+    ------
+    BadInput
+        If a value is not a finite number.
+    """
+
+    block: int
+    point: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        check.set_integers("fixed point", self, "block")
+        check.set_vectors("fixed point", self, "point")
+
+
+@dataclass(frozen=True, slots=True)
+class Bolt:
+    """A rock bolt: a spring between two blocks, or between a block and the ground.
+
+    Parameters
+    ----------
+    block_a, point_a : int, (x, y)
+        Block at one end and where it is anchored at the start [m].
+    block_b, point_b : int or None, (x, y)
+        The other end; None: anchored in the ground.
+    stiffness : float
+        Tension per elongation, per metre of slope width [N/m].
+    prestress : float
+        Tension at the start [N].
+    yield_force : float or None
+        Tension at which it yields, perfectly plastic [N]; None: never.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or out of its range, or both ends are at one point or block.
+    """
+
+    block_a: int
+    point_a: tuple[float, float]
+    block_b: int | None
+    point_b: tuple[float, float]
+    stiffness: float
+    prestress: float = 0.0
+    yield_force: float | None = None
+
+    def __post_init__(self) -> None:
+        check.set_integers("bolt", self, "block_a")
+        if self.block_b is not None:
+            check.set_integers("bolt", self, "block_b")
+            if self.block_b == self.block_a:
+                raise BadInput("bolt: block_b", self.block_b, "give another block than block_a")
+        check.set_vectors("bolt", self, "point_a", "point_b")
+        if math.dist(self.point_a, self.point_b) < 1e-6:
+            raise BadInput("bolt: point_b", self.point_b, "put it apart from point_a")
+        check.set_number(self, "stiffness", 0.0, open_low=True, field="bolt: stiffness")
+        check.set_number(self, "prestress", 0.0, field="bolt: prestress")
+        if self.yield_force is not None:
+            check.set_number(self, "yield_force", self.prestress, field="bolt: yield_force")
+
+
+Support = FixedPoint | Bolt
+
 
 Floats = NDArray[np.float64]
 
@@ -36,8 +136,8 @@ class PointLoad:
     force: tuple[float, float]
 
     def __post_init__(self) -> None:
-        fields.set_integers("point load", self, "block")
-        fields.set_vectors("point load", self, "point", "force")
+        check.set_integers("point load", self, "block")
+        check.set_vectors("point load", self, "point", "force")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
@@ -69,8 +169,8 @@ class LineLoad:
     force_per_length: tuple[float, float]
 
     def __post_init__(self) -> None:
-        fields.set_integers("line load", self, "block")
-        fields.set_vectors("line load", self, "start", "end", "force_per_length")
+        check.set_integers("line load", self, "block")
+        check.set_vectors("line load", self, "start", "end", "force_per_length")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
@@ -100,8 +200,8 @@ class BodyForce:
     force_per_area: tuple[float, float]
 
     def __post_init__(self) -> None:
-        fields.set_integers("body force", self, "block")
-        fields.set_vectors("body force", self, "force_per_area")
+        check.set_integers("body force", self, "block")
+        check.set_vectors("body force", self, "force_per_area")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
         """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""

@@ -12,14 +12,14 @@ import numpy as np
 from rigdda import check
 from rigdda.barriers import Barrier, Built, Mesh, as_layout
 from rigdda.errors import BadInput
-from rigdda.model import boulders
+from rigdda.model import loose_blocks
 from rigdda.model.block import Block
-from rigdda.model.events import Drawn
-from rigdda.model.roughness import Roughness
+from rigdda.model.random_streams import stream
 from rigdda.model.scene import Scene
+from rigdda.model.site_tables import Drawn
 from rigdda.model.source import Source
-from rigdda.model.streams import stream
 from rigdda.model.surface import MOST_DAMPING, Surface, smaller
+from rigdda.model.terrain import Roughness
 
 if TYPE_CHECKING:
     from rigdda.model.site import Site
@@ -59,7 +59,7 @@ def draw(site: Site, seed: int, event: str | None) -> Drawn:
     else:
         rng = stream((seed, index))
         normal = rng.standard_normal()
-        areas, drawn = boulders.draw(rng, rock, what, boulders.line(site.slope.points))
+        areas, drawn = loose_blocks.draw(rng, rock, what, loose_blocks.line(site.slope.points))
         blocks = tuple(drawn)
     shift = normal * site.scatter.friction_deg
     return Drawn(name, blocks, what.width_of(areas), shift, *_ground(site, seed, index))
@@ -167,7 +167,7 @@ def _taken(site: Site) -> list[tuple[float, float]]:
     found = []
     for source in site.sources:
         if source.band is not None:
-            reaches = (boulders.reach(source, event) for event in site.events_of(source))
+            reaches = (loose_blocks.reach(source, event) for event in site.events_of(source))
             reach = max(reaches, default=0.0)
             found.append((source.band[0] - reach, source.band[1] + reach))
     return found

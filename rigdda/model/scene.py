@@ -1,15 +1,24 @@
-"""One concrete mechanical problem: terrain, blocks, surfaces and barriers."""
+"""What a scene is made of: the kinds of its members, and how they refer to one another.
+
+Clear space of a scene: nothing starts in something else, barriers stand one behind the other.
+
+One concrete mechanical problem: terrain, blocks, surfaces and barriers.
+
+Scenes as JSON.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from types import MappingProxyType
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check, fields
+from rigdda import check
 from rigdda.barriers import (
     Barrier,
     Built,
@@ -19,24 +28,173 @@ from rigdda.barriers import (
     Mesh,
     Wall,
     earthworks,
+    from_table,
+    to_tables,
 )
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
-from rigdda.model.base_motion import history
 from rigdda.model.block import Block
-from rigdda.model.clearance import check_blocks, check_clear, check_order
-from rigdda.model.composition import (
-    check_capacities,
-    check_indices,
-    check_known,
-    check_names,
-    set_members,
+from rigdda.model.loads import (
+    BodyForce,
+    Bolt,
+    FixedPoint,
+    LineLoad,
+    Load,
+    PointLoad,
+    Support,
+    history,
 )
-from rigdda.model.loads import Load
-from rigdda.model.roughness import Roughness
-from rigdda.model.supports import Support
+from rigdda.model.overlap import check_apart, deepest, in_ground
 from rigdda.model.surface import Surface, smaller
-from rigdda.model.terrain import Terrain
+from rigdda.model.terrain import Roughness, Terrain
+
+MEMBERS = (
+    ("blocks", Block, "rigdda.Block"),
+    ("barriers", Built, "barriers: rigdda.Wall, GravityWall, Fence, Ditch or Embankment"),
+    ("loads", Load, "loads: rigdda.PointLoad, LineLoad or BodyForce"),
+    ("supports", Support, "supports: rigdda.FixedPoint or Bolt"),
+)
+"""Fields of a scene that are sequences, the class of their members, and that in words."""
+
+
+def set_members(scene: Scene) -> None:
+    """Check what a scene is made of, and set sequences to tuples and mappings to dicts.
+
+    Raises
+    ------
+    BadInput
+        If a member is of another kind.
+    """
+    if not isinstance(scene.terrain, Terrain | None):
+        raise BadInput("terrain", scene.terrain, "give a rigdda.Terrain or None")
+    for name, kind, what in MEMBERS:
+        members = check.sequence(name, getattr(scene, name), kind, what)
+        object.__setattr__(scene, name, members)
+    for name in ("surfaces", "interfaces"):
+        named = check.mapping(name, getattr(scene, name), Surface, "rigdda.Surface")
+        object.__setattr__(scene, name, named)
+
+
+def check_indices(scene: Scene) -> None:
+    """Check that every block is there that a load or a support is on.
+
+    Raises
+    ------
+    BadInput
+        If one is not.
+    """
+    for i, load in enumerate(scene.loads):
+        _check_index(scene, f"loads[{i}]: block", load.block)
+    for i, support in enumerate(scene.supports):
+        if isinstance(support, FixedPoint):
+            _check_index(scene, f"supports[{i}]: block", support.block)
+        else:
+            _check_index(scene, f"supports[{i}]: block_a", support.block_a)
+            if support.block_b is not None:
+                _check_index(scene, f"supports[{i}]: block_b", support.block_b)
+
+
+def _check_index(scene: Scene, where: str, index: int) -> None:
+    if index >= len(scene.blocks):
+        raise BadInput(where, index, f"give the index of one of {len(scene.blocks)} blocks")
+
+
+def check_names(scene: Scene) -> None:
+    """Check that every surface that is named is there.
+
+    Raises
+    ------
+    BadInput
+        If one is not, or an interface is not of two.
+    """
+    for i, block in enumerate(scene.blocks):
+        check_known(scene.surfaces, f"block {i}: surface", block.surface)
+    for i, name in enumerate(scene.terrain.surfaces if scene.terrain else ()):
+        check_known(scene.surfaces, f"terrain surfaces[{i}]", name)
+    for pair in scene.interfaces:
+        if not isinstance(pair, tuple) or len(pair) != 2:
+            raise BadInput("interfaces", pair, "name two surfaces (first, second)")
+        for name in pair:
+            check_known(scene.surfaces, f"interfaces {pair}", name)
+
+
+def check_known(surfaces: Mapping[str, Surface], where: str, name: str) -> None:
+    """Check that a surface is there.
+
+    Raises
+    ------
+    BadInput
+        If it is not.
+    """
+    if name not in surfaces:
+        known = ", ".join(surfaces)
+        raise BadInput(where, name, f"define it in surfaces or use one of {known}")
+
+
+def check_capacities(barriers: Sequence[Barrier]) -> None:
+    """Check that the capacity of every fence is that of a metre.
+
+    Raises
+    ------
+    BadInput
+        If a fence has only the class of a panel.
+    """
+    for i, barrier in enumerate(barriers):
+        if isinstance(barrier, Fence) and barrier.capacity is None:
+            mend = "give fence.for_width(width): a scene is a metre wide"
+            raise BadInput(f"barriers[{i}].energy_class", barrier.energy_class, mend)
+
+
+def check_blocks(blocks: Sequence[Block]) -> None:
+    """Check that there is a free block and that blocks are apart.
+
+    Raises
+    ------
+    BadInput
+        If there is none, or two share too much.
+    """
+    if not any(not b.fixed for b in blocks):
+        raise BadInput("blocks", f"{len(blocks)} blocks", "give at least one free block")
+    check_apart([b.vertices for b in blocks], [b.fixed for b in blocks])
+
+
+def check_clear(scene: Scene, ground: Terrain) -> None:
+    """Check that no free block starts deep in the ground or in what stands on it.
+
+    Raises
+    ------
+    BadInput
+        If one does.
+    """
+    free = {i: block.vertices for i, block in enumerate(scene.blocks) if not block.fixed}
+    found = in_ground(ground, list(free.values()))
+    if found is not None:
+        i = list(free)[found.block]
+        mend = f"raise it: {found.shared:.3g} m2 of it are in the ground"
+        raise BadInput(f"blocks[{i}]", scene.blocks[i].vertices.tolist(), mend)
+    for j in scene.bodies:
+        found = deepest(scene.outline(j), list(free.values()))
+        if found is not None:
+            i = list(free)[found.block]
+            mend = f"move it: {found.shared:.3g} m2 of block {i} are in it"
+            raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, mend)
+
+
+def check_order(scene: Scene) -> None:
+    """Check that every barrier which is a body stands downhill of where the one before it ends.
+
+    Raises
+    ------
+    BadInput
+        If one does not.
+    """
+    upright = sorted(scene.bodies, key=lambda i: scene.barriers[i].x)
+    for i, j in pairwise(upright):
+        end = scene.barriers[i].end
+        if scene.barriers[j].x < end - 1e-9 * max(1.0, abs(end)):
+            mend = f"put it downhill of x = {end:g}, where barriers[{i}] ends"
+            raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, mend)
+
 
 __all__ = ["Barrier", "Block", "Scene", "Surface", "Terrain", "Wall"]
 
@@ -113,8 +271,8 @@ class Scene:
         if isinstance(self.gravity, Sequence | np.ndarray):
             object.__setattr__(self, "gravity", check.vector("gravity", self.gravity))
         else:
-            fields.set_number(self, "gravity", 0.0)
-        fields.set_number(self, "damping", 0.0)
+            check.set_number(self, "gravity", 0.0)
+        check.set_number(self, "damping", 0.0)
         check.one_of("damping_when", self.damping_when, ("always", "contact"))
         check_blocks(self.blocks)
         check_indices(self)
@@ -287,3 +445,66 @@ class Scene:
         if pair is not None:
             return pair
         return smaller(self.surfaces[first], self.surfaces[second])
+
+
+LOADS = {kind.__name__: kind for kind in (PointLoad, LineLoad, BodyForce)}
+SUPPORTS = {kind.__name__: kind for kind in (FixedPoint, Bolt)}
+
+
+def scene_to_json(scene: Scene) -> bytes:
+    """Return a scene as JSON; numbers survive exactly."""
+    return msgspec.json.encode(
+        {
+            "terrain": scene.terrain
+            and {
+                "points": scene.terrain.points.tolist(),
+                "surfaces": scene.terrain.surfaces,
+            },
+            "blocks": [
+                {
+                    "vertices": b.vertices.tolist(),
+                    "density": b.density,
+                    "surface": b.surface,
+                    "velocity": b.velocity,
+                    "fixed": b.fixed,
+                }
+                for b in scene.blocks
+            ],
+            "surfaces": scene.surfaces,
+            "barriers": to_tables(scene.barriers),
+            "interfaces": [[*pair, surface] for pair, surface in scene.interfaces.items()],
+            "loads": [[type(load).__name__, load] for load in scene.loads],
+            "supports": [[type(support).__name__, support] for support in scene.supports],
+            "base_motion": scene.base_motion is not None and scene.base_motion.tolist(),
+            "gravity": scene.gravity,
+            "damping": scene.damping,
+            "damping_when": scene.damping_when,
+            "roughness": scene.roughness,
+        }
+    )
+
+
+def scene_from_json(text: bytes) -> Scene:
+    """Return the scene that `scene_to_json` wrote.
+
+    Raises
+    ------
+    BadInput
+        If a value in it is not sound.
+    """
+    data = msgspec.json.decode(text)
+    terrain, roughness = data.pop("terrain"), data.pop("roughness", None)
+    return Scene(
+        terrain=terrain and Terrain(**terrain),
+        blocks=tuple(Block(**b) for b in data.pop("blocks")),
+        surfaces={name: Surface(**s) for name, s in data.pop("surfaces").items()},
+        barriers=tuple(
+            from_table(f"barriers[{i}]", table) for i, table in enumerate(data.pop("barriers"))
+        ),
+        interfaces={(a, b): Surface(**s) for a, b, s in data.pop("interfaces")},
+        loads=tuple(LOADS[name](**load) for name, load in data.pop("loads")),
+        supports=tuple(SUPPORTS[name](**support) for name, support in data.pop("supports")),
+        base_motion=data.pop("base_motion") or None,
+        roughness=roughness and msgspec.convert(roughness, Roughness),
+        **data,
+    )

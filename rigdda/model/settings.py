@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check, fields
+from rigdda import check
 
 USUAL_DT = 5e-3
 """Step of a simulation, and of a site that does not say [s]: the outcome of a rockfall is within
@@ -97,23 +97,23 @@ class Settings:
     sleeping: bool = True
 
     def __post_init__(self) -> None:
-        fields.set_number(self, "dt", SHORTEST_DT, LARGEST_DT)
+        check.set_number(self, "dt", SHORTEST_DT, LARGEST_DT)
         if self.penetration is not None:
-            fields.set_number(self, "penetration", 0.0, open_low=True)
-        fields.set_number(self, "tolerance", 0.0, 1e-2, open_low=True)
-        fields.set_number(self, "sweep_tolerance", 0.0, open_low=True)
+            check.set_number(self, "penetration", 0.0, open_low=True)
+        check.set_number(self, "tolerance", 0.0, 1e-2, open_low=True)
+        check.set_number(self, "sweep_tolerance", 0.0, open_low=True)
         iterations = check.integer("open_close_iterations", self.open_close_iterations, 1)
         object.__setattr__(self, "open_close_iterations", iterations)
         check.one_of("mode", self.mode, ("dynamic", "static"))
         check.one_of("solver", self.solver, SOLVERS)
-        fields.set_number(self, "relaxation", 0.0, 1.99, open_low=True)
-        fields.set_booleans(self, "post_correction", "islands", "sleeping")
+        check.set_number(self, "relaxation", 0.0, 1.99, open_low=True)
+        check.set_booleans(self, "post_correction", "islands", "sleeping")
 
 
 def longest_step(areas: NDArray[np.float64], gravity: float) -> float:
     """Return the longest step [s] that suits free blocks of these areas [m2].
 
-    A scene with a longer one is refused (`rigdda.dynamics.pack.parameters.check_step`), a site
+    A scene with a longer one is refused (`rigdda.dynamics.packing.check_step`), a site
     divides its step (`Site.settings`).
 
     Without gravity as under that of the earth.

@@ -16,18 +16,16 @@ import tomli_w
 
 from rigdda import sites
 from rigdda.barriers import Barrier, Built, as_layout
+from rigdda.check import mistyped
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, read
 from rigdda.geometry import polygon_properties
-from rigdda.mistyped import mistyped
 from rigdda.model import economy, realisation
 from rigdda.model.economy import Bill
-from rigdda.model.events import Drawn, Event
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
-from rigdda.model.place import Rebound
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
-from rigdda.model.site_tables import SiteTables
+from rigdda.model.site_tables import Drawn, Event, Rebound, SiteTables
 from rigdda.model.soundness import check_damping, check_site
 from rigdda.model.surface import Surface
 

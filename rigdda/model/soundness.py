@@ -12,10 +12,10 @@ import shapely
 from rigdda import check
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
-from rigdda.model import boulders
+from rigdda.model import loose_blocks
 from rigdda.model.economy import DITCHES
-from rigdda.model.place import Motion
 from rigdda.model.settings import Settings
+from rigdda.model.site_tables import Motion
 from rigdda.model.source import NEAR, Point, Source
 from rigdda.model.surface import check_surface
 
@@ -183,7 +183,7 @@ def _check_source(site: Site, source: Source) -> None:
         if (np.diff(chain[:, 0]) < 0.0).any():
             mend = "give a polygon or blocks: a band needs ground without overhangs"
             raise BadInput(f"{source.words}.band", source.band, mend)
-        room = max((boulders.reach(source, e) for e in site.events_of(source)), default=0.0)
+        room = max((loose_blocks.reach(source, e) for e in site.events_of(source)), default=0.0)
         low, high = source.band
         if low - room < chain[0, 0] or high + room >= site.road.start:
             first, last = chain[0, 0] + room, site.road.start - room

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rigdda import check
 from rigdda.errors import BadInput
 from rigdda.geometry import overlap, without_straight_corners
+from rigdda.model.block import convex_polygon, simple_polygon
 from rigdda.model.joints import JointSet, cut
-from rigdda.model.polygon import convex_polygon, simple_polygon
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
@@ -174,7 +174,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Return the corners of the blocks of a mass [m], or those given; `rng` draws the joints.
 
         Corners that lie within an edge, as surveys have them, are left out.
-        Not of a band, whose blocks lie on the ground of a site: see `rigdda.model.boulders`.
+        Not of a band, whose blocks lie on the ground of a site: see `rigdda.model.loose_blocks`.
         """
         if self.blocks:
             return [without_straight_corners(np.array(block)) for block in self.blocks]

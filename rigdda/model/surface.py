@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from rigdda import fields
+from rigdda import check
 from rigdda.errors import BadInput
 from rigdda.model.grounds import GROUNDS
 
@@ -86,17 +86,17 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         for name, value in usual.items():
             if getattr(self, name) is msgspec.UNSET:
                 msgspec.structs.force_setattr(self, name, value)
-        fields.set_number(self, "friction_deg", 0.0, 89.9)
-        fields.set_number(self, "cohesion", 0.0)
-        fields.set_number(self, "tension", 0.0)
+        check.set_number(self, "friction_deg", 0.0, 89.9)
+        check.set_number(self, "cohesion", 0.0)
+        check.set_number(self, "tension", 0.0)
         if self.restitution is not None:
-            fields.set_number(self, "restitution", 0.0, 1.0)
+            check.set_number(self, "restitution", 0.0, 1.0)
         if self.damping is not None:
-            fields.set_number(self, "damping", 0.0, MOST_DAMPING)
-        fields.set_number(self, "friction_sd_deg", 0.0, 15.0)
-        fields.set_number(self, "restitution_sd", 0.0, 0.5)
-        fields.set_number(self, "damping_sd", 0.0, MOST_DAMPING)
-        fields.set_number(self, "roughness", 0.0, 2.0)
+            check.set_number(self, "damping", 0.0, MOST_DAMPING)
+        check.set_number(self, "friction_sd_deg", 0.0, 15.0)
+        check.set_number(self, "restitution_sd", 0.0, 0.5)
+        check.set_number(self, "damping_sd", 0.0, MOST_DAMPING)
+        check.set_number(self, "roughness", 0.0, 2.0)
 
     @property
     def varies(self) -> bool:

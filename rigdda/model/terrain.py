@@ -1,10 +1,16 @@
-"""The natural ground."""
+"""The natural ground.
+
+Roughness of the ground: pits at random, one in each length of a block.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import msgspec
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
@@ -110,3 +116,105 @@ class Terrain:
                 p[:, 1] + share * (q[:, 1] - p[:, 1]),
             ).max()
         )
+
+
+STEEPEST = 5.0
+"""Rise over run beyond which a piece of the ground stays as it is [-]: pits go straight down, which
+on a face of 80 degrees would hardly change it."""
+
+CLEAR = 0.25
+"""Least distance of a pit from an even interval, over the spacing [-]: no step at its ends."""
+
+SAME = 1e-3
+"""Distance over the spacing within which a corner of the ground stands for a pit [-]."""
+
+REACH = 1.0 + CLEAR
+"""Distance from an even interval within which it changes the ground, over the spacing [-]."""
+
+
+class Roughness(msgspec.Struct, frozen=True):
+    """Pits in the ground of a scene.
+
+    At each multiple of `spacing` the ground lies below the smooth surface by the absolute value of
+    a normal number times the `amplitude` of its surface, and in between by what is linear in x. So
+    pits do not depend on how finely the ground was surveyed, what starts clear of the smooth ground
+    stays clear of it, and pits are the same with every layout but within 1.25 spacings of a
+    barrier: where barriers stand the ground is even.
+
+    Parameters
+    ----------
+    spacing : float
+        Distance of the pits [m], about the size of a block.
+    amplitude : mapping of str to float
+        Root-mean-square depth of the pits by the name of the surface [m].
+    seed : sequence of int
+        Of the random numbers.
+
+    Raises
+    ------
+    BadInput
+        If a value is not finite or outside its range.
+    """
+
+    spacing: float
+    amplitude: Mapping[str, float]
+    seed: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        spacing = check.number("roughness.spacing", self.spacing, 0.0, 1e3, open_low=True)
+        amplitude: Any = self.amplitude
+        if not isinstance(amplitude, Mapping):
+            raise BadInput("roughness.amplitude", amplitude, "give a depth for each surface")
+        depths = {
+            str(name): check.number(f"roughness.amplitude[{name!r}]", depth, 0.0, 1e2)
+            for name, depth in amplitude.items()
+        }
+        if not isinstance(self.seed, list | tuple):
+            raise BadInput("roughness.seed", self.seed, "give a sequence of whole numbers")
+        seed = tuple(check.integer("roughness.seed", number, 0) for number in self.seed)
+        for name, value in (("spacing", spacing), ("amplitude", depths), ("seed", seed)):
+            msgspec.structs.force_setattr(self, name, value)
+
+    def applied(self, ground: Terrain, even: Sequence[tuple[float, float]] = ()) -> Terrain:
+        """Return a ground with pits, but for the intervals of x that are to stay even [m].
+
+        Ground that overhangs stays as it is.
+        """
+        x, y = ground.points.T
+        if (np.diff(x) < 0.0).any():
+            return ground
+        nodes, depths = self._nodes(x[0], x[-1], even)
+        points, names = [], []
+        rise, run = np.abs(np.diff(y)), np.diff(x)
+        amplitude = np.array([self.amplitude.get(name, 0.0) for name in ground.surfaces])
+        amplitude[rise > STEEPEST * run] = 0.0
+        for i, name in enumerate(ground.surfaces):
+            inner = np.zeros(0)
+            if amplitude[i] > 0.0:
+                away = SAME * self.spacing
+                inner = nodes[(nodes > x[i] + away) & (nodes < x[i + 1] - away)]
+            at = np.concatenate([x[i : i + 1], inner])
+            level = np.concatenate([y[i : i + 1], np.interp(inner, x[i : i + 2], y[i : i + 2])])
+            deep = np.full(len(at), amplitude[i])
+            deep[0] = min(amplitude[max(i - 1, 0)], amplitude[i])  # surfaces meet without a step
+            points.append(np.column_stack([at, level - deep * np.interp(at, nodes, depths)]))
+            names += [name] * len(at)
+        points.append(ground.points[-1:])
+        return Terrain.sound(np.concatenate(points), tuple(names))
+
+    def _nodes(
+        self, left: float, right: float, even: Sequence[tuple[float, float]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where the depth of pits is given, ascending [m], and that depth over amplitude."""
+        first, last = math.floor(left / self.spacing), math.ceil(right / self.spacing)
+        nodes: NDArray[np.float64] = self.spacing * np.arange(first, last + 1, dtype=np.float64)
+        rng = np.random.Generator(np.random.PCG64(self.seed))
+        depths: NDArray[np.float64] = np.abs(rng.standard_normal(len(nodes)))
+        for low, high in even:
+            clear = CLEAR * self.spacing
+            kept = (nodes < low - clear) | (nodes > high + clear)
+            kept |= (depths == 0.0) & ((nodes < low) | (nodes > high))  # ends of another interval
+            nodes, depths = nodes[kept], depths[kept]
+            nodes, depths = np.append(nodes, (low, high)), np.append(depths, (0.0, 0.0))
+        order = np.unique(nodes, return_index=True)[1]
+        return nodes[order], depths[order]

@@ -11,9 +11,7 @@ import rerun.blueprint as rrb
 
 from rigdda.dynamics.run import Run
 from rigdda.errors import BadInput
-from rigdda.results.blueprint import PLACEMENT, TIMELINE, slope_view
-from rigdda.results.marks import Marks
-from rigdda.results.replay import log_run, recording
+from rigdda.results.replay import PLACEMENT, TIMELINE, Marks, log_run, recording, slope_view
 
 
 @dataclass(frozen=True, slots=True)

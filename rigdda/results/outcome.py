@@ -1,4 +1,11 @@
-"""What a release means for the road."""
+"""The state of a barrier over time, as outcomes judge it and replays show it.
+
+How a release ended: what its outcome is judged by.
+
+What one barrier took in a release, and what it holds in the end.
+
+What a release means for the road.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +15,242 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, compress
 from operator import and_
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rigdda.barriers import Barrier
+from rigdda.barriers.base import Reach
+from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.dynamics.run import Run
+from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Scene
 from rigdda.model.site import Site
-from rigdda.results.barrier_outcome import BarrierOutcome, holding, measure_barrier
-from rigdda.results.ending import Ending, ending
+
+pass
+
+STANDS = "stands"
+
+
+def states(run: Run, index: int) -> list[tuple[float, str]]:
+    """Return the states of a barrier, each with the time from which it is in it [s].
+
+    The first is "stands"; a fence "failed", an embankment was "pushed", a gravity wall "slid" or
+    is "overturned", by the frames of the run.
+    """
+    barrier, poses = run.scene.barriers[index], run.barrier_poses[:, index]
+    start = (float(run.times[0]), STANDS)
+    return [start, *barrier.changes(run.times, poses, run.failure(index))]
+
+
+class BarrierEnding(NamedTuple):
+    """A barrier at the end of a release."""
+
+    barrier: Barrier
+    states: Sequence[tuple[float, str]]
+    """Its states, each with the time from which it was in it [s]; the first is "stands"."""
+    reach: Reach
+    """Where it holds rock at the end if it still holds any."""
+    absorbed: float
+    """Energy that it took [J]."""
+    thrust: float
+    """Greatest mean over a second of the thrust on it [N/m]."""
+    resistance: float
+    """Thrust that it bears [N/m]."""
+    displacement: float
+    """Distance of its centroid from where it was at the start [m]."""
+    road_area: float
+    """Its area beyond the uphill edge of the road [m2]."""
+
+
+class Ending(NamedTuple):
+    """The end of a release of N blocks."""
+
+    areas: Sequence[float]
+    """Area of each block [m2]."""
+    masses: Sequence[float]
+    """Mass of each block per metre of width, 0 of one that is fixed [kg]."""
+    starts: Sequence[float]
+    """Chainage of the centroid of each block at the start [m]."""
+    places: Sequence[tuple[float, float]]
+    """Centroid of each block at the end [m]."""
+    speeds: Sequence[float]
+    """Speed of each centroid at the end [m/s]."""
+    log: Log
+    """What happened on the way."""
+    extent: tuple[float, float]
+    """Chainages between which all blocks stayed, corners included [m]."""
+    road_energy: float
+    """Largest kinetic energy of a block over the road [J]."""
+    time: float
+    """When it was [s]."""
+    barriers: Sequence[BarrierEnding]
+
+
+def ending(run: Run, lines: Sequence[float], road_start: float) -> Ending:
+    """Return how a run ended that watched some stations, and energies over the road.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    lines : sequence of float
+        Stations that it watched [m].
+    road_start : float
+        Chainage of the uphill edge of the road [m].
+    """
+    scene = run.scene
+    areas = [polygon_properties(block.vertices)[0] for block in scene.blocks]
+    rise = steepest_deposit(surface.friction_deg for surface in scene.surfaces.values())
+    return Ending(
+        areas=areas,
+        masses=[
+            0.0 if block.fixed else block.density * area
+            for block, area in zip(scene.blocks, areas, strict=True)
+        ],
+        starts=run.poses[0, :, 0].tolist(),
+        places=list(zip(*run.poses[-1, :, :2].T.tolist(), strict=True)),
+        speeds=[math.hypot(vx, vy) for vx, vy, _ in run.velocities[-1].tolist()],
+        log=log_of(run.events.tolist(), len(scene.barriers), len(scene.blocks), lines),
+        extent=(float(run.extent[:, 0].min()), float(run.extent[:, 1].max())),
+        road_energy=float(run.watch_energy.max()),
+        time=float(run.times[-1]),
+        barriers=[_barrier(run, i, rise, road_start) for i in range(len(scene.barriers))],
+    )
+
+
+def steepest_deposit(friction_deg: Iterable[float]) -> float:
+    """Return the rise over run of the steepest deposit on surfaces of these friction angles [-]."""
+    return math.tan(math.radians(min(friction_deg)))
+
+
+def _barrier(run: Run, index: int, rise: float, road_start: float) -> BarrierEnding:
+    """Return how a barrier of a run ended; a deposit on it rises so at most [-]."""
+    scene, barrier, outline = run.scene, run.scene.barriers[index], run.outline(index)
+    return BarrierEnding(
+        barrier=barrier,
+        states=states(run, index),
+        reach=barrier.holds(outline, scene.ground, rise),
+        absorbed=float(run.absorbed[index]),
+        thrust=float(run.thrust[index]),
+        resistance=scene.resistance(index),
+        displacement=math.dist(*run.barrier_poses[[0, -1], index, :2].tolist()),
+        road_area=barrier.area_beyond(road_start, outline),
+    )
+
+
+GONE = ("failed", "overturned", "pushed")
+"""States in which a barrier holds nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class BarrierOutcome:
+    """What one barrier took in a release.
+
+    Ditches and embankments are ground: what happens on them counts as no hit, and they absorb
+    nothing here.
+
+    Parameters
+    ----------
+    hits : int
+        Hits, counted anew after 0.1 s apart.
+    max_energy, total_energy : float
+        Largest and summed energy of the hits, of translation and rotation just before the first
+        touch [J].
+    absorbed_energy : float
+        Work that contact forces of the barrier took from the blocks [J]: of a fence the force of
+        its brakes times its path, and what its own mass took.
+    impact_heights : tuple of float
+        Height of each hit above the ground at the barrier's uphill face at the start [m].
+    overtopped : int
+        Blocks that started uphill of the barrier and first passed it before it failed, was pushed
+        away or overturned: beyond its downhill face, the downhill edge of a ditch or of an
+        embankment's crest. A gravity wall counts as where it stood at the start.
+    failed : bool
+        Whether it no longer stands as it was built.
+    caught : float
+        Share of the released mass at rest at the end that it holds, or that is in the ditch.
+    state : {"stands", "failed", "slid", "overturned", "pushed"}
+        At the end. A fence failed, a gravity wall has slid if a corner is more than 0.1 m away from
+        its place, and is overturned if it was turned beyond the angle of its diagonal; an
+        embankment was pushed away.
+    displacement : float
+        Distance of its centroid at the end from where it was at the start [m]; of a fence the
+        elongation that was used.
+    road_area : float
+        Its area that lies beyond the uphill edge of the road at the end [m2]: only a gravity wall
+        comes there.
+    thrust : float
+        Greatest mean over a second of the horizontal force on it, downhill [N/m], of a ditch none.
+    resistance : float
+        Thrust that it bears [N/m], inf where none can move it, see `rigdda.Scene.resistance`; of
+        a fence the force against which it gives way.
+    left_height : float
+        Height that is left of it [m]: none of what failed, was overturned or pushed away, nor of a
+        ditch.
+    """
+
+    hits: int
+    max_energy: float
+    total_energy: float
+    absorbed_energy: float
+    impact_heights: tuple[float, ...]
+    overtopped: int
+    failed: bool
+    caught: float
+    state: str
+    displacement: float
+    road_area: float
+    thrust: float
+    resistance: float
+    left_height: float
+
+
+def measure_barrier(
+    ended: BarrierEnding,
+    hits: Sequence[tuple[float, float]],
+    passed: Iterable[tuple[float, float]],
+    caught: float,
+) -> BarrierOutcome:
+    """Return the outcome of a barrier.
+
+    Parameters
+    ----------
+    ended : BarrierEnding
+        The barrier in the end.
+    hits : sequence of (energy, height)
+        Hits of it [J, m].
+    passed : iterable of (start, time)
+        Chainage of each block at the start, and when it first passed the barrier [m, s].
+    caught : float
+        Share of the released mass that it holds at rest [-].
+    """
+    barrier, state = ended.barrier, ended.states[-1][1]
+    gone = next((time for time, state in ended.states if state in GONE), math.inf)
+    return BarrierOutcome(
+        hits=len(hits),
+        max_energy=max((energy for energy, _ in hits), default=0.0),
+        total_energy=math.fsum(energy for energy, _ in hits),
+        absorbed_energy=ended.absorbed,
+        impact_heights=tuple(height for _, height in hits),
+        overtopped=sum(x < barrier.x and time < gone for x, time in passed),
+        failed=state != STANDS,
+        caught=caught,
+        state=state,
+        displacement=ended.displacement,
+        road_area=ended.road_area,
+        thrust=ended.thrust,
+        resistance=ended.resistance,
+        left_height=0.0 if state in GONE else barrier.left_height(ended.displacement),
+    )
+
+
+def holding(ended: BarrierEnding, places: Sequence[tuple[float, float]]) -> list[bool]:
+    """Return which centroids (x, y) a barrier holds at the end, see `rigdda.Outcome`."""
+    if ended.states[-1][1] in GONE:
+        return [False] * len(places)
+    return [ended.reach.includes(x, y) for x, y in places]
+
 
 GRAIN = 2.0**40
 """Fractions are whole multiples of 1/GRAIN, so that they add up to 1 exactly in any order."""
@@ -192,3 +426,40 @@ def _run_out(x: list[float], weight: list[float]) -> tuple[float, float, float]:
     reached = list(accumulate(weight[k] / GRAIN for k in order))
     half, most, every = (x[order[bisect_left(reached, q)]] for q in (0.5, 0.95, 1.0))
     return half, most, every
+
+
+class Log(NamedTuple):
+    """The events of a run: what happened to each barrier, and when blocks first passed stations."""
+
+    hits: list[list[tuple[float, float]]]  # energy [J] and height [m] of each hit of a barrier
+    failed: list[float]  # when each barrier failed, inf if it did not [s]
+    passed: dict[float, list[float]]  # by station: when each block passed it, inf if it did not [s]
+
+
+def log_of(
+    events: Iterable[tuple[Any, ...]], barriers: int, blocks: int, lines: Sequence[float]
+) -> Log:
+    """Return what happened in a run of so many barriers and blocks that watched some stations.
+
+    Parameters
+    ----------
+    events : iterable of tuple
+        Events in order of time, each with the fields of `rigdda.dynamics.run.EVENT`.
+    barriers, blocks : int
+        Their numbers.
+    lines : sequence of float
+        The stations, ascending [m].
+    """
+    log = Log(
+        [[] for _ in range(barriers)],
+        [math.inf] * barriers,
+        {line: [math.inf] * blocks for line in lines},
+    )
+    for time, kind, block, target, _, _, height, _, energy in events:
+        if kind == HIT:
+            log.hits[target].append((energy, height))
+        elif kind == CROSSING:
+            log.passed[lines[target]][block] = time
+        elif kind == FAILED:
+            log.failed[target] = min(log.failed[target], time)
+    return log

@@ -1,4 +1,16 @@
-"""Replays for the rerun viewer: a run as an .rrd file.
+"""How a replay looks: its camera, layers and colours.
+
+What a view on a scene takes in.
+
+The events of a run, put together by what they happened to.
+
+What a replay shows beside the scene.
+
+Plots of a replay: what is computed from each frame of a run.
+
+Layout of the viewer: the slope, beside it notes and plots, below them the timeline.
+
+Replays for the rerun viewer: a run as an .rrd file.
 
 Geometry is logged once, poses and numbers by column. The world is in metres, y up, seen by a far
 pinhole camera (a flat view of filled shapes); z only orders the layers.
@@ -8,7 +20,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from uuid import uuid4
 
 import numpy as np
@@ -17,32 +30,196 @@ import rerun.blueprint as rrb
 import shapely
 from numpy.typing import NDArray
 
+from rigdda import check
+from rigdda.barriers import describe
+from rigdda.dynamics.monitors import CROSSING
 from rigdda.dynamics.run import Run
+from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
-from rigdda.results.blueprint import PLACEMENT, TIMELINE, run_blueprint
-from rigdda.results.frame import frame
-from rigdda.results.marks import Marks
-from rigdda.results.plots import PLOTS, scalars
-from rigdda.results.states import STANDS, states
-from rigdda.results.style import (
-    BARRIER,
-    BROKEN,
-    CAMERA,
-    DOT,
-    EDGE,
-    FAILED,
-    GROUND,
-    INK,
-    LABEL,
-    LAYER,
-    ROAD,
-    ROCK,
-    Colour,
-)
+from rigdda.model.scene import Scene
+from rigdda.results.outcome import STANDS, states
 from rigdda.results.viewer import rrd_path
 
+Colour = tuple[int, int, int]
+
+CAMERA = 1000.0
+"""Distance of the camera [m]: one pixel is one metre, and a layer shifts a point by 1e-5."""
+LAYER = {"terrain": 0.0, "barriers": 0.02, "road": 0.04, "blocks": 0.06}
+LABEL = 0.05
+"""Height of a label above the top of its barrier, as a share of the view; every third is as
+high."""
+DOT = -3.0
+"""Radius of the dot of a label: negative numbers are points of the screen."""
+EDGE = 0.01
+"""z of a layer, and of an outline above its fill [m]."""
+
+SKY: Colour = (233, 240, 246)
+GROUND: Colour = (201, 188, 165)
+BARRIER: Colour = (28, 90, 160)
+BROKEN: Colour = (176, 182, 188)
+FAILED_BARRIER: Colour = (214, 40, 70)
+ROAD: Colour = (232, 93, 4)
+ROCK: tuple[Colour, ...] = ((104, 88, 74), (128, 108, 90), (88, 80, 76), (146, 122, 98))
+INK: Colour = (40, 34, 30)
+
+
+def frame(scene: Scene) -> tuple[float, float, float, float]:
+    """Return left, bottom, right, top of a view on the whole scene at its start [m]."""
+    parts = [block.vertices for block in scene.blocks]
+    if scene.ground is not None:
+        parts += [scene.ground.points, *(scene.outline(i) for i in range(len(scene.barriers)))]
+    points = np.concatenate(parts)
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.04 * float((high - low).max())
+    left, bottom = (low - margin).tolist()
+    right, top = (high + margin).tolist()
+    return left, bottom, right, top
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """What a replay shows that the scene does not know.
+
+    Parameters
+    ----------
+    road : (float, float), optional
+        Chainages of the road's uphill and downhill edge [m].
+    notes : mapping of str to str
+        Words about the episode: seed, layout, reward, objective.
+    title : str
+        Name of the recording.
+    labels : sequence of str
+        What each barrier of the scene is called, a fence with its class; without any, the words
+        that the scene has for them.
+
+    Raises
+    ------
+    BadInput
+        If the road is not an interval.
+    """
+
+    road: tuple[float, float] | None = None
+    notes: Mapping[str, str] = field(default_factory=dict)
+    title: str = "rockfall"
+    labels: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if self.road is None:
+            return
+        uphill, downhill = check.interval("road", self.road)
+        if uphill == downhill:
+            raise BadInput("road", self.road, "give its uphill edge, then its downhill edge")
+
+    def labels_of(self, scene: Scene) -> Sequence[str]:
+        """Return what each barrier of a scene is called.
+
+        Raises
+        ------
+        BadInput
+            If there are labels, but not one for each barrier.
+        """
+        count = len(scene.barriers)
+        if self.labels and len(self.labels) != count:
+            mend = f"give one for each of {count} barriers, or none"
+            raise BadInput("labels", self.labels, mend)
+        return self.labels or [describe(barrier) for barrier in scene.barriers]
+
+
 Floats = NDArray[np.float64]
+
+MOVING = 0.1
+"""Speed above which a block counts as moving [m/s]; slower is a creep of under 1 m in 10 s."""
+
+PLOTS = {
+    "kinetic_energy": ("kinetic energy [J]", ROAD),
+    "debris": ("debris past the road's edge [share of mass]", (214, 40, 70)),
+    "greatest_speed": ("greatest speed [m/s]", (150, 90, 200)),
+    "moving": ("moving blocks", (40, 150, 90)),
+    "potential_energy": ("potential energy [J]", (60, 130, 210)),
+}
+"""Title and colour of every scalar."""
+
+
+def scalars(run: Run, marks: Marks) -> dict[str, Floats]:
+    """Return the (T,) numbers of every plot, of the free blocks; debris where there is a road."""
+    free = np.array([not block.fixed for block in run.scene.blocks])
+    shapes = [polygon_properties(block.vertices) for block in run.scene.blocks]
+    density = np.array([block.density for block in run.scene.blocks])
+    mass = (density * [area for area, _, _ in shapes])[free]
+    inertia = (density * [moment for _, _, moment in shapes])[free]
+    vx, vy, omega = np.moveaxis(run.velocities[:, free], -1, 0)
+    squared = vx**2 + vy**2
+    x, y = run.poses[:, free, 0], run.poses[:, free, 1] - frame(run.scene)[1]
+    gx, gy = run.scene.gravity_vector
+    out = {
+        "kinetic_energy": 0.5 * (squared @ mass + omega**2 @ inertia),
+        "potential_energy": -(gx * x + gy * y) @ mass,
+        "greatest_speed": np.sqrt(squared.max(axis=1)),
+        "moving": np.count_nonzero(squared > MOVING**2, axis=1).astype(np.float64),
+    }
+    if marks.road is not None:
+        out["debris"] = _passed(run, marks.road[0])[:, free] @ mass / mass.sum()
+    return out
+
+
+def _passed(run: Run, edge: float) -> NDArray[np.bool_]:
+    """Return whether each block's centroid was ever at or past chainage `edge`, (T, N).
+
+    Crossings count where they happened, so that a block which came back between two frames is
+    not missed.
+    """
+    seen = run.poses[:, :, 0] >= edge
+    for event in run.events[(run.events["kind"] == CROSSING) & (run.events["x"] >= edge)]:
+        seen[np.searchsorted(run.times, event["time"]) :, event["block"]] = True
+    return np.logical_or.accumulate(seen, axis=0)
+
+
+TIMELINE = "sim_time"
+PLACEMENT = "placement"
+"""Timeline of an episode in which barriers are placed one by one."""
+
+
+def slope_view(run: Run, name: str, root: str = "") -> rrb.Spatial2DView:
+    """Return the view on the slope of a run that is logged below the entity `root`."""
+    left, bottom, right, top = frame(run.scene)
+    return rrb.Spatial2DView(
+        origin=f"{root}/world/camera",
+        contents=f"{root}/world/**",
+        name=name,
+        background=SKY,
+        visual_bounds=rrb.VisualBounds2D(x_range=(0, right - left), y_range=(0, top - bottom)),
+    )
+
+
+def run_blueprint(run: Run, marks: Marks) -> rrb.Blueprint:
+    """Return the layout: the slope, beside it the notes and the plots."""
+    slope = slope_view(run, marks.title)
+    plots = {
+        name: rrb.TimeSeriesView(
+            origin=f"/plots/{name}",
+            name=title,
+            axis_y=rrb.ScalarAxis(range=(0.0, 1.05)) if name == "debris" else None,
+            plot_legend=rrb.PlotLegend(visible=False),
+        )
+        for name, (title, _) in PLOTS.items()
+    }
+    debris = plots.pop("debris")
+    side: list[rrb.Container | rrb.View] = [
+        plots.pop("kinetic_energy"),
+        rrb.Tabs(*plots.values()),
+    ]
+    if marks.road is not None:
+        side = [debris, *side]
+    notes = rrb.TextDocumentView(origin="/notes", name="episode")
+    column = rrb.Vertical(notes, *side, row_shares=[1.4] + [1.0] * len(side))
+    return rrb.Blueprint(
+        rrb.Horizontal(slope, column, column_shares=[5, 2]),
+        rrb.TimePanel(timeline=TIMELINE, play_state="playing", loop_mode="all", state="collapsed"),
+        collapse_panels=True,
+    )
+
+
 Clock = Callable[[Sequence[float] | Floats], list[rr.TimeColumn]]
 """Gives the time columns of rows at some times [s]."""
 
@@ -179,7 +356,7 @@ def _log_state(
     left, bottom, right, high = frame(run.scene)
     lift = LABEL * max(right - left, high - bottom) * (1 + i % 3)
     place = (x, top + lift, LAYER["blocks"] + EDGE)
-    colours = [BARRIER if state == STANDS else FAILED for _, state in changes]
+    colours = [BARRIER if state == STANDS else FAILED_BARRIER for _, state in changes]
     rec.send_columns(
         entity,
         clock([time for time, _ in changes]),

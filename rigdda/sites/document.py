@@ -16,12 +16,19 @@ from rigdda import sites
 from rigdda.barriers import KINDS, MeshOption
 from rigdda.files import atomic
 from rigdda.model.economy import Consequences, Prices
-from rigdda.model.events import Event
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
-from rigdda.model.place import BarrierZone, Motion, Rebound, Road, Scatter
-from rigdda.model.site_tables import SiteTables
-from rigdda.model.slope import Slope, Stretch
+from rigdda.model.site_tables import (
+    BarrierZone,
+    Event,
+    Motion,
+    Rebound,
+    Road,
+    Scatter,
+    SiteTables,
+    Slope,
+    Stretch,
+)
 from rigdda.model.source import Source
 from rigdda.model.surface import Interface, Surface
 

@@ -18,10 +18,8 @@ import numpy as np
 from rigdda import check
 from rigdda.barriers import MeshOption
 from rigdda.model.economy import Consequences, Prices
-from rigdda.model.events import Event
-from rigdda.model.place import BarrierZone, Road
 from rigdda.model.site import Site
-from rigdda.model.slope import Slope, Stretch
+from rigdda.model.site_tables import BarrierZone, Event, Road, Slope, Stretch
 from rigdda.model.source import Point, Source
 from rigdda.model.surface import Surface
 from rigdda.sites import FAMILIES, load

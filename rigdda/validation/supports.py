@@ -8,8 +8,8 @@ import numpy as np
 from scipy.special import ellipk
 
 from rigdda.dynamics.simulation import Simulation
+from rigdda.model.loads import Bolt, FixedPoint
 from rigdda.model.scene import Block, Scene
-from rigdda.model.supports import Bolt, FixedPoint
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, box, polygon, rock
 

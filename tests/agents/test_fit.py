@@ -19,7 +19,7 @@ from rigdda.agents.fit import (
     scores,
     with_values,
 )
-from rigdda.model.place import Rebound
+from rigdda.model.site_tables import Rebound
 
 SITE = Site.load("verge")
 TRUE = {"lumped.soil.tangential": 0.7, "lumped.soil.friction_deg": 35.0}

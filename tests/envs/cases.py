@@ -13,8 +13,7 @@ from rigdda import (
     Source,
     Surface,
 )
-from rigdda.model.place import BarrierZone, Motion, Road
-from rigdda.model.slope import Slope, Stretch
+from rigdda.model.site_tables import BarrierZone, Motion, Road, Slope, Stretch
 
 FREE = Prices(
     fence_base=0.0,

@@ -6,8 +6,7 @@ import pytest
 
 from rigdda import Site, Surface
 from rigdda.model.joints import JointSet
-from rigdda.model.place import BarrierZone, Motion, Road
-from rigdda.model.slope import Slope
+from rigdda.model.site_tables import BarrierZone, Motion, Road, Slope
 from rigdda.model.source import Source
 
 

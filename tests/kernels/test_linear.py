@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rigdda.dynamics import solvers
 from rigdda.dynamics.arrays import Matrix, Scratch
-from rigdda.dynamics.linear import direct, pcg, skyline, sor
-from rigdda.dynamics.pack.space import empty_matrix, empty_scratch
+from rigdda.dynamics.packing import empty_matrix, empty_scratch
 from rigdda.kernel import from_python
 
-solve_block = from_python(direct.solve_block)
-multiply, solve_pcg = map(from_python, (pcg.multiply, pcg.solve_pcg))
-profile, solve_skyline = map(from_python, (skyline.profile, skyline.solve_skyline))
-solve_sor = from_python(sor.solve_sor)
+solve_block = from_python(solvers.solve_block)
+multiply, solve_pcg = map(from_python, (solvers.multiply, solvers.solve_pcg))
+profile, solve_skyline = map(from_python, (solvers.profile, solvers.solve_skyline))
+solve_sor = from_python(solvers.solve_sor)
 
 seeds = st.integers(0, 2**32 - 1)
 

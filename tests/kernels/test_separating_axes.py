@@ -16,8 +16,8 @@ from rigdda.dynamics.contact.separating_axes import (
     Approach,
     face_of_contact,
 )
-from rigdda.dynamics.correction import place_corners
-from rigdda.dynamics.pack import Arrays, pack
+from rigdda.dynamics.packing import Arrays, pack
+from rigdda.dynamics.post_correction import place_corners
 from rigdda.kernel import from_python
 from rigdda.validation.scenes import rock
 

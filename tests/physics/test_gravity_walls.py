@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from physics.helpers import FLAT, GRAVITY, box, rock
 from rigdda import Fence, GravityWall, Run, Scene, Simulation, Site, Terrain, Wall, release
 from rigdda.releases import release_many
-from rigdda.results.states import states
+from rigdda.results.outcome import states
 from rigdda.validation.case import Lab
 from rigdda.validation.gravity_walls import DURATION, FACE, Push, displacement
 

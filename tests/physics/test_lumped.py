@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigdda import BadInput, Ditch, Embankment, GravityWall, Site, Terrain, lumped
-from rigdda.dynamics.lumped import trajectories
+from rigdda.dynamics.point_mass import trajectories
 from rigdda.lumped_mass import felt
 
 G = 9.81

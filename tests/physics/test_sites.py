@@ -19,7 +19,7 @@ from rigdda import (
     sites,
 )
 from rigdda.geometry import overlap
-from rigdda.model.place import Scatter
+from rigdda.model.site_tables import Scatter
 from rigdda.results.outcome import measure, stations, watch
 from rigdda.sites.generator import fallen
 from rigdda.validation import toppling

@@ -9,9 +9,9 @@ import pytest
 
 from physics.helpers import FLAT, box, rock
 from rigdda import BadInput, Block, Scene, Settings, Simulation, Terrain
+from rigdda.model.loads import FixedPoint
 from rigdda.model.scene import Surface
 from rigdda.model.settings import EARTH, longest_step
-from rigdda.model.supports import FixedPoint
 from rigdda.validation.scenes import incline, polygon
 
 

@@ -23,7 +23,7 @@ from rigdda import (
     Terrain,
     sites,
 )
-from rigdda.batch import EVERY, Batch
+from rigdda.releases import EVERY, Batch
 from rigdda.results.outcome import Outcome, measure, stations, watch
 
 SITE = sites.load("bench")

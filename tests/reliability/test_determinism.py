@@ -7,7 +7,7 @@ import pytest
 from physics.helpers import FLAT, box, rock
 
 from rigdda import Run, Scene, Settings, Simulation, Site, Terrain, Wall, simulate_many
-from rigdda.model.scene_json import scene_to_json
+from rigdda.model.scene import scene_to_json
 
 SITE = Site.load("quick")
 LAYOUT = (Wall(0.5 * (SITE.barrier_zone.start + SITE.barrier_zone.end), 1.5),)

@@ -11,13 +11,12 @@ import pytest
 
 import rigdda
 from rigdda import BadInput, Block, Ditch, Embankment, Fence, Layout, Site, Wall, sites
-from rigdda.batch import Batch
-from rigdda.dynamics.pack.parameters import pack_interfaces
-from rigdda.model.meetings import Meetings
-from rigdda.model.place import Scatter
-from rigdda.model.streams import stream
+from rigdda.dynamics.packing import pack_interfaces
+from rigdda.model.interfaces import Meetings
+from rigdda.model.random_streams import stream
+from rigdda.model.site_tables import Scatter
 from rigdda.model.surface import Interface
-from rigdda.single import SingleReleases, can_share
+from rigdda.releases import Batch, SingleReleases, can_share
 
 BENCH = sites.load("bench")
 PUSHED = Embankment(31.0, 0.6, width=0.5, density=300.0)

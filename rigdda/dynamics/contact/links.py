@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import BOLT, PIN, STICK
-from rigdda.dynamics.contact.approach import effective_mass, point_velocity
-from rigdda.dynamics.contact.law import rigid_stiffness
-from rigdda.dynamics.correction import place_corners
+from rigdda.dynamics.contact.law import effective_mass, point_velocity, rigid_stiffness
+from rigdda.dynamics.post_correction import place_corners
 from rigdda.dynamics.records import Bodies, Body, Contact, Link, Links, Parameters
 from rigdda.kernel import entry_kernel, kernel
 

@@ -8,11 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.barriers import GravityWall
-from rigdda.dynamics.pack import Arrays, pack
-from rigdda.dynamics.pack.bodies import barrier_trait, block_traits, set_brakes, write_polygons
-from rigdda.dynamics.pack.ground import pack_ground
-from rigdda.dynamics.pack.monitors import start_rock, start_targets
-from rigdda.dynamics.pack.parameters import pack_interfaces, rock_numbers
+from rigdda.dynamics.packing import (
+    Arrays,
+    barrier_trait,
+    block_traits,
+    pack,
+    pack_ground,
+    pack_interfaces,
+    rock_numbers,
+    set_brakes,
+    start_rock,
+    start_targets,
+    write_polygons,
+)
 from rigdda.geometry import is_convex
 from rigdda.model.scene import Scene, Terrain
 from rigdda.model.settings import Settings

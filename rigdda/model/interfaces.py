@@ -19,8 +19,8 @@ from rigdda.model.realisation import STEEPEST_DEG, pairs
 from rigdda.model.surface import MOST_DAMPING
 
 if TYPE_CHECKING:
-    from rigdda.model.events import Drawn
     from rigdda.model.site import Site
+    from rigdda.model.site_tables import Drawn
 
 FRICTION, FRICTION_SD, RESTITUTION, RESTITUTION_SD, DAMPING, DAMPING_SD, VARIES = range(7)
 """Columns of the table of surfaces: angle of friction [deg], coefficient of restitution [-] and

@@ -1,1 +1,0 @@
-"""Submatrices of the simultaneous equilibrium equations."""

@@ -1,1 +1,0 @@
-"""Solvers of the simultaneous equations; relaxation of forces, which needs no matrix."""

@@ -1,0 +1,651 @@
+"""Space for contacts, for the equations of an island, and for what a step works on.
+
+The ground under the bodies, and its motion.
+
+What is watched during a run.
+
+Numbers of the scene and the settings, and how surfaces meet.
+
+Bodies with their outlines, and the supports between them.
+
+From a scene to the arrays that the kernels work on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda.barriers import Embankment, Fence, GravityWall
+from rigdda.barriers.fence import MASS
+from rigdda.dynamics.arrays import (
+    Boxes,
+    Ground,
+    Islands,
+    Matrix,
+    Monitors,
+    Outlines,
+    Rows,
+    Scratch,
+    Work,
+)
+from rigdda.dynamics.constants import (
+    ASLEEP,
+    AWAKE,
+    BOLT,
+    FIXED,
+    MARGIN_RATIO,
+    PENETRATION_RATIO,
+    PIN,
+    PLAIN_CONTACT,
+    TERRAIN,
+)
+from rigdda.dynamics.post_correction import polygon_row, set_body_coordinates
+from rigdda.dynamics.post_correction import polygons as polygons_of
+from rigdda.dynamics.records import (
+    BODY,
+    BOX,
+    CONTACT,
+    CORNER,
+    INTERFACE,
+    LINK,
+    LOCAL,
+    PARAMETERS,
+    POLYGON,
+    SEGMENT,
+    SHAKING,
+    STATION,
+    TARGET,
+    WATCHED,
+    Bodies,
+    Contacts,
+    Floats,
+    Interfaces,
+    Links,
+    Shaking,
+)
+from rigdda.dynamics.rows import COLUMNS, FACTS, SLOT_COLUMNS
+from rigdda.dynamics.run import EVENT
+from rigdda.errors import BadInput
+from rigdda.geometry import convex_parts, moments, polygon_properties, turns
+from rigdda.kernel import Direct, short_kernel
+from rigdda.model.loads import FixedPoint
+from rigdda.model.scene import Block, Scene, Terrain
+from rigdda.model.settings import EARTH, SOLVERS, Settings, longest_step
+
+MOST_BANDWIDTH = 64
+"""Blocks to the left of the diagonal, on average, up to which a skyline is kept room for."""
+
+
+def empty_contacts(room: int) -> Contacts:
+    """Return space for `room` contacts."""
+    return np.zeros(room, dtype=CONTACT).view(np.recarray)
+
+
+def empty_matrix(blocks: int, room: int) -> Matrix:
+    """Return space for the equations of an island of all blocks."""
+    return Matrix(
+        np.zeros((blocks, 3, 3)),
+        np.zeros((room, 3, 3)),
+        np.zeros(room, dtype=np.int64),
+        np.zeros(room, dtype=np.int64),
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+    )
+
+
+def empty_scratch(blocks: int, room: int) -> Scratch:
+    """Return space for the solvers of these equations."""
+    return Scratch(
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+        np.zeros((blocks, 3)),
+        np.zeros(blocks, dtype=np.int64),
+        np.zeros(3 * blocks, dtype=np.int64),
+        np.zeros(profile_room(blocks)),
+        np.zeros(2 * room, dtype=np.int64),
+    )
+
+
+def profile_room(blocks: int) -> int:
+    """Return the entries of a skyline that are kept room for; longer ones are not factorised."""
+    return 9 * blocks * min(blocks, MOST_BANDWIDTH)
+
+
+def empty_work(bodies: int, blocks: int, room: int) -> Work:
+    """Return the scratch arrays of a step."""
+
+    def whole(n: int) -> NDArray[np.int64]:
+        return np.zeros(n, dtype=np.int64)
+
+    row = np.zeros(bodies, BOX).view(np.recarray)
+    row["body"] = np.arange(bodies)
+    return Work(
+        Boxes(
+            swept=row.copy(),
+            row=row,
+            pairs=whole(2 * room),
+            partner_start=whole(bodies + 1),
+            partner=whole(room),
+        ),
+        Islands(
+            parent=whole(bodies),
+            slot=whole(bodies),
+            block_start=whole(bodies + 1),
+            block_item=whole(bodies),
+            contact_start=whole(bodies + 1),
+            contact_item=whole(room),
+        ),
+        Rows(
+            row=np.zeros((room, COLUMNS)),
+            fact=np.zeros((room, FACTS)),
+            form=whole(room),
+            row_i=whole(room),
+            row_j=whole(room),
+            idle=whole(room),
+            visit=whole(room),
+            place=whole(room),
+            height=np.zeros(room),
+            layer=whole(room + 1),
+            moved_in=whole(blocks + 1),
+            scale=np.zeros((blocks + 1, 3)),
+            slot=np.zeros((blocks + 1, SLOT_COLUMNS)),
+        ),
+        empty_matrix(blocks, room),
+        empty_scratch(blocks, room),
+        first=whole(bodies + 1),
+        begin=whole(bodies + 1),
+    )
+
+
+def pack_ground(ground: Terrain | None, names: list[str]) -> Ground:
+    """Return the terrain segments and the bins that find them by x."""
+    if ground is None:
+        none, start = np.zeros(1, dtype=SEGMENT), np.zeros(1, dtype=np.int64)
+        return Ground(none.view(np.recarray), start, start[:0], 0.0, 1.0)
+    points = ground.points
+    step = np.diff(points, axis=0)
+    length = np.hypot(step[:, 0], step[:, 1])
+    tangent = step / length[:, None]
+    turn = np.zeros(len(points))
+    turn[1:-1] = np.arctan2(
+        tangent[:-1, 0] * tangent[1:, 1] - tangent[:-1, 1] * tangent[1:, 0],
+        (tangent[:-1] * tangent[1:]).sum(axis=1),
+    )
+    turn[np.abs(turn) < 1e-12] = 0.0
+    extent = np.sort(np.stack([points[:-1], points[1:]]), axis=0)
+    (left, bottom), (right, top) = (corner.T for corner in extent)
+    origin, bins = left.min(), max(1, min(2 * len(step), 4096))
+    width = max((right.max() - origin) / bins, 1e-9)
+    first, last = (np.minimum((x - origin) / width, bins - 1).astype(int) for x in (left, right))
+    items: list[list[int]] = [[] for _ in range(bins)]
+    for s in range(len(step)):
+        for cell in range(first[s], last[s] + 1):
+            items[cell].append(s)
+    segment = np.zeros(len(points), dtype=SEGMENT)
+    segment["x"], segment["y"], segment["turn"] = *points.T, turn
+    columns = {
+        "normal_x": -tangent[:, 1],
+        "normal_y": tangent[:, 0],
+        "length": length,
+        "surface": [names.index(s) for s in ground.surfaces],
+        "left": left,
+        "right": right,
+        "bottom": bottom,
+        "top": top,
+        "bin": first,
+    }
+    for name, values in columns.items():
+        segment[name][:-1] = values
+    return Ground(
+        segment.view(np.recarray),
+        np.cumsum([0, *(len(i) for i in items)]).astype(np.int64),
+        np.array([s for cell in items for s in cell], dtype=np.int64),
+        float(origin),
+        float(width),
+    )
+
+
+def pack_shaking(scene: Scene) -> Shaking:
+    """Return the motion of the ground with its integrals over time."""
+    history = np.zeros((0, 3)) if scene.base_motion is None else scene.base_motion
+    shaking = np.zeros(len(history), dtype=SHAKING)
+    shaking["time"], shaking["x"], shaking["y"] = t, x, y = history.T
+    if len(t):
+        shaking["sum_x"][1:], shaking["sum_y"][1:] = cumulative(t, x), cumulative(t, y)
+    return shaking.view(np.recarray)
+
+
+def cumulative(t: Floats, a: Floats) -> Floats:
+    """Return the integral of a polygon up to each of its corners but the first."""
+    return np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))
+
+
+def pack_monitors(
+    scene: Scene,
+    bodies: Bodies,
+    stations: NDArray[np.float64],
+    watch: tuple[float, float],
+    leave: float,
+    dt: float,
+) -> Monitors:
+    """Return the monitors, with no station passed that a block starts beyond; `dt` in s."""
+    blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.smooth_ground
+    station = np.zeros(len(stations), dtype=STATION)
+    station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
+    rock = np.zeros(blocks, dtype=WATCHED)
+    start_rock(rock, bodies, stations)
+    target = np.zeros(barriers, dtype=TARGET)
+    target["ground"] = [_ground(ground, b.x) for b in scene.barriers]
+    start_targets(target, scene)
+    room = event_room(free_bodies(scene), len(stations), barriers)
+    return Monitors(
+        station.view(np.recarray),
+        rock.view(np.recarray),
+        target.view(np.recarray),
+        np.array([-1] * blocks + list(scene.bodies), dtype=np.int64),
+        np.zeros((barriers, 2)),
+        np.zeros((barriers, max(1, round(1.0 / dt)), 2)),
+        np.zeros((barriers, 2)),
+        np.full((free_bodies(scene), barriers), -np.inf),
+        float(watch[0]),
+        float(watch[1]),
+        float(leave),
+        np.zeros(room, dtype=EVENT).view(np.recarray),
+    )
+
+
+def start_targets(target: NDArray[np.void], scene: Scene) -> None:
+    """Write what embankments resist, where they press on the ground, and how fences sag."""
+    target["low"] = target["limit"] = np.inf
+    target["high"] = -np.inf
+    for i, barrier in enumerate(scene.barriers):
+        if isinstance(barrier, Embankment):
+            corners = scene.outline(i)
+            target["limit"][i] = scene.resistance(i)
+            target["low"][i], target["high"][i] = corners[:, 0].min(), corners[:, 0].max()
+        elif isinstance(barrier, Fence):
+            target["sag"][i] = barrier.sag
+
+
+def start_rock(rock: NDArray[np.void], bodies: Bodies, stations: NDArray[np.float64]) -> None:
+    """Write where blocks start: between which stations, and their extent."""
+    x, radius = bodies["x"][: len(rock)], bodies["radius"][: len(rock)]
+    rock["next"] = stations.searchsorted(x, side="right")
+    rock["low"], rock["high"] = x - radius, x + radius
+
+
+def _ground(terrain: Terrain | None, x: float) -> float:
+    """Return the elevation of the highest ground at x, 0 where there is none [m]."""
+    points = terrain.points[:, 0] if terrain else np.array([np.inf])
+    return terrain.height(x) if terrain and points.min() <= x <= points.max() else 0.0
+
+
+def event_room(blocks: int, stations: int, barriers: int) -> int:
+    """Return the size of an event buffer that holds any two steps."""
+    return 2 * (blocks + 1) * (stations + barriers) + 1
+
+
+FALL_BELOW = 20.0
+"""Depth below the lowest terrain at which a block that left the site is retired [m]."""
+
+
+def check_step(settings: Settings, areas: NDArray[np.float64], gravity: float) -> None:
+    """Refuse a step that is too long for free blocks of these areas [m2]."""
+    most = longest_step(areas, gravity)
+    if settings.dt > most and settings.mode == "dynamic":
+        sizes = np.sqrt(areas)
+        mend = (
+            f"give at most {math.floor(1e5 * most) / 1e5:g} s: the blocks are {sizes.min():.2g} to "
+            f"{sizes.max():.2g} m large, and contacts would sink in"
+        )
+        raise BadInput("dt", settings.dt, mend)
+
+
+def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
+    """Return how each two surfaces meet.
+
+    Fences, which come last, are of the surface of barriers, but plastic, without strength and
+    without friction: a net moves along with what it holds.
+    Damping that a surface leaves open is that of the scene.
+    """
+    fences = any(isinstance(b, Fence) for b in scene.barriers)
+    every = [*names, scene.barrier_surface] if fences else names
+    found = np.zeros((len(every), len(every)), dtype=INTERFACE)
+    found["friction"] = frictions(scene, len(every))
+    found["friction"][len(names) :] = found["friction"][:, len(names) :] = 0.0
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
+            surface = scene.interface(a, b)
+            plain = surface.restitution is None
+            found["restitution"][i, j] = PLAIN_CONTACT if plain else surface.restitution
+            found["cohesion"][i, j], found["tension"][i, j] = surface.cohesion, surface.tension
+    found["damping"] = dampings(scene, len(every))
+    return found.view(np.recarray)
+
+
+def frictions(scene: Scene, size: int) -> list[list[float]]:
+    """Return the coefficient of friction of each two of `size` surfaces, see `pack_interfaces`."""
+    every = list(scene.surfaces)
+    every += [scene.barrier_surface] * (size - len(every))
+    return [[math.tan(math.radians(scene.friction_deg(a, b))) for b in every] for a in every]
+
+
+def dampings(scene: Scene, size: int) -> list[list[float]]:
+    """Return the damping of each two of `size` surfaces [1/s], see `pack_interfaces`."""
+    every = list(scene.surfaces)
+    every += [scene.barrier_surface] * (size - len(every))
+    pairs = [[scene.interface(a, b).damping for b in every] for a in every]
+    return [[scene.damping if d is None else d for d in row] for row in pairs]
+
+
+def rock_numbers(scene: Scene, settings: Settings, bodies: Bodies) -> dict[str, float]:
+    """Return the numbers that depend on the blocks."""
+    free = [i for i, b in enumerate(scene.blocks) if not b.fixed]
+    mass = bodies["mass"][free]
+    area = mass / [scene.blocks[i].density for i in free]
+    size = math.sqrt(np.add.reduce(area) / len(free))
+    gravity = math.hypot(*scene.gravity_vector)
+    check_step(settings, area, gravity)
+    return {
+        "block_weight": np.add.reduce(mass) / len(free) * (gravity or EARTH),
+        "penetration": settings.penetration or PENETRATION_RATIO * size,
+        "margin": MARGIN_RATIO * size,
+    }
+
+
+def pack_parameters(
+    scene: Scene, settings: Settings, bodies: Bodies, interfaces: Interfaces
+) -> NDArray[np.void]:
+    """Return the numbers of the scene and the settings: of a step, and of parts of one."""
+    gx, gy = scene.gravity_vector
+    static = settings.mode == "static"
+    shaken = scene.base_motion is not None
+    floor = -np.inf
+    if scene.terrain is not None and gx == 0.0 and gy < 0.0:
+        floor = scene.terrain.points[:, 1].min() - FALL_BELOW
+    numbers = {
+        "dt": settings.dt,
+        "blocks": free_bodies(scene),
+        "gravity_x": gx,
+        "gravity_y": gy,
+        "gravity": math.hypot(gx, gy),
+        "field_x": gx,
+        "field_y": gy,
+        "damping": scene.damping,
+        "damping_in_flight": scene.damping if scene.damping_when == "always" else 0.0,
+        "tolerance": settings.tolerance,
+        "sweep_tolerance": settings.sweep_tolerance,
+        "iterations": settings.open_close_iterations,
+        "static": static,
+        "post_correction": settings.post_correction,
+        "islands": settings.islands,
+        "solver": SOLVERS.index(settings.solver),
+        "relaxation": settings.relaxation,
+        "sleeping": settings.sleeping and not (static or shaken or scene.supports),
+        "floor": floor,
+        "bonded": (interfaces["cohesion"] + interfaces["tension"]).any(),
+    }
+    parameters = np.zeros(1, dtype=PARAMETERS)
+    for name, value in (numbers | rock_numbers(scene, settings, bodies)).items():
+        parameters[name] = value
+    return parameters.view(np.recarray)
+
+
+def free_bodies(scene: Scene) -> int:
+    """Return how many bodies are not barriers that are fixed: these come first."""
+    return len(scene.blocks) + sum(isinstance(b, GravityWall | Fence) for b in scene.barriers)
+
+
+def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
+    """Return the blocks, then the barriers, as bodies at the start, and their outlines.
+
+    The surface of fences comes after the named ones.
+    """
+    polygons = [b.vertices for b in scene.blocks] + [scene.outline(i) for i in scene.bodies]
+    bodies = np.zeros(len(polygons), dtype=BODY)  # its columns are quicker to set than a recarray's
+    outlines = pack_outlines(polygons, bodies)
+    traits = block_traits(scene.blocks, names)
+    traits += [barrier_trait(scene, i, names) for i in scene.bodies]
+    bodies = bodies.view(np.recarray)
+    write_polygons(polygons, traits, bodies, outlines)
+    for load in scene.loads:
+        i = load.block
+        area, centre, _ = polygon_properties(polygons[i])
+        _add_load(bodies, i, *load.resultant(area, centre))
+    return bodies, outlines
+
+
+Trait = tuple[float, float, float, float, int, int]
+"""Density [kg/m3], velocity [m/s, m/s, rad/s], surface and status of a body."""
+
+
+def block_traits(blocks: Sequence[Block], names: list[str]) -> list[Trait]:
+    """Return density, velocity, surface and status of blocks."""
+    return [
+        (
+            b.density,
+            *((0.0, 0.0, 0.0) if b.fixed else b.velocity),
+            names.index(b.surface),
+            FIXED if b.fixed else AWAKE,
+        )
+        for b in blocks
+    ]
+
+
+def barrier_trait(scene: Scene, number: int, names: list[str]) -> Trait:
+    """Return the same of a barrier that is a body."""
+    barrier = scene.barriers[number]
+    if isinstance(barrier, Fence):
+        area = polygon_properties(scene.outline(number))[0]
+        density = MASS * barrier.height / area
+        return density, 0.0, 0.0, 0.0, len(names), ASLEEP
+    surface = names.index(scene.barrier_surface)
+    if isinstance(barrier, GravityWall):
+        return barrier.density, 0.0, 0.0, 0.0, surface, AWAKE
+    return 1.0, 0.0, 0.0, 0.0, surface, FIXED
+
+
+def start_fences(scene: Scene, bodies: Bodies, parameters: NDArray[np.void]) -> None:
+    """Write how fences give way; they sleep until something comes near.
+
+    Where nothing sleeps they are awake, and in static mode and without post-correction fixed.
+    """
+    p = parameters[0]
+    moves = p["post_correction"] and not p["static"]
+    for place in fences(scene):
+        body = bodies[place]
+        body["island"], body["held_at"] = place, body["x"]
+        body["status"] = (ASLEEP if p["sleeping"] else AWAKE) if moves else FIXED
+    set_brakes(scene, bodies)
+
+
+def fences(scene: Scene) -> dict[int, Fence]:
+    """Return the fences of a scene by their places among the bodies."""
+    found = ((place, scene.barriers[i]) for place, i in enumerate(scene.bodies, len(scene.blocks)))
+    return {place: barrier for place, barrier in found if isinstance(barrier, Fence)}
+
+
+def set_brakes(scene: Scene, bodies: Bodies) -> None:
+    """Write the forces against which fences give way, by the width of an event, and how far."""
+    for place, fence in fences(scene).items():
+        bodies["brake"][place], bodies["elongation"][place] = fence.braking_force, fence.elongation
+
+
+def write_polygons(
+    polygons: Sequence[Floats], traits: Sequence[Trait], bodies: Bodies, outlines: Outlines
+) -> None:
+    """Write the first bodies of an array and their outlines, from the corners of each."""
+    corners = np.concatenate(polygons)
+    _write.call(corners, np.array(traits, dtype=np.float64), bodies, outlines)
+
+
+@short_kernel
+def write_bodies(corners: NDArray, traits: NDArray, bodies: Bodies, outlines: Outlines) -> None:
+    """Set bodies at their start from the corners of one after the other, and place their corners.
+
+    The number of corners and the parts of each body are set. Density, velocity, surface and status
+    are columns of `traits`.
+    """
+    low = 0
+    for i in range(len(traits)):
+        body = bodies[i]
+        high = low + body.count
+        area, body.x, body.y, second = moments(corners, low, high)
+        density = traits[i, 0]
+        body.mass, body.inertia = density * area, density * second
+        body.vx, body.vy, body.omega = traits[i, 1], traits[i, 2], traits[i, 3]
+        body.surface, body.status = int(traits[i, 4]), int(traits[i, 5])
+        body.apart = math.inf
+        farthest = 0.0
+        for k in range(low, high):
+            dx, dy = corners[k, 0] - body.x, corners[k, 1] - body.y
+            farthest = max(farthest, math.hypot(dx, dy))
+        body.radius = farthest
+        for place in range(polygons_of(body)):
+            row = polygon_row(body, i, place)
+            for k in range(outlines.polygon[row].count):
+                local, number = outlines.local[row, k], outlines.corner[row, k].number
+                local.x = corners[low + number, 0] - body.x
+                local.y = corners[low + number, 1] - body.y
+        set_body_coordinates(bodies, outlines, i)
+        low = high
+
+
+_write = Direct(write_bodies)
+
+
+def _add_load(bodies: Bodies, i: int, force: Floats, point: Floats) -> None:
+    """Add a dead load on body i at the start; its arm turns with the body."""
+    (fx, fy), (x, y) = force, point - (bodies["x"][i], bodies["y"][i])
+    bodies["force_x"][i] += fx
+    bodies["force_y"][i] += fy
+    bodies["moment_cos"][i] += x * fy - y * fx
+    bodies["moment_sin"][i] -= x * fx + y * fy
+
+
+def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
+    """Return the outlines and convex parts of bodies, and set where each body's parts are.
+
+    Where their corners are `write_polygons` sets.
+    """
+    rows = [(i, list(range(len(p)))) for i, p in enumerate(polygons)]
+    for i, polygon in enumerate(polygons):
+        parts = convex_parts(polygon)
+        bodies["count"][i], bodies["parts"][i] = len(polygon), len(parts)
+        bodies["part"][i] = i if len(parts) == 1 else len(rows)
+        rows += [(i, part) for part in parts if len(parts) > 1]
+    shape = (len(rows), max(len(corner) for _, corner in rows))
+    outlined, points = np.zeros(len(rows), dtype=POLYGON), np.zeros(shape, dtype=LOCAL)
+    corners = np.zeros(shape, dtype=CORNER)
+    for row, (i, number) in enumerate(rows):
+        polygon, corner = polygons[i], corners[row, : len(number)]
+        outlined["count"][row], outlined["body"][row] = len(number), i
+        corner["number"] = number
+        following = [*number[1:], number[0]]
+        corner["inner"] = np.subtract(following, number) % len(polygon) != 1
+        if bodies["parts"][i] > 1:
+            corner["reentrant"] = turns(polygon)[number] < 0.0
+    return Outlines(
+        outlined.view(np.recarray),
+        corners.view(np.recarray),
+        points.view(np.recarray),
+    )
+
+
+def pack_links(scene: Scene, bodies: Bodies) -> Links:
+    """Return the supports in order of their block a.
+
+    Block a is free unless both are not, and the first of two that are free, as of contacts.
+    """
+
+    def anchor(block: int, point: tuple[float, float]) -> tuple[float, float]:
+        if block == TERRAIN:
+            return point
+        return point[0] - bodies["x"][block], point[1] - bodies["y"][block]
+
+    def rank(end: tuple[int, tuple[float, float]]) -> tuple[bool, int]:
+        block = end[0]
+        return block == TERRAIN or bodies["status"][block] == FIXED, block
+
+    links = np.zeros(len(scene.supports), dtype=LINK).view(np.recarray)
+    for number, (link, support) in enumerate(zip(links, scene.supports, strict=True)):
+        link["number"], link["yielding"], link["sign"] = number, math.inf, 1.0
+        if isinstance(support, FixedPoint):
+            link["kind"], link["a"], link["b"] = PIN, support.block, TERRAIN
+            link["ax"], link["ay"] = anchor(support.block, support.point)
+            link["bx"], link["by"] = support.point
+            continue
+        second = TERRAIN if support.block_b is None else support.block_b
+        ends = (support.block_a, support.point_a), (second, support.point_b)
+        (a, at_a), (b, at_b) = ends if second == TERRAIN else sorted(ends, key=rank)
+        link["kind"], link["a"], link["b"] = BOLT, a, b
+        link["ax"], link["ay"] = anchor(a, at_a)
+        link["bx"], link["by"] = anchor(b, at_b)
+        link["sign"] = 1.0 if a == support.block_a else -1.0
+        link["stiffness"], link["prestress"] = support.stiffness, support.prestress
+        link["length"] = math.dist(support.point_a, support.point_b)
+        if support.yield_force is not None:
+            link["yielding"] = support.yield_force
+    return links[np.argsort(links["a"], kind="stable")]
+
+
+class Arrays(NamedTuple):
+    """Everything the step loop needs, for one scene."""
+
+    bodies: Bodies
+    outlines: Outlines
+    ground: Ground
+    interfaces: Interfaces
+    links: Links
+    shaking: Shaking
+    now: Contacts
+    before: Contacts
+    work: Work
+    monitors: Monitors
+    parameters: NDArray[np.void]  # (1,) of PARAMETERS
+
+
+def pack(
+    scene: Scene,
+    settings: Settings,
+    stations: NDArray[np.float64],
+    watch: tuple[float, float],
+    leave: float = -math.inf,
+) -> Arrays:
+    """Return the kernels' arrays for a scene at rest at its start.
+
+    Parameters
+    ----------
+    stations : (K,) array
+        Ascending chainages whose first crossings are recorded [m].
+    watch : (float, float)
+        Interval of x in which energies are watched [m].
+    leave : float
+        x beyond which what moves on is left alone [m], -inf: the run is not ended early.
+    """
+    names = list(scene.surfaces)
+    bodies, outlines = pack_bodies(scene, names)
+    blocks = free_bodies(scene)
+    room = 16 * blocks + 64
+    interfaces = pack_interfaces(scene, names)
+    parameters = pack_parameters(scene, settings, bodies, interfaces)
+    start_fences(scene, bodies, parameters)
+    return Arrays(
+        bodies,
+        outlines,
+        pack_ground(scene.ground, names),
+        interfaces,
+        pack_links(scene, bodies),
+        pack_shaking(scene),
+        empty_contacts(room),
+        empty_contacts(room),
+        empty_work(len(bodies), blocks, room),
+        pack_monitors(scene, bodies, stations, watch, leave, settings.dt),
+        parameters,
+    )

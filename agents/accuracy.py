@@ -12,7 +12,7 @@ from rigdda import BadInput
 from rigdda.agents.reports.tables import applies_not, empty_table, write_rows
 from rigdda.validation import CASES, Case, Convergence, Result, converge, evaluate
 from rigdda.validation.convergence import STEPS
-from rigdda.validation.flight import CASES as FLIGHT
+from rigdda.validation.free_flight import CASES as FLIGHT
 
 if TYPE_CHECKING:
     from rich.table import Table

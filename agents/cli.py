@@ -34,7 +34,7 @@ from rigdda.agents.terminal import (
 )
 
 if TYPE_CHECKING:
-    from rigdda.agents.design_study import Study
+    from rigdda.agents.design_study import DesignStudy
     from rigdda.agents.designers.store import Store
     from rigdda.envs import DesignProblem
 
@@ -301,7 +301,7 @@ def _pose(
     return DesignProblem(site, **asked)
 
 
-def _tell(done: Study, store: Store, verify: int, folder: Path) -> None:
+def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, what limits it, and what it took."""
     from rigdda.agents.reports import findings, tables
     from rigdda.agents.reports.folder import FILES

@@ -12,7 +12,7 @@ NOTHING, RULE, CONSTANT, SHED = "nothing", "rule", "constant", "rock shed"
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class VerifiedLayout:
     """A layout that was verified on releases that no search has seen.
 
     Parameters
@@ -28,7 +28,7 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True)
-class Study:
+class DesignStudy:
     """A designed layout beside what it is compared with.
 
     Parameters
@@ -37,7 +37,7 @@ class Study:
         What was to be designed.
     result : DesignResult
         What the designer found.
-    cases : tuple of Case
+    cases : tuple of VerifiedLayout
         Nothing, the rule, the constant, what was found: the last.
     left : str
         What is left of the risk with what was found, in words.
@@ -45,16 +45,16 @@ class Study:
 
     problem: DesignProblem
     result: DesignResult
-    cases: tuple[Case, ...]
+    cases: tuple[VerifiedLayout, ...]
     left: str
 
     @property
-    def nothing(self) -> Case:
+    def nothing(self) -> VerifiedLayout:
         """No barrier."""
         return self.cases[0]
 
     @property
-    def chosen(self) -> Case:
+    def chosen(self) -> VerifiedLayout:
         """What was found."""
         return self.cases[-1]
 

@@ -11,7 +11,7 @@ import numpy as np
 import rigdda
 from rigdda import Barrier, Ditch, Embankment, Fence, Layout, Outcome, Run, Site
 from rigdda.agents import designers
-from rigdda.agents.design_study import CONSTANT, NOTHING, RULE, Case, Study
+from rigdda.agents.design_study import CONSTANT, NOTHING, RULE, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Entry, release_seeds, verify
 from rigdda.agents.designers.store import Store
@@ -58,7 +58,7 @@ def study(
     releases: int,
     out: Path,
     tick: Tick,
-) -> tuple[Study, Store]:
+) -> tuple[DesignStudy, Store]:
     """Design a layout, then verify it and what it is compared with on `releases` fresh releases.
 
     Writes `evaluations.csv` and the store `evaluations.jsonl` into `out` as it goes; a study that
@@ -78,15 +78,15 @@ def study(
             tick(entry.simulations, f"{name}: {entry.stage}")
 
         result = designers.module(name).design(problem, simulations, seed, progress, store)
-        cases: list[Case] = []
+        cases: list[VerifiedLayout] = []
         for case, layout in _compared(problem, name, result, simulations, seed, store):
             tick(simulations + releases * len(cases), f"verifying: {case}")
             evaluation = verify(problem, layout, releases, seed, store)
             file.add(Entry(result.simulations, "verification", evaluation))
-            cases.append(Case(case, evaluation))
+            cases.append(VerifiedLayout(case, evaluation))
     tick(simulations + releases * len(cases), "what is left")
     left = _left(problem, [case.evaluation for case in cases], seed)
-    return Study(problem, result, tuple(cases), left), store
+    return DesignStudy(problem, result, tuple(cases), left), store
 
 
 def _compared(

@@ -135,7 +135,7 @@ UNIT = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class BarrierReach:
     """A barrier of a layout where it stands.
 
     Parameters
@@ -157,7 +157,9 @@ class Standing:
     bears: float
 
 
-standing_layouts: Memory[tuple[bytes, tuple[Built, ...]], tuple[Standing, ...]] = Memory(1 << 12)
+standing_layouts: Memory[tuple[bytes, tuple[Built, ...]], tuple[BarrierReach, ...]] = Memory(
+    1 << 12
+)
 """What stands of a layout on a site."""
 
 
@@ -205,7 +207,7 @@ def inferred_outcome(
     )
 
 
-def _holds(site: Site, barrier: Standing, without: Outcome) -> bool | None:
+def _holds(site: Site, barrier: BarrierReach, without: Outcome) -> bool | None:
     """Tell whether a barrier holds a block that came to rest uphill of it; None if in doubt."""
     low, high = without.reach
     if without.slope_fraction == 0.0 or low > barrier.face or barrier.face == -math.inf:
@@ -231,7 +233,7 @@ def _known_to_bear(layout: Sequence[Built]) -> bool:
     return all(isinstance(barrier, Fence | Ditch) for barrier in layout)
 
 
-def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[Standing, ...]:
+def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[BarrierReach, ...]:
     """Return what stands of a layout."""
     known = standing_layouts.recall([(key, layout)]).get((key, layout))
     if known is None:
@@ -250,7 +252,7 @@ def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[Standi
     return known
 
 
-def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) -> Standing:
+def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) -> BarrierReach:
     """Return where a barrier stands, with the corners of the earth moved for it."""
     if moved is None:
         assert not isinstance(barrier, Earthwork)
@@ -264,10 +266,10 @@ def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) 
     # speed is at most twice that of the fall
     drop = float(np.ptp(site.profile.points[:, 1]))
     near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop) + REACH * site.pit_spacing
-    return Standing(start - near, end + near, face, top, bears)
+    return BarrierReach(start - near, end + near, face, top, bears)
 
 
-def _idle(built: Built, barrier: Built, there: Standing, holds: bool) -> BarrierOutcome:
+def _idle(built: Built, barrier: Built, there: BarrierReach, holds: bool) -> BarrierOutcome:
     """Return what happens to a barrier that no block comes near."""
     bears = there.bears
     if isinstance(built, Fence):

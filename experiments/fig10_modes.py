@@ -46,7 +46,7 @@ def site_of(slope_deg: int, restitution: float | None) -> Site:
 
 
 def descents(site: Site, slope_deg: int, releases: int) -> Floats:
-    """Return the descents of a slope, a row each with the fields of `ritchie.Descent`."""
+    """Return the descents of a slope, a row each with the fields of `ritchie.RitchieDescent`."""
     lab = Lab(Settings().dt)
     each = (ritchie.descend(lab, site, lab.random(slope_deg, i)) for i in range(releases))
     return np.array(list(each))

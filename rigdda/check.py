@@ -1,8 +1,6 @@
-"""Small checks shared by the dataclasses that describe a scene.
+"""Checks of input, and of the types of the values in a file.
 
-Fields of frozen records, set to what they are once they are checked.
-
-Values of another type than a field of a file asks for: where they are, and what to write.
+Each raises one error that names the field, the value and what to write instead.
 """
 
 from __future__ import annotations

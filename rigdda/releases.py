@@ -1,11 +1,8 @@
-"""Releases of a single block of a site with a layout, by how they end.
+"""Releases: a site with a layout, simulated for a seed, one or many.
 
-Most releases are of a single block, and it comes down in less than a millisecond. What all of them
-share is prepared once: the ground, where barriers stand, how surfaces meet.
-
-Many releases of one site with one layout, which share what does not depend on the seed.
-
-Releases: a site with a layout, simulated for a seed.
+Many releases of one site with one layout share what does not depend on the seed. Most are of a
+single block, which comes down in less than a millisecond: for these the ground, where barriers
+stand and how surfaces meet are prepared once.
 """
 
 from __future__ import annotations
@@ -64,7 +61,7 @@ NEVER: NDArray[np.float64] = np.zeros(0)
 """Times of the frames that are kept on the way: none."""
 
 
-class Standing(NamedTuple):
+class StandingBarrier(NamedTuple):
     """A barrier where it stands, as it is for all releases."""
 
     reach: Reach
@@ -116,7 +113,7 @@ class SingleReleases:
         self._standing = [self._stand(i, names) for i in range(len(layout))]
         self._blocks: dict[float, SingleBlock] = {}  # by the step [s]
 
-    def _stand(self, index: int, names: list[str]) -> Standing:
+    def _stand(self, index: int, names: list[str]) -> StandingBarrier:
         """Return how a barrier stands; `names` are those of the surfaces in their order."""
         scene, barrier = self._scene, self._scene.barriers[index]
         outline, base = scene.outline(index), []
@@ -124,7 +121,7 @@ class SingleReleases:
             assert scene.terrain is not None
             own = names.index(scene.fill)
             base = [(own, names.index(n)) for n in surfaces_below(scene.terrain, outline)]
-        return Standing(
+        return StandingBarrier(
             reach=barrier.holds(outline, scene.ground, 0.0),
             area=section(outline),
             base=base,

@@ -62,7 +62,7 @@ translation and rotation [J], mass [kg] and volume [m3]: of the block over its w
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ensemble:
+class CrossingEnsemble:
     """Crossings of R barrier-free releases.
 
     Parameters
@@ -110,14 +110,14 @@ def ensemble_seeds(site: Site, seed: int, simulations: int) -> dict[str, tuple[i
     return {name: release_seeds("ensemble", seed, each) for name in few}
 
 
-def ensemble_for(ledger: Ledger, stations: Floats) -> Ensemble:
+def ensemble_for(ledger: Ledger, stations: Floats) -> CrossingEnsemble:
     """Return the ensemble that a designer looks at, charged to its budget."""
     seeds = ensemble_seeds(ledger.problem.site, ledger.seed, ledger.budget)
     ledger.used += sum(map(len, seeds.values()))
     return ensemble(ledger.problem.site, seeds, stations)
 
 
-def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -> Ensemble:
+def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -> CrossingEnsemble:
     """Return the crossings of barrier-free releases, simulated over all cores in threads.
 
     The last few ensembles are kept in memory.
@@ -141,7 +141,7 @@ def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -
 @lru_cache(maxsize=4)
 def _ensemble(
     text: bytes, seeds: tuple[tuple[str, tuple[int, ...]], ...], stations: tuple[float, ...]
-) -> Ensemble:
+) -> CrossingEnsemble:
     site = msgspec.json.decode(text, type=Site)
     lines = (*stations, site.road.start)
     jobs = [(name, seed) for name, drawn in seeds for seed in drawn]
@@ -169,7 +169,7 @@ def _ensemble(
     crossings, widths = zip(*parts, strict=True)
     number = {name: i for i, name in enumerate(site.event_names)}
     event = np.array([number[name] for name, _ in jobs])
-    return Ensemble(np.array(stations), np.concatenate(crossings), event, np.array(widths))
+    return CrossingEnsemble(np.array(stations), np.concatenate(crossings), event, np.array(widths))
 
 
 def _area_and_radius(vertices: NDArray[np.float64]) -> tuple[float, float]:
@@ -226,7 +226,9 @@ class Catalogue:
         return Catalogue(barriers, self.weight, self.base, relief, annual, self.span[i])
 
 
-def tabulate(problem: DesignProblem, ensemble: Ensemble, barriers: list[Barrier]) -> Catalogue:
+def tabulate(
+    problem: DesignProblem, ensemble: CrossingEnsemble, barriers: list[Barrier]
+) -> Catalogue:
     """Return the catalogue of barriers that a problem allows."""
     site = problem.site
     weight = ensemble.weights([site.rate(name, ()) for name in site.event_names])
@@ -242,7 +244,7 @@ def tabulate(problem: DesignProblem, ensemble: Ensemble, barriers: list[Barrier]
     return Catalogue(barriers, weight, effects.base, relief, annual, span)
 
 
-def whole(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> Catalogue:
+def whole(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Catalogue:
     """Return the catalogue of everything on a menu."""
     barriers = [b for kind in problem.kinds for b in menu.lone(kind)]
     return tabulate(problem, ensemble, barriers)
@@ -251,7 +253,7 @@ def whole(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> Catalogue:
 class Effects:
     """What single barriers do to the releases of an ensemble."""
 
-    def __init__(self, site: Site, ensemble: Ensemble):
+    def __init__(self, site: Site, ensemble: CrossingEnsemble):
         self.site, self.ensemble = site, ensemble
         count = len(ensemble.event)
         order = np.lexsort((ensemble.crossings["time"], ensemble.crossings["release"]))

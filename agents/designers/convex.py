@@ -25,7 +25,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdda import Fence, Layout
-from rigdda.agents.designers.catalogue import Catalogue, Ensemble, Floats, ensemble_for, whole
+from rigdda.agents.designers.catalogue import (
+    Catalogue,
+    CrossingEnsemble,
+    Floats,
+    ensemble_for,
+    whole,
+)
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import STEP, Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, Proposals, search
@@ -161,7 +167,9 @@ def _propose(layouts: list[Layout]) -> Proposals:
         yield layout
 
 
-def best_choices(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> tuple[Choice, ...]:
+def best_choices(
+    problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu
+) -> tuple[Choice, ...]:
     """Return the optima of different layouts, of few barriers first."""
     catalogue = promising(whole(problem, ensemble, menu))
     found: dict[Layout, Choice] = {}
@@ -212,13 +220,13 @@ def starts(ledger: Ledger) -> list[Layout]:
     return found
 
 
-def unsearched(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> list[Layout]:
+def unsearched(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> list[Layout]:
     """Return the layouts that every search must beat: the rule's and the best constant."""
     layouts = rule(problem, ensemble, menu), constant(problem, menu)
     return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]
 
 
-def known(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> list[Layout]:
+def known(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> list[Layout]:
     """Return the layouts that need no search: the rule's, it smaller, and the best constant."""
     one = rule(problem, ensemble, menu)
     smaller = [_smaller(one, *steps) for steps in CHEAPER]

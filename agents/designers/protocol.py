@@ -20,7 +20,7 @@ from rigdda import (
     check,
 )
 from rigdda.agents.designers.menu import on_bound
-from rigdda.agents.designers.store import Batch, Store
+from rigdda.agents.designers.store import Store, StoredEvaluation
 from rigdda.agents.limits import RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
 
@@ -249,7 +249,7 @@ class Ledger:
 
     def sample(
         self, layout: Layout, stage: str, start: Mapping[str, int], counts: Mapping[str, int]
-    ) -> Batch:
+    ) -> StoredEvaluation:
         """Sample some releases of each event with a layout and enter what they say together.
 
         Parameters

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Barrier, Ditch, Layout, Mesh
-from rigdda.agents.designers.catalogue import Catalogue, Ensemble, ensemble_for, tabulate
+from rigdda.agents.designers.catalogue import Catalogue, CrossingEnsemble, ensemble_for, tabulate
 from rigdda.agents.designers.convex import offered, unsearched
 from rigdda.agents.designers.menu import FINEST, Menu, numbers, spread
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, search
@@ -43,7 +43,7 @@ SPREAD = 0.3
 """Standard deviation of what is left of Z about what is expected, over Z of nothing [-]."""
 
 
-class Surface:
+class KindSurrogate:
     """What is left of Z behind each of some barriers of one kind.
 
     Parameters
@@ -111,7 +111,7 @@ class Kind:
 
     barriers: list[Barrier]
     annual: list[float]
-    surface: Surface
+    surface: KindSurrogate
     order: list[int]
 
     def believed(self, hope: float) -> list[tuple[float, Barrier]]:
@@ -121,7 +121,12 @@ class Kind:
 
 
 def scout(
-    track: Track, menu: Menu, ensemble: Ensemble, known: Sequence[Layout], budget: int, first: int
+    track: Track,
+    menu: Menu,
+    ensemble: CrossingEnsemble,
+    known: Sequence[Layout],
+    budget: int,
+    first: int,
 ) -> list[Arm]:
     """Return what was looked at, singles and the `known`, what is believed to be the best first."""
     problem = track.problem
@@ -145,7 +150,7 @@ def scout(
     return sorted(arms, key=lambda arm: (arm.shortfall(), value.get(arm.layout, arm.objective())))
 
 
-def _kind(track: Track, menu: Menu, ensemble: Ensemble, barriers: list[Barrier]) -> Kind:
+def _kind(track: Track, menu: Menu, ensemble: CrossingEnsemble, barriers: list[Barrier]) -> Kind:
     """Return a kind with what the ensemble says of its barriers."""
     problem, nothing = track.problem, track.problem.nothing.objective
     annual = np.array([problem.site.annual((b,)) for b in barriers])
@@ -158,7 +163,9 @@ def _kind(track: Track, menu: Menu, ensemble: Ensemble, barriers: list[Barrier])
     expected = nothing * (trust * share + 1.0 - trust)
     length = menu.zone.end - menu.zone.start
     order = np.argsort(table.objective, kind="stable").tolist()
-    return Kind(barriers, annual.tolist(), Surface(barriers, expected, nothing, length), order)
+    return Kind(
+        barriers, annual.tolist(), KindSurrogate(barriers, expected, nothing, length), order
+    )
 
 
 def _apart(track: Track, kinds: Sequence[Kind], n: int) -> list[Layout]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Site, Wall
-from rigdda.agents.designers.catalogue import Ensemble, ensemble_for
+from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble_for
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress
 from rigdda.agents.designers.store import Store
@@ -77,7 +77,7 @@ def design(
     return ledger.result(evaluation, "start")
 
 
-def rule(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> Layout:
+def rule(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Layout:
     """Return the layout of the rule, none where no design block reaches the road."""
     events = problem.site.events
     design = [i for i, event in enumerate(events) if event.design] or list(range(len(events)))
@@ -90,7 +90,7 @@ def rule(problem: DesignProblem, ensemble: Ensemble, menu: Menu) -> Layout:
     return instead(menu, *asked[-1][::2])
 
 
-def demands(ensemble: Ensemble, events: list[int]) -> list[tuple[float, float, float]]:
+def demands(ensemble: CrossingEnsemble, events: list[int]) -> list[tuple[float, float, float]]:
     """Return station [m], energy E_d [J] and height [m] that are asked of a fence, downhill.
 
     Only stations that enough of the blocks of some events cross which reach the road.

@@ -117,7 +117,7 @@ class Release(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class StoredEvaluation:
     """Releases of a layout, by event, and what they say of it together."""
 
     evaluation: Evaluation
@@ -148,7 +148,7 @@ class Store:
     def __init__(self, path: str | os.PathLike[str] | None = None):
         self.path = None if path is None else Path(path)
         self.simulated = self.resumed = 0
-        self._known: dict[str, Batch] = {}
+        self._known: dict[str, StoredEvaluation] = {}
         self._kept: set[str] = set()
         if self.path is not None and self.path.is_file():
             self._read(self.path)
@@ -161,7 +161,7 @@ class Store:
             try:
                 data = json.loads(line, parse_constant=CONSTANTS.__getitem__)
                 if data["sum"] == _sum(data["key"], data["batch"]):
-                    self._known[data["key"]] = msgspec.convert(data["batch"], Batch)
+                    self._known[data["key"]] = msgspec.convert(data["batch"], StoredEvaluation)
             except (ValueError, KeyError, TypeError, RecursionError, msgspec.ValidationError):
                 continue
         self._kept = set(self._known)
@@ -177,15 +177,15 @@ class Store:
         """
         drawn = tuple(seeds)
 
-        def simulate() -> Batch:
-            return Batch(problem.evaluate(layout, drawn), {})
+        def simulate() -> StoredEvaluation:
+            return StoredEvaluation(problem.evaluate(layout, drawn), {})
 
         found = self._recall(_key(problem, layout, drawn), len(drawn), simulate)
         return replace(found.evaluation, layout=layout, seeds=drawn)
 
     def sample(
         self, problem: DesignProblem, layout: Layout, seeds: Mapping[str, Sequence[int]]
-    ) -> Batch:
+    ) -> StoredEvaluation:
         """Return what releases of some events cost with a layout, simulated or as it was kept.
 
         Parameters
@@ -201,7 +201,7 @@ class Store:
         """
         asked = {name: tuple(drawn) for name, drawn in seeds.items()}
 
-        def simulate() -> Batch:
+        def simulate() -> StoredEvaluation:
             outcomes = problem.sample(layout, asked)
             found: dict[str, list[Release]] = {name: [] for name in asked}
             for outcome in outcomes:
@@ -209,13 +209,15 @@ class Store:
             kept = {name: tuple(releases) for name, releases in found.items()}
             missing = {name: LENT for name in problem.site.event_names if not asked.get(name)}
             lent = problem.sample((), missing) if missing else ()
-            return Batch(problem.judge(layout, (*outcomes, *lent)), kept)
+            return StoredEvaluation(problem.judge(layout, (*outcomes, *lent)), kept)
 
         count = sum(map(len, asked.values()))
         found = self._recall(_key(problem, layout, sorted(asked.items())), count, simulate)
         return replace(found, evaluation=replace(found.evaluation, layout=layout))
 
-    def _recall(self, key: str, count: int, simulate: Callable[[], Batch]) -> Batch:
+    def _recall(
+        self, key: str, count: int, simulate: Callable[[], StoredEvaluation]
+    ) -> StoredEvaluation:
         """Return what is known by a key, or simulate it and keep it."""
         if key in self._known:
             self.resumed += count if key in self._kept else 0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import rigdda
 from rigdda import Layout, Site
-from rigdda.agents.design_study import SHED, Case, Study
+from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import findings, pictures
 from rigdda.agents.reports.pictures import BLOCKS, Flights, Panel, fly, section
@@ -22,7 +22,7 @@ SEEN = 50
 """Releases among which one is looked for that reaches the road without barriers."""
 
 
-def write(done: Study, out: Path, seed: int) -> None:
+def write(done: DesignStudy, out: Path, seed: int) -> None:
     """Write `layout.toml`, `section.png`, `cost.png` and `episode.rrd` of a study into `out`.
 
     Raises
@@ -39,7 +39,7 @@ def write(done: Study, out: Path, seed: int) -> None:
     _replay(done, out / "episode.rrd", seed)
 
 
-def _section(done: Study, path: Path, seed: int) -> None:
+def _section(done: DesignStudy, path: Path, seed: int) -> None:
     """Write the picture of the slope before and after."""
     site, chosen = done.problem.site, done.chosen
     nothing = _all(site, (), seed)
@@ -56,12 +56,12 @@ def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:
     return [fly(site, layout, event.name, seeds, stations) for event in site.events]
 
 
-def _words(case: Case) -> str:
+def _words(case: VerifiedLayout) -> str:
     e = case.evaluation
     return f"Z = {euros(e.objective)} ({span(e.ci)}) EUR per metre and year"
 
 
-def _replay(done: Study, path: Path, seed: int) -> None:
+def _replay(done: DesignStudy, path: Path, seed: int) -> None:
     """Write the replay of the layout in a release that reaches the road without it.
 
     Of the event that makes most of the risk without barriers.

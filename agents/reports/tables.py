@@ -23,7 +23,7 @@ from rigdda import (
     Points,
     Site,
 )
-from rigdda.agents.design_study import SHED, Study, design_events
+from rigdda.agents.design_study import SHED, DesignStudy, design_events
 from rigdda.agents.designers.protocol import Entry
 from rigdda.agents.reports.wording import euros, percent, short, span, standing
 from rigdda.barriers import Earthwork, to_tables
@@ -261,7 +261,7 @@ def points(found: Points) -> Table:
     return out
 
 
-def costs(study: Study) -> Table:
+def costs(study: DesignStudy) -> Table:
     """Return the table of what each layout costs, at most 80 characters wide.
 
     Money is in EUR per metre of road and year, but for the last column but one: EUR per metre.
@@ -287,7 +287,7 @@ def costs(study: Study) -> Table:
     return table
 
 
-def chances(study: Study) -> Table | None:
+def chances(study: DesignStudy) -> Table | None:
     """Return the table of what may happen in each design event; None if the site has none.
 
     Each probability with its one-sided 95 % upper bound.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from experiments.bench.penetration import penetration
 from rigdda import Block, Scene, Site, Terrain
-from rigdda.validation import flight, rocking, slides, stacks
+from rigdda.validation import free_flight, rocking, slides, stacks
 from rigdda.validation.scenes import FLAT, box, incline, polygon, rock
 
 Floats = NDArray[np.float64]
@@ -105,7 +105,7 @@ def creep(scene: Scene, times: Floats, poses: Floats) -> float:
 
 def fall_error(scene: Scene, times: Floats, poses: Floats) -> float:
     """Return the relative error of the way of a damped fall."""
-    exact = flight.fall(scene.damping, times[-1])[0]
+    exact = free_flight.fall(scene.damping, times[-1])[0]
     return abs((poses[0, 0, 1] - poses[-1, 0, 1]) / exact - 1.0)
 
 

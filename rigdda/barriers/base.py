@@ -1,7 +1,4 @@
-"""What every barrier has.
-
-What barriers share that stand on the ground.
-"""
+"""What every barrier has, and what barriers share that stand on the ground."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Layouts of barriers: the ground that they leave, their tables in files, their words.
-
-Layout files.
-"""
+"""Layouts of barriers: the ground that they leave, their files, their words."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Outlines(NamedTuple):
     local: NDArray[np.void]  # (R, P) of LOCAL: the corners in body coordinates
 
 
-class Ground(NamedTuple):
+class GroundArrays(NamedTuple):
     """Terrain segments with bins along x that list those above them."""
 
     segment: NDArray[np.void]  # (S + 1,) of SEGMENT; the last is only where the one before ends
@@ -45,7 +45,7 @@ class World(NamedTuple):
 
     bodies: Bodies
     outlines: Outlines
-    ground: Ground
+    ground: GroundArrays
     interfaces: Interfaces
     links: Links
     shaking: Shaking

@@ -1,12 +1,10 @@
-"""Inertia and mass-proportional damping of a block (Koo and Chern 1998).
-
-Contact springs as submatrices.
+"""The simultaneous equations of an island: inertia, damping, weight, loads and closed contacts.
 
 A spring of stiffness k along direction e of a contact contributes k e_i^t e_j to the stiffness,
 with e_i = (l, m, r x (l, m)) the rows of T_i along (l, m) = the normal or the shear direction.
-`island.assemble_contact` adds the springs of a contact to the system, friction among them.
-
-The system of equations of an island: inertia, damping, weight, loads and closed contacts.
+`assemble_contact` adds the springs of a contact, the friction submatrix among them.
+Mass-proportional damping enters with the inertia (`inertia_stiffness`, with the coefficient of
+`damping_of`); in relaxation it is in `relaxation.pull`.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import math
 
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Ground, Islands, Monitors, Outlines
+from rigdda.dynamics.arrays import GroundArrays, Islands, Monitors, Outlines
 from rigdda.dynamics.constants import ASLEEP, AWAKE, LONGEST_FLIGHT, RETIRED
 from rigdda.dynamics.island_step import check_body, fall
 from rigdda.dynamics.monitors import barrier_contact
@@ -51,8 +51,8 @@ def time_to_fall(gap: float, speed: float, gravity: float) -> float:
 
 @kernel
 def time_to_ground(
-    body: Body, i: int, outlines: Outlines, ground: Ground, speed: float, reach: float, most: float,
-    gravity: float,
+    body: Body, i: int, outlines: Outlines, ground: GroundArrays, speed: float, reach: float,
+    most: float, gravity: float,
 ) -> float:  # fmt: skip
     """Return in what time, at most `most`, the body can come as near to the ground as `reach`.
 
@@ -104,7 +104,7 @@ def time_to_bodies(
 
 @kernel
 def steps_of_flight(
-    bodies: Bodies, i: int, outlines: Outlines, ground: Ground, p: Parameters
+    bodies: Bodies, i: int, outlines: Outlines, ground: GroundArrays, p: Parameters
 ) -> int:
     """Return for how many steps body i can surely touch nothing.
 
@@ -121,7 +121,8 @@ def steps_of_flight(
 
 @kernel
 def take_off(
-    bodies: Bodies, outlines: Outlines, ground: Ground, islands: Islands, begin: Ints, p: Parameters
+    bodies: Bodies, outlines: Outlines, ground: GroundArrays, islands: Islands, begin: Ints,
+    p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
     """Return the body that flies and for how many steps, 0 if none does; it is island 0 then."""
     i = lone_flyer(bodies, begin, p)

@@ -135,12 +135,11 @@ def is_tried_whole(
 ) -> bool:
     """Return whether an island is solved as a whole before relaxation is tried.
 
-    It is in static mode; where it has supports, or the paper's
-    contacts, whose stiffness is given; and where it is `quiet` and has joints that hold, or was
-    solved so in the last step. Never if a fence belongs to it, which has no entries in the system
-    of equations.
+    That is so in static mode, for islands with supports or with the paper's contacts, and for
+    `quiet` islands whose joints hold or that were solved as a whole in the last step. It is not
+    so for an island with a fence, which has no entries in the system of equations.
     """
-    springs, bonds, rested = p.static, False, True
+    required, bonds, rested = p.static, False, True
     for place in range(islands.block_start[island], islands.block_start[island + 1]):
         body = bodies[islands.block_item[place]]
         if body.brake > 0.0:
@@ -148,9 +147,9 @@ def is_tried_whole(
         rested = rested and body.whole
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
-        springs = springs or is_elastic(c)
+        required = required or is_elastic(c)
         bonds = bonds or c.bond > 0.0
-    return springs or (quiet and (bonds or rested))
+    return required or (quiet and (bonds or rested))
 
 
 @stage

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import Ground, Totals, World
+from rigdda.dynamics.arrays import GroundArrays, Totals, World
 from rigdda.dynamics.constants import (
     ASLEEP,
     AWAKE,
@@ -34,7 +34,7 @@ advance_directly = Direct(advance)
 
 
 @lru_cache(maxsize=16)
-def _packed_ground(ground: Terrain | None, names: tuple[str, ...]) -> Ground:
+def _packed_ground(ground: Terrain | None, names: tuple[str, ...]) -> GroundArrays:
     """Return a ground in arrays: releases of a site have the same one left, and only read it."""
     return pack_ground(ground, list(names))
 

@@ -1,9 +1,6 @@
-"""Stations: chainages at which passages of blocks are recorded.
+"""What a run watches: hits of barriers, crossings of stations, energies, thrust on barriers.
 
-What a run watches: hits of barriers, crossings of stations, energies in an interval.
-
-Thrust on barriers: its mean over a second, and what that pushes away.
-
+The thrust on a barrier is a mean over a second, which may push an embankment away.
 What lies against a barrier and what strikes it both press on it, in the ratio of chance in any one
 step. Over a second it is the momentum that the barrier takes, which does not depend on the step.
 A contact with the ground presses on the embankment on which it is.

@@ -1,12 +1,9 @@
-"""States of contacts: open, stick, slip, from the forces of the current iterate.
+"""Open-close iteration: solve an island as a whole for states with which all its forces agree.
 
-A closed contact must press, an open one must not overlap, a sticking one must stay within its
-friction limit, a slipping one must slip against its friction.
-
-Open-close iteration: solve an island as a whole for states with which all its forces agree.
-
-Which state a contact has `states` says. Islands at rest are solved like this, and all in static
-mode; what moves is relaxed, see `relaxation`, and so is what does not settle.
+`next_state` decides the state of each contact: a closed contact must press, an open one must not
+overlap, a sticking one must stay within its friction limit, a slipping one must slip against its
+friction. All islands are solved like this in static mode, and islands at rest where relaxation
+does not settle; all others are relaxed, see `rigdda.dynamics.relaxation`.
 """
 
 from __future__ import annotations

@@ -1,15 +1,4 @@
-"""Space for contacts, for the equations of an island, and for what a step works on.
-
-The ground under the bodies, and its motion.
-
-What is watched during a run.
-
-Numbers of the scene and the settings, and how surfaces meet.
-
-Bodies with their outlines, and the supports between them.
-
-From a scene to the arrays that the kernels work on.
-"""
+"""From a scene to the arrays that the kernels work on, with room for contacts and equations."""
 
 from __future__ import annotations
 
@@ -24,7 +13,7 @@ from rigdda.barriers import Embankment, Fence, GravityWall
 from rigdda.barriers.fence import MASS
 from rigdda.dynamics.arrays import (
     Boxes,
-    Ground,
+    GroundArrays,
     Islands,
     Matrix,
     Monitors,
@@ -163,11 +152,11 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
     )
 
 
-def pack_ground(ground: Terrain | None, names: list[str]) -> Ground:
+def pack_ground(ground: Terrain | None, names: list[str]) -> GroundArrays:
     """Return the terrain segments and the bins that find them by x."""
     if ground is None:
         none, start = np.zeros(1, dtype=SEGMENT), np.zeros(1, dtype=np.int64)
-        return Ground(none.view(np.recarray), start, start[:0], 0.0, 1.0)
+        return GroundArrays(none.view(np.recarray), start, start[:0], 0.0, 1.0)
     points = ground.points
     step = np.diff(points, axis=0)
     length = np.hypot(step[:, 0], step[:, 1])
@@ -202,7 +191,7 @@ def pack_ground(ground: Terrain | None, names: list[str]) -> Ground:
     }
     for name, values in columns.items():
         segment[name][:-1] = values
-    return Ground(
+    return GroundArrays(
         segment.view(np.recarray),
         np.cumsum([0, *(len(i) for i in items)]).astype(np.int64),
         np.array([s for cell in items for s in cell], dtype=np.int64),
@@ -600,7 +589,7 @@ class Arrays(NamedTuple):
 
     bodies: Bodies
     outlines: Outlines
-    ground: Ground
+    ground: GroundArrays
     interfaces: Interfaces
     links: Links
     shaking: Shaking

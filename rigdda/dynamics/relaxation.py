@@ -15,10 +15,10 @@ within a part, its contacts act with the geometry of the middle, which is of sec
 of sixteen sides rolls 1e-4 too far; in ten substeps with the geometry of their start, 8e-4.
 
 Impulses are found by projected Gauss-Seidel sweeps, which decide the state of each contact as they
-visit it. The normal impulse does not pull. It leaves an open contact at most the velocity with
-which its gap closes within the substep, a closed one none. The shear impulse stops the bodies from
-slipping, within the friction limit. Many short substeps of few sweeps find where a blow goes better
-than one step of many (Macklin et al. 2019, Small steps in physics simulation).
+visit it. The normal impulse does not pull. After it an open contact closes no faster than would
+just close its gap within the substep, and a closed one does not approach. The shear impulse stops
+the bodies from slipping, within the friction limit. Many short substeps of few sweeps find where a
+blow goes better than one step of many (Macklin et al. 2019, Small steps in physics simulation).
 
 A contact that closes faster than gravity would make it in `IMPACT_STEPS` steps is struck. Its
 substep is plastic. At the end of it, all contacts that were struck open with the velocities that

@@ -1,7 +1,4 @@
-"""The facade: a scene in motion.
-
-Many scenes at once.
-"""
+"""A scene in motion: the simulation of one scene, and of many at once."""
 
 from __future__ import annotations
 

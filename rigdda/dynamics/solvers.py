@@ -1,15 +1,10 @@
-"""Direct solution for one block.
+"""Solvers of the simultaneous equations of an island.
 
-Direct solution of an island: Cholesky factors within the profile of the matrix (a skyline).
-
-Best for few blocks and for chains such as stacks, whose profile is short when blocks are numbered
-along the chain.
-
-Conjugate gradients preconditioned by the inverse of the diagonal (Koo and Chern 1998).
-
-Or, for comparison, by the inverses of the 3x3 blocks on it.
-
-Successive over-relaxation, the original solver of DDA, kept for comparison (Fig. 5).
+Conjugate gradients preconditioned by the inverse of the diagonal (Koo and Chern 1998) are usual;
+for comparison by the inverses of the 3x3 blocks on it. Successive over-relaxation is the original
+solver of DDA (Fig. 5). The direct solution has Cholesky factors within the profile of the matrix (a
+skyline): best for few blocks and for chains such as stacks, whose profile is short when blocks are
+numbered along the chain.
 """
 
 from __future__ import annotations

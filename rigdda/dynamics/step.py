@@ -17,7 +17,7 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.contact.links import mend_links
 from rigdda.dynamics.detection import copy_index, detect
-from rigdda.dynamics.fence import give_way
+from rigdda.dynamics.fence_brakes import update_fences
 from rigdda.dynamics.flight import fly, keep_touch, land, take_off
 from rigdda.dynamics.frames import keep_frame
 from rigdda.dynamics.island_step import step_island
@@ -149,7 +149,7 @@ def advance(
             swapped = not swapped
             bad = solve_and_move(world, now, work, monitors, time, p, totals)
             ledger[4] += mend_links(bodies, outlines, links, p)
-            give_way(bodies, outlines, now, count, monitors, counters, ledger, time, p)
+            update_fences(bodies, outlines, now, count, monitors, counters, ledger, time, p)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         press_asleep(bodies, now, count, monitors, p.dt)

@@ -1,7 +1,4 @@
-"""Corners of polygons: checked, anticlockwise, read-only.
-
-Blocks of rock.
-"""
+"""Blocks of rock: polygons with checked, anticlockwise, read-only corners."""
 
 from __future__ import annotations
 

@@ -1,10 +1,7 @@
-"""The motion of the ground, as a history of its acceleration.
+"""What acts on blocks beside their weight: loads, supports and the motion of the ground.
 
-Supports of blocks: the paper's fixed point and rock bolt.
-
-What they do is computed in `rigdda.dynamics.contact.links`.
-
-Loads on blocks: the paper's point load, line load and body force.
+Loads are the paper's point load, line load and body force, supports its fixed point and rock bolt;
+`rigdda.dynamics.contact.links` computes what supports do.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""Shapes of loose blocks and the places where they come to rest, as kernels.
+"""Loose blocks of a band: random convex polygons that rest on the ground and on one another.
 
 Corners of a block lie on an ellipse, so that they are convex, at angles that are spaced at random
 within `JITTER`. A block that was measured fills a face of its box: natural blocks of given edges
 weigh half to two thirds of a full box, as such outlines do.
-
-Loose blocks of a band: random convex polygons that rest on the ground and on one another.
 """
 
 from __future__ import annotations

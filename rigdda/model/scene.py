@@ -1,10 +1,7 @@
-"""What a scene is made of: the kinds of its members, and how they refer to one another.
+"""One concrete mechanical problem: terrain, blocks, surfaces and barriers.
 
-Clear space of a scene: nothing starts in something else, barriers stand one behind the other.
-
-One concrete mechanical problem: terrain, blocks, surfaces and barriers.
-
-Scenes as JSON.
+Its members are checked together: how they refer to one another, that nothing starts in something
+else, and that barriers stand one behind the other. Scenes are kept as JSON.
 """
 
 from __future__ import annotations

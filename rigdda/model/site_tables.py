@@ -1,11 +1,4 @@
-"""The slope of a site and its surfaces.
-
-What comes down a slope, and how often.
-
-Tables of a site: road, where barriers may stand, how releases move and vary.
-
-The tables of a site file, and what is looked up in them.
-"""
+"""The tables of a site file: slope, events, road, zone, motion, scatter; what they say."""
 
 from __future__ import annotations
 

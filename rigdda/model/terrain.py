@@ -1,7 +1,4 @@
-"""The natural ground.
-
-Roughness of the ground: pits at random, one in each length of a block.
-"""
+"""The natural ground, and its roughness: pits at random, one in each length of a block."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""The state of a barrier over time, as outcomes judge it and replays show it.
-
-How a release ended: what its outcome is judged by.
-
-What one barrier took in a release, and what it holds in the end.
-
-What a release means for the road.
-"""
+"""What a release means for the road, and what each barrier took in it and holds in the end."""
 
 from __future__ import annotations
 

@@ -1,19 +1,8 @@
-"""How a replay looks: its camera, layers and colours.
-
-What a view on a scene takes in.
-
-The events of a run, put together by what they happened to.
-
-What a replay shows beside the scene.
-
-Plots of a replay: what is computed from each frame of a run.
-
-Layout of the viewer: the slope, beside it notes and plots, below them the timeline.
-
-Replays for the rerun viewer: a run as an .rrd file.
+"""Replays for the rerun viewer: a run as an .rrd file.
 
 Geometry is logged once, poses and numbers by column. The world is in metres, y up, seen by a far
-pinhole camera (a flat view of filled shapes); z only orders the layers.
+pinhole camera (a flat view of filled shapes); z only orders the layers. The viewer shows the slope,
+beside it notes and plots, below them the timeline.
 """
 
 from __future__ import annotations

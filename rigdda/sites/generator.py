@@ -33,7 +33,7 @@ MARGIN = 0.05
 """Distance by which a zone begins further downhill than that [m]."""
 
 
-class Ground:
+class StretchedGround:
     """A built-in site's ground, stretched.
 
     Parameters
@@ -98,7 +98,7 @@ def generate(name: str, family: str, number: int) -> Site:
     """Return an instance of a family, "random" for one after the other, always the same."""
     base = load(FAMILIES[number % len(FAMILIES)] if family == "random" else family)
     rng = np.random.default_rng([FAMILIES.index(base.name), number])
-    ground = Ground(base, rng)
+    ground = StretchedGround(base, rng)
     size = float(np.exp(rng.uniform(-0.35, 0.35)))
     sources = tuple(_source(source, ground) for source in base.sources)
     stretches = tuple(
@@ -137,7 +137,7 @@ def fallen(slope: Slope, sources: tuple[Source, ...]) -> float:
     return slope.toe
 
 
-def _source(source: Source, ground: Ground) -> Source:
+def _source(source: Source, ground: StretchedGround) -> Source:
     if source.band is None:
         return ground.mass(source)
     return replace(source, band=(ground.x(source.band[0]), ground.x(source.band[1])))
@@ -152,7 +152,9 @@ def _event(event: Event, size: float, rng: np.random.Generator) -> Event:
     return replace(event, rate=rate, area=(low, high))
 
 
-def _zone(base: Site, slope: Slope, sources: tuple[Source, ...], ground: Ground) -> BarrierZone:
+def _zone(
+    base: Site, slope: Slope, sources: tuple[Source, ...], ground: StretchedGround
+) -> BarrierZone:
     """Return the zone: moved along, and no higher up than rock has fallen far enough."""
     zone = base.barrier_zone
     start = max(ground.x(zone.start), fallen(slope, sources) + MARGIN)
@@ -190,7 +192,7 @@ def _consequences(what: Consequences, rng: np.random.Generator) -> Consequences:
     return replace(what, closure=round(what.closure * float(np.exp(rng.uniform(-0.4, 0.4))), -2))
 
 
-def _mesh(option: MeshOption, ground: Ground, rng: np.random.Generator) -> MeshOption:
+def _mesh(option: MeshOption, ground: StretchedGround, rng: np.random.Generator) -> MeshOption:
     """Return a mesh over a face that is so much higher or lower, at another price."""
     high = float(ground.new[:, 1].max() / (ground.old[:, 1].max() or 1.0))
     price = check.number("mesh price", option.price * rng.uniform(0.85, 1.2), 0.0)

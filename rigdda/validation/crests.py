@@ -20,7 +20,7 @@ NEAR = 0.2
 """Height of the lowest corner above that level at which the flight is read [m]."""
 
 
-class Slide(NamedTuple):
+class CrestSlide(NamedTuple):
     """A bench, its friction angle and the speed of the box with its front at the crest."""
 
     bench_deg: float
@@ -29,14 +29,14 @@ class Slide(NamedTuple):
 
 
 SLIDES = (
-    Slide(10.0, 5.0, 2.0),
-    Slide(10.0, 5.0, 4.0),
-    Slide(25.0, 20.0, 4.0),
-    Slide(0.0, 0.0, 3.0),
+    CrestSlide(10.0, 5.0, 2.0),
+    CrestSlide(10.0, 5.0, 4.0),
+    CrestSlide(25.0, 20.0, 4.0),
+    CrestSlide(0.0, 0.0, 3.0),
 )
 
 
-def over_the_crest(slide: Slide) -> tuple[float, float]:
+def over_the_crest(slide: CrestSlide) -> tuple[float, float]:
     """Return rate of rotation in flight [rad/s] and where the centroid is at the landing [m].
 
     The crest is at (0, 0). The box slides flat until its support, which friction shifts forward by
@@ -102,7 +102,7 @@ def ground(bench_deg: float, pieces: int) -> tuple[Terrain, list[Block]]:
     return Terrain([(1e-3, -DROP), (80.0, -DROP)]), blocks
 
 
-def fall(lab: Lab, slide: Slide, pieces: int) -> tuple[float, float]:
+def fall(lab: Lab, slide: CrestSlide, pieces: int) -> tuple[float, float]:
     """Return what `over_the_crest` does, of a simulation over a bench of so many pieces."""
     terrain, fixed = ground(slide.bench_deg, pieces)
     bench = math.radians(slide.bench_deg)

@@ -98,7 +98,7 @@ def volley(
     return Scene(Terrain(FLAT), tuple(blocks), rock(30.0, 0.5), barriers=(fence,), gravity=0.0)
 
 
-class Outcome(NamedTuple):
+class FenceOutcome(NamedTuple):
     """What comes of a volley by closed forms."""
 
     breaking: int
@@ -111,7 +111,7 @@ class Outcome(NamedTuple):
     """Energy that the fence has taken from the blocks, its plate included [J]."""
 
 
-def outcome(shares: Sequence[float], fence: Fence = FENCE) -> Outcome:
+def outcome(shares: Sequence[float], fence: Fence = FENCE) -> FenceOutcome:
     """Return what comes of a volley: braked energies add up until the capacity is spent.
 
     The block that breaks the fence goes on as fast as the plate at that time.
@@ -130,7 +130,7 @@ def outcome(shares: Sequence[float], fence: Fence = FENCE) -> Outcome:
             breaking = hit
             kept = (spent + braked - capacity) * mass / (mass + plate)
         spent = min(spent + braked, capacity)
-    return Outcome(breaking, kept, spent / fence.braking_force, sum(shares) * CAPACITY - kept)
+    return FenceOutcome(breaking, kept, spent / fence.braking_force, sum(shares) * CAPACITY - kept)
 
 
 def fly(lab: Lab, scene: Scene) -> tuple[int, float, float]:

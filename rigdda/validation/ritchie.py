@@ -48,7 +48,7 @@ PUSH = 1e-6
 the end of a step would miss impacts that are over by then."""
 
 
-class Descent(NamedTuple):
+class RitchieDescent(NamedTuple):
     """How a block came down a slope, until it is as near to the foot as it is large.
 
     `aloft` is the share of the time in which its lowest corner is higher above the slope than its
@@ -74,7 +74,7 @@ def pushed(site: Site, rng: np.random.Generator) -> tuple[Block, float]:
     return Block(corners, site.sources[0].density, velocity=velocity), 2.0 * radius
 
 
-def descend(lab: Lab, site: Site, rng: np.random.Generator) -> Descent:
+def descend(lab: Lab, site: Site, rng: np.random.Generator) -> RitchieDescent:
     """Push a block off the crest of a site and watch it down to the foot."""
     block, size = pushed(site, rng)
     sim = lab.simulate(Scene(site.profile, (block,), site.surfaces))
@@ -92,11 +92,13 @@ def descend(lab: Lab, site: Site, rng: np.random.Generator) -> Descent:
         touching.append(np.hypot(*change) > PUSH)
     way = float(np.hypot(*(sim.poses[0, :2] - start)))
     touches = int((np.diff(touching, prepend=False) & touching).sum())
-    return Descent(float(np.mean(aloft)), float(np.mean(touching)), touches, way / (math.pi * size))
+    return RitchieDescent(
+        float(np.mean(aloft)), float(np.mean(touching)), touches, way / (math.pi * size)
+    )
 
 
 def descents(lab: Lab, slope_deg: int) -> Floats:
-    """Return all descents of a slope, a row each with the fields of `Descent`."""
+    """Return all descents of a slope, a row each with the fields of `RitchieDescent`."""
     site = Site.load(f"ritchie-{slope_deg}")
     return np.array([descend(lab, site, lab.random(slope_deg, i)) for i in range(RELEASES)])
 
@@ -115,7 +117,7 @@ def overlaps(*intervals: Floats) -> list[float]:
 def measure_modes(lab: Lab) -> tuple[Measured, ...]:
     """Compare the descents of the three slopes."""
     roll, bounce, fall = (descents(lab, deg) for deg in (ROLLING, BOUNCING, FALLING))
-    aloft, _, touches, turns = range(len(Descent._fields))
+    aloft, _, touches, turns = range(len(RitchieDescent._fields))
     return (
         Measured(roll[:, turns].sum() / roll[:, touches].sum()),
         Measured(roll[:, aloft].mean()),

@@ -8,12 +8,12 @@ from rigdda.validation import (
     crests,
     energy,
     fences,
-    flight,
+    free_flight,
     gravity_walls,
     impacts,
     invariance,
     joint_strength,
-    joints,
+    jointed_blocks,
     ritchie,
     rocking,
     rolling,
@@ -28,9 +28,9 @@ from rigdda.validation import (
 from rigdda.validation.case import Case
 
 CASES: tuple[Case, ...] = (
-    *flight.CASES,
+    *free_flight.CASES,
     *slides.CASES,
-    *joints.CASES,
+    *jointed_blocks.CASES,
     *joint_strength.CASES,
     *rolling.CASES,
     *rocking.CASES,

@@ -13,7 +13,7 @@ from rigdda.agents.designers import convex
 from rigdda.agents.designers.catalogue import (
     CROSSING,
     Catalogue,
-    Ensemble,
+    CrossingEnsemble,
     ensemble,
     tabulate,
     whole,
@@ -64,7 +64,7 @@ def test_where_nothing_helps_nothing_is_built() -> None:
     assert choose(table.take([]), 2).layout == ()
 
 
-def looked(energy: list[float], speed: float = 10.0, width: float = 1.0) -> Ensemble:
+def looked(energy: list[float], speed: float = 10.0, width: float = 1.0) -> CrossingEnsemble:
     """Return one release whose blocks cross the only station and then the road."""
     n = len(energy)
     table = np.zeros(2 * n, dtype=CROSSING)
@@ -74,7 +74,7 @@ def looked(energy: list[float], speed: float = 10.0, width: float = 1.0) -> Ense
     table["energy"] = np.tile(energy, 2)
     table["speed"], table["volume"], table["mass"] = speed, 1.0, 2600.0
     table["height"], table["radius"] = 1.0, 0.5
-    return Ensemble(np.array([20.0]), table, np.zeros(1, dtype=int), np.array([width]))
+    return CrossingEnsemble(np.array([20.0]), table, np.zeros(1, dtype=int), np.array([width]))
 
 
 def test_a_fence_stops_blocks_in_their_order_until_its_capacity_is_spent(site: Site) -> None:

@@ -7,7 +7,7 @@ import pytest
 from valley import SITE
 
 from rigdda import Ditch, Embankment, Fence, Site
-from rigdda.agents.designers.catalogue import CROSSING, Ensemble
+from rigdda.agents.designers.catalogue import CROSSING, CrossingEnsemble
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.rule import demands, ritchie, rule
 from rigdda.barriers import FENCE_CLASSES
@@ -18,7 +18,9 @@ SPEED, MASS, ENERGY, FREEBOARD = 1.122, 1.02, 1.2, 0.5
 """Partial factors of UNI 11211-4, of trajectories by 1.10 x 1.02, and the free height [m]."""
 
 
-def crossings(speeds: dict[int, float], height: float = 1.0, mass: float = 1000.0) -> Ensemble:
+def crossings(
+    speeds: dict[int, float], height: float = 1.0, mass: float = 1000.0
+) -> CrossingEnsemble:
     """Return 20 blocks of the first event that cross some stations and the road."""
     places = [*speeds, len(STATIONS)]
     table = np.zeros(20 * len(places), dtype=CROSSING)
@@ -26,10 +28,12 @@ def crossings(speeds: dict[int, float], height: float = 1.0, mass: float = 1000.
     table["release"] = np.tile(np.arange(20), len(places))
     table["speed"] = np.repeat([*speeds.values(), 1.0], 20)
     table["height"], table["radius"], table["mass"] = height, 0.4, mass
-    return Ensemble(STATIONS, table, np.zeros(20, dtype=int), np.ones(20))
+    return CrossingEnsemble(STATIONS, table, np.zeros(20, dtype=int), np.ones(20))
 
 
-def build(ensemble: Ensemble, kinds: tuple[str, ...] = ("fence",), site: Site = SITE) -> tuple:
+def build(
+    ensemble: CrossingEnsemble, kinds: tuple[str, ...] = ("fence",), site: Site = SITE
+) -> tuple:
     problem = DesignProblem(site, kinds=kinds)
     return rule(problem, ensemble, Menu(problem))
 
@@ -75,14 +79,14 @@ def test_of_all_stations_the_cheapest_fence_is_built() -> None:
 def test_a_station_below_which_blocks_start_is_passed_over() -> None:
     looked = crossings({0: 5.0, 1: 10.0})
     looked.crossings["release"][:10] += 100  # half of what crosses there does not reach the road
-    looked = Ensemble(STATIONS, looked.crossings, np.zeros(200, dtype=int), np.ones(200))
+    looked = CrossingEnsemble(STATIONS, looked.crossings, np.zeros(200, dtype=int), np.ones(200))
     (fence,) = build(looked)
     assert fence.x == 20.0
 
 
 def test_where_nothing_comes_nothing_is_built() -> None:
     looked = crossings({1: 5.0})
-    empty = Ensemble(STATIONS, looked.crossings[:0], looked.event, looked.width)
+    empty = CrossingEnsemble(STATIONS, looked.crossings[:0], looked.event, looked.width)
     assert build(empty) == ()
 
 

@@ -89,7 +89,7 @@ class Valley(DesignProblem):
 
 def seen(
     site: Site, seeds: Mapping[str, Sequence[int]], stations: Sequence[float]
-) -> catalogue.Ensemble:
+) -> catalogue.CrossingEnsemble:
     """Return crossings that say of standing barriers what holds in the valley."""
     x = np.asarray(stations, dtype=np.float64)
     jobs = [(i, seed) for i, own in enumerate(seeds.values()) for seed in own]
@@ -102,7 +102,7 @@ def seen(
     dice = [np.random.default_rng([seed, i]).random(len(x)) for i, seed in jobs]
     table["height"][:, :-1] = HEIGHT * np.array(dice) / stopped
     event = np.array([i for i, _ in jobs])
-    return catalogue.Ensemble(x, table.ravel(), event, np.ones(len(jobs)))
+    return catalogue.CrossingEnsemble(x, table.ravel(), event, np.ones(len(jobs)))
 
 
 KNOWN: dict[type, ensemble.Ensemble] = {}

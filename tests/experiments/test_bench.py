@@ -17,7 +17,7 @@ from experiments.bench.levels import Row
 from experiments.bench.penetration import centroids, penetration
 from rigdda import Scene, Terrain
 from rigdda.geometry import is_convex, polygon_properties
-from rigdda.validation import flight, rocking, slides
+from rigdda.validation import free_flight, rocking, slides
 from rigdda.validation.scenes import FLAT, box, rock
 
 
@@ -58,7 +58,7 @@ def moved(way: np.ndarray) -> np.ndarray:
 def test_exact_ways_have_no_error() -> None:
     times = np.linspace(0.0, 2.0, 5)
     fall = Scene(None, (box(),), rock(), damping=0.6)
-    ways = np.array([flight.fall(0.6, t)[0] for t in times])
+    ways = np.array([free_flight.fall(0.6, t)[0] for t in times])
     assert cases.fall_error(fall, times, moved(-ways)) == pytest.approx(0.0, abs=1e-12)
     slid = np.array([slides.slide(30.0, 20.0, t) for t in times])
     assert cases.slide_error(fall, times, moved(slid)) == pytest.approx(0.0, abs=1e-12)

@@ -1,6 +1,4 @@
-r"""How the bodies of a contact come together: arms, velocities, the mass that resists.
-
-The law that a contact follows over one step in an island that is solved as a whole.
+r"""The law that a contact follows over one step in an island that is solved as a whole.
 
 Every closed contact is a penalty spring on the *end* velocity of the step,
 
@@ -22,8 +20,8 @@ plain    b = -2 g and w_0 taken as 0: a penalty spring on the gap, the paper's c
 =======  ====================================================================================
 
 The shear spring is the same on the shear velocity, from the shear force of the last step, limited
-by Coulomb friction: a return mapping. Islands that move faster are relaxed, see
-`rigdda.dynamics.relaxation`, where contacts are rigid.
+by Coulomb friction: a return mapping. Islands that move, and islands at rest at first, are relaxed
+instead (`rigdda.dynamics.relaxation`), where contacts are rigid.
 """
 
 from __future__ import annotations

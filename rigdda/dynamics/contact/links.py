@@ -2,7 +2,9 @@
 
 They enter the system of equations, the exchange of forces and the ledger like any closed contact,
 and follow the same law (`contact.law`): a pin with b = 0. The mean tension of a bolt over a step,
-T + k d / 2, is this law with w_0 = 0, kappa = k / 4 and b = -T / kappa: at no step energy is lost.
+T + k d / 2, is this law with w_0 = 0, kappa = k / 4 and b = -T / kappa: no energy is lost,
+whatever the step. The state of a support is decided in `open_close.next_state_of_link`, and in
+relaxation by `relaxation.aim_row` and the limits of `relaxation.sweep`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Points over, along and under segments of the terrain.
-
-Contacts of a block with the terrain over a step.
+"""Contacts of a block with the terrain over a step.
 
 Corners of the block against segments, and convex corners of the terrain against edges of the
 convex parts of the block. Segments are lengthened into the ground at concave corners, or blocks
@@ -11,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from rigdda.dynamics.arrays import Ground, Outlines
+from rigdda.dynamics.arrays import GroundArrays, Outlines
 from rigdda.dynamics.constants import IMPACT_STEPS, SAME_FACE, TERRAIN
 from rigdda.dynamics.contact.narrow_phase import add_contact, keep_nearest
 from rigdda.dynamics.contact.separating_axes import edge_over_point, following
@@ -20,21 +18,21 @@ from rigdda.kernel import inlined, kernel, variable
 
 
 @kernel
-def below_segment(ground: Ground, s: int, x: float, y: float) -> float:
+def below_segment(ground: GroundArrays, s: int, x: float, y: float) -> float:
     """Return the gap of a point over the line of segment s [m]: < 0 in the ground."""
     one = ground.segment[s]
     return one.normal_x * (x - one.x) + one.normal_y * (y - one.y)
 
 
 @kernel
-def along_segment(ground: Ground, s: int, x: float, y: float) -> float:
+def along_segment(ground: GroundArrays, s: int, x: float, y: float) -> float:
     """Return how far along segment s a point lies [m]."""
     one = ground.segment[s]
     return one.normal_y * (x - one.x) - one.normal_x * (y - one.y)
 
 
 @kernel
-def over_segment(ground: Ground, s: int, x: float, y: float, depth: float) -> bool:
+def over_segment(ground: GroundArrays, s: int, x: float, y: float, depth: float) -> bool:
     """Return whether a point lies over segment s, lengthened by what `depth` needs at its ends."""
     along, one = along_segment(ground, s, x, y), ground.segment[s]
     turn_end = ground.segment[s + 1].turn
@@ -47,7 +45,7 @@ def over_segment(ground: Ground, s: int, x: float, y: float, depth: float) -> bo
 
 
 @kernel
-def shadowed(ground: Ground, s: int, x: float, y: float, gap: float) -> bool:
+def shadowed(ground: GroundArrays, s: int, x: float, y: float, gap: float) -> bool:
     """Return whether a point under segment s is less deep under a convex neighbour."""
     if gap >= 0.0:
         return False
@@ -57,7 +55,9 @@ def shadowed(ground: Ground, s: int, x: float, y: float, gap: float) -> bool:
 
 
 @kernel
-def crosses_segment(ground: Ground, s: int, x0: float, y0: float, x1: float, y1: float) -> bool:
+def crosses_segment(
+    ground: GroundArrays, s: int, x0: float, y0: float, x1: float, y1: float
+) -> bool:
     """Return whether the line from (x0, y0) to (x1, y1) crosses segment s."""
     g0, g1 = below_segment(ground, s, x0, y0), below_segment(ground, s, x1, y1)
     if g0 * g1 >= 0.0:
@@ -68,7 +68,7 @@ def crosses_segment(ground: Ground, s: int, x0: float, y0: float, x1: float, y1:
 
 @kernel
 def along_neighbour(
-    ground: Ground, s: int, x: float, y: float, dx: float, dy: float
+    ground: GroundArrays, s: int, x: float, y: float, dx: float, dy: float
 ) -> tuple[float, float]:
     """Return the displacement of a point less what would take it into segment s, if it is over it.
 
@@ -90,7 +90,13 @@ NEVER = 2.0
 
 @kernel
 def beneath_roof(
-    bodies: Bodies, outlines: Outlines, ground: Ground, a: int, vertex: int, s: int, gap: float
+    bodies: Bodies,
+    outlines: Outlines,
+    ground: GroundArrays,
+    a: int,
+    vertex: int,
+    s: int,
+    gap: float,
 ) -> bool:
     """Return whether a corner of block a under segment s lies in the air beneath an overhang.
 
@@ -118,7 +124,14 @@ def beneath_roof(
 
 @kernel
 def place_of_hit(
-    bodies: Bodies, ground: Ground, s: int, a: int, x: float, y: float, gap: float, p: Parameters
+    bodies: Bodies,
+    ground: GroundArrays,
+    s: int,
+    a: int,
+    x: float,
+    y: float,
+    gap: float,
+    p: Parameters,
 ) -> tuple[float, float]:
     """Return where in the step a corner of block a meets the line of segment s.
 
@@ -144,7 +157,7 @@ def place_of_hit(
 
 @kernel
 def leaves_over_end(
-    ground: Ground, s: int, x: float, y: float, hit_x: float, hit_y: float, gap: float,
+    ground: GroundArrays, s: int, x: float, y: float, hit_x: float, hit_y: float, gap: float,
     margin: float,
 ) -> bool:  # fmt: skip
     """Return whether a corner at (x, y) slides off a convex end of segment s.
@@ -165,7 +178,7 @@ def leaves_over_end(
 
 @kernel
 def meets_segment(
-    ground: Ground, s: int, x: float, y: float, hit_x: float, hit_y: float, gap: float,
+    ground: GroundArrays, s: int, x: float, y: float, hit_x: float, hit_y: float, gap: float,
     reach: float, margin: float,
 ) -> bool:  # fmt: skip
     """Return whether a corner at (x, y) meets segment s; its line it meets at (hit_x, hit_y).
@@ -181,8 +194,8 @@ def meets_segment(
 
 @inlined
 def corners_on_segment(
-    bodies: Bodies, outlines: Outlines, ground: Ground, contacts: Contacts, k: int, first: int,
-    a: int, s: int, p: Parameters,
+    bodies: Bodies, outlines: Outlines, ground: GroundArrays, contacts: Contacts, k: int,
+    first: int, a: int, s: int, p: Parameters,
 ) -> int:  # fmt: skip
     """Add contacts of the corners of block a with segment s; returns the new number."""
     one, block = ground.segment[s], bodies[a]
@@ -221,7 +234,7 @@ def corners_on_segment(
 
 @kernel
 def bridges(
-    outlines: Outlines, ground: Ground, part: int, edge: int, corner: int, least: float
+    outlines: Outlines, ground: GroundArrays, part: int, edge: int, corner: int, least: float
 ) -> bool:
     """Return whether the ends of an edge are on either side of a ridge, no deeper than `least` [m].
 
@@ -235,7 +248,7 @@ def bridges(
 
 @inlined
 def edge_on_ridge(
-    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, contacts: Contacts, k: int,
+    bodies: Bodies, outlines: Outlines, ground: GroundArrays, box: Box, contacts: Contacts, k: int,
     a: int, part: int, corner: int, p: Parameters,
 ) -> int:  # fmt: skip
     """Add the contact of a convex terrain corner with an edge of a part of block a, if it has one.
@@ -306,7 +319,7 @@ def edge_on_ridge(
 
 @inlined
 def collide_terrain(
-    bodies: Bodies, outlines: Outlines, ground: Ground, box: Box, contacts: Contacts, k: int,
+    bodies: Bodies, outlines: Outlines, ground: GroundArrays, box: Box, contacts: Contacts, k: int,
     a: int, p: Parameters,
 ) -> int:  # fmt: skip
     """Add the contacts of block a with the terrain from entry k; returns the new number.

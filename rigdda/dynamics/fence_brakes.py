@@ -44,13 +44,14 @@ def last_block(
 
 
 @stage
-def give_way(
+def update_fences(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, monitors: Monitors,
     counters: NDArray, ledger: NDArray, time: float, p: Parameters,
 ) -> None:  # fmt: skip
     """Spend the elongation of the fences that have moved in this step, and lower their tops.
 
     A fence whose elongation is spent fails, by the block that presses hardest on it or did last.
+    What a fence absorbs is added up in `island_step.account_contacts`.
     """
     for fence in range(len(monitors.rock), p.blocks):
         body = bodies[fence]

@@ -25,7 +25,7 @@ CLEARANCE = 1e-4
 """Of a block in a slot [m]."""
 
 
-class Slide(NamedTuple):
+class JointSlide(NamedTuple):
     """A slide over joints: slope and friction [deg], first speed [m/s], gravity [m/s2]."""
 
     slope: float
@@ -68,7 +68,7 @@ def fall_along(friction_deg: float, clearance: float | None) -> Scene:
     return Scene(None, (slider, *stack), rock(friction_deg))
 
 
-def measure_slide(lab: Lab, slide: Slide) -> tuple[Measured]:
+def measure_slide(lab: Lab, slide: JointSlide) -> tuple[Measured]:
     """Let a block slide over the row at all steps."""
     ways = []
     for dt in STEPS:
@@ -91,7 +91,7 @@ def measure_fall(lab: Lab, clearance: float | None) -> tuple[Measured]:
     return (Measured(ways, 0.5 * GRAVITY * 1.2**2),)
 
 
-def slide_case(name: str, slide: Slide) -> Case:
+def slide_case(name: str, slide: JointSlide) -> Case:
     """Return the case of one slide."""
     form = "v t + g t^2/2 (sin th - cos th tan phi)"
     check = Check("way, 1-20 ms", form, "m", 1e-2, "relative")
@@ -105,13 +105,13 @@ def fall_case(name: str, clearance: float | None) -> Case:
 
 
 CASES = (
-    slide_case("joints-35-20", Slide(35.0, 20.0)),
-    slide_case("joints-35-0", Slide(35.0, 0.0)),
-    slide_case("joints-0-20", Slide(0.0, 20.0, 10.0)),
-    slide_case("joints-0-0", Slide(0.0, 0.0, 10.0)),
-    slide_case("joints-weightless", Slide(0.0, 20.0, 3.0, 0.0)),
-    slide_case("joints-free-35-20", Slide(35.0, 20.0, free=True)),
-    slide_case("joints-free-0-20", Slide(0.0, 20.0, 6.0, free=True)),
+    slide_case("joints-35-20", JointSlide(35.0, 20.0)),
+    slide_case("joints-35-0", JointSlide(35.0, 0.0)),
+    slide_case("joints-0-20", JointSlide(0.0, 20.0, 10.0)),
+    slide_case("joints-0-0", JointSlide(0.0, 0.0, 10.0)),
+    slide_case("joints-weightless", JointSlide(0.0, 20.0, 3.0, 0.0)),
+    slide_case("joints-free-35-20", JointSlide(35.0, 20.0, free=True)),
+    slide_case("joints-free-0-20", JointSlide(0.0, 20.0, 6.0, free=True)),
     fall_case("joints-wall", None),
     fall_case("joints-slot", CLEARANCE),
 )

@@ -70,11 +70,6 @@ def read_layout(path: str | None) -> Layout:
     return () if path is None else load_layout(path)
 
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
@@ -188,31 +183,34 @@ def kept(folder: Path) -> Iterator[None]:
         raise Stopped(f"{reason}; kept in {folder}: {names}", code) from None
 
 
+LOCK = ".lock"
+"""File in a folder of results that the process which writes into it has locked."""
+
+
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Keep other processes of this package out of a folder, on systems that can lock one."""
+    """Keep other processes of this package out of a folder, where its drive can lock files."""
+    from filelock import FileLock, Timeout
+
     from rigdda import BadInput
 
-    if fcntl is None:
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
+    lock = FileLock(folder / LOCK)
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            mend = "another run writes into it: wait for its end or name another folder"
-            raise BadInput("--out", str(folder), mend) from None
-        except OSError:  # some network drives lock nothing
-            pass
+        lock.acquire(timeout=0.0)
+    except Timeout:
+        mend = "another run writes into it: wait for its end or name another folder"
+        raise BadInput("--out", str(folder), mend) from None
+    except (OSError, NotImplementedError):  # some network drives lock nothing
+        pass
+    try:
         yield
     finally:
-        os.close(handle)
+        lock.release()
 
 
 def _stamps(folder: Path) -> set[tuple[str, tuple[int, int, int]]]:
     """Return the names in a folder, each with what changes when it is written."""
-    found = ((file.name, file.lstat()) for file in folder.iterdir())
+    found = ((file.name, file.lstat()) for file in folder.iterdir() if file.name != LOCK)
     return {(name, (s.st_ino, s.st_size, s.st_mtime_ns)) for name, s in found}
 
 

@@ -112,8 +112,9 @@ class Recorder:
     Parameters
     ----------
     folder : path
-        Where `episode-NNNNNN.rrd` goes; made when it is needed. Copies of an environment that
-        run side by side need folders of their own.
+        Where `episode-NNNNNN.rrd` goes; made when it is needed. No file is overwritten: the
+        second of the same number, of another copy of the environment or of a former run, is
+        `episode-NNNNNN-2.rrd`.
     trigger : callable, optional
         Whether to record an episode, by its number from 0; None: every one.
 
@@ -204,7 +205,12 @@ class Recorder:
         return path
 
     def _path(self, episode: int) -> Path:
-        return self.folder / f"episode-{episode:06d}.rrd"
+        """Return the name of a new file: copies of an environment may share the folder."""
+        path, number = self.folder / f"episode-{episode:06d}.rrd", 2
+        while path.exists():
+            path = path.with_name(f"episode-{episode:06d}-{number}.rrd")
+            number += 1
+        return path
 
 
 def _check_room(folder: Path) -> None:

@@ -32,7 +32,10 @@ def open_viewer(path: str | os.PathLike[str]) -> None:
     try:
         code = viewer.wait()
     except KeyboardInterrupt:  # `python -m rerun` only starts the viewer: end the whole group
-        os.killpg(viewer.pid, signal.SIGTERM)
+        if hasattr(os, "killpg"):
+            os.killpg(viewer.pid, signal.SIGTERM)
+        else:  # Windows
+            viewer.terminate()
         viewer.wait()
         return
     if code:

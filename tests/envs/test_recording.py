@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 from cases import cut
@@ -56,6 +57,19 @@ def test_an_episode_is_recorded(tmp_path: Path) -> None:
     assert f"**layout**: {describe(wall, 2)}" in notes
     assert f"**reward**: {reward:+.4f}" in notes
     assert f"**objective**: {info['objective']:.4f}" in notes
+
+
+def test_copies_that_share_a_folder_keep_each_others_replays(tmp_path: Path) -> None:
+    import rigdda.envs  # noqa: F401  registers the environments
+
+    batch = gymnasium.make_vec(
+        "rigdda/BarrierDesign-v0", 2, vectorization_mode="sync", site=CUT, **FENCE,
+        max_barriers=1, releases=2, record=tmp_path,
+    )  # fmt: skip
+    batch.reset(seed=3)
+    batch.step(np.stack([ACTION, ACTION]))
+    batch.close()
+    assert sorted(os.listdir(tmp_path)) == ["episode-000000-2.rrd", "episode-000000.rrd"]
 
 
 def test_a_truncated_episode_is_recorded_when_the_next_begins(tmp_path: Path) -> None:

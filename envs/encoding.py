@@ -106,22 +106,35 @@ def decode(place: Room, values: Floats, kinds: Sequence[str]) -> Layout:
     tuple of Barrier
         At most n, each of which may be built where it stands.
     """
+    built, _ = built_and_dropped(place, values, kinds)
+    return tuple(sorted(built, key=lambda barrier: barrier.x))
+
+
+def built_and_dropped(
+    place: Room, values: Floats, kinds: Sequence[str]
+) -> tuple[list[Barrier], list[str]]:
+    """Return the barriers that `decode` builds, and what it leaves out, each with the reason."""
     built: list[Barrier] = []
+    dropped: list[str] = []
     taken: list[Span] = []
-    for slot in values.reshape(-1, slot_size(kinds)):
+    for number, slot in enumerate(values.reshape(-1, slot_size(kinds))):
         if slot[0] <= 0.0:
             continue
         kind = kinds[int(np.argmax(slot[NUMBERS:]))] if len(kinds) > 1 else kinds[0]
         station, height, size = (0.5 * (slot[1:NUMBERS] + 1.0)).tolist()
         if kind == "mesh":
-            if not any(isinstance(barrier, Mesh) for barrier in built):
+            if any(isinstance(barrier, Mesh) for barrier in built):
+                dropped.append(f"slot {number}: mesh: another mesh is built")
+            else:
                 built.append(place.mesh(_part(size, len(place.site.meshes))))
             continue
         found = place.nearest(make(place.zone, kind, station, height, size), taken)
-        if found is not None:
+        if found is None:
+            dropped.append(f"slot {number}: {kind}: no place in the zone has room for it")
+        else:
             built.append(found[0])
             taken.append(found[1])
-    return tuple(sorted(built, key=lambda barrier: barrier.x))
+    return built, dropped
 
 
 def make(zone: BarrierZone, kind: str, station: float, height: float, size: float) -> Barrier:

@@ -271,6 +271,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         info: Info = {
             "site": self.problem.site.name,
             "layout": now.layout,
+            "dropped": self.slots.dropped(self.problem, self._numbers),
             "outcomes": plain(now.outcomes),
             **{name: float(getattr(now, name)) for name in TOLD},
         }
@@ -348,7 +349,8 @@ class BarrierDesign(BarrierEnv):
         After one step. Truncated by a TimeLimit only.
     Info
         At reset without barriers, at step with the layout: `site` (name), `layout` (tuple of
-        Barrier), `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
+        Barrier), `dropped` (tuple of str: barriers that were asked for and are not built, each
+        with the reason), `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
         (floats), `outcomes`: plain numbers of each release, none at reset.
     Randomness
         `reset` draws the seeds of the episode's releases and, if there is a choice, the site;

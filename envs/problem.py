@@ -315,6 +315,14 @@ class DesignProblem:
         """Lowest and highest vector, -1 and 1, each (size,)."""
         return np.full(self.size, -1.0), np.full(self.size, 1.0)
 
+    def dropped(self, vector: ArrayLike) -> tuple[str, ...]:
+        """Return which barriers that a (size,) vector asks for are not built, and why.
+
+        Raises BadInput if the vector is unsound.
+        """
+        values = encoding.vector("vector", vector, self.size)
+        return tuple(encoding.built_and_dropped(self.place, values, self.kinds)[1])
+
     def decode(self, vector: ArrayLike) -> Layout:
         """Return the layout that a (size,) vector stands for, see `rigdda.envs.encoding`.
 

@@ -66,10 +66,18 @@ class Slots:
 
     def decode(self, problem: DesignProblem, numbers: Floats) -> Layout:
         """Return the layout of the first slots, the others being empty."""
+        return problem.decode(self._vector(problem, numbers))
+
+    def dropped(self, problem: DesignProblem, numbers: Floats) -> tuple[str, ...]:
+        """Return which barriers that the first slots ask for are not built, and why."""
+        return problem.dropped(self._vector(problem, numbers))
+
+    def _vector(self, problem: DesignProblem, numbers: Floats) -> Floats:
+        """Return the problem's vector of the first slots, the others being empty."""
         used = numbers.reshape(-1, self.width)
         vector = np.full((problem.max_barriers, slot_size(problem.kinds)), -1.0)
         vector[: len(used)] = used[:, self._columns(problem.kinds)]
-        return problem.decode(vector.ravel())
+        return vector.ravel()
 
     def encode(self, problem: DesignProblem, layout: Layout) -> Floats:
         """Return the numbers of all slots that `decode` turns into a layout that it gave."""

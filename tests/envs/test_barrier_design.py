@@ -264,3 +264,15 @@ def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:
     with pytest.raises(BadInput, match=message) as caught:
         BarrierDesign(**keywords)
     assert "\n" not in str(caught.value)
+
+
+def test_a_barrier_that_is_asked_for_and_not_built_is_told() -> None:
+    env = BarrierDesign(CUT, kinds=("ditch",), max_barriers=4, releases=1)
+    _, info = env.reset(seed=1)
+    assert info["dropped"] == ()
+    widest = np.tile(np.array([1.0, 0.0, 1.0, 1.0], dtype=np.float32), 4)
+    _, _, _, _, info = env.step(widest)
+    assert len(info["layout"]) + len(info["dropped"]) == 4 and info["dropped"]
+    assert all(words.endswith("no place in the zone has room for it") for words in info["dropped"])
+    vector = env.problem.encode(info["layout"])
+    assert env.problem.dropped(vector) == ()

@@ -86,14 +86,14 @@ def _version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
               help="Show the version.")  # fmt: skip
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """Rockfall protection: simulate a slope, design its barriers, look at releases."""
+    """Simulate rockfall on a slope, design barriers and replay releases."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
 
 @cli.command()
 def sites() -> None:
-    """List the built-in sites: families, events with their rates, where barriers may stand."""
+    """List the built-in sites with their events and the zone for barriers."""
     import rigdda
     from rigdda.agents.reports import tables
 
@@ -103,12 +103,16 @@ def sites() -> None:
 @cli.command()
 @click.argument("site")
 @layout_option
-@click.option("--event", metavar="NAME", help="Releases of this event only.  [default: by rate]")
-@count_option("--releases", 1, 100, "Releases to average.")
+@click.option(
+    "--event",
+    metavar="NAME",
+    help="Simulate this event only.  [default: draw events by their rates]",
+)
+@count_option("--releases", 1, 100, "Number of releases.")
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
-              show_default=True, help="lumped: each block a point, for a quick look without "
-              "barriers that stand.")  # fmt: skip
-@seed_option("Seed of the first release; the others follow it.")
+              show_default=True, help="How rock is simulated. 'lumped' treats each block as a "
+              "point: quick, but without barriers that stand on the ground.")  # fmt: skip
+@seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("simulate-SITE")
 def simulate(
     site: str,
@@ -119,11 +123,12 @@ def simulate(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Simulate releases of SITE (a name or a TOML file) and say what reaches the road.
+    """Simulate releases of SITE and report what reaches the road.
 
-    Without --event each release is of an event drawn by its rate. Writes outcomes.csv, run.npz
-    (the first release) and section.png; with --model lumped points.csv. The energy of a hit is that
-    of the block just before it touches; a barrier absorbs what its forces take from all blocks.
+    SITE is the name of a built-in site or a TOML file. Writes outcomes.csv, run.npz (the first
+    release) and section.png, or points.csv with --model lumped. The energy of a hit is the kinetic
+    energy of the block just before it touches the barrier. The energy that a barrier absorbs is
+    the work that its forces take from all blocks.
     """
     import rigdda
     from rigdda.agents import jobs
@@ -154,14 +159,14 @@ def simulate(
 
 @cli.command()
 @click.argument("site")
-@count_option("--releases", 10, 2000, "Releases of each layout at each fidelity.")
+@count_option("--releases", 10, 2000, "Number of releases of each layout at each fidelity.")
 @seed_option("Seed of the releases.")
 @out_option("fidelity-SITE")
 def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
-    """Measure what fidelity "fast" costs and gains on SITE (a name or a TOML file).
+    """Measure the bias and the speed-up of the fidelity "fast" on SITE.
 
-    Compares Z and the processor time of a release, for no barrier, the constant and what the
-    engineering rule builds. Writes fidelity.csv.
+    Compares Z and the processor time of a release without barriers, with the constant layout and
+    with the layout of the engineering rule. Writes fidelity.csv.
     """
     from rigdda.agents import fidelity_bias
     from rigdda.envs import DesignProblem
@@ -178,13 +183,16 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
 @cli.command()
 @click.argument("target")
 @layout_option
-@click.option("--event", metavar="NAME", help="A release of this event.  [default: by rate]")
+@click.option(
+    "--event", metavar="NAME", help="Replay a release of this event.  [default: drawn by rate]"
+)
 @seed_option("Seed of the release.")
 @out_option("replay-SITE")
 def replay(target: str, layout: str | None, event: str | None, seed: int, out: Path | None) -> None:
-    """Open a replay (FILE.rrd, or a run FILE.npz) or make one of a release of a site.
+    """Open the replay TARGET, or record one of a release of the site TARGET.
 
-    For a site, writes episode.rrd and prints its path; for a run, FILE.rrd beside it.
+    A replay (FILE.rrd) is opened. A run (FILE.npz) is converted to FILE.rrd and opened. For a site,
+    a release is simulated and episode.rrd is written.
     """
     import rigdda
     from rigdda.agents.reports import findings
@@ -236,18 +244,21 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @cli.command()
 @click.argument("site")
 @click.option("--designer", type=click.Choice(DESIGNERS), default=DEFAULT, show_default=True,
-              help="How to search.")  # fmt: skip
+              help="Search method.")  # fmt: skip
 @click.option("--kinds", callback=_kinds, metavar="KIND,...",
-              help="Kinds to choose from: fence, ditch, embankment, gravity_wall, mesh, wall.  "
-              "[default: all but wall]")  # fmt: skip
+              help="Allowed kinds of barrier: fence, ditch, embankment, gravity_wall, mesh, wall.  "
+              "[default: all except wall]")  # fmt: skip
 @click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
-              help="Meet this: P that a block of a design event reaches the road.")  # fmt: skip
+              help="Largest acceptable probability that rock of a design event reaches the "
+              "road.")  # fmt: skip
 @click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
-              help="Meet this: P that a barrier fails in a design event.")  # fmt: skip
+              help="Largest acceptable probability that a barrier fails in a design "
+              "event.")  # fmt: skip
 @click.option("--zone", type=float, nargs=2, metavar="A B",
-              help="Barriers may stand from A to B [m].  [default: the site's]")  # fmt: skip
-@count_option("--budget", 2, BUDGET, "Releases that the search may simulate.")
-@count_option("--verify", 10, RELEASES, "Unseen releases that each layout is verified on.")
+              help="Place barriers between the chainages A and B [m].  [default: the zone of "
+              "the site]")  # fmt: skip
+@count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
+@count_option("--verify", 10, RELEASES, "Number of new releases on which each layout is verified.")
 @seed_option("Seed of the search and of its releases.", SEED)
 @out_option("design-SITE")
 def design(
@@ -262,12 +273,14 @@ def design(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Design the barriers of SITE (a name or a TOML file) and verify them on unseen releases.
+    """Search for the best layout of barriers on SITE and verify it on new releases.
 
-    Least Z: capital and upkeep, harm on the road, and repair, in EUR per metre of road and year.
-    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. Layouts that a
-    killed or former run has evaluated are in evaluations.jsonl and are not simulated again; a
-    folder that holds a design of another problem (problem.json) is refused.
+    SITE is the name of a built-in site or a TOML file. The best layout has the least cost Z:
+    capital and upkeep, expected harm on the road and expected repair, in EUR per metre of road and
+    year.
+    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. A run that was
+    interrupted continues from evaluations.jsonl. A folder with the design of another problem
+    (problem.json) is refused.
     """
     from rigdda.agents import jobs
     from rigdda.agents.designers.store import FILE, claim
@@ -342,14 +355,14 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
 
 @cli.command()
 @click.argument("file", metavar="STUDY.toml")
-@seed_option("Seed of the first release; the others follow it.")
+@seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("study-NAME")
 def study(file: str, seed: int, out: Path | None) -> None:
-    """Simulate every layout of STUDY.toml in the same releases: one row each in study.csv.
+    """Compare the layouts of STUDY.toml on the same releases.
 
-    The file names a `site`, how many `releases` of each event, and `layouts`: tables with a `name`
-    and either `barriers`, as in a layout file, or the `file` that holds them. A study that was
-    killed goes on from its study.csv.
+    The file gives a `site`, the number of `releases` of each event, and `layouts`: tables with a
+    `name` and either `barriers`, as in a layout file, or a `file` that contains them. Writes one
+    row for each layout to study.csv. A study that was interrupted continues from study.csv.
     """
     from rigdda.agents import studies
     from rigdda.agents.reports import findings
@@ -371,12 +384,12 @@ def study(file: str, seed: int, out: Path | None) -> None:
 @click.argument("site")
 @click.argument("observed", type=click.Path(dir_okay=False, path_type=Path))
 @click.option("--parameters", "names", multiple=True, required=True, metavar="PATH[=LOW:HIGH]",
-              help="A number of the site file to fit, such as surfaces.soil.restitution; repeat "
-              "it, four at most are wise.")  # fmt: skip
+              help="Number of the site file to fit, such as surfaces.soil.restitution. May be "
+              "repeated; more than four are rarely identified.")  # fmt: skip
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
-              show_default=True, help="What computes run-outs.")  # fmt: skip
-@count_option("--budget", 8, 160, "Sets of values that are computed.")
-@count_option("--releases", 10, 150, "Releases of each event with each set.")
+              show_default=True, help="Model that computes the run-outs.")  # fmt: skip
+@count_option("--budget", 8, 160, "Number of sets of values to try.")
+@count_option("--releases", 10, 150, "Number of releases of each event for each set.")
 @seed_option("Seed of the search and of the first release.", SEED)
 @out_option("fit-SITE")
 def fit(
@@ -389,12 +402,12 @@ def fit(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Fit numbers of SITE (a name or a TOML file) to run-outs in OBSERVED, a CSV file.
+    """Fit numbers of SITE to the run-outs in OBSERVED, a CSV file.
 
-    Its columns are event and run_out_m, the chainage at which the block stopped. Prints the fitted
-    numbers with 95 % intervals, or "not identified" where the interval is nearly as long as the
-    range that was given, and what they predict of runs that were left out. Writes site.toml (SITE
-    with them), fit.csv and fit.png.
+    The columns of the file are event and run_out_m, the chainage at which the block stopped. Prints
+    the fitted numbers with 95 % intervals, or "not identified" where the interval is nearly as long
+    as the range that was given, and how well they predict runs that were left out of the fit.
+    Writes site.toml (SITE with the fitted numbers), fit.csv and fit.png.
     """
     import rigdda
     from rigdda.agents import fit as job
@@ -413,15 +426,16 @@ def fit(
 
 
 @cli.command()
-@count_option("--sites", 2, 512, "Random sites to train on.")
-@count_option("--episodes", 0, 49152, "Episodes.")
-@seed_option("Seed of all that is random.", SEED)
+@count_option("--sites", 2, 512, "Number of random sites to train on.")
+@count_option("--episodes", 0, 49152, "Number of episodes.")
+@seed_option("Seed of all random numbers.", SEED)
 @out_option("train")
 def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
-    """Train a policy that designs a layout for a site from what it sees of it, without a search.
+    """Train a policy that designs a layout for a site without a search.
 
-    Writes policy.safetensors, which `rigdda evaluate --policy` takes, and logs for TensorBoard.
-    A training that was killed goes on where it stopped. Needs the extra rl.
+    The policy sees what comes down the site without barriers. Writes policy.safetensors, for
+    `rigdda evaluate --policy`, and logs for TensorBoard. A training that was interrupted continues
+    where it stopped. Requires the extra `rl`.
     """
     from rigdda.agents import training
 
@@ -438,13 +452,17 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
 @cli.command()
 @click.option("--designer", "names", type=click.Choice(DESIGNERS), multiple=True,
               default=("rule", "race"), show_default=True,
-              help="What to try beside constant and random; repeatable.")  # fmt: skip
-@click.option("--policy", type=click.Path(), help="What `train` wrote, to be tried as well.")
+              help="Designer to compare with constant and random. May be repeated.")  # fmt: skip
+@click.option(
+    "--policy",
+    type=click.Path(),
+    help="Trained policy to compare as well, a file that `rigdda train` wrote.",
+)
 @click.option("--split", type=click.Choice(("train", "validation", "test")), default="test",
-              show_default=True, help="Sites to learn from, to choose by, or unseen.")  # fmt: skip
-@count_option("--budget", 2, 3_000, "Releases that each designer may simulate on a site.")
-@count_option("--sites", 1, 6, "Sites of the split; six are one of each family.")
-@count_option("--verify", 10, 2_000, "Unseen releases that each layout is verified on.")
+              show_default=True, help="Which of the generated sites to use.")  # fmt: skip
+@count_option("--budget", 2, 3_000, "Number of releases that each designer may simulate on a site.")
+@count_option("--sites", 1, 6, "Number of sites; six are one of each family.")
+@count_option("--verify", 10, 2_000, "Number of new releases on which each layout is verified.")
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("evaluate")
 def evaluate(
@@ -457,10 +475,11 @@ def evaluate(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Try designers on generated sites: how far each is behind the best, in EUR a year.
+    """Compare designers on generated sites.
 
-    Prints means over the sites with 95 % intervals; writes scores.csv. Layouts that a killed or
-    former run has evaluated are not simulated again.
+    Prints by how much the layouts of each designer cost more than the best one, as means over the
+    sites with 95 % intervals, and writes scores.csv. A run that was interrupted continues from its
+    evaluations.
     """
     from rigdda.agents import contest, designers
     from rigdda.agents.designers.store import Store
@@ -486,15 +505,16 @@ def evaluate(
 
 @cli.command()
 @click.option("--only", multiple=True, metavar="NAME",
-              help="Run cases whose names start with NAME, slow or not; repeatable.")  # fmt: skip
-@click.option("--slow", is_flag=True, help="Run the cases that take long as well.")
+              help="Run only cases whose names start with NAME. May be repeated.")  # fmt: skip
+@click.option("--slow", is_flag=True, help="Run the slow cases, too.")
 @seed_option("Seed of the random shapes, speeds and offsets.")
 @out_option("validate")
 def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path | None) -> None:
-    """Compare computed motions with closed forms, and the observed order of convergence.
+    """Compare computed motions with closed forms.
 
-    Writes validate.csv and convergence.csv. The exit code is 1 if a figure misses its bar. The
-    last column of the table is processor time per simulated time, in microseconds a second.
+    Writes validate.csv, and convergence.csv with the observed order of convergence in the time
+    step. The exit code is 1 if an error exceeds its bar. The last column of the table is processor
+    time per simulated time, in microseconds per second.
     """
     from rigdda.agents import accuracy
 

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from rigdda import Layout
 
 layout_option = click.option(
-    "--layout", type=click.Path(), help="Barriers: a TOML or JSON file, as `design` writes."
+    "--layout",
+    type=click.Path(),
+    help="Layout of barriers: a TOML or JSON file such as `rigdda design` writes.",
 )
 
 

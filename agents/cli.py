@@ -322,17 +322,17 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
 
     chosen, result = done.chosen.evaluation, done.result
     click.echo(
-        "Z and its parts in EUR per metre of road and year; to build in EUR per metre;\n"
-        "rule: UNI 11211-4; debris: of what comes onto the road without barriers"
+        "Z and its parts in EUR per metre of road and year, cost to build in EUR per metre;\n"
+        "rule: UNI 11211-4; debris: rock on the road, relative to no barriers"
     )
     show(tables.costs(done))
     chances = tables.chances(done)
     if chances is not None:
-        click.echo("chances in each design event, with their 95 % upper bounds")
+        click.echo("probabilities in each design event, with 95 % upper bounds")
         show(chances)
     else:
         click.echo("no design events: the site names none (design = true)")
-    from_start = " (what the search began with)" if result.origin == "start" else ""
+    from_start = " (a starting layout of the search)" if result.origin == "start" else ""
     click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
     for barrier in chosen.layout:
         click.echo(f"  {order(barrier, done.problem.site)}")
@@ -345,10 +345,10 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     ]
     for line in filter(None, lines):
         click.echo(line)
-    resumed = f"; {store.resumed:,} taken from a former run" if store.resumed else ""
+    resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
-        f"verification: {verify:,} unseen ones each{resumed}\n"
+        f"verification: {verify:,} new releases of each layout{resumed}\n"
         f"{', '.join(FILES)} are in {folder}"
     )
 
@@ -376,7 +376,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):
             note(f"the layout {name!r} {words}")
-    words = f", {resumed} taken from a former run" if resumed else ""
+    words = f", {resumed} from an earlier run" if resumed else ""
     click.echo(f"{asked.size:,} releases{words}; study.csv is in {folder}")
 
 
@@ -498,7 +498,7 @@ def evaluate(
     tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
     click.echo("EUR per metre of road and year; best: of these designers on each site")
     show(contest.table(scores))
-    resumed = f", {store.resumed:,} releases taken from a former run" if store.resumed else ""
+    resumed = f", {store.resumed:,} releases from an earlier run" if store.resumed else ""
     click.echo(f"{len(posed)} sites of {split}, verified on {verify:,} releases each{resumed}; "
                f"scores.csv is in {folder}")  # fmt: skip
 

@@ -192,8 +192,8 @@ def unheld(problem: DesignProblem, event: str, seed: int) -> str:
         return ""
     volume = _volume(problem, event, seeds[event][0])
     return (
-        f"no single barrier that may be built, at its largest, holds the event {event!r} "
-        f"({volume:.2g} m3 per metre) back"
+        f"no single barrier that may be built here stops the event {event!r} "
+        f"({volume:.2g} m3 per metre), however large it is"
     )
 
 

@@ -18,7 +18,7 @@ def unbuildable(site: Site, layout: Layout) -> str:
     try:
         Room(site, site.barrier_zone).check_layout(layout, list(KINDS), len(layout))
     except BadInput as error:
-        return f"is computed as given, but may not be built: {error}"
+        return f"is simulated as given, but could not be built: {error}"
     return ""
 
 
@@ -28,8 +28,8 @@ def of_layout(site: Site, layout: Layout, event: str | None) -> str:
     words = [f"the layout {found}"] if found else []
     if event is None and any(isinstance(barrier, Mesh) for barrier in layout):
         words.append(
-            "mesh makes events rarer, and changes no release: these are drawn by the rates "
-            "without it; `design` and `study` count it"
+            "mesh makes events rarer but does not change a release: here events are drawn by their "
+            "rates without mesh; `design` and `study` take mesh into account"
         )
     return "; ".join(words)
 
@@ -40,8 +40,8 @@ def unfitted(site: Site) -> str:
     if not names:
         return ""
     return (
-        f"points rebound from {', '.join(names)} by defaults that nothing was fitted to, see "
-        "[lumped.NAME]: blocks may run out far less or far more"
+        f"the rebound from {', '.join(names)} uses default coefficients that were not fitted to "
+        "observations (see [lumped.NAME]): real blocks may run out much less or much farther"
     )
 
 
@@ -74,21 +74,24 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
     chosen = cases[-1][1]
     cheap = [name for name, other in cases[1:-1] if other.ci[1] < chosen.ci[0]]
     parts = [] if cheap and not chosen.layout else [_pays(cases[0][1], chosen)]
-    parts += [f"{name} costs less a year: the search wants a larger --budget" for name in cheap]
+    parts += [
+        f"the layout {name!r} costs less per year than the optimised one: use a larger --budget"
+        for name in cheap
+    ]
     if chosen.layout and result.on_bound:
-        parts.append(f"the layout lies on a bound: {', '.join(result.on_bound)}")
+        parts.append(f"the layout lies on a bound of the search: {', '.join(result.on_bound)}")
     return "; ".join(filter(None, [*parts, left]))
 
 
 def _pays(nothing: Evaluation, chosen: Evaluation) -> str:
     """Return in words that no layout pays, or that none is shown to pay; else nothing."""
     if not chosen.layout:
-        return "nothing pays: no layout was found that costs less a year than it saves"
+        return "no layout was found that saves more per year than it costs"
     if chosen.ci[1] < nothing.ci[0]:
         return ""
     return (
-        f"nothing pays as far as {chosen.releases:,} releases tell: Z is {span(chosen.ci)} with "
-        f"the layout and {span(nothing.ci)} without"
+        f"{chosen.releases:,} releases do not show that the layout saves more than it costs: Z is "
+        f"{span(chosen.ci)} with it and {span(nothing.ci)} without"
     )
 
 
@@ -103,8 +106,9 @@ def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
     chosen = cases[-1][1]
     order = {None: 0, "met": 0, "undecided": 1, "missed": 2}
     return [
-        f"{name} may cost as little a year ({span(other.ci)} against {span(chosen.ci)}), and costs "
-        f"{euros(other.cost)} instead of {euros(chosen.cost)} EUR per metre to build"
+        f"the layout {name!r} may cost as little per year ({span(other.ci)}, optimised "
+        f"{span(chosen.ci)}) and is cheaper to build: {euros(other.cost)} instead of "
+        f"{euros(chosen.cost)} EUR per metre"
         for name, other in cases[1:-1]
         if other.ci[0] <= chosen.ci[1] and chosen.ci[0] <= other.ci[1]
         if other.cost < chosen.cost and order[other.targets] <= order[chosen.targets]
@@ -115,14 +119,14 @@ def left_over(evaluation: Evaluation) -> str:
     """Return in words what is left of the risk, and which event makes most of it."""
     left, most = evaluation.by_event, worst(evaluation)
     if most is None:
-        return "nothing is left of the risk in these releases"
+        return "no harm or repair remains in these releases"
     total = sum(left.values())
-    words = f"what is left is {euros(total)} EUR per metre and year"
+    words = f"the remaining harm and repair are {euros(total)} EUR per metre and year"
     if len(left) == 1:
         return words
     if left[most] < PART * total:
-        return f"{words}, of which no event makes more than {percent(left[most] / total)}"
-    return f"{words}, of which the event {most!r} {euros(left[most])}"
+        return f"{words}; no event contributes more than {percent(left[most] / total)}"
+    return f"{words}, {euros(left[most])} of it from the event {most!r}"
 
 
 def failing(site: Site, evaluation: Evaluation) -> list[str]:
@@ -133,7 +137,7 @@ def failing(site: Site, evaluation: Evaluation) -> list[str]:
         if chance.releases and chance.bound > SURE:
             lines.append(
                 f"a barrier fails in {percent(chance.probability)} of the releases of the design "
-                f"event {event!r} (at most {percent(chance.bound)})"
+                f"event {event!r} (95 % upper bound {percent(chance.bound)})"
             )
     return lines
 
@@ -145,5 +149,5 @@ def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
         return ""
     pairs = (("reach", asked.reach), ("failure", asked.failure))
     words = " and ".join(f"P({name}) <= {percent(p)}" for name, p in pairs if p is not None)
-    more = ": more releases (--verify) would tell" if evaluation.targets == "undecided" else ""
+    more = "; a larger --verify would decide it" if evaluation.targets == "undecided" else ""
     return f"target {words} in every design event: {evaluation.targets}{more}"

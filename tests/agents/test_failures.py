@@ -66,7 +66,7 @@ def test_a_design_that_stops_keeps_its_evaluations_and_goes_on(
     assert len(Path("o/evaluations.csv").read_text().splitlines()) == 4
     left[0] = 1000
     assert cli.main(arguments) == 0
-    assert "taken from a former run" in capsys.readouterr().out
+    assert "from an earlier run" in capsys.readouterr().out
 
 
 def test_a_fault_of_the_programme_is_not_called_bad_input(

@@ -23,8 +23,10 @@ def test_what_costs_as_little_a_year_and_less_to_build_is_named(problem: DesignP
         return findings.cheaper([("nothing", nothing), (name, other), ("optimised", chosen)])
 
     (line,) = told("constant", alike)
-    assert line.startswith("constant may cost as little a year (683 to 708 against 680 to 705)")
-    assert line.endswith("487 instead of 2,575 EUR per metre to build")
+    assert line.startswith(
+        "the layout 'constant' may cost as little per year (683 to 708, optimised 680 to 705)"
+    )
+    assert line.endswith("cheaper to build: 487 instead of 2,575 EUR per metre")
     assert not told("constant", replace(alike, ci=(706.0, 730.0)))
     assert not told("constant", replace(alike, cost=3_000.0))
     assert not told("constant", replace(alike, ci=(640.0, 660.0)))
@@ -39,8 +41,10 @@ def test_nothing_pays_only_if_nothing_that_was_verified_does(problem: DesignProb
     def told(other: Evaluation) -> str:
         return findings.limits(result, [("nothing", bare), ("rule", other), ("found", bare)], "")
 
-    assert told(dear).startswith("nothing pays")
-    assert told(replace(dear, ci=(700.0, 720.0))).startswith("rule costs less a year")
+    assert told(dear).startswith("no layout was found that saves")
+    assert told(replace(dear, ci=(700.0, 720.0))).startswith(
+        "the layout 'rule' costs less per year"
+    )
 
 
 @pytest.mark.parametrize(("name", "kind"), [("verge", "ditch"), ("narrow", "gravity_wall")])

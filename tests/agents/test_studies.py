@@ -63,7 +63,7 @@ def test_a_study_is_one_row_a_layout_and_release(folder: Path, site: Site) -> No
     assert {row["event"] for row in table} == set(site.event_names)
     assert table[0]["barrier_0_hits"] == "" and table[6 * len(site.events)]["barrier_1_hits"] == ""
     assert all(name in words for name in names)
-    assert "note: the layout 'from a file' is computed as given, but may not be built" in words
+    assert "note: the layout 'from a file' is simulated as given, but could not be built" in words
     assert "'one' is" not in words
 
 
@@ -91,7 +91,7 @@ def test_a_killed_study_goes_on_and_ends_the_same(folder: Path) -> None:
     killed.communicate()
     (folder / "study.toml").write_text(text)
     again = run("study", "study.toml", "--out", "k", folder=folder)
-    assert "taken from a former run" in again and "former" not in whole
+    assert "from an earlier run" in again and "earlier" not in whole
     assert file.read_bytes() == (folder / "o/study.csv").read_bytes()
 
 

@@ -12,6 +12,7 @@ from rigdda.dynamics.constants import (
     LATELY,
     OPEN,
     PIN,
+    PLAIN,
     REST,
     SLEEP_SPEED,
     SLIP,
@@ -135,20 +136,22 @@ def is_tried_whole(
 ) -> bool:
     """Return whether an island is solved as a whole before relaxation is tried.
 
-    That is so in static mode, for islands with supports or with the paper's contacts, and for
-    `quiet` islands whose joints hold or that were solved as a whole in the last step. It is not
-    so for an island with a fence, which has no entries in the system of equations.
+    That is so in static mode, for islands with the paper's contacts, for a lone block with
+    supports, and for `quiet` islands with supports, with joints that hold, or that were solved as a
+    whole in the last step. It is not so for an island with a fence, which has no entries in the
+    system of equations.
     """
     required, bonds, rested = p.static, False, True
-    for place in range(islands.block_start[island], islands.block_start[island + 1]):
+    low, high = islands.block_start[island], islands.block_start[island + 1]
+    for place in range(low, high):
         body = bodies[islands.block_item[place]]
         if body.brake > 0.0:
             return False
         rested = rested and body.whole
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
-        required = required or is_elastic(c)
-        bonds = bonds or c.bond > 0.0
+        required = required or c.kind == PLAIN or (high - low == 1 and is_elastic(c))
+        bonds = bonds or c.bond > 0.0 or is_elastic(c)
     return required or (quiet and (bonds or rested))
 
 

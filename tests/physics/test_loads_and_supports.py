@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from rigdda import (
     Scene,
     Settings,
     Simulation,
+    Site,
     Surface,
     Terrain,
 )
@@ -295,3 +297,15 @@ def test_bad_input(case):
     with pytest.raises(BadInput) as caught:
         wrong()
     assert caught.value.field.startswith(field)
+
+
+def test_a_bolt_that_does_nothing_costs_no_solution_of_a_moving_mass() -> None:
+    """Islands with supports are relaxed while they move, like all others."""
+    scene = Site.load("quick").realise((), 1, "mass")
+    x, y = scene.blocks[0].vertices.mean(axis=0)
+    solves = []
+    for supports in ((), (Bolt(0, (x, y), None, (x, y + 200.0), 1e-3),)):
+        sim = Simulation(replace(scene, supports=supports), Settings(dt=1e-2))
+        sim.step(300)
+        solves.append(sim.diagnostics.solves)
+    assert solves[1] <= solves[0] + 50

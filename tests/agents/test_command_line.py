@@ -20,7 +20,6 @@ from rerun.chunk import RrdReader
 import rigdda
 from rigdda import Site
 from rigdda.agents import DESIGNERS, cli
-from rigdda.agents.terminal import LOCK
 from rigdda.barriers import to_tables
 
 TINY = ("--budget", "400", "--verify", "40")
@@ -96,7 +95,7 @@ def without_time(file: Path) -> list[dict[str, str]]:
 
 def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -> None:
     folder, _ = designed
-    assert {path.name for path in folder.iterdir()} == {*FILES, LOCK}
+    assert {path.name for path in folder.iterdir()} == set(FILES)
     layout = rigdda.load_layout(folder / "layout.toml")
     table = rows(folder / "evaluations.csv")
     assert [row["stage"] for row in table[-4:]] == 4 * ["verification"]

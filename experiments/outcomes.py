@@ -15,6 +15,7 @@ import csv
 import hashlib
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,17 @@ import numpy as np
 import rigdda.envs  # noqa: F401  registers the environments
 from experiments.made_by import KERNELS, kernels_hash, made_by
 from experiments.script import RESULTS, put, say, write
-from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Simulation, Site
+from rigdda import (
+    Bolt,
+    Ditch,
+    Embankment,
+    Fence,
+    FixedPoint,
+    GravityWall,
+    Layout,
+    Simulation,
+    Site,
+)
 from rigdda.envs import DesignProblem
 from rigdda.model.settings import Settings
 from rigdda.releases import Batch
@@ -90,6 +101,17 @@ def motion_of(**settings: Any) -> str:
     return digest(simulation.poses, simulation.velocities, simulation.energy())
 
 
+def motion_with_supports() -> str:
+    """Return the digest of the mass of `quick` after 4 s with a bolt and a fixed point in it."""
+    scene = Site.load("quick").realise((), 1, "mass")
+    (x, y), last = (scene.blocks[i].vertices.mean(axis=0) for i in (0, -1))
+    bolt = Bolt(0, (x, y), None, (x, y + 30.0), 1e6)
+    held = replace(scene, supports=(bolt, FixedPoint(len(scene.blocks) - 1, last)))
+    simulation = Simulation(held, Settings(dt=1e-2))
+    simulation.step(400)
+    return digest(simulation.poses, simulation.velocities, simulation.supports())
+
+
 def episodes_of(name: str) -> str:
     """Return the digest of episodes of an environment with random actions."""
     env = gymnasium.make(name, site="quick")
@@ -129,6 +151,7 @@ def computed() -> Iterator[tuple[str, Callable[[], str]]]:
         yield f"motion with solver {solver}", lambda s=solver: motion_of(solver=s)
     yield "motion in static mode", lambda: motion_of(mode="static")
     yield "motion without post-correction", lambda: motion_of(post_correction=False)
+    yield "motion with a bolt and a fixed point", motion_with_supports
     yield "motion as one island", lambda: motion_of(islands=False, sleeping=False)
     for case in CASES:
         if case.name in CASE_NAMES:

@@ -197,8 +197,8 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     import rigdda
     from rigdda.agents.reports import findings
     from rigdda.agents.reports.wording import short, standing
-    from rigdda.results.replay import Marks
-    from rigdda.results.viewer import open_viewer
+    from rigdda.replay.recording import Marks
+    from rigdda.replay.viewer import open_viewer
 
     file = Path(target)
     if file.suffix in (".npz", ".rrd") and (layout or event or seed or out):

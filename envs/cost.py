@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from rigdda import BadInput, Layout, Outcome, Site
 from rigdda.barriers.fence import PANEL
 from rigdda.envs.intervals import Estimate, Interval, Known, Mean, cost, estimate, pair, total
-from rigdda.model.economy import capitals
 
 
 @dataclass(frozen=True, slots=True)
@@ -380,5 +379,5 @@ def _mending(site: Site, layout: Layout) -> float:
 
     A panel of it, the least that is mended; 0 if none can.
     """
-    prices = zip(layout, capitals(site, layout), strict=True)
+    prices = zip(layout, site.capitals(layout), strict=True)
     return PANEL * max((price for b, price in prices if b.kind in FAIL), default=0.0)

@@ -156,7 +156,7 @@ class Recorder:
         rewards : sequence of float
             Of each step.
         """
-        from rigdda.results.replay import Marks
+        from rigdda.replay.recording import Marks
 
         end, site = stages[-1], shown.site
         run, _ = rigdda.release(site, end.layout, shown.seed, shown.event)
@@ -186,7 +186,7 @@ class Recorder:
         stages : sequence of Evaluation
             What stood at the start, nothing, and after each step.
         """
-        from rigdda.results.episode import Placement, write_episode
+        from rigdda.replay.episode import Placement, write_episode
 
         site = shown.site
         placements = [

@@ -16,7 +16,7 @@ from rigdda.barriers import Layout
 from rigdda.envs.rendering import draw as draw_frame
 from rigdda.errors import SoftContacts
 from rigdda.geometry import polygon_properties
-from rigdda.results.outcome import Outcome
+from rigdda.model.outcome import Outcome
 
 SITE = Site.load("shu-hwa-paper")
 

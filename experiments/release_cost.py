@@ -17,8 +17,8 @@ import numpy as np
 
 from experiments.script import Number, main, say, write
 from rigdda import Embankment, Fence, Layout, Site, sites
+from rigdda.measurement import judge
 from rigdda.releases import Batch
-from rigdda.results.outcome import judge
 
 SITE, TARGET = "bench", 0.5
 EVENTS = {"one block": "block", "group": "group", "slab": "slab"}

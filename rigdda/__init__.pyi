@@ -20,8 +20,9 @@ from .errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from .lumped_mass import Points, lumped
 from .model import grounds
 from .model.block import Block
-from .model.economy import Bill, Consequences, Prices
 from .model.loads import BodyForce, Bolt, FixedPoint, LineLoad, PointLoad
+from .model.outcome import BarrierOutcome, Outcome
+from .model.prices import Bill, Consequences, Prices
 from .model.scene import Scene
 from .model.settings import Settings
 from .model.site import Site
@@ -30,7 +31,6 @@ from .model.source import Source
 from .model.surface import Surface
 from .model.terrain import Terrain
 from .releases import release, release_many, release_outcome
-from .results.outcome import BarrierOutcome, Outcome
 
 __version__: str
 

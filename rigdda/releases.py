@@ -37,16 +37,10 @@ from rigdda.dynamics.single_block import MOST_CORNERS, Descent, SingleBlock
 from rigdda.dynamics.template import Template
 from rigdda.errors import BadInput, DoubtfulInput, Error
 from rigdda.geometry import clearly_convex, polygon_properties
-from rigdda.model.interfaces import Meetings
-from rigdda.model.scene import Scene
-from rigdda.model.settings import Settings, longest_step_of_single
-from rigdda.model.site import Site
-from rigdda.model.site_tables import Drawn
-from rigdda.results.outcome import (
+from rigdda.measurement import (
     STANDS,
     BarrierEnding,
     Ending,
-    Outcome,
     ending,
     judge,
     leave,
@@ -56,6 +50,12 @@ from rigdda.results.outcome import (
     steepest_deposit,
     watch,
 )
+from rigdda.model.interfaces import Meetings
+from rigdda.model.outcome import Outcome
+from rigdda.model.scene import Scene
+from rigdda.model.settings import Settings, longest_step_of_single
+from rigdda.model.site import Site
+from rigdda.model.site_tables import Drawn
 
 NEVER: NDArray[np.float64] = np.zeros(0)
 """Times of the frames that are kept on the way: none."""

@@ -18,7 +18,7 @@ from rigdda import (
 )
 from rigdda.envs import DesignProblem
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
-from rigdda.model.realisation import FARTHEST
+from rigdda.model.site import FARTHEST
 from rigdda.model.site_tables import Motion
 from rigdda.model.surface import Interface
 from rigdda.model.terrain import REACH, Roughness, Terrain

@@ -23,8 +23,8 @@ from rigdda import (
     save_layout,
 )
 from rigdda.barriers import KINDS, describe
-from rigdda.results.outcome import states, stations
-from rigdda.results.replay import Marks
+from rigdda.measurement import stations
+from rigdda.replay.recording import Marks
 
 QUICK = Site.load("quick")
 LAYOUT = (
@@ -127,7 +127,7 @@ def test_what_passes_a_failed_fence_did_not_overtop_it(released):
 def test_what_passes_a_wall_that_was_overturned_did_not_overtop_it():
     wall = GravityWall(25.6, 4.0, 0.6)
     run, outcome = rigdda.release(QUICK, (wall,), 0, "mass")
-    (over,) = (time for time, state in states(run, 0) if state == "overturned")
+    (over,) = (time for time, state in run.states(0) if state == "overturned")
     passed = run.crossings(stations(QUICK, (wall,)).index(wall.end))["time"]
     assert outcome.barriers[0].overtopped == (passed < over).sum() < len(passed)
 

@@ -11,9 +11,9 @@ from physics.helpers import FLAT, box, rock
 
 from rigdda import Ditch, Fence, Scene, Settings, Simulation, Site, Surface, Terrain, Wall
 from rigdda.geometry import polygon_properties
+from rigdda.measurement import measure, stations, watch
 from rigdda.model.settings import longest_step
 from rigdda.model.site_tables import Motion, Scatter
-from rigdda.results.outcome import measure, stations, watch
 
 QUICK = Site.load("quick")
 EDGE = QUICK.road.start

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import shapely
 from rerun.chunk import RrdReader
+from rigdda.results import replay, viewer
 
 from rigdda.barriers import Built, Embankment, Fence, GravityWall, Wall
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
@@ -24,10 +25,8 @@ from rigdda.model.block import Block
 from rigdda.model.scene import Scene
 from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
-from rigdda.results import replay, viewer
-from rigdda.results.outcome import states
-from rigdda.results.replay import PLOTS, Marks
-from rigdda.results.viewer import open_viewer
+from rigdda.replay.recording import PLOTS, Marks
+from rigdda.replay.viewer import open_viewer
 
 GRAVITY = 9.81
 SIZES = np.array([[1.0, 2.0], [1.5, 1.0], [2.0, 2.0]])
@@ -175,9 +174,9 @@ def test_barriers_are_labelled_with_what_they_are_and_their_state_over_time(
 def test_a_gravity_wall_slides_then_is_overturned(run: Run) -> None:
     moved = with_barriers(run, GravityWall(27.0, 2.0, 1.0), failed=())
     moved.barrier_poses[10:, 0, 0] += 0.2
-    assert states(moved, 0) == [(0.0, "stands"), (0.5, "slid")]
+    assert moved.states(0) == [(0.0, "stands"), (0.5, "slid")]
     moved.barrier_poses[20:, 0, 2] += 1.0
-    assert states(moved, 0) == [(0.0, "stands"), (0.5, "slid"), (1.0, "overturned")]
+    assert moved.states(0) == [(0.0, "stands"), (0.5, "slid"), (1.0, "overturned")]
 
 
 def test_debris_is_all_that_ever_passed_the_road(run: Run, file: Path) -> None:

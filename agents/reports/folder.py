@@ -11,7 +11,7 @@ from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import findings, pictures
 from rigdda.agents.reports.pictures import BLOCKS, Flights, Panel, fly, section
 from rigdda.agents.reports.wording import euros, short, span, standing
-from rigdda.results.replay import Marks
+from rigdda.replay.recording import Marks
 
 FILES = (
     "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png", "episode.rrd",

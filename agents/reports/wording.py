@@ -48,7 +48,7 @@ def strength(fence: Fence) -> str:
 def order(barrier: Barrier, site: Site) -> str:
     """Return what to order, where it stands, and what room it leaves, in words."""
     if isinstance(barrier, Mesh):
-        option = site.mesh(barrier)
+        option = site.mesh(barrier.option)
         return f"mesh {option.name!r}: {option.area:g} m2 per metre, {option.price:g} EUR/m2"
     ground, road = site.profile, site.road
     above = ground.height(barrier.x) - ground.height(road.start)

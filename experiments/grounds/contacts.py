@@ -23,7 +23,7 @@ import numpy as np
 from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
 from rigdda.agents.fit import Floats
 from rigdda.dynamics.constants import APART
-from rigdda.model.realisation import FARTHEST
+from rigdda.model.site import FARTHEST
 from rigdda.model.terrain import Roughness
 
 SEEN = Path(__file__).parent / "chant_sura_contacts.csv"

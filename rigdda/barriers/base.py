@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Self
+from typing import ClassVar, Literal, NamedTuple, Protocol, Self
 
 import msgspec
 import numpy as np
@@ -15,15 +15,18 @@ from numpy.typing import NDArray
 from rigdda import check
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
+from rigdda.model.prices import Prices
+from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
-
-if TYPE_CHECKING:
-    from rigdda.model.scene import Scene
-    from rigdda.model.site import Site
-    from rigdda.model.terrain import Terrain
 
 Floats = NDArray[np.float64]
 Drawn = Literal["solid", "moving", "line"]
+
+STANDS = "stands"
+"""State of a barrier as it was built."""
+
+GONE = ("failed", "overturned", "pushed")
+"""States in which a barrier holds nothing."""
 
 ELEMENT = 5.0
 """Length of an element along the slope, which acts whole, and the least that is mended [m]."""
@@ -48,6 +51,55 @@ class Reach(NamedTuple):
         return self.start <= x < self.end and y < self.top + self.rise * (self.end - x)
 
 
+class MeshPrice(Protocol):
+    """What a mesh costs: its area per metre of road [m2/m] and its price [EUR/m2]."""
+
+    @property
+    def area(self) -> float:
+        """Area per metre of road [m2/m]."""
+
+    @property
+    def price(self) -> float:
+        """Price [EUR/m2]."""
+
+
+class PricedSite(Protocol):
+    """What a barrier needs to know of a site to have a price: `rigdda.Site` knows it."""
+
+    @property
+    def prices(self) -> Prices:
+        """Prices of the site."""
+
+    def surface_at(self, x: float) -> str:
+        """Return the surface of the ground at a chainage."""
+
+    def mesh(self, name: str) -> MeshPrice:
+        """Return an option of mesh by its name."""
+
+
+class Subsoil(Protocol):
+    """What a barrier needs to know of a scene to resist thrust: `rigdda.Scene` knows it."""
+
+    @property
+    def terrain(self) -> Terrain | None:
+        """The natural ground."""
+
+    @property
+    def gravity_vector(self) -> tuple[float, float]:
+        """Acceleration of gravity [m/s2]."""
+
+    @property
+    def fill(self) -> str:
+        """Surface of embankments."""
+
+    @property
+    def barrier_surface(self) -> str:
+        """Surface of barriers."""
+
+    def interface(self, first: str, second: str) -> Surface:
+        """Return how two surfaces meet."""
+
+
 class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fields=True):
     """What every barrier has; written as a table with its `kind`.
 
@@ -66,14 +118,14 @@ class BarrierBase(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_
     repaired: ClassVar[float] = ELEMENT
     drawn: ClassVar[Drawn] = "solid"
 
-    def price(self, site: Site, outline: Floats | None) -> float:
+    def price(self, site: PricedSite, outline: Floats | None) -> float:
         """Return what it costs to build at the height of the road [EUR per metre of road].
 
         `outline`: what an earthwork moves, (n, 2) [m].
         """
         raise NotImplementedError
 
-    def resistance(self, scene: Scene, outline: Floats) -> float:
+    def resistance(self, scene: Subsoil, outline: Floats) -> float:
         """Return the thrust that it bears, standing as `outline` [N/m]; inf: none moves it."""
         return math.inf
 
@@ -134,7 +186,7 @@ def section(outline: Floats) -> float:
     return abs(polygon_properties(outline)[0])
 
 
-def base_friction(scene: Scene, density: float, own: str, outline: Floats) -> float:
+def base_friction(scene: Subsoil, density: float, own: str, outline: Floats) -> float:
     """Return weight times friction of what stands on the ground as an outline [N/m].
 
     The friction is the least of its surface, `own`, on those under it.

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from rigdda.barriers.base import BarrierBase, Drawn, Floats, Reach
+from rigdda.barriers.base import BarrierBase, Drawn, Floats, PricedSite, Reach
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
 from rigdda.errors import BadInput
 from rigdda.model.terrain import Terrain
-
-if TYPE_CHECKING:
-    from rigdda.model.site import Site
 
 
 class Ditch(BarrierBase, frozen=True, tag="ditch"):
@@ -80,7 +77,7 @@ class Ditch(BarrierBase, frozen=True, tag="ditch"):
         line = np.array([[left, high], [first, floor], [last, floor], [right, low]])
         return regrade("ditch x", ground, line, np.minimum, None)
 
-    def price(self, site: Site, outline: Floats | None) -> float:
+    def price(self, site: PricedSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, by the surface of what is dug [EUR/m].
 
         `outline` has the new ground from left to right, then the old one back, see
@@ -94,7 +91,7 @@ class Ditch(BarrierBase, frozen=True, tag="ditch"):
         old = np.array([new[0], *outline[: count - 1 : -1, 1], new[-1]])
         depth = np.abs(old - new)
         volume = 0.5 * (depth[1:] + depth[:-1]) * np.diff(x)
-        names = [site.slope.surface_at(middle) for middle in 0.5 * (x[1:] + x[:-1])]
+        names = [site.surface_at(middle) for middle in 0.5 * (x[1:] + x[:-1])]
         dug = sum(v * prices.get(n, dearest) for v, n in zip(volume, names, strict=True))
         return site.prices.ditch_base + float(dug)
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
-from rigdda.barriers.base import BarrierBase, Floats, Reach, base_friction, section
+from rigdda.barriers.base import (
+    BarrierBase,
+    Floats,
+    PricedSite,
+    Reach,
+    Subsoil,
+    base_friction,
+    section,
+)
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
 from rigdda.errors import BadInput
 from rigdda.model.terrain import Terrain
-
-if TYPE_CHECKING:
-    from rigdda.model.scene import Scene
-    from rigdda.model.site import Site
 
 
 class Embankment(BarrierBase, frozen=True, tag="embankment"):
@@ -115,12 +119,12 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
             "put it where the ground is flatter than its side, which does not meet the ground",
         )
 
-    def price(self, site: Site, outline: Floats | None) -> float:
+    def price(self, site: PricedSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, that of its fill [EUR/m]."""
         assert outline is not None
         return site.prices.embankment * section(outline)
 
-    def resistance(self, scene: Scene, outline: Floats) -> float:
+    def resistance(self, scene: Subsoil, outline: Floats) -> float:
         """Return its weight times the friction of its base [N/m]."""
         return base_friction(scene, self.density, scene.fill, outline)
 

@@ -5,17 +5,13 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import msgspec
 
-from rigdda.barriers.base import FOUNDATION, Floats, Standing
+from rigdda.barriers.base import FOUNDATION, Floats, PricedSite, Standing, Subsoil
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.model.terrain import Terrain
-
-if TYPE_CHECKING:
-    from rigdda.model.scene import Scene
-    from rigdda.model.site import Site
 
 PANEL = 10.0
 """Length of a panel of a fence along the slope, which acts whole [m]."""
@@ -182,11 +178,11 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         assert self.elongation is not None  # set at the start
         return self.capacity / self.elongation if self.capacity is not None else math.inf
 
-    def resistance(self, scene: Scene, outline: Floats) -> float:
+    def resistance(self, scene: Subsoil, outline: Floats) -> float:
         """Return the force against which it gives way [N/m]."""
         return self.braking_force
 
-    def price(self, site: Site, outline: Floats | None) -> float:
+    def price(self, site: PricedSite, outline: Floats | None) -> float:
         """Return the price at the height of the road [EUR/m], with its foundations.
 
         One that is lower than any of its class costs as much as the lowest.

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 import msgspec
 import numpy as np
 import shapely
 
-from rigdda.barriers.base import ELEMENT, Drawn, Floats, Standing, base_friction
+from rigdda.barriers.base import (
+    ELEMENT,
+    Drawn,
+    Floats,
+    PricedSite,
+    Standing,
+    Subsoil,
+    base_friction,
+)
 from rigdda.model.terrain import Terrain
-
-if TYPE_CHECKING:
-    from rigdda.model.scene import Scene
-    from rigdda.model.site import Site
 
 SLID = 0.1
 """Displacement of a corner beyond which a gravity wall has slid [m]: what its contacts give under
@@ -82,11 +86,11 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
         top = max(left, right) + self.height
         return np.array([[x[0], left], [x[-1], right], [x[-1], top], [x[0], top]])
 
-    def price(self, site: Site, outline: Floats | None) -> float:
+    def price(self, site: PricedSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, that of its concrete [EUR/m]."""
         return site.prices.concrete * self.height * self.thickness
 
-    def resistance(self, scene: Scene, outline: Floats) -> float:
+    def resistance(self, scene: Subsoil, outline: Floats) -> float:
         """Return its weight times the friction of its base [N/m]."""
         return base_friction(scene, self.density, scene.barrier_surface, outline)
 

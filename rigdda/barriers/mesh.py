@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from rigdda import check
-from rigdda.barriers.base import BarrierBase, Floats
+from rigdda.barriers.base import BarrierBase, Floats, PricedSite
 from rigdda.errors import BadInput
-
-if TYPE_CHECKING:
-    from rigdda.model.site import Site
 
 
 class Mesh(BarrierBase, frozen=True, tag="mesh"):
@@ -48,9 +44,9 @@ class Mesh(BarrierBase, frozen=True, tag="mesh"):
         """Length that it takes up among barriers on the slope [m]: none."""
         return 0.0
 
-    def price(self, site: Site, outline: Floats | None) -> float:
+    def price(self, site: PricedSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, of its option [EUR/m]."""
-        option = site.mesh(self)
+        option = site.mesh(self.option)
         return option.area * option.price
 
     def left_height(self, displacement: float) -> float:

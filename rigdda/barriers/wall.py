@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from rigdda.barriers.base import Floats, Standing
-
-if TYPE_CHECKING:
-    from rigdda.model.site import Site
+from rigdda.barriers.base import Floats, PricedSite, Standing
 
 
 class Wall(Standing, frozen=True, tag="wall"):
@@ -34,7 +30,7 @@ class Wall(Standing, frozen=True, tag="wall"):
     def __post_init__(self) -> None:
         self._check("height", "thickness")
 
-    def price(self, site: Site, outline: Floats | None) -> float:
+    def price(self, site: PricedSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, that of its concrete [EUR/m]."""
         return site.prices.concrete * self.height * self.thickness
 

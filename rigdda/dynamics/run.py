@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.barriers import Fence, GravityWall
+from rigdda.barriers.base import STANDS
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.errors import BadInput
 from rigdda.files import atomic
@@ -21,7 +22,7 @@ from rigdda.model.scene import Scene, scene_from_json, scene_to_json
 from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:
-    from rigdda.results.replay import Marks
+    from rigdda.replay.recording import Marks
 
 EVENT = np.dtype(
     [
@@ -113,6 +114,28 @@ class Run:
         failed = self._of(FAILED, barrier)
         return float(failed["time"][0]) if len(failed) else np.inf
 
+    def states(self, barrier: int) -> list[tuple[float, str]]:
+        """Return the states of a barrier, each with the time from which it is in it [s].
+
+        The first is "stands"; then a fence "failed", an embankment was "pushed", a gravity wall
+        "slid" or is "overturned", by the frames of the run.
+        """
+        changes = self.scene.barriers[barrier].changes
+        poses = self.barrier_poses[:, barrier]
+        start = (float(self.times[0]), STANDS)
+        return [start, *changes(self.times, poses, self.failure(barrier))]
+
+    def passed(self, x: float) -> NDArray[np.bool_]:
+        """Return whether each block's centroid was ever at or past a chainage [m], (T, N).
+
+        Crossings count where they happened, so that a block which came back between two frames is
+        not missed.
+        """
+        seen = self.poses[:, :, 0] >= x
+        for event in self.events[(self.events["kind"] == CROSSING) & (self.events["x"] >= x)]:
+            seen[np.searchsorted(self.times, event["time"]) :, event["block"]] = True
+        return np.logical_or.accumulate(seen, axis=0)
+
     def outline(self, barrier: int, frame: int = -1) -> NDArray[np.float64]:
         """Return the (n, 2) corners of a barrier in a frame, see `Scene.outline` [m]."""
         corners = self.scene.outline(barrier)
@@ -192,6 +215,6 @@ class Run:
         marks : Marks, optional
             What the scene does not know: the road and words about the episode.
         """
-        from rigdda.results.replay import write_rerun
+        from rigdda.replay.recording import write_rerun
 
         write_rerun(self, path, marks)

@@ -1,6 +1,6 @@
 """How the surfaces of a site meet in a release, in numbers that a kernel varies with what is drawn.
 
-The same as `rigdda.model.realisation.strength` and `rigdda.Scene.interface` give, to the bit, in a
+The same as `rigdda.Site.strength` and `rigdda.Scene.interface` give, to the bit, in a
 hundredth of the time: no surfaces are built and checked. Contacts of two surfaces have the smaller
 value of each property, and other pairs those of one surface; so that every pair has the smaller
 values of two rows of a table, which may be the same row.
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.kernel import Direct, kernel, short_kernel
-from rigdda.model.realisation import STEEPEST_DEG, pairs
+from rigdda.model.site import STEEPEST_DEG, pairs
 from rigdda.model.surface import MOST_DAMPING
 
 if TYPE_CHECKING:

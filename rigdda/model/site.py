@@ -1,4 +1,4 @@
-"""What an engineer knows about a site, as a TOML file."""
+"""A site: what an engineer knows about it, its file, its releases and its prices."""
 
 from __future__ import annotations
 
@@ -6,31 +6,49 @@ import math
 import os
 import tomllib
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TypeVar
 
 import msgspec
 import numpy as np
 import tomli_w
 
-from rigdda import sites
-from rigdda.barriers import Barrier, Built, as_layout
+from rigdda import check
+from rigdda.barriers import Barrier, Built, Layout, Mesh, as_layout, earthworks
 from rigdda.check import mistyped
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, read
 from rigdda.geometry import polygon_properties
-from rigdda.model import economy, realisation
-from rigdda.model.economy import Bill
+from rigdda.model import loose_blocks, site_names
+from rigdda.model.block import Block
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
+from rigdda.model.outcome import Outcome
+from rigdda.model.prices import ACCESS_HEIGHT, Bill
+from rigdda.model.random_streams import stream
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
+from rigdda.model.site_generator import generate
 from rigdda.model.site_tables import Drawn, Event, Rebound, SiteTables
 from rigdda.model.soundness import check_damping, check_site
-from rigdda.model.surface import Surface
+from rigdda.model.source import Source
+from rigdda.model.surface import MOST_DAMPING, Surface, smaller
+from rigdda.model.terrain import Roughness
 
-if TYPE_CHECKING:
-    from rigdda.results.outcome import Outcome
+Value = TypeVar("Value")
+
+ROUNDING = 1e-9
+"""Length by which a barrier may reach into loose rock [m]: vectors lose last digits of its edge."""
+
+STRENGTHS, PITS = 1, 2
+"""Ends of the seeds of what is drawn of the ground beside the blocks."""
+
+FARTHEST = 2.5
+"""Standard deviations at which normal numbers of the ground are cut off."""
+
+STEEPEST_DEG = 85.0
+"""Friction angle up to which scatter may raise that of a surface [deg]."""
 
 
 class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -54,6 +72,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             check_damping(self.motion)
             msgspec.structs.force_setattr(self, "surfaces", _with_damping(self.surfaces))
         check_site(self)
+        if not self.rooms:
+            mend = "leave room for barriers: bands of loose rock take all of the zone"
+            raise BadInput("barrier_zone.end", self.barrier_zone.end, mend)
 
     @classmethod
     def load(cls, source: str | os.PathLike[str]) -> Site:
@@ -68,7 +89,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             raise BadInput("site", source, "name a TOML file or a built-in site")
         path = Path(source)
         if path.suffix != ".toml" and not path.is_file():
-            return sites.load(str(source))
+            return cls.named(str(source))
         if not path.is_file():
             raise BadInput("site", str(source), "name an existing TOML file")
         return cls.parse(read("site file", path), str(source))
@@ -91,6 +112,14 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             raise bad or BadInput("site file", name, str(error)) from None
         except (msgspec.DecodeError, RecursionError) as error:
             raise BadInput("site file", name, f"mend its TOML: {error}") from None
+
+    @classmethod
+    def named(cls, name: str) -> Site:
+        """Return a built-in site, or a generated one, by its name, see `rigdda.sites.load`."""
+        if name in site_names.names():
+            return cls.parse(site_names.text(name), name)
+        family, number = site_names.instance(name)
+        return generate(cls.named(site_names.built_in(family, number)), name, number)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the site as TOML; `load` gives it back.
@@ -121,7 +150,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     def pick(self, seed: int) -> str:
         """Return the name of the event that a seed draws by rate."""
-        return realisation.pick(self, seed)
+        rates = np.array([event.rate for event in self.events])
+        rng = np.random.default_rng([check.integer("seed", seed, 0), len(rates)])
+        return self.events[rng.choice(len(rates), p=rates / rates.sum())].name
 
     @property
     def rooms(self) -> tuple[tuple[float, float], ...]:
@@ -129,7 +160,13 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
         Around a band so much is left out as its largest block reaches beyond it.
         """
-        return realisation.rooms(self)
+        start, end = self.barrier_zone.start, self.barrier_zone.end
+        found = []
+        for low, high in sorted(_taken(self)):
+            if start < min(low, end):
+                found.append((start, min(low, end)))
+            start = max(start, high)
+        return (*found, (start, end)) if start < end else tuple(found)
 
     def settings(self, scene: Scene) -> Settings:
         """Return the numerical settings of the scene of a release.
@@ -149,7 +186,21 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If there is no such event, or the seed is not a whole number >= 0.
         """
-        return realisation.draw(self, seed, event)
+        seed = check.integer("seed", seed, 0)
+        name = self.pick(seed) if event is None else event
+        index = self.index(name)
+        what = self.events[index]
+        rock = self.source(what.source)
+        areas: list[float] = []
+        if rock.band is None:
+            normal, blocks = _cut(msgspec.json.encode(rock), seed, index)
+        else:
+            rng = stream((seed, index))
+            normal = rng.standard_normal()
+            areas, drawn = loose_blocks.draw(rng, rock, what, loose_blocks.line(self.slope.points))
+            blocks = tuple(drawn)
+        shift = normal * self.scatter.friction_deg
+        return Drawn(name, blocks, what.width_of(areas), shift, *_ground(self, seed, index))
 
     def built(self, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
         """Return what stands of a layout, as it resists an event of this width [m].
@@ -159,11 +210,32 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If a barrier stands where loose rock lies, or a mesh is not one of the options.
         """
-        return realisation.built(self, layout, width)
+        standing: list[Built] = []
+        taken = _taken(self)
+        for i, barrier in enumerate(as_layout(layout)):
+            if isinstance(barrier, Mesh):
+                self.mesh(barrier.option)
+                continue
+            for low, high in taken:
+                if barrier.x < high - ROUNDING and barrier.x + barrier.extent > low + ROUNDING:
+                    mend = f"put it outside x = {low:.2f} to {high:.2f}, where loose rock lies"
+                    raise BadInput(f"barriers[{i}].x", barrier.x, mend)
+            standing.append(barrier.for_width(width))
+        return tuple(standing)
 
     def scene(self, drawn: Drawn, barriers: Sequence[Built] = ()) -> Scene:
         """Return the scene of what was drawn, with barriers as `built` gives them."""
-        return realisation.scene(self, drawn, barriers)
+        surfaces, interfaces = self.strength(drawn)
+        return Scene(
+            terrain=self.profile,
+            blocks=drawn.blocks,
+            surfaces=surfaces,
+            interfaces=interfaces,
+            barriers=tuple(barriers),
+            damping=self.motion.damping or 0.0,
+            damping_when=self.motion.damping_when,
+            roughness=drawn.roughness,
+        )
 
     def realise(
         self, layout: Sequence[Barrier] = (), seed: int = 0, event: str | None = None
@@ -183,12 +255,28 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     def strength(self, drawn: Drawn) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
         """Return the surfaces and how pairs meet in a release, with what was drawn of them."""
-        return realisation.strength(self, drawn)
+        surfaces, normals = self.surfaces, drawn.strengths
+        if normals:
+            each = zip(surfaces.items(), normals, strict=True)
+            fallback = self.motion.damping
+            surfaces = {name: _varied(s, fallback, *normal) for (name, s), normal in each}
+        if drawn.friction_deg != 0.0:
+            surfaces = {name: _shifted(s, drawn.friction_deg) for name, s in surfaces.items()}
+        found = pairs(self, surfaces)
+        for pair in self.interfaces:
+            ends = pair.first, pair.second
+            usual = found.pop(ends[::-1], None) or found.get(ends)
+            usual = usual or smaller(surfaces[pair.first], surfaces[pair.second])
+            meets = _shifted(pair.surface, drawn.friction_deg)
+            if meets.damping is None:
+                meets = msgspec.structs.replace(meets, damping=usual.damping)
+            found[ends] = meets
+        return surfaces, found
 
     def access(self, x: float) -> float:
         """Return the factor on prices at a chainage: dearer the higher above the road [-]."""
         rise = self.profile.height(x) - self.profile.height(self.road.start)
-        return 1.0 + self.prices.access * max(rise, 0.0) / economy.ACCESS_HEIGHT
+        return 1.0 + self.prices.access * max(rise, 0.0) / ACCESS_HEIGHT
 
     def rate(self, event: str, layout: Sequence[Barrier] = ()) -> float:
         """Return how often an event happens with the mesh of a layout [1/year per metre of slope].
@@ -198,7 +286,26 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If there is no such event or mesh option, or an option is there twice.
         """
-        return economy.rate(self, event, layout)
+        often, used = self.event(event).rate / 100.0, set()
+        for barrier in layout:
+            if isinstance(barrier, Mesh):
+                if barrier.option in used:
+                    raise BadInput("mesh option", barrier.option, "hang each option once")
+                used.add(barrier.option)
+                often *= self.mesh(barrier.option).factors.get(event, 1.0)
+        return often
+
+    def capitals(self, layout: Sequence[Barrier]) -> list[float]:
+        """Return the price of each barrier of a layout, to build [EUR per metre of road].
+
+        Raises
+        ------
+        BadInput
+            If a barrier has no price, or an earthwork does not fit.
+        """
+        standing = as_layout(layout)
+        _, moved = earthworks(self.profile, standing, self.soil)
+        return [b.price(self, moved.get(b)) * self.access(b.x) for b in standing]
 
     def capital(self, layout: Sequence[Barrier]) -> float:
         """Return what a layout costs to build [EUR per metre of road].
@@ -208,7 +315,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If an earthwork does not fit, or a barrier has no price.
         """
-        return float(sum(economy.capitals(self, as_layout(layout))))
+        return float(sum(self.capitals(layout)))
 
     def annual(self, layout: Sequence[Barrier]) -> float:
         """Return what a layout costs a year, upkeep included [EUR per metre of road and year].
@@ -216,12 +323,30 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         Raises as `capital` does.
         """
         standing = as_layout(layout)
-        each = zip(standing, economy.capitals(self, standing), strict=True)
+        each = zip(standing, self.capitals(standing), strict=True)
         return float(sum(price * self.prices.annual(b.kind) for b, price in each))
 
     def bill(self, layout: Sequence[Barrier], outcome: Outcome) -> Bill:
-        """Return what a release with a layout costs [EUR per occurrence of its event]."""
-        return economy.bill(self, as_layout(layout), outcome)
+        """Return what a release with a layout costs [EUR per occurrence of its event].
+
+        Of what failed, the length that the event was wide is built anew, but at least a panel or
+        an element; what the barriers hold is carried off. What of a gravity wall came onto the
+        road blocks it as rock does.
+        """
+        layout = as_layout(layout)
+        volume, reached = outcome.road_volume, outcome.reached
+        repair = self.prices.removal * outcome.held_fraction * outcome.released_volume
+        if any(found.failed for found in outcome.barriers):
+            built = [b for b in layout if not isinstance(b, Mesh)]
+            cost = _capital_of(self, layout)
+            for barrier, found in zip(built, outcome.barriers, strict=True):
+                if not found.failed:
+                    continue
+                length = max(outcome.width, barrier.repaired)
+                repair += cost[barrier] * length
+                volume += found.road_area * length
+                reached = reached or found.road_area > 0.0
+        return Bill(self.consequences.harm(volume, reached), repair)
 
     def shed(self) -> float:
         """Return what a rock shed over the road costs a year [EUR per metre of road and year].
@@ -276,3 +401,113 @@ def _is_bad(table: object, kind: type | None) -> bool:
     except msgspec.ValidationError:
         return True
     return False
+
+
+@lru_cache(maxsize=4096)
+def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]]:
+    """Return what a seed draws of a mass, as JSON: a standard normal number and its blocks.
+
+    Cutting takes as long as simulating a small release, and a search asks for the same releases
+    again and again; one takes about 10 kB.
+    """
+    rng, rock = np.random.default_rng([seed, event]), msgspec.json.decode(source, type=Source)
+    normal = rng.standard_normal()
+    outlines = rock.cut(rng)
+    starts = rock.disturbed(rng, len(outlines))
+    return normal, tuple(
+        Block(corners, rock.density, rock.surface, velocity)
+        for corners, velocity in zip(outlines, starts, strict=True)
+    )
+
+
+def _ground(
+    site: Site, seed: int, index: int
+) -> tuple[tuple[tuple[float, float, float], ...], Roughness | None]:
+    """Return what a seed draws of the ground: see `Drawn.strengths` and `Drawn.roughness`.
+
+    By random numbers of their own, so that blocks do not depend on how the ground varies.
+    """
+    strengths: tuple[tuple[float, float, float], ...] = ()
+    if any(surface.varies for surface in site.surfaces.values()):
+        rng = stream((seed, index, STRENGTHS))
+        drawn = rng.standard_normal((len(site.surfaces), 3)).tolist()
+        strengths = tuple((_cut_off(a), _cut_off(b), _cut_off(c)) for a, b, c in drawn)
+    amplitude = {name: s.roughness for name, s in site.surfaces.items() if s.roughness > 0.0}
+    if not amplitude:
+        return strengths, None
+    event = site.events[index]
+    spacing = event.block_size(site.source(event.source))
+    return strengths, Roughness(spacing, amplitude, (seed, index, PITS))
+
+
+def _cut_off(normal: float) -> float:
+    """Return a normal number, or the nearest one that is not farther than `FARTHEST` from 0."""
+    return min(max(normal, -FARTHEST), FARTHEST)
+
+
+def pairs(site: Site, surfaces: Mapping[str, Value]) -> dict[tuple[str, str], Value]:
+    """Return what counts in contacts of rock with the ground: of the two surfaces the ground's."""
+    grounds = {site.slope.surface, *(s.surface for s in site.slope.surfaces)}
+    if "soil" in site.surfaces:
+        grounds.add("soil")  # embankments are ground
+    rocks = {source.surface for source in site.sources}
+    return {(r, g): surfaces[g] for r in sorted(rocks) for g in sorted(grounds) if r != g}
+
+
+def _taken(site: Site) -> list[tuple[float, float]]:
+    """Return the intervals that loose blocks of bands may take up [m]."""
+    found = []
+    for source in site.sources:
+        if source.band is not None:
+            reaches = (loose_blocks.reach(source, event) for event in site.events_of(source))
+            reach = max(reaches, default=0.0)
+            found.append((source.band[0] - reach, source.band[1] + reach))
+    return found
+
+
+def _varied(
+    surface: Surface, fallback: float | None, friction: float, restitution: float, damping: float
+) -> Surface:
+    """Return a surface whose values are off by so many of their standard deviations.
+
+    `fallback` is the damping of the site [1/s].
+    """
+    if not surface.varies:
+        return surface
+    rebound = surface.restitution
+    loss = fallback if surface.damping is None else surface.damping
+    angle = surface.friction_deg + friction * surface.friction_sd_deg
+    return msgspec.structs.replace(
+        surface,
+        friction_deg=min(max(angle, 0.0), max(surface.friction_deg, STEEPEST_DEG)),
+        restitution=None
+        if rebound is None
+        else min(max(rebound + restitution * surface.restitution_sd, 0.0), 1.0),
+        damping=None
+        if loss is None
+        else min(max(loss + damping * surface.damping_sd, 0.0), MOST_DAMPING),
+    )
+
+
+def _shifted(surface: Surface, shift: float) -> Surface:
+    """Return a surface whose friction angle is shifted [deg]."""
+    if shift == 0.0:
+        return surface
+    angle = min(surface.friction_deg + shift, max(surface.friction_deg, STEEPEST_DEG))
+    return msgspec.structs.replace(surface, friction_deg=max(angle, 0.0))
+
+
+_last: tuple[Site, Layout, dict[Barrier, float]] | None = None
+
+
+def _capital_of(site: Site, layout: Layout) -> dict[Barrier, float]:
+    """Return the price of each barrier [EUR/m], kept until another layout is asked for.
+
+    A layout has thousands of releases, and earthworks take longer to price than a block to fall.
+    """
+    global _last
+    known = _last
+    if known is None or known[0] is not site or known[1] != layout:
+        known = site, layout, dict(zip(layout, site.capitals(layout), strict=True))
+        _last = known
+    return known[2]

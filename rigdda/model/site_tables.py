@@ -10,10 +10,10 @@ from typing import NamedTuple
 import msgspec
 
 from rigdda import check
-from rigdda.barriers import Mesh, MeshOption
+from rigdda.barriers import MeshOption
 from rigdda.errors import BadInput
 from rigdda.model.block import Block
-from rigdda.model.economy import Consequences, Prices
+from rigdda.model.prices import Consequences, Prices
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
 from rigdda.model.source import Point, Source
 from rigdda.model.surface import Interface, Surface
@@ -493,6 +493,10 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         """Return the events that come from a source."""
         return [event for event in self.events if event.source == source.name]
 
+    def surface_at(self, x: float) -> str:
+        """Return the surface of the ground at a chainage."""
+        return self.slope.surface_at(x)
+
     @property
     def soil(self) -> str:
         """Name of the surface of embankments."""
@@ -506,8 +510,8 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         spanned = {name for (a, _), (b, _), name in ends if a < x + width and b > x}
         return max((STEEP_SIDES.get(name, FLAT_SIDE) for name in spanned), default=FLAT_SIDE)
 
-    def mesh(self, mesh: Mesh) -> MeshOption:
-        """Return the option that a mesh is.
+    def mesh(self, name: str) -> MeshOption:
+        """Return an option of mesh by its name.
 
         Raises
         ------
@@ -515,10 +519,10 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             If the site has no such option.
         """
         for option in self.meshes:
-            if option.name == mesh.option:
+            if option.name == name:
                 return option
         known = ", ".join(option.name for option in self.meshes) or "none: this site has no mesh"
-        raise BadInput("mesh option", mesh.option, f"choose one of {known}")
+        raise BadInput("mesh option", name, f"choose one of {known}")
 
 
 @lru_cache(maxsize=256)

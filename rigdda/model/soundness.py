@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -13,14 +12,11 @@ from rigdda import check
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
 from rigdda.model import loose_blocks
-from rigdda.model.economy import DITCHES
+from rigdda.model.prices import DITCHES
 from rigdda.model.settings import Settings
-from rigdda.model.site_tables import Motion
+from rigdda.model.site_tables import Motion, SiteTables
 from rigdda.model.source import NEAR, Point, Source
 from rigdda.model.surface import check_surface
-
-if TYPE_CHECKING:
-    from rigdda.model.site import Site
 
 BEYOND = 30.0
 """Least length of the ground beyond the road [m]: blocks that run past it shall not fall off the
@@ -37,7 +33,7 @@ CHEAPEST = 100.0
 """Closure of a day [EUR] below which thousands of EUR may have been meant."""
 
 
-def check_site(site: Site) -> None:
+def check_site(site: SiteTables) -> None:
     """Check a site.
 
     Raises
@@ -104,7 +100,7 @@ def check_names(field: str, names: Iterable[str]) -> None:
         seen.add(name)
 
 
-def _check_surfaces(site: Site) -> None:
+def _check_surfaces(site: SiteTables) -> None:
     for name, surface in site.surfaces.items():
         check_surface(f"surfaces.{name}", surface)
     check.one_of("slope.surface", site.slope.surface, site.surfaces)
@@ -131,7 +127,7 @@ def _check_surfaces(site: Site) -> None:
         check.one_of(f"{source.words}.surface", source.surface, site.surfaces)
 
 
-def _check_slope(site: Site) -> None:
+def _check_slope(site: SiteTables) -> None:
     points, road = np.array(site.slope.points), site.road
     x, (low, high) = points[:, 0], points[[0, -1], 0]
     downhill = low < high and (low <= x).all() and (x <= high).all()
@@ -162,7 +158,7 @@ def _check_slope(site: Site) -> None:
         )
 
 
-def _check_events(site: Site) -> None:
+def _check_events(site: SiteTables) -> None:
     check_names("sources", (source.name for source in site.sources))
     check_names("events", (event.name for event in site.events))
     if not site.sources:
@@ -175,7 +171,7 @@ def _check_events(site: Site) -> None:
         raise BadInput("events", [e.rate for e in site.events], "give a rate above 0 to one")
 
 
-def _check_source(site: Site, source: Source) -> None:
+def _check_source(site: SiteTables, source: Source) -> None:
     chain = site.profile.points
     deep = chain[:, 1].min() - 1.0
     ground = shapely.Polygon([*chain, (chain[-1, 0], deep), (chain[0, 0], deep)])
@@ -193,7 +189,9 @@ def _check_source(site: Site, source: Source) -> None:
         _check_piece(site, where, piece, ground)
 
 
-def _check_piece(site: Site, where: str, piece: tuple[Point, ...], ground: shapely.Polygon) -> None:
+def _check_piece(
+    site: SiteTables, where: str, piece: tuple[Point, ...], ground: shapely.Polygon
+) -> None:
     rock = shapely.Polygon(piece)
     left, _, right, _ = rock.bounds
     crest = site.slope.points[0][0]
@@ -210,7 +208,7 @@ def _check_piece(site: Site, where: str, piece: tuple[Point, ...], ground: shape
         raise BadInput(f"{where}[{corner}]", piece[corner], mend)
 
 
-def _check_zone(site: Site) -> None:
+def _check_zone(site: SiteTables) -> None:
     zone, ground = site.barrier_zone, site.profile
     check.number("barrier_zone.start", zone.start, site.slope.points[0][0])
     check.number("barrier_zone.end", zone.end, zone.start, site.road.start, open_low=True)
@@ -225,12 +223,9 @@ def _check_zone(site: Site) -> None:
             if taken.area > NEAR * taken.length:
                 mend = f"put it beyond {taken.bounds[2]:g}: {where} is where barriers may stand"
                 raise BadInput("barrier_zone.start", zone.start, mend)
-    if not site.rooms:
-        mend = "leave room for barriers: bands of loose rock take all of the zone"
-        raise BadInput("barrier_zone.end", zone.end, mend)
 
 
-def _check_meshes(site: Site) -> None:
+def _check_meshes(site: SiteTables) -> None:
     check_names("meshes", (option.name for option in site.meshes))
     for option in site.meshes:
         for name in option.factors:

@@ -15,9 +15,9 @@ import msgspec
 from rigdda import sites
 from rigdda.barriers import KINDS, MeshOption
 from rigdda.files import atomic
-from rigdda.model.economy import Consequences, Prices
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
+from rigdda.model.prices import Consequences, Prices
 from rigdda.model.site_tables import (
     BarrierZone,
     Event,

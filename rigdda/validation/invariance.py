@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from rigdda.geometry import polygon_properties
+from rigdda.measurement import measure as outcome_of
+from rigdda.measurement import stations, watch
 from rigdda.model.scene import Block, Scene, Terrain
 from rigdda.model.settings import Settings
 from rigdda.model.site import Site
-from rigdda.results.outcome import measure as outcome_of
-from rigdda.results.outcome import stations, watch
 from rigdda.validation.case import Case, Check, Lab, Measured, Metered
 from rigdda.validation.scenes import GRAVITY, Floats, polygon, rock, rough
 

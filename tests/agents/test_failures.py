@@ -165,7 +165,7 @@ def test_replay_opens_recordings_and_converts_runs(
     chute: Path, site: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[Path] = []
-    monkeypatch.setattr("rigdda.results.viewer.open_viewer", opened.append)
+    monkeypatch.setattr("rigdda.replay.viewer.open_viewer", opened.append)
     rigdda.release(site, (), 1)[0].save("one.npz")
     assert cli.main(["replay", "one.npz"]) == 0
     assert cli.main(["replay", "one.rrd"]) == 0

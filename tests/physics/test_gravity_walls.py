@@ -11,7 +11,6 @@ from msgspec.structs import replace
 from physics.helpers import FLAT, GRAVITY, box, rock
 from rigdda import Fence, GravityWall, Run, Scene, Simulation, Site, Terrain, Wall, release
 from rigdda.releases import release_many
-from rigdda.results.outcome import states
 from rigdda.validation.case import Lab
 from rigdda.validation.gravity_walls import DURATION, FACE, Push, displacement
 
@@ -92,7 +91,7 @@ def test_runs_with_every_kind_are_stored(tmp_path):
 def test_the_state_at_the_end_is_told(share, at, friction_deg, state):
     push = Push(GravityWall(FACE, 2.0, 1.0), friction_deg, at)
     run = Simulation(push.scene(share * push.limit())).run(5.0)
-    assert states(run, 0)[-1][1] == state
+    assert run.states(0)[-1][1] == state
 
 
 def test_more_walls_than_blocks():

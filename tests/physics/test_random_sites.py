@@ -9,8 +9,8 @@ import pytest
 
 import rigdda
 from rigdda import BadInput, Site, sites
-from rigdda.results.outcome import Outcome
-from rigdda.sites.generator import fallen
+from rigdda.model.outcome import Outcome
+from rigdda.model.site_generator import fallen
 
 SPLITS = ("train", "validation", "test")
 

@@ -11,7 +11,7 @@ import shapely
 
 from rigdda import Settings, Simulation, Site, Wall
 from rigdda.geometry import polygon_properties
-from rigdda.results.outcome import measure, stations, watch
+from rigdda.measurement import measure, stations, watch
 
 SITE = Site.load("shu-hwa-paper")
 

@@ -19,9 +19,9 @@ from rigdda import (
     sites,
 )
 from rigdda.geometry import overlap
+from rigdda.measurement import measure, stations, watch
+from rigdda.model.site_generator import fallen
 from rigdda.model.site_tables import Scatter
-from rigdda.results.outcome import measure, stations, watch
-from rigdda.sites.generator import fallen
 from rigdda.validation import toppling
 
 NAMES = sites.names()

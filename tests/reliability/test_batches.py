@@ -23,8 +23,9 @@ from rigdda import (
     Terrain,
     sites,
 )
+from rigdda.measurement import measure, stations, watch
+from rigdda.model.outcome import Outcome
 from rigdda.releases import EVERY, Batch
-from rigdda.results.outcome import Outcome, measure, stations, watch
 
 SITE = sites.load("bench")
 EVENTS = ("block", "small", "group")

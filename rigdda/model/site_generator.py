@@ -11,18 +11,20 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import TypeVar
 
 import msgspec
 import numpy as np
 
 from rigdda import check
 from rigdda.barriers import MeshOption
-from rigdda.model.economy import Consequences, Prices
-from rigdda.model.site import Site
-from rigdda.model.site_tables import BarrierZone, Event, Road, Slope, Stretch
+from rigdda.model.prices import Consequences, Prices
+from rigdda.model.site_names import FAMILIES
+from rigdda.model.site_tables import BarrierZone, Event, Road, SiteTables, Slope, Stretch
 from rigdda.model.source import Point, Source
 from rigdda.model.surface import Surface
-from rigdda.sites import FAMILIES, load
+
+S = TypeVar("S", bound=SiteTables)
 
 replace = msgspec.structs.replace
 
@@ -44,7 +46,7 @@ class StretchedGround:
         Draws the factors.
     """
 
-    def __init__(self, site: Site, rng: np.random.Generator):
+    def __init__(self, site: SiteTables, rng: np.random.Generator):
         points = np.array(site.slope.points)
         high = rng.uniform(0.8, 1.25)
         wide = high * rng.uniform(0.93, 1.07)
@@ -94,9 +96,8 @@ class StretchedGround:
         return replace(source, polygon=polygon, joints=joints)
 
 
-def generate(name: str, family: str, number: int) -> Site:
-    """Return an instance of a family, "random" for one after the other, always the same."""
-    base = load(FAMILIES[number % len(FAMILIES)] if family == "random" else family)
+def generate(base: S, name: str, number: int) -> S:
+    """Return an instance of the family of a built-in site, always the same."""
     rng = np.random.default_rng([FAMILIES.index(base.name), number])
     ground = StretchedGround(base, rng)
     size = float(np.exp(rng.uniform(-0.35, 0.35)))
@@ -153,7 +154,7 @@ def _event(event: Event, size: float, rng: np.random.Generator) -> Event:
 
 
 def _zone(
-    base: Site, slope: Slope, sources: tuple[Source, ...], ground: StretchedGround
+    base: SiteTables, slope: Slope, sources: tuple[Source, ...], ground: StretchedGround
 ) -> BarrierZone:
     """Return the zone: moved along, and no higher up than rock has fallen far enough."""
     zone = base.barrier_zone
@@ -161,7 +162,7 @@ def _zone(
     return replace(zone, start=millimetres(start), end=ground.x(zone.end))
 
 
-def _surfaces(base: Site, rng: np.random.Generator) -> dict[str, Surface]:
+def _surfaces(base: SiteTables, rng: np.random.Generator) -> dict[str, Surface]:
     shift, factor, loss = rng.uniform(-2.0, 2.0), *rng.uniform(0.75, 1.25, 2)
     return {
         name: replace(

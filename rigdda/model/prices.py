@@ -9,19 +9,12 @@ over barriers b and events k. All prices are orders of magnitude and a user's to
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from rigdda import check
-from rigdda.barriers import Barrier, Layout, Mesh, earthworks
-from rigdda.errors import BadInput
-
-if TYPE_CHECKING:
-    from rigdda.model.site import Site
-    from rigdda.results.outcome import Outcome
 
 ACCESS_HEIGHT = 60.0
 """Height above the road at which access costs `Prices.access` times the price at the road [m]."""
@@ -185,65 +178,3 @@ class Bill(NamedTuple):
 
     harm: float
     repair: float
-
-
-def capitals(site: Site, layout: Layout) -> list[float]:
-    """Return the price of each barrier of a layout, to build [EUR per metre of road].
-
-    Raises
-    ------
-    BadInput
-        If a barrier has no price, or an earthwork does not fit.
-    """
-    _, moved = earthworks(site.profile, layout, site.soil)
-    return [b.price(site, moved.get(b)) * site.access(b.x) for b in layout]
-
-
-def rate(site: Site, event: str, layout: Sequence[Barrier]) -> float:
-    """Return how often an event happens with the mesh of a layout, see `Site.rate`."""
-    often, used = site.event(event).rate / 100.0, set()
-    for barrier in layout:
-        if isinstance(barrier, Mesh):
-            if barrier.option in used:
-                raise BadInput("mesh option", barrier.option, "hang each option once")
-            used.add(barrier.option)
-            often *= site.mesh(barrier).factors.get(event, 1.0)
-    return often
-
-
-def bill(site: Site, layout: Layout, outcome: Outcome) -> Bill:
-    """Return what a release with a layout costs.
-
-    Of what failed, the length that the event was wide is built anew, but at least a panel or an
-    element; what the barriers hold is carried off. What of a gravity wall came onto the road
-    blocks it as rock does.
-    """
-    volume, reached = outcome.road_volume, outcome.reached
-    repair = site.prices.removal * outcome.held_fraction * outcome.released_volume
-    if any(found.failed for found in outcome.barriers):
-        built = [b for b in layout if not isinstance(b, Mesh)]
-        cost = _capital_of(site, layout)
-        for barrier, found in zip(built, outcome.barriers, strict=True):
-            if not found.failed:
-                continue
-            length = max(outcome.width, barrier.repaired)
-            repair += cost[barrier] * length
-            volume += found.road_area * length
-            reached = reached or found.road_area > 0.0
-    return Bill(site.consequences.harm(volume, reached), repair)
-
-
-_last: tuple[Site, Layout, dict[Barrier, float]] | None = None
-
-
-def _capital_of(site: Site, layout: Layout) -> dict[Barrier, float]:
-    """Return the price of each barrier [EUR/m], kept until another layout is asked for.
-
-    A layout has thousands of releases, and earthworks take longer to price than a block to fall.
-    """
-    global _last
-    known = _last
-    if known is None or known[0] is not site or known[1] != layout:
-        known = site, layout, dict(zip(layout, capitals(site, layout), strict=True))
-        _last = known
-    return known[2]

@@ -11,6 +11,7 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 from uuid import uuid4
 
 import numpy as np
@@ -21,16 +22,54 @@ from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.barriers import describe
-from rigdda.dynamics.monitors import CROSSING
-from rigdda.dynamics.run import Run
+from rigdda.barriers.base import STANDS
 from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
 from rigdda.model.scene import Scene
-from rigdda.results.outcome import STANDS, states
-from rigdda.results.viewer import rrd_path
+from rigdda.model.terrain import Terrain
+from rigdda.replay.viewer import rrd_path
 
 Colour = tuple[int, int, int]
+Floats = NDArray[np.float64]
+
+
+class Motion(Protocol):
+    """What a replay shows: the motion of a scene, as a `rigdda.Run` has recorded it."""
+
+    @property
+    def scene(self) -> Scene:
+        """What was simulated."""
+
+    @property
+    def times(self) -> Floats:
+        """(T,) times of the frames [s]."""
+
+    @property
+    def poses(self) -> Floats:
+        """(T, N, 3) poses of the blocks [m, m, rad]."""
+
+    @property
+    def velocities(self) -> Floats:
+        """(T, N, 3) rates of the poses [m/s, m/s, rad/s]."""
+
+    @property
+    def barrier_poses(self) -> Floats:
+        """(T, B, 3) poses of the barriers [m, m, rad]."""
+
+    @property
+    def ground(self) -> Terrain | None:
+        """The ground at the end."""
+
+    def passed(self, x: float) -> NDArray[np.bool_]:
+        """Return whether each block was ever at or past a chainage, by frame."""
+
+    def failure(self, barrier: int) -> float:
+        """Return the time at which a barrier failed, inf if it did not [s]."""
+
+    def states(self, barrier: int) -> list[tuple[float, str]]:
+        """Return the states of a barrier, each with the time from which it is in it [s]."""
+
 
 CAMERA = 1000.0
 """Distance of the camera [m]: one pixel is one metre, and a layer shifts a point by 1e-5."""
@@ -115,8 +154,6 @@ class Marks:
         return self.labels or [describe(barrier) for barrier in scene.barriers]
 
 
-Floats = NDArray[np.float64]
-
 MOVING = 0.1
 """Speed above which a block counts as moving [m/s]; slower is a creep of under 1 m in 10 s."""
 
@@ -130,7 +167,7 @@ PLOTS = {
 """Title and colour of every scalar."""
 
 
-def scalars(run: Run, marks: Marks) -> dict[str, Floats]:
+def scalars(run: Motion, marks: Marks) -> dict[str, Floats]:
     """Return the (T,) numbers of every plot, of the free blocks; debris where there is a road."""
     free = np.array([not block.fixed for block in run.scene.blocks])
     shapes = [polygon_properties(block.vertices) for block in run.scene.blocks]
@@ -148,20 +185,8 @@ def scalars(run: Run, marks: Marks) -> dict[str, Floats]:
         "moving": np.count_nonzero(squared > MOVING**2, axis=1).astype(np.float64),
     }
     if marks.road is not None:
-        out["debris"] = _passed(run, marks.road[0])[:, free] @ mass / mass.sum()
+        out["debris"] = run.passed(marks.road[0])[:, free] @ mass / mass.sum()
     return out
-
-
-def _passed(run: Run, edge: float) -> NDArray[np.bool_]:
-    """Return whether each block's centroid was ever at or past chainage `edge`, (T, N).
-
-    Crossings count where they happened, so that a block which came back between two frames is
-    not missed.
-    """
-    seen = run.poses[:, :, 0] >= edge
-    for event in run.events[(run.events["kind"] == CROSSING) & (run.events["x"] >= edge)]:
-        seen[np.searchsorted(run.times, event["time"]) :, event["block"]] = True
-    return np.logical_or.accumulate(seen, axis=0)
 
 
 TIMELINE = "sim_time"
@@ -169,7 +194,7 @@ PLACEMENT = "placement"
 """Timeline of an episode in which barriers are placed one by one."""
 
 
-def slope_view(run: Run, name: str, root: str = "") -> rrb.Spatial2DView:
+def slope_view(run: Motion, name: str, root: str = "") -> rrb.Spatial2DView:
     """Return the view on the slope of a run that is logged below the entity `root`."""
     left, bottom, right, top = frame(run.scene)
     return rrb.Spatial2DView(
@@ -181,7 +206,7 @@ def slope_view(run: Run, name: str, root: str = "") -> rrb.Spatial2DView:
     )
 
 
-def run_blueprint(run: Run, marks: Marks) -> rrb.Blueprint:
+def run_blueprint(run: Motion, marks: Marks) -> rrb.Blueprint:
     """Return the layout: the slope, beside it the notes and the plots."""
     slope = slope_view(run, marks.title)
     plots = {
@@ -213,7 +238,7 @@ Clock = Callable[[Sequence[float] | Floats], list[rr.TimeColumn]]
 """Gives the time columns of rows at some times [s]."""
 
 
-def write_rerun(run: Run, path: str | os.PathLike[str], marks: Marks | None = None) -> None:
+def write_rerun(run: Motion, path: str | os.PathLike[str], marks: Marks | None = None) -> None:
     """Write `run` as a rerun recording with geometry, poses, scalars and a blueprint.
 
     Parameters
@@ -252,7 +277,7 @@ def recording(
 
 
 def log_run(
-    rec: rr.RecordingStream, run: Run, marks: Marks, root: str = "", placement: int | None = None
+    rec: rr.RecordingStream, run: Motion, marks: Marks, root: str = "", placement: int | None = None
 ) -> None:
     """Log a whole run below the entity `root`; its frames are those of a `placement`, if any.
 
@@ -287,7 +312,7 @@ def log_run(
     rec.log(f"{root}/notes", page, static=True)
 
 
-def _log_setting(rec: rr.RecordingStream, world: str, run: Run, marks: Marks) -> None:
+def _log_setting(rec: rr.RecordingStream, world: str, run: Motion, marks: Marks) -> None:
     """Log what never changes: the camera, the ground as it is at the end and the road."""
     left, bottom, right, top = frame(run.scene)
     rec.log(world, rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
@@ -314,7 +339,7 @@ def _log_setting(rec: rr.RecordingStream, world: str, run: Run, marks: Marks) ->
         rec.log(f"{world}/road", line, static=True)
 
 
-def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i: int) -> None:
+def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Motion, i: int) -> None:
     """Log barrier `i`: a gravity wall moves, what fails turns pale, a ditch is a line."""
     barrier, z = run.scene.barriers[i], LAYER["barriers"]
     outline = run.scene.outline(i)
@@ -337,10 +362,10 @@ def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i
 
 
 def _log_state(
-    rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i: int, label: str
+    rec: rr.RecordingStream, entity: str, clock: Clock, run: Motion, i: int, label: str
 ) -> None:
     """Log what barrier `i` is and in which state, over time, above its top."""
-    outline, changes = run.scene.outline(i), states(run, i)
+    outline, changes = run.scene.outline(i), run.states(i)
     x, top = float(outline[:, 0].mean()), float(outline[:, 1].max())
     left, bottom, right, high = frame(run.scene)
     lift = LABEL * max(right - left, high - bottom) * (1 + i % 3)
@@ -372,7 +397,7 @@ def _log_motion(
     rec.send_columns(entity, when, columns)
 
 
-def _log_block(rec: rr.RecordingStream, entity: str, clock: Clock, run: Run, i: int) -> None:
+def _log_block(rec: rr.RecordingStream, entity: str, clock: Clock, run: Motion, i: int) -> None:
     """Log block `i`: its polygon about its centroid once, and where that is in every frame."""
     block = run.scene.blocks[i]
     body = block.vertices - polygon_properties(block.vertices)[1]

@@ -9,9 +9,16 @@ from dataclasses import dataclass
 import rerun as rr
 import rerun.blueprint as rrb
 
-from rigdda.dynamics.run import Run
 from rigdda.errors import BadInput
-from rigdda.results.replay import PLACEMENT, TIMELINE, Marks, log_run, recording, slope_view
+from rigdda.replay.recording import (
+    PLACEMENT,
+    TIMELINE,
+    Marks,
+    Motion,
+    log_run,
+    recording,
+    slope_view,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +35,7 @@ class Placement:
         Of the placement; at the start, without barriers, the reward is 0.
     """
 
-    run: Run
+    run: Motion
     layout: str
     reward: float
     objective: float

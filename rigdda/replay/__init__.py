@@ -1,0 +1,1 @@
+"""Replays: runs and episodes as files of the rerun viewer."""

@@ -196,7 +196,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     """
     import rigdda
     from rigdda.agents.reports import findings
-    from rigdda.agents.reports.wording import short, standing
+    from rigdda.barriers import standing
     from rigdda.replay.recording import Marks
     from rigdda.replay.viewer import open_viewer
 
@@ -219,7 +219,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     notes = {"event": outcome.event, "seed": str(seed), "comes onto the road": came}
     if words := findings.of_layout(where, barriers, event):
         notes["doubt"] = words
-    road, labels = (where.road.start, where.road.end), tuple(map(short, standing(barriers)))
+    road, labels = (where.road.start, where.road.end), tuple(b.label for b in standing(barriers))
     run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels))
     click.echo(folder / "episode.rrd")
 

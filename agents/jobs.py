@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 import rigdda
-from rigdda import Barrier, Ditch, Embankment, Fence, Layout, Outcome, Run, Site
+from rigdda import Barrier, Layout, Outcome, Run, Site
 from rigdda.agents import designers
 from rigdda.agents.design_study import CONSTANT, NOTHING, RULE, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.menu import Menu
@@ -17,7 +16,6 @@ from rigdda.agents.designers.protocol import DesignResult, Entry, release_seeds,
 from rigdda.agents.designers.store import Store
 from rigdda.agents.reports import findings
 from rigdda.agents.reports.tables import EvaluationsFile
-from rigdda.barriers import Standing
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.geometry import polygon_properties
 
@@ -142,34 +140,16 @@ def tried(problem: DesignProblem) -> tuple[Layout, ...]:
     """
     menu, found = Menu(problem), list[Barrier]()
     for kind in problem.kinds:
-        barriers = [_thick(menu, b) for b in menu.lone(kind)] if kind != "mesh" else []
-        least = LARGE * max(map(_size, barriers), default=0.0)
-        large = sorted((b for b in barriers if _size(b) >= least), key=lambda b: b.x)
+        barriers = (
+            [menu.put(b.thickest(menu.zone), b.x) or b for b in menu.lone(kind)]
+            if kind != "mesh"
+            else []
+        )
+        least = LARGE * max((b.size for b in barriers), default=0.0)
+        large = sorted((b for b in barriers if b.size >= least), key=lambda b: b.x)
         places = np.linspace(0, len(large) - 1, min(STATIONS, len(large))).round().astype(int)
         found += [large[i] for i in places.tolist()]
     return tuple((barrier,) for barrier in found)
-
-
-def _size(barrier: Barrier) -> float:
-    """Return what the barriers of a kind are compared by."""
-    match barrier:
-        case Fence():
-            assert barrier.energy_class is not None  # of a menu
-            return barrier.energy_class * barrier.height
-        case Ditch():
-            return barrier.depth * barrier.width
-        case Embankment() | Standing():
-            return barrier.height
-    return 0.0
-
-
-def _thick(menu: Menu, barrier: Barrier) -> Barrier:
-    """Return an embankment or a wall as thick as may be where it stands."""
-    name = {"embankment": "width", "gravity_wall": "thickness"}.get(barrier.kind)
-    if name is None:
-        return barrier
-    thick = msgspec.structs.replace(barrier, **{name: menu.zone.max_thickness})
-    return menu.put(thick, barrier.x) or barrier
 
 
 def unheld(problem: DesignProblem, event: str, seed: int) -> str:

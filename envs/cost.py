@@ -195,9 +195,6 @@ REPAIR_VARIATION = 0.2
 """Coefficient of variation of what the repair of a failed barrier costs [-]: widths of events
 differ little beyond the panel or element that is mended at least."""
 
-FAIL = ("fence", "gravity_wall", "embankment")
-"""Kinds of barrier that can fail."""
-
 
 @dataclass(frozen=True, slots=True)
 class Sums:
@@ -380,4 +377,4 @@ def _mending(site: Site, layout: Layout) -> float:
     A panel of it, the least that is mended; 0 if none can.
     """
     prices = zip(layout, site.capitals(layout), strict=True)
-    return PANEL * max((price for b, price in prices if b.kind in FAIL), default=0.0)
+    return PANEL * max((price for b, price in prices if b.fallible), default=0.0)

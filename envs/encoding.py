@@ -23,42 +23,20 @@ Heights and depths run from 0.5 m to the greatest of the zone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigdda import BadInput, Barrier, Fence, Layout, Mesh
-from rigdda.barriers import FENCE_CLASSES, Built
-from rigdda.envs.siting import MIN_HEIGHT, TOLERANCE, Room, Span
-from rigdda.model.site_tables import BarrierZone
+from rigdda import BadInput, Barrier, Layout, Mesh
+from rigdda.barriers import KINDS
+from rigdda.barriers.base import MIN_HEIGHT, TOLERANCE, share_of
+from rigdda.envs.siting import Room, Span
+from rigdda.model.barrier_zone import BarrierZone
 
 Floats = NDArray[np.float64]
 
 NUMBERS = 4
 """Numbers in a slot, without scores."""
-
-CLASSES = tuple(FENCE_CLASSES)
-"""Energy classes of fences, ascending [kJ]."""
-
-
-class Decision(NamedTuple):
-    """Which lengths of a kind are decided, and the fields of the zone that limit them."""
-
-    height: str
-    max_height: str
-    size: str
-    min_size: str
-    max_size: str
-
-
-DECISIONS = {
-    "ditch": Decision("depth", "max_depth", "width", "min_width", "max_width"),
-    "embankment": Decision("height", "max_height", "width", "min_thickness", "max_thickness"),
-    "gravity_wall": Decision("height", "max_height", "thickness", "min_thickness", "max_thickness"),
-    "wall": Decision("height", "max_height", "thickness", "min_thickness", "max_thickness"),
-}
 
 
 def slot_size(kinds: Sequence[str]) -> int:
@@ -140,15 +118,7 @@ def built_and_dropped(
 def make(zone: BarrierZone, kind: str, station: float, height: float, size: float) -> Barrier:
     """Return the barrier of three shares from 0 to 1, wherever that is; no mesh."""
     x = zone.start + station * (zone.end - zone.start)
-    if kind == "fence":
-        energy_class = CLASSES[_part(size, len(CLASSES))]
-        tall = _between(MIN_HEIGHT, _tallest(zone), height)
-        return Fence(x, min(tall, FENCE_CLASSES[energy_class].height), energy_class=energy_class)
-    decision = DECISIONS[kind]
-    tall = _between(MIN_HEIGHT, getattr(zone, decision.max_height), height)
-    large = _between(getattr(zone, decision.min_size), getattr(zone, decision.max_size), size)
-    sizes = {"x": x, decision.height: tall, decision.size: large}
-    return msgspec.convert({"kind": kind, **sizes}, Built)
+    return KINDS[kind].of_shares(zone, x, height, size)
 
 
 def encode(place: Room, layout: Layout, slots: int, kinds: Sequence[str]) -> Floats:
@@ -183,19 +153,11 @@ def _numbers(place: Room, i: int, barrier: Barrier) -> list[float]:
         usual: Barrier = place.mesh(names.index(barrier.option))
         shares = (0.5, 0.0, _middle(names.index(barrier.option), len(names)))
     else:
-        if isinstance(barrier, Fence):
-            assert barrier.energy_class is not None  # checked
-            number = CLASSES.index(barrier.energy_class)
-            tall, limit, size = barrier.height, _tallest(zone), _middle(number, len(CLASSES))
-        else:
-            decision = DECISIONS[barrier.kind]
-            tall, limit = getattr(barrier, decision.height), getattr(zone, decision.max_height)
-            low, high = getattr(zone, decision.min_size), getattr(zone, decision.max_size)
-            size = _share(getattr(barrier, decision.size), low, high)
-        shares = (_share(barrier.x, zone.start, zone.end), _share(tall, MIN_HEIGHT, limit), size)
+        shares = (share_of(barrier.x, zone.start, zone.end), *barrier.shares(zone))
+        tall = getattr(barrier, barrier.lengths[0].field)
         if tall < MIN_HEIGHT - TOLERANCE:
             mend = f"give a number of at least {MIN_HEIGHT:g}"
-            raise BadInput(f"layout[{i}].height", tall, mend)
+            raise BadInput(f"layout[{i}].{barrier.lengths[0].field}", tall, mend)
         clipped = np.clip(shares, 0.0, 1.0).tolist()
         usual = place.put(make(zone, barrier.kind, *clipped), barrier.x) or barrier
     _check_usual(f"layout[{i}]", barrier, usual)
@@ -212,19 +174,6 @@ def _check_usual(where: str, barrier: Barrier, usual: Barrier) -> None:
             if abs(value - decided) <= 1e-6 * max(1.0, abs(decided)):
                 continue
         raise BadInput(f"{where}.{name}", value, f"give {decided!r}: no vector stands for another")
-
-
-def _tallest(zone: BarrierZone) -> float:
-    """Return the greatest height of a fence [m]."""
-    return min(zone.max_height, max(row.height for row in FENCE_CLASSES.values()))
-
-
-def _between(low: float, high: float, share: float) -> float:
-    return low + share * (high - low)
-
-
-def _share(value: float, low: float, high: float) -> float:
-    return (value - low) / (high - low) if high > low else 0.5
 
 
 def _part(share: float, parts: int) -> int:

@@ -24,16 +24,11 @@ import numpy as np
 import rigdda
 from rigdda import (
     BarrierOutcome,
-    Ditch,
-    Embankment,
-    Fence,
-    GravityWall,
     Layout,
-    Mesh,
     Outcome,
     Site,
 )
-from rigdda.barriers import Built, Earthwork, earthworks
+from rigdda.barriers import Built, Standing, earthworks, standing
 from rigdda.model.settings import EARTH
 from rigdda.model.terrain import REACH
 
@@ -230,7 +225,7 @@ def _holds(site: Site, barrier: BarrierReach, without: Outcome) -> bool | None:
 
 def _known_to_bear(layout: Sequence[Built]) -> bool:
     """Tell whether what a layout bears does not depend on friction."""
-    return all(isinstance(barrier, Fence | Ditch) for barrier in layout)
+    return not any(barrier.by_friction for barrier in layout)
 
 
 def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[BarrierReach, ...]:
@@ -255,13 +250,10 @@ def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[Barrie
 def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) -> BarrierReach:
     """Return where a barrier stands, with the corners of the earth moved for it."""
     if moved is None:
-        assert not isinstance(barrier, Earthwork)
+        assert isinstance(barrier, Standing)
         moved = barrier.outline(site.profile)
     (start, _), (end, top) = moved.min(axis=0).tolist(), moved.max(axis=0).tolist()
-    face = start
-    if isinstance(barrier, Embankment):
-        face += barrier.side_slope * barrier.height
-    face = -math.inf if isinstance(barrier, Ditch) else face
+    face = barrier.holds(moved, site.profile, 0.0).end if barrier.left_height(0.0) else -math.inf
     # half of what a corner moves in a step that has all the energy of a fall from the top: its
     # speed is at most twice that of the fall
     drop = float(np.ptp(site.profile.points[:, 1]))
@@ -271,13 +263,6 @@ def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) 
 
 def _idle(built: Built, barrier: Built, there: BarrierReach, holds: bool) -> BarrierOutcome:
     """Return what happens to a barrier that no block comes near."""
-    bears = there.bears
-    if isinstance(built, Fence):
-        bears = built.braking_force
-    elif isinstance(built, GravityWall | Embankment):
-        unit = barrier.for_width(UNIT)
-        assert isinstance(unit, GravityWall | Embankment)
-        bears *= built.density / unit.density
     return BarrierOutcome(
         hits=0,
         max_energy=0.0,
@@ -291,8 +276,8 @@ def _idle(built: Built, barrier: Built, there: BarrierReach, holds: bool) -> Bar
         displacement=0.0,
         road_area=0.0,
         thrust=0.0,
-        resistance=bears,
-        left_height=0.0 if isinstance(built, Ditch) else built.height,
+        resistance=built.idle_resistance(barrier.for_width(UNIT), there.bears),
+        left_height=built.left_height(0.0),
     )
 
 
@@ -330,8 +315,7 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
     """
     prints = {id(site): fingerprint(site) for site, *_ in jobs}
     keys = [
-        Key(prints[id(site)], tuple(b for b in layout if not isinstance(b, Mesh)), seed, event)
-        for site, layout, seed, event in jobs
+        Key(prints[id(site)], standing(layout), seed, event) for site, layout, seed, event in jobs
     ]
     known = _recall(keys, jobs)
     new = {key: job for key, job in zip(keys, jobs, strict=True) if key not in known}

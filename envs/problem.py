@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
-from rigdda.barriers import KINDS as ALL_KINDS
+from rigdda.barriers import KINDS
 from rigdda.envs import cost, encoding, ensemble, outcome_cache
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.intervals import Estimate
@@ -126,7 +126,7 @@ def site_at_fidelity(site: Site, fidelity: str) -> Site:
 MOST_BARRIERS = 100
 """Most slots of a layout; a site has room for a few."""
 
-KINDS = ("fence", "ditch", "embankment", "gravity_wall")
+USUAL_KINDS = tuple(name for name, kind in KINDS.items() if kind.designed and name != "mesh")
 """Kinds of barrier that are designed if none are named, and mesh where a site has options. Not the
 rigid wall, which nothing moves: it is for experiments."""
 
@@ -154,10 +154,10 @@ def checked_zone(site: Site, zone: object) -> BarrierZone:
 def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
     """Return the kinds of barrier to choose from."""
     if kinds is None:
-        return (*KINDS, "mesh") if site.meshes else KINDS
+        return (*USUAL_KINDS, "mesh") if site.meshes else USUAL_KINDS
     if not isinstance(kinds, Sequence) or isinstance(kinds, str):
         raise BadInput("kinds", kinds, "give a sequence of names")
-    names = tuple(check.one_of("kinds", kind, ALL_KINDS) for kind in kinds)
+    names = tuple(check.one_of("kinds", kind, KINDS) for kind in kinds)
     if not names or len(set(names)) < len(names):
         raise BadInput("kinds", kinds, "name each kind once")
     if "mesh" in names and not site.meshes:

@@ -6,47 +6,13 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import (
-    BadInput,
-    Barrier,
-    Ditch,
-    Embankment,
-    Fence,
-    GravityWall,
-    Layout,
-    Mesh,
-    Site,
-    check,
-)
-from rigdda.barriers import MeshOption, as_layout, earthworks
-from rigdda.model.site_tables import BarrierZone
-
-MIN_HEIGHT = 0.5
-"""Least height of a barrier that is designed, and depth of a ditch [m]."""
-
-SLENDER = 0.4
-"""Least thickness over height of a gravity wall [-]: it stands by its weight, also in the wind and
-on ground that gives."""
-
-TOLERANCE = 1e-9
-"""Rounding that is forgiven at limits: share of the limit, and of 1 [m]."""
-
-
-def limits(zone: BarrierZone, barrier: Barrier) -> dict[str, tuple[float, float]]:
-    """Return the fields of a barrier that the zone limits, with least and greatest value [m]."""
-    if isinstance(barrier, Ditch):
-        return {"depth": (0.0, zone.max_depth), "width": (zone.min_width, zone.max_width)}
-    own: dict[str, tuple[float, float]] = {"height": (0.0, zone.max_height)}
-    if isinstance(barrier, Embankment):
-        return own | {"width": (zone.min_thickness, zone.max_thickness)}
-    if isinstance(barrier, Fence):
-        return own
-    return own | {"thickness": (zone.min_thickness, zone.max_thickness)}
-
+from rigdda import BadInput, Barrier, GravityWall, Layout, Mesh, Site, check
+from rigdda.barriers import KINDS, Earthwork, MeshOption, as_layout, earthworks
+from rigdda.barriers.base import TOLERANCE
+from rigdda.model.barrier_zone import BarrierZone
 
 Span = tuple[float, float]
 
@@ -55,10 +21,9 @@ MIN_GAP = 0.5
 
 
 def room(barrier: Barrier, works: Span) -> Span:
-    """Return the chainages that a barrier needs: its works, and where a fence gives way to [m]."""
+    """Return the chainages that a barrier needs: its works, and where it gives way to [m]."""
     start, end = works
-    gives = barrier.elongation if isinstance(barrier, Fence) else None
-    return start, end + (gives or 0.0)
+    return start, end + barrier.elongation_path
 
 
 def meet(one: Span, two: Span) -> bool:
@@ -87,11 +52,6 @@ def check_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> None:
 
 
 Floats = NDArray[np.float64]
-
-STEEPEST = {"ditch": 30.0, "embankment": 25.0, "gravity_wall": 30.0, "wall": 30.0}
-"""Greatest mean inclination of the ground under a barrier [deg], of a gravity wall of all of it. On
-steeper ground fill slides, and what is dug or founded there starts a fall itself. Fences stand on
-posts, anywhere."""
 
 MACHINE = 3.0
 """Width of a machine that builds, empties and mends what is dug, filled or cast [m]: so much ground
@@ -127,7 +87,8 @@ class Rules:
             mend = f"leave room in {site.rooms}: elsewhere loose rock lies"
             raise BadInput("zone", (zone.start, zone.end), mend)
         self._x, self._y = site.profile.points.T
-        self._gentle = {angle: self._stretches(angle) for angle in set(STEEPEST.values())}
+        angles = {kind.steepest for kind in KINDS.values()} - {None}
+        self._gentle = {angle: self._stretches(angle) for angle in angles if angle is not None}
 
     def _stretches(self, steepest: float) -> list[Span]:
         """Return the stretches of the ground that are at most so steep [deg], each whole."""
@@ -162,25 +123,8 @@ class Rules:
         return min(min(x) for x in ends), max(max(x) for x in ends)
 
     def works(self, barrier: Barrier) -> Span:
-        """Return the chainages between which a barrier takes up the ground [m].
-
-        Of an embankment up to where its downhill side meets the ground; to the end of the ground if
-        it does not.
-        """
-        if not isinstance(barrier, Embankment):
-            return barrier.x, barrier.x + barrier.extent
-        top = float(self.level(np.array([barrier.x]))[0]) + barrier.height
-        ahead = self._x > barrier.end
-        x = np.concatenate([[barrier.end], self._x[ahead]])
-        ground = np.concatenate([self.level(x[:1]), self._y[ahead]])
-        over = top - (x - barrier.end) / barrier.side_slope - ground
-        k = int(np.argmax(over <= 0.0))  # the first corner below which the side is
-        if over[k] > 0.0:
-            return barrier.x, float(x[-1])
-        if k == 0:
-            return barrier.x, barrier.end
-        share = over[k - 1] / (over[k - 1] - over[k])
-        return barrier.x, float(x[k - 1] + share * (x[k] - x[k - 1]))
+        """Return the chainages between which a barrier takes up the ground [m]."""
+        return barrier.works(self.site.profile)
 
     def check_layout(self, layout: Sequence[Barrier], kinds: Sequence[str], most: int) -> Layout:
         """Return a layout of some kinds and at most so many barriers, sorted downhill.
@@ -229,11 +173,11 @@ class Rules:
         self._check_size(where, barrier)
         start, end = self.works(barrier)
         self._check_place(where, barrier, start, end)
-        steepest = STEEPEST.get(barrier.kind)
+        steepest = barrier.steepest
         if steepest is not None:
             angle, most = self.inclination(start, end), steepest
             if isinstance(barrier, GravityWall):
-                angle, most = self.foundation(start, end)
+                angle, most = self.foundation(start, end, steepest)
             if angle > most + TOLERANCE:
                 mend = f"put it where the ground is at most {most:g} deg steep, not {angle:.1f}"
                 raise BadInput(f"{where}.x", barrier.x, mend)
@@ -243,7 +187,7 @@ class Rules:
                     f"put it where {MACHINE:g} m beside it are left to a machine, not {beside:.1f}"
                 )
                 raise BadInput(f"{where}.x", barrier.x, mend)
-        if isinstance(barrier, Ditch | Embankment):
+        if isinstance(barrier, Earthwork):
             try:
                 earthworks(self.site.profile, (barrier,), self.site.soil)
             except BadInput as bad:
@@ -251,25 +195,13 @@ class Rules:
         return start, end
 
     def _check_size(self, where: str, barrier: Barrier) -> None:
-        for name, (low, high) in limits(self.zone, barrier).items():
-            value = getattr(barrier, name)
+        for length in barrier.lengths:
+            value, (low, high) = getattr(barrier, length.field), length.limits(self.zone)
             slack = TOLERANCE * max(1.0, high)
             if not low - slack <= value <= high + slack:
                 mend = f"give a number of at least {low:g} and at most {high:g}"
-                raise BadInput(f"{where}.{name}", value, mend)
-        if isinstance(barrier, Fence) and barrier.energy_class is None:
-            mend = "give its energy class instead of a capacity"
-            raise BadInput(f"{where}.capacity", barrier.capacity, mend)
-        if isinstance(barrier, GravityWall):
-            least = SLENDER * barrier.height
-            if barrier.thickness < least - TOLERANCE:
-                mend = f"give at least {least:g}: a gravity wall stands by its weight"
-                raise BadInput(f"{where}.thickness", barrier.thickness, mend)
-        if isinstance(barrier, Ditch):
-            least = self.site.ditch_side(barrier.x, barrier.width)
-            if barrier.side_slope < least - TOLERANCE:
-                mend = f"give at least {least:g}, at which a cut in this ground stands"
-                raise BadInput(f"{where}.side_slope", barrier.side_slope, mend)
+                raise BadInput(f"{where}.{length.field}", value, mend)
+        barrier.check_design(where, self.site)
 
     def _check_place(self, where: str, barrier: Barrier, start: float, end: float) -> None:
         """Check that it is in a part of the zone, and its distance from the road."""
@@ -279,9 +211,9 @@ class Rules:
             mend = f"keep all of it, up to {end:g} m, within {rooms}"
             raise BadInput(f"{where}.x", barrier.x, mend)
         road = self.site.road.start
-        give = room(barrier, (0.0, 0.0))[1]
-        if isinstance(barrier, Fence) and end + give > road + slack:
-            most = road - give - barrier.thickness
+        give = barrier.elongation_path
+        if give > 0.0 and end + give > road + slack:
+            most = road - give - barrier.extent
             mend = f"put it at {most:g} or uphill: it gives way by {give:g} m"
             raise BadInput(f"{where}.x", barrier.x, f"{mend}, and the road begins at {road:g}")
 
@@ -290,23 +222,19 @@ class Rules:
         high, low = self.level(np.array([start, end])).tolist()
         return math.degrees(math.atan2(abs(high - low), end - start))
 
-    def foundation(self, start: float, end: float) -> tuple[float, float]:
+    def foundation(self, start: float, end: float, most: float) -> tuple[float, float]:
         """Return the steepest ground under a gravity wall, and what it may be at most [deg].
 
         A wall of which a corner stands on ground that is steeper than its friction angle slides
-        before any rock comes.
+        before any rock comes; `most` is what the ground may be beside that [deg].
         """
         under = np.flatnonzero((self._x[:-1] < end) & (start < self._x[1:]))
         rise, run = np.abs(np.diff(self._y))[under], np.diff(self._x)[under]
         names = {self.site.profile.surfaces[k] for k in under}
         friction = min(self.site.surfaces[name].friction_deg for name in names)
         steepest = float(np.degrees(np.arctan2(rise, run)).max())
-        return steepest, min(STEEPEST["gravity_wall"], friction)
+        return steepest, min(most, friction)
 
-
-MIN_FLOOR = 1.0
-"""Least width of the floor of a ditch that is designed [m]: a machine empties it, and what falls
-into a notch stops it up."""
 
 STEP = 0.25
 """Distance of the places that are looked at for a barrier that does not fit [m]."""
@@ -327,25 +255,8 @@ class Room(Rules):
         return Mesh(0.5 * (low + high), self.site.meshes[option].name)
 
     def put(self, barrier: Barrier, x: float) -> Barrier | None:
-        """Return a barrier moved to `x`; a ditch with the sides that it needs there.
-
-        It is as deep as these sides allow; None if that is less than `MIN_HEIGHT`. A gravity wall
-        is as thick as its height needs, as high as the greatest thickness allows.
-        """
-        if isinstance(barrier, GravityWall):
-            tall = min(barrier.height, self.zone.max_thickness / SLENDER)
-            thick = max(barrier.thickness, SLENDER * tall)
-            return msgspec.structs.replace(barrier, x=x, height=tall, thickness=thick)
-        if not isinstance(barrier, Ditch):
-            return msgspec.structs.replace(barrier, x=x)
-        end = x + barrier.width
-        high, low = self.level(np.array([x, end])).tolist()
-        side = self.site.ditch_side(x, barrier.width)
-        deepest = 0.5 * ((barrier.width - MIN_FLOOR) / side - abs(high - low))
-        depth = min(barrier.depth, deepest)
-        if depth < MIN_HEIGHT - TOLERANCE:
-            return None
-        return msgspec.structs.replace(barrier, x=x, depth=depth, side_slope=side)
+        """Return a barrier moved to `x` with the sizes that it needs there; None if it cannot."""
+        return barrier.placed(x, self.site, self.zone)
 
     def nearest(self, barrier: Barrier, taken: Sequence[Span]) -> tuple[Barrier, Span] | None:
         """Return a barrier moved as little as need be to where it may stand, and its works.
@@ -390,7 +301,7 @@ class Room(Rules):
         """Return where it may stand as far as is seen without building it, the nearest first."""
         length = barrier.extent
         give = room(barrier, (0.0, length))[1]  # with what it needs downhill
-        last = self.site.road.start - give if isinstance(barrier, Fence) else math.inf
+        last = self.site.road.start - give if barrier.elongation_path > 0.0 else math.inf
         ends = [(low, min(high - length, last)) for low, high in self.parts]
         ends = [(low, high) for low, high in ends if low <= high]
         if not ends:
@@ -399,11 +310,11 @@ class Room(Rules):
         edges += [x for low, high in taken for x in (low - MIN_GAP - give, high + MIN_GAP)]
         x = np.concatenate([*(np.arange(low, high, STEP) for low, high in ends), edges])
         x = x[np.any([(x >= low) & (x <= high) for low, high in ends], axis=0)]
-        steepest = STEEPEST.get(barrier.kind)
+        steepest = barrier.steepest
         if steepest is not None:
             rise = np.abs(self.level(x) - self.level(x + length))
             x = x[rise <= length * math.tan(math.radians(steepest)) + NEAR_ZERO]
-            if not isinstance(barrier, Embankment):  # whose works end farther down
+            if not barrier.has_sides:  # its works end where its side meets the ground
                 x = x[self.beside(x, x + length, steepest) >= MACHINE - TOLERANCE]
         for low, high in taken:
             x = x[(x >= high + MIN_GAP - TOLERANCE) | (x + give <= low - MIN_GAP + TOLERANCE)]

@@ -22,9 +22,8 @@ from msgspec.structs import replace
 from experiments.script import BLUE, GREEN, RED, Number, draw, main
 from experiments.study import Row, tabulate
 from rigdda import Barrier, Embankment, Fence, GravityWall, Site
-from rigdda.agents.designers.menu import HEIGHTS
 from rigdda.barriers import FENCE_CLASSES, describe
-from rigdda.envs.siting import SLENDER
+from rigdda.barriers.base import HEIGHTS, SLENDER
 from rigdda.releases import release_many
 
 SITES = {"shu-hwa": 83.6, "quick": 23.0}

@@ -25,9 +25,9 @@ from rigdda.barriers import (
     Fence,
     GravityWall,
     Layout,
-    Mesh,
     as_layout,
     section,
+    standing,
 )
 from rigdda.barriers.base import Reach, sliding_resistance, surfaces_below
 from rigdda.dynamics.monitors import chainages
@@ -268,7 +268,7 @@ class Batch:
 
     def __init__(self, site: Site, layout: Sequence[Barrier]):
         self._site, self._layout = as_site(site), as_layout(layout)
-        self._standing = [b for b in self._layout if not isinstance(b, Mesh)]
+        self._standing = list(standing(self._layout))
         self._watch = watch(site)
         self._base: tuple[Scene, Drawn] | None = None
         self._single: SingleReleases | None = None

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 import shapely
 from rerun.chunk import RrdReader
-from rigdda.results import replay, viewer
 
 from rigdda.barriers import Built, Embankment, Fence, GravityWall, Wall
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
@@ -25,6 +24,8 @@ from rigdda.model.block import Block
 from rigdda.model.scene import Scene
 from rigdda.model.surface import Surface
 from rigdda.model.terrain import Terrain
+from rigdda.replay import recording as replay
+from rigdda.replay import viewer
 from rigdda.replay.recording import PLOTS, Marks
 from rigdda.replay.viewer import open_viewer
 

@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 from rigdda import (
     Barrier,
     Ditch,
-    Embankment,
     Fence,
     GravityWall,
     Mesh,
     Simulation,
     Site,
-    Wall,
 )
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import Ledger, release_seeds
@@ -290,8 +288,7 @@ class Effects:
         none = np.zeros(len(table), dtype=bool)
         if isinstance(barrier, Ditch):
             return self._lands(barrier, table), none
-        assert isinstance(barrier, Fence | GravityWall | Embankment | Wall)
-        low = table["height"] <= barrier.height
+        low = table["height"] <= barrier.left_height(0.0)
         width = self.ensemble.width[table["release"]]
         if isinstance(barrier, Fence):
             assert barrier.energy_class is not None

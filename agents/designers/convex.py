@@ -33,13 +33,14 @@ from rigdda.agents.designers.catalogue import (
     whole,
 )
 from rigdda.agents.designers.constant import constant
-from rigdda.agents.designers.menu import STEP, Menu
+from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, Proposals, search
 from rigdda.agents.designers.rule import rule
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import FENCE_CLASSES
+from rigdda.barriers.base import STEP
+from rigdda.barriers.fence import CLASSES
 from rigdda.envs import DesignProblem
-from rigdda.envs.encoding import CLASSES
 from rigdda.envs.siting import MIN_GAP
 
 

@@ -9,24 +9,13 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import (
-    Barrier,
-    Ditch,
-    Embankment,
-    Fence,
-    GravityWall,
-    Layout,
-    Mesh,
-    Wall,
-)
-from rigdda.barriers import FENCE_CLASSES
+from rigdda import Barrier, Layout, Mesh
+from rigdda.barriers import KINDS
+from rigdda.barriers.base import NEAR
 from rigdda.envs import DesignProblem
-from rigdda.envs.encoding import CLASSES
-from rigdda.envs.siting import MIN_HEIGHT, SLENDER
 
 Floats = NDArray[np.float64]
 
@@ -34,20 +23,8 @@ STATIONS = 32
 """Stations across the zone."""
 
 
-HEIGHTS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
-"""Heights of barriers [m]."""
-
-
-CREST = 1.0
-"""Least width of the crest of an embankment [m]: a machine builds it from above."""
-
-
 FINEST = 0.1
 """Least step of a station in a search [m]; places in it are rounded to it."""
-
-
-STEP = 0.5
-"""Step of heights, depths and widths in a search [m]; of thickness half as much."""
 
 
 class Menu:
@@ -72,17 +49,12 @@ class Menu:
         apart = [x for x in even if not corners or np.abs(np.subtract(corners, x)).min() >= FINEST]
         return np.unique(np.round([*apart, *corners], 2))
 
-    @property
-    def crest(self) -> float:
-        """Least width of the crest of an embankment [m]."""
-        return min(max(CREST, self.zone.min_thickness), self.zone.max_thickness)
-
     def lone(self, kind: str) -> list[Barrier]:
         """Return every barrier of a kind that may be built, over stations and sizes."""
         if kind == "mesh":
             return [self.room.mesh(i) for i in range(len(self.problem.site.meshes))]
         found = []
-        for barrier in self._sizes(kind):
+        for barrier in KINDS[kind].catalogue(self.zone):
             places = [*self.stations, *self._ends(barrier)]
             put = (self.put(barrier, float(x)) for x in places)
             found += [b for b in put if b is not None]
@@ -102,32 +74,10 @@ class Menu:
     def _ends(self, barrier: Barrier) -> list[float]:
         """Return the last chainages where a barrier may stand, as far as is told without trying."""
         last = self.zone.end - barrier.extent
-        if isinstance(barrier, Fence):
-            assert barrier.elongation is not None  # of its class
-            last = min(last, self.problem.site.road.start - barrier.extent - barrier.elongation)
+        if barrier.elongation_path > 0.0:
+            road = self.problem.site.road.start
+            last = min(last, road - barrier.extent - barrier.elongation_path)
         return [math.floor(10.0 * last + 1e-6) / 10.0]
-
-    def _sizes(self, kind: str) -> Iterator[Barrier]:
-        """Yield barriers of a kind, of every size, at the start of the zone."""
-        zone, x = self.zone, self.zone.start
-        heights = [h for h in HEIGHTS if h <= zone.max_height]
-        if kind == "fence":
-            for name, row in FENCE_CLASSES.items():
-                for h in heights:
-                    if row.lowest <= h <= row.height:
-                        yield Fence(x, h, energy_class=name)
-        elif kind == "ditch":
-            for depth in DEPTHS:
-                for width in WIDTHS:
-                    if depth <= zone.max_depth and zone.min_width <= width <= zone.max_width:
-                        yield Ditch(x, depth, width)
-        elif kind == "embankment":
-            yield from (Embankment(x, h, self.crest) for h in heights)
-        else:
-            for h in heights:
-                thick = round(SLENDER * h, 1)
-                thick = min(max(thick, zone.min_thickness), zone.max_thickness)
-                yield (GravityWall if kind == "gravity_wall" else Wall)(x, h, thick)
 
     def neighbours(self, layout: Layout, step: float, level: int) -> Iterator[Layout]:
         """Yield layouts that differ from one in one station or one size of one barrier.
@@ -153,52 +103,12 @@ class Menu:
         for way in (-1.0, 1.0):
             x = barrier.x + way * step
             yield from self._put(barrier, round(x, 1))
-        for name, size in self._lengths(barrier):
-            for way in (-level, level):
-                value = max(getattr(barrier, name) + way * size, MIN_HEIGHT)
-                yield from self._put(self._resized(barrier, name, value), barrier.x)
-        if isinstance(barrier, Fence):
-            assert barrier.energy_class is not None
-            at = CLASSES.index(barrier.energy_class)
-            for other in (at - level, at + level):
-                if 0 <= other < len(CLASSES):
-                    row = FENCE_CLASSES[CLASSES[other]]
-                    tall = min(max(barrier.height, row.lowest), row.height, self.zone.max_height)
-                    yield Fence(barrier.x, tall, energy_class=CLASSES[other])
+        for other in barrier.varied(level, self.zone):
+            yield from self._put(other, barrier.x)
 
     def _put(self, barrier: Barrier, x: float) -> list[Barrier]:
         moved = self.room.put(barrier, x)
         return [] if moved is None else [moved]
-
-    def _lengths(self, barrier: Barrier) -> list[tuple[str, float]]:
-        """Return which lengths of a barrier are decided, and their steps [m]."""
-        match barrier:
-            case Ditch():
-                return [("depth", STEP), ("width", STEP)]
-            case Embankment():
-                return [("height", STEP), ("width", STEP)]
-            case Fence():
-                return [("height", STEP)]
-        return [("height", STEP), ("thickness", 0.5 * STEP)]
-
-    def _resized(self, barrier: Barrier, name: str, value: float) -> Barrier:
-        """Return a barrier with another length, within the limits of the zone."""
-        zone = self.zone
-        if isinstance(barrier, Ditch):
-            low, high = (MIN_HEIGHT, zone.max_depth)
-            if name == "width":
-                low, high = zone.min_width, zone.max_width
-        elif name == "height":
-            low, high = MIN_HEIGHT, zone.max_height
-            if isinstance(barrier, Fence):
-                assert barrier.energy_class is not None
-                row = FENCE_CLASSES[barrier.energy_class]
-                low, high = row.lowest, min(high, row.height)
-        else:
-            low, high = zone.min_thickness, zone.max_thickness
-            if isinstance(barrier, Embankment):
-                low = self.crest
-        return msgspec.structs.replace(barrier, **{name: min(max(value, low), high)})
 
 
 def spread(barriers: Sequence[Barrier], n: int) -> list[Barrier]:
@@ -209,7 +119,7 @@ def spread(barriers: Sequence[Barrier], n: int) -> list[Barrier]:
     """
     if len(barriers) <= n:
         return list(barriers)
-    table = np.array([numbers(b) for b in barriers])
+    table = np.array([b.numbers for b in barriers])
     table = (table - table.min(axis=0)) / np.maximum(np.ptp(table, axis=0), 1e-9)
     table[:, 0] *= 2.0
     centres = table[_far_apart(table, n)]
@@ -242,23 +152,6 @@ def _distances(table: Floats, centres: Floats) -> Floats:
     return apart
 
 
-def numbers(barrier: Barrier) -> list[float]:
-    """Return the numbers of a barrier that are decided."""
-    match barrier:
-        case Ditch():
-            return [barrier.x, barrier.depth, barrier.width]
-        case Fence():
-            assert barrier.energy_class is not None
-            return [barrier.x, barrier.height, math.log(barrier.energy_class)]
-        case Mesh():
-            return [barrier.x]
-    return [barrier.x, barrier.height]
-
-
-NEAR = 0.05
-"""Distance from a bound at which a length lies on it [m]."""
-
-
 def on_bound(problem: DesignProblem, layout: Layout) -> tuple[str, ...]:
     """Return what lies on a bound of the zone, of its kind or of the list of classes, in words.
 
@@ -268,7 +161,7 @@ def on_bound(problem: DesignProblem, layout: Layout) -> tuple[str, ...]:
     names = []
     for barrier in layout:
         if not isinstance(barrier, Mesh):
-            found = [*_place(problem, barrier), *_size(problem, barrier)]
+            found = [*_place(problem, barrier), *barrier.sizes_at_bounds(problem.zone)]
             names += [f"{barrier.words}: {words}" for words in found]
     return tuple(names)
 
@@ -282,38 +175,6 @@ def _place(problem: DesignProblem, barrier: Barrier) -> list[str]:
         found.append("start of the zone")
     if zone.end - end <= NEAR:
         found.append("end of the zone")
-    if isinstance(barrier, Fence):
-        assert barrier.elongation is not None  # of its class
-        if road - end - barrier.elongation <= NEAR:
-            found.append("clearance to the road")
+    if barrier.elongation_path > 0.0 and road - end - barrier.elongation_path <= NEAR:
+        found.append("clearance to the road")
     return found
-
-
-def _size(problem: DesignProblem, barrier: Barrier) -> list[str]:
-    """Return which sizes of a barrier are the least or greatest."""
-    zone = problem.zone
-    if isinstance(barrier, Fence):
-        assert barrier.energy_class is not None
-        found = _ends(barrier.height, MIN_HEIGHT, zone.max_height, "height")
-        if barrier.energy_class in (CLASSES[0], CLASSES[-1]):
-            found.append("lowest class" if barrier.energy_class == CLASSES[0] else "highest class")
-        return found
-    if isinstance(barrier, Ditch):
-        depth = _ends(barrier.depth, MIN_HEIGHT, zone.max_depth, "depth")
-        return depth + _ends(barrier.width, zone.min_width, zone.max_width, "width")
-    assert isinstance(barrier, Embankment | GravityWall | Wall)
-    what = "width" if isinstance(barrier, Embankment) else "thickness"
-    height = _ends(barrier.height, MIN_HEIGHT, zone.max_height, "height")
-    crest = Menu(problem).crest if isinstance(barrier, Embankment) else 0.0
-    least, most = max(crest, zone.min_thickness), zone.max_thickness
-    return height + _ends(getattr(barrier, what), least, most, what)
-
-
-def _ends(value: float, low: float, high: float, name: str) -> list[str]:
-    """Return whether a length is the least or the greatest."""
-    found = [f"least {name}"] if value - low <= NEAR else []
-    return found + ([f"greatest {name}"] if high - value <= NEAR else [])
-
-
-DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
-"""Depths and widths of ditches [m]."""

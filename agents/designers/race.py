@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from rigdda import Barrier, Ditch, Layout, Mesh
 from rigdda.agents.designers.catalogue import Catalogue, CrossingEnsemble, ensemble_for, tabulate
 from rigdda.agents.designers.convex import offered, unsearched
-from rigdda.agents.designers.menu import FINEST, Menu, numbers, spread
+from rigdda.agents.designers.menu import FINEST, Menu, spread
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, search
 from rigdda.agents.designers.racing import Arm, Track, error
 from rigdda.agents.designers.store import Store
@@ -61,7 +61,7 @@ class KindSurrogate:
     def __init__(
         self, barriers: Sequence[Barrier], expected: Floats, nothing: float, length: float
     ):
-        table = np.array([numbers(b) for b in barriers])
+        table = np.array([b.numbers for b in barriers])
         scale = SIZES * np.maximum(np.ptp(table, axis=0), 1e-9)
         mesh = isinstance(barriers[0], Mesh)  # options have nothing to do with each other
         scale[0] = 1e-6 if mesh else max(NEAR, SHARE * length)

@@ -24,8 +24,8 @@ from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import FENCE_CLASSES
+from rigdda.barriers.base import MIN_HEIGHT
 from rigdda.envs import DesignProblem
-from rigdda.envs.siting import MIN_HEIGHT
 
 QUANTILE = 0.95
 
@@ -141,7 +141,7 @@ def instead(menu: Menu, x: float, height: float) -> Layout:
     width, depth = ritchie(menu.problem.site)
     width = min(max(width, zone.min_width), zone.max_width)
     tall = min(max(height, MIN_HEIGHT), zone.max_height)
-    thick = menu.crest
+    thick = Embankment.least_crest(zone)
     for barrier, at in (
         (Ditch(x, min(depth, zone.max_depth), width), toe),
         (Embankment(x, tall, thick), x),

@@ -10,7 +10,8 @@ from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import findings, pictures
 from rigdda.agents.reports.pictures import BLOCKS, Flights, Panel, fly, section
-from rigdda.agents.reports.wording import euros, short, span, standing
+from rigdda.agents.reports.wording import euros, span
+from rigdda.barriers import standing
 from rigdda.replay.recording import Marks
 
 FILES = (
@@ -75,13 +76,13 @@ def _replay(done: DesignStudy, path: Path, seed: int) -> None:
     run, outcome = rigdda.release(site, layout, drawn, event)
     risk = nothing.evaluation.by_event[event]
     notes = {
-        "layout": "; ".join(map(short, layout)) or "no barrier",
+        "layout": "; ".join(b.label for b in layout) or "no barrier",
         "event": f"{event}, {euros(risk)} EUR per metre and year without barriers",
         "release": f"seed {drawn}, {outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3 "
         "come onto the road",
         "without barriers": _words(nothing),
         "with the layout": _words(chosen),
     }
-    labels = tuple(short(barrier) for barrier in standing(layout))
+    labels = tuple(barrier.label for barrier in standing(layout))
     road = site.road.start, site.road.end
     run.to_rerun(path, Marks(road, notes, f"{site.name}: {chosen.name}", labels))

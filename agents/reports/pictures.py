@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import Barrier, Ditch, Fence, Layout, Run, Simulation, Site
-from rigdda.agents.reports.wording import short, standing
-from rigdda.barriers import Earthwork, earthworks
+from rigdda import Barrier, Fence, Layout, Run, Simulation, Site
+from rigdda.barriers import Earthwork, earthworks, standing
 from rigdda.envs import Evaluation
 from rigdda.envs.rendering import GROUND, ROAD
 from rigdda.files import atomic
@@ -428,12 +427,12 @@ def _barriers(axes: Axes, site: Site, panel: Panel, moved: Mapping[Barrier, Floa
         for b in standing(panel.layout)
     ]
     for i, (barrier, outline) in enumerate(zip(standing(panel.layout), outlines, strict=True)):
-        dug = isinstance(barrier, Ditch)
+        dug = barrier.drawn == "line"
         axes.fill(*outline.T, facecolor="white" if dug else BARRIER, edgecolor=BARRIER,
                   linewidth=1.4 if dug else 2.0, zorder=5)  # fmt: skip
         foot = outline[np.argmin(outline[:, 0])]
         axes.annotate(
-            short(barrier).replace(", ", ",\n"),
+            barrier.label.replace(", ", ",\n"),
             foot,
             xytext=(-34, -16 - 36 * _near(outlines[:i], outline)),
             textcoords="offset points",
@@ -445,7 +444,7 @@ def _barriers(axes: Axes, site: Site, panel: Panel, moved: Mapping[Barrier, Floa
             arrowprops={"arrowstyle": "-", "color": BARRIER, "linewidth": 0.9, "shrinkB": 0},
         )
     for i, mesh in enumerate(set(panel.layout) - set(standing(panel.layout))):
-        axes.text(0.98, 0.93 - 0.09 * i, short(mesh), ha="right", color=BARRIER,
+        axes.text(0.98, 0.93 - 0.09 * i, mesh.label, ha="right", color=BARRIER,
                   fontweight="bold", transform=axes.transAxes, zorder=7)  # fmt: skip
 
 
@@ -467,8 +466,9 @@ def _envelopes(
         axes.grid(alpha=0.25)
         axes.set_xlabel("x [m]")
     for barrier in standing(layout):
-        if not isinstance(barrier, Ditch):
-            heights.plot([barrier.x] * 2, [0.0, barrier.height], color=BARRIER, linewidth=4,
+        tall = barrier.left_height(0.0)
+        if tall > 0.0:
+            heights.plot([barrier.x] * 2, [0.0, tall], color=BARRIER, linewidth=4,
                          solid_capstyle="butt")  # fmt: skip
         else:
             heights.axvline(barrier.x, color=BARRIER, linewidth=1, linestyle=":")

@@ -25,8 +25,8 @@ from rigdda import (
 )
 from rigdda.agents.design_study import SHED, DesignStudy, design_events
 from rigdda.agents.designers.protocol import Entry
-from rigdda.agents.reports.wording import euros, percent, short, span, standing
-from rigdda.barriers import Earthwork, to_tables
+from rigdda.agents.reports.wording import euros, percent, span
+from rigdda.barriers import Earthwork, standing, to_tables
 from rigdda.envs.intervals import Estimate, estimate, mid_p, student_interval
 from rigdda.files import atomic
 
@@ -163,7 +163,7 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
     add("run-out of 95 % of the rock", "m", 1.0, run_out, -math.inf)
     for i, barrier in enumerate(standing(layout)):
         table.add_section()
-        table.add_row(f"{short(barrier)}, at {barrier.x:.1f} m")
+        table.add_row(f"{barrier.label}, at {barrier.x:.1f} m")
         for name, (words, unit, factor) in HIT.items():
             if isinstance(barrier, Earthwork) and name not in ("overtopped", "caught", *ONLY):
                 continue

@@ -4,21 +4,20 @@ Walls, gravity walls and fences stand on the ground; ditches and embankments cha
 the face. The x of each is the chainage where it begins for a block that comes down the slope.
 """
 
-from rigdda.barriers.base import Standing, section
+from rigdda.barriers.base import Barrier, Earthwork, Standing, section
 from rigdda.barriers.ditch import Ditch
 from rigdda.barriers.embankment import Embankment
 from rigdda.barriers.fence import FENCE_CLASSES, Fence, FenceClass
 from rigdda.barriers.gravity_wall import GravityWall
 from rigdda.barriers.layout import (
     KINDS,
-    Barrier,
     Built,
-    Earthwork,
     Layout,
     as_layout,
     describe,
     earthworks,
     from_table,
+    standing,
     to_tables,
 )
 from rigdda.barriers.mesh import Mesh, MeshOption
@@ -45,5 +44,6 @@ __all__ = [
     "earthworks",
     "from_table",
     "section",
+    "standing",
     "to_tables",
 ]

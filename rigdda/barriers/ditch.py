@@ -2,18 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import ClassVar
+from collections.abc import Callable, Iterator
+from typing import ClassVar, Self
 
+import msgspec
 import numpy as np
 
-from rigdda.barriers.base import BarrierBase, Drawn, Floats, PricedSite, Reach
+from rigdda.barriers.base import (
+    MIN_HEIGHT,
+    TOLERANCE,
+    Drawn,
+    Earthwork,
+    Floats,
+    KnownSite,
+    Length,
+    Reach,
+)
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
 from rigdda.errors import BadInput
+from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
+MIN_FLOOR = 1.0
+"""Least width of the floor of a ditch that is designed [m]: a machine empties it, and what falls
+into a notch stops it up."""
 
-class Ditch(BarrierBase, frozen=True, tag="ditch"):
+DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+"""Depths and widths of ditches of the catalogue of a search [m]."""
+
+
+class Ditch(Earthwork, frozen=True, tag="ditch"):
     """A ditch with a level floor, cut into the terrain. Its surface is that of the terrain.
 
     Parameters
@@ -37,6 +55,11 @@ class Ditch(BarrierBase, frozen=True, tag="ditch"):
     width: float
     side_slope: float = 0.25
     drawn: ClassVar[Drawn] = "line"
+    steepest: ClassVar[float | None] = 30.0
+    lengths: ClassVar[tuple[Length, ...]] = (
+        Length("depth", "max_depth"),
+        Length("width", "max_width", "min_width"),
+    )
 
     def __post_init__(self) -> None:
         self._check("depth", "width")
@@ -77,7 +100,7 @@ class Ditch(BarrierBase, frozen=True, tag="ditch"):
         line = np.array([[left, high], [first, floor], [last, floor], [right, low]])
         return regrade("ditch x", ground, line, np.minimum, None)
 
-    def price(self, site: PricedSite, outline: Floats | None) -> float:
+    def price(self, site: KnownSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, by the surface of what is dug [EUR/m].
 
         `outline` has the new ground from left to right, then the old one back, see
@@ -103,6 +126,49 @@ class Ditch(BarrierBase, frozen=True, tag="ditch"):
         """Return that it holds what lies between its edges, below a deposit that it stops."""
         assert ground is not None
         return Reach(self.x, self.end, ground.height(self.end), rise)
+
+    @property
+    def label(self) -> str:
+        """Kind and sizes in words."""
+        return f"ditch {self.depth:.1f} m deep, {self.width:.1f} m wide"
+
+    def check_design(self, where: str, site: KnownSite) -> None:
+        """Check that its sides stand in the ground. Raises as that of `Barrier`."""
+        least = site.ditch_side(self.x, self.width)
+        if self.side_slope < least - TOLERANCE:
+            mend = f"give at least {least:g}, at which a cut in this ground stands"
+            raise BadInput(f"{where}.side_slope", self.side_slope, mend)
+
+    def placed(self, x: float, site: KnownSite, zone: BarrierZone) -> Self | None:
+        """Return it at another chainage with the sides that it needs there.
+
+        It is as deep as these sides allow; None if that is less than `MIN_HEIGHT`.
+        """
+        high, low = np.interp(np.array([x, x + self.width]), *site.profile.points.T).tolist()
+        side = site.ditch_side(x, self.width)
+        deepest = 0.5 * ((self.width - MIN_FLOOR) / side - abs(high - low))
+        depth = min(self.depth, deepest)
+        if depth < MIN_HEIGHT - TOLERANCE:
+            return None
+        return msgspec.structs.replace(self, x=x, depth=depth, side_slope=side)
+
+    @classmethod
+    def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
+        """Yield ditches of every depth and width that the zone allows."""
+        for depth in DEPTHS:
+            for width in WIDTHS:
+                if depth <= zone.max_depth and zone.min_width <= width <= zone.max_width:
+                    yield cls(zone.start, depth, width)
+
+    @property
+    def numbers(self) -> list[float]:
+        """Its chainage, depth and width."""
+        return [self.x, self.depth, self.width]
+
+    @property
+    def size(self) -> float:
+        """Depth times width."""
+        return self.depth * self.width
 
     def sizes(self, metres: Callable[[float], str]) -> str:
         """Return its sizes in words."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import ClassVar, Self
 
+import msgspec
 import numpy as np
 
 from rigdda.barriers.base import (
-    BarrierBase,
+    HEIGHTS,
+    Barrier,
+    Earthwork,
     Floats,
-    PricedSite,
+    KnownSite,
+    Length,
     Reach,
     Subsoil,
     base_friction,
@@ -18,10 +22,14 @@ from rigdda.barriers.base import (
 )
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
 from rigdda.errors import BadInput
+from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
+CREST = 1.0
+"""Least width of the crest of an embankment in a search [m]: a machine builds it from above."""
 
-class Embankment(BarrierBase, frozen=True, tag="embankment"):
+
+class Embankment(Earthwork, frozen=True, tag="embankment"):
     """A dam of earth with a level crest, raised on the terrain.
 
     Its surface is "soil" where the scene defines it, else that of the other barriers. If the thrust
@@ -53,6 +61,14 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
     side_slope: float = 0.5
     density: float = 1900.0
     fails: ClassVar[str] = "pushed"
+    fallible: ClassVar[bool] = True
+    by_friction: ClassVar[bool] = True
+    steepest: ClassVar[float | None] = 25.0
+    has_sides: ClassVar[bool] = True
+    lengths: ClassVar[tuple[Length, ...]] = (
+        Length("height", "max_height"),
+        Length("width", "max_thickness", "min_thickness"),
+    )
 
     def __post_init__(self) -> None:
         self._check("height", "width")
@@ -119,7 +135,7 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
             "put it where the ground is flatter than its side, which does not meet the ground",
         )
 
-    def price(self, site: PricedSite, outline: Floats | None) -> float:
+    def price(self, site: KnownSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, that of its fill [EUR/m]."""
         assert outline is not None
         return site.prices.embankment * section(outline)
@@ -127,6 +143,11 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
         """Return its weight times the friction of its base [N/m]."""
         return base_friction(scene, self.density, scene.fill, outline)
+
+    def idle_resistance(self, other: Barrier, resistance: float) -> float:
+        """Return the thrust that it bears, in proportion to its weight [N/m]."""
+        assert isinstance(other, Embankment)
+        return resistance * self.density / other.density
 
     def holds(self, outline: Floats, ground: Terrain | None, rise: float) -> Reach:
         """Return what it holds: its uphill side belongs to it."""
@@ -136,6 +157,53 @@ class Embankment(BarrierBase, frozen=True, tag="embankment"):
     def left_height(self, displacement: float) -> float:
         """Return its height [m]."""
         return self.height
+
+    @property
+    def label(self) -> str:
+        """Kind and height in words."""
+        return f"embankment {self.height:.1f} m high"
+
+    def order(self, road: float) -> tuple[str, str]:
+        """Return the width of its crest in words."""
+        return f"crest {self.width:.1f} m wide", ""
+
+    def works(self, ground: Terrain) -> tuple[float, float]:
+        """Return the chainages up to which it takes up the natural ground [m].
+
+        Up to where its downhill side meets the ground; to the end of the ground if it does not.
+        """
+        along, level = ground.points.T
+        top = float(np.interp(np.array([self.x]), along, level)[0]) + self.height
+        ahead = along > self.end
+        x = np.concatenate([[self.end], along[ahead]])
+        y = np.concatenate([np.interp(x[:1], along, level), level[ahead]])
+        over = top - (x - self.end) / self.side_slope - y
+        k = int(np.argmax(over <= 0.0))  # the first corner below which the side is
+        if over[k] > 0.0:
+            return self.x, float(x[-1])
+        if k == 0:
+            return self.x, self.end
+        share = over[k - 1] / (over[k - 1] - over[k])
+        return self.x, float(x[k - 1] + share * (x[k] - x[k - 1]))
+
+    @classmethod
+    def least_crest(cls, zone: BarrierZone) -> float:
+        """Return the least width of the crest in a search [m]."""
+        return min(max(CREST, zone.min_thickness), zone.max_thickness)
+
+    @classmethod
+    def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
+        """Yield embankments of every height, with the narrowest crest."""
+        crest = cls.least_crest(zone)
+        yield from (cls(zone.start, h, crest) for h in HEIGHTS if h <= zone.max_height)
+
+    def bounds(self, zone: BarrierZone) -> dict[str, tuple[float, float]]:
+        """Return the range of its height and of the width of its crest in a search [m]."""
+        return super().bounds(zone) | {"width": (self.least_crest(zone), zone.max_thickness)}
+
+    def thickest(self, zone: BarrierZone) -> Self:
+        """Return it with the widest crest that the zone allows."""
+        return msgspec.structs.replace(self, width=zone.max_thickness)
 
     def sizes(self, metres: Callable[[float], str]) -> str:
         """Return its sizes in words."""

@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import ClassVar, NamedTuple, Self
 
 import msgspec
 
-from rigdda.barriers.base import FOUNDATION, Floats, PricedSite, Standing, Subsoil
+from rigdda.barriers.base import (
+    FOUNDATION,
+    HEIGHTS,
+    MIN_HEIGHT,
+    Barrier,
+    Floats,
+    KnownSite,
+    Length,
+    Standing,
+    Subsoil,
+    at_ends,
+    share_of,
+)
 from rigdda.errors import BadInput, DoubtfulInput
+from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
 PANEL = 10.0
@@ -58,6 +71,10 @@ FENCE_CLASSES = {
 kits; heights and elongations are orders of magnitude, from memory."""
 
 
+CLASSES = tuple(FENCE_CLASSES)
+"""Energy classes of fences, ascending [kJ]."""
+
+
 class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     """A flexible fence, which brakes rock with a constant force over its elongation.
 
@@ -102,6 +119,8 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     thickness: float = 0.2
     elongation: float | None = None
     repaired: ClassVar[float] = PANEL
+    fallible: ClassVar[bool] = True
+    lengths: ClassVar[tuple[Length, ...]] = (Length("height", "max_height"),)
 
     def __post_init__(self) -> None:
         self._check("height", "thickness")
@@ -145,6 +164,12 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         capacity = 1e3 * self.energy_class / min(width, PANEL)
         return self._with(capacity=capacity, energy_class=None)
 
+    @property
+    def elongation_path(self) -> float:
+        """Its elongation, the distance downhill that it needs to give way [m]."""
+        assert self.elongation is not None  # set at the start
+        return self.elongation
+
     def outline(self, ground: Terrain) -> Floats:
         """Return the (4, 2) corners, the foot below all ground over which it may give way.
 
@@ -182,7 +207,7 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         """Return the force against which it gives way [N/m]."""
         return self.braking_force
 
-    def price(self, site: PricedSite, outline: Floats | None) -> float:
+    def price(self, site: KnownSite, outline: Floats | None) -> float:
         """Return the price at the height of the road [EUR/m], with its foundations.
 
         One that is lower than any of its class costs as much as the lowest.
@@ -196,11 +221,106 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         height = max(self.height, FENCE_CLASSES[self.energy_class].lowest)
         return prices.fence[name] * height + prices.fence_base
 
+    def idle_resistance(self, other: Barrier, resistance: float) -> float:
+        """Return the force against which it gives way [N/m]."""
+        return self.braking_force
+
+    @property
+    def strength(self) -> str:
+        """What it withstands, in words: its energy class, or its capacity per metre."""
+        if self.energy_class is not None:
+            return f"{self.energy_class:,g} kJ"
+        assert self.capacity is not None
+        return f"{self.capacity / 1e3:,.0f} kJ/m"
+
+    @property
+    def label(self) -> str:
+        """Kind, class and height in words."""
+        return f"fence {self.strength}, {self.height:.1f} m high"
+
+    def order(self, road: float) -> tuple[str, str]:
+        """Return how far it gives way, and what is left to the road, in words."""
+        clear = road - self.end - self.elongation_path
+        told = f"; it gives way by {self.elongation_path:.1f} m, to {clear:.1f} m from the road"
+        return "", told
+
+    @property
+    def rated(self) -> int:
+        """Its energy class [kJ], of a fence that is designed: it has one."""
+        assert self.energy_class is not None
+        return self.energy_class
+
+    def check_design(self, where: str, site: KnownSite) -> None:
+        """Check that it has an energy class. Raises as that of `Barrier`."""
+        if self.energy_class is None:
+            mend = "give its energy class instead of a capacity"
+            raise BadInput(f"{where}.capacity", self.capacity, mend)
+
+    @classmethod
+    def of_shares(cls, zone: BarrierZone, x: float, first: float, second: float) -> Self:
+        """Return one at a chainage: its height and its energy class by shares from 0 to 1."""
+        energy_class = CLASSES[min(int(second * len(CLASSES)), len(CLASSES) - 1)]
+        tall = MIN_HEIGHT + first * (tallest(zone) - MIN_HEIGHT)
+        return cls(x, min(tall, FENCE_CLASSES[energy_class].height), energy_class=energy_class)
+
+    def shares(self, zone: BarrierZone) -> tuple[float, float]:
+        """Return the shares of its height, and of its energy class, the middle of its part."""
+        size = (CLASSES.index(self.rated) + 0.5) / len(CLASSES)
+        return share_of(self.height, MIN_HEIGHT, tallest(zone)), size
+
+    @classmethod
+    def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
+        """Yield fences of every class and every height that is made of it."""
+        for name, row in FENCE_CLASSES.items():
+            for height in (h for h in HEIGHTS if h <= zone.max_height):
+                if row.lowest <= height <= row.height:
+                    yield cls(zone.start, height, energy_class=name)
+
+    def bounds(self, zone: BarrierZone) -> dict[str, tuple[float, float]]:
+        """Return the range of the height that is made of its class [m]."""
+        row = FENCE_CLASSES[self.rated]
+        return {"height": (row.lowest, min(zone.max_height, row.height))}
+
+    def varied(self, level: int, zone: BarrierZone) -> Iterator[Self]:
+        """Yield it higher and lower, and of the classes so many steps above and below."""
+        yield from super().varied(level, zone)
+        at = CLASSES.index(self.rated)
+        for other in (at - level, at + level):
+            if 0 <= other < len(CLASSES):
+                row = FENCE_CLASSES[CLASSES[other]]
+                tall = min(max(self.height, row.lowest), row.height, zone.max_height)
+                yield type(self)(self.x, tall, energy_class=CLASSES[other])
+
+    @property
+    def numbers(self) -> list[float]:
+        """Its chainage, its height and the logarithm of its class."""
+        return [self.x, self.height, math.log(self.rated)]
+
+    @property
+    def size(self) -> float:
+        """Class times height."""
+        return self.rated * self.height
+
+    def sizes_at_bounds(self, zone: BarrierZone) -> list[str]:
+        """Return in words whether its height or its class is the least or the greatest.
+
+        The greatest height of its class does not count: the next class is higher.
+        """
+        found = at_ends(self.height, MIN_HEIGHT, zone.max_height, "height")
+        if self.energy_class in (CLASSES[0], CLASSES[-1]):
+            found.append("lowest class" if self.energy_class == CLASSES[0] else "highest class")
+        return found
+
     def sizes(self, metres: Callable[[float], str]) -> str:
         """Return its sizes in words."""
         capacity, named = self.capacity, self.energy_class
         takes = f"{named} kJ" if capacity is None else f"{capacity / 1e3:.0f} kJ/m"
         return f"{metres(self.height)} high, {takes}"
+
+
+def tallest(zone: BarrierZone) -> float:
+    """Return the greatest height of a fence of any class in a zone [m]."""
+    return min(zone.max_height, max(row.height for row in FENCE_CLASSES.values()))
 
 
 def _usual_elongation(capacity: float) -> float:

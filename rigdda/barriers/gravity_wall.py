@@ -12,13 +12,18 @@ import shapely
 
 from rigdda.barriers.base import (
     ELEMENT,
+    SLENDER,
+    TOLERANCE,
+    Barrier,
     Drawn,
     Floats,
-    PricedSite,
+    KnownSite,
     Standing,
     Subsoil,
     base_friction,
 )
+from rigdda.errors import BadInput
+from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
 SLID = 0.1
@@ -53,6 +58,9 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     thickness: float = 1.0
     density: float = 2400.0
     drawn: ClassVar[Drawn] = "moving"
+    fallible: ClassVar[bool] = True
+    by_friction: ClassVar[bool] = True
+    steepest: ClassVar[float | None] = 30.0
 
     def __post_init__(self) -> None:
         self._check("height", "thickness")
@@ -86,13 +94,18 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
         top = max(left, right) + self.height
         return np.array([[x[0], left], [x[-1], right], [x[-1], top], [x[0], top]])
 
-    def price(self, site: PricedSite, outline: Floats | None) -> float:
+    def price(self, site: KnownSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, that of its concrete [EUR/m]."""
         return site.prices.concrete * self.height * self.thickness
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
         """Return its weight times the friction of its base [N/m]."""
         return base_friction(scene, self.density, scene.barrier_surface, outline)
+
+    def idle_resistance(self, other: Barrier, resistance: float) -> float:
+        """Return the thrust that it bears, in proportion to its weight [N/m]."""
+        assert isinstance(other, GravityWall)
+        return resistance * self.density / other.density
 
     def changes(self, times: Floats, poses: Floats, failure: float) -> list[tuple[float, str]]:
         """Return when it "slid" for good and when it "overturned", after which it slides no more.
@@ -119,6 +132,30 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
         if far <= x:
             return 0.0
         return float(shapely.clip_by_rect(shapely.Polygon(outline), x, low, far, high).area)
+
+    def order(self, road: float) -> tuple[str, str]:
+        """Return its thickness in words."""
+        return f"{self.thickness:.1f} m thick", ""
+
+    def check_design(self, where: str, site: KnownSite) -> None:
+        """Check that it is thick enough to stand by its weight. Raises as that of `Barrier`."""
+        least = SLENDER * self.height
+        if self.thickness < least - TOLERANCE:
+            mend = f"give at least {least:g}: a gravity wall stands by its weight"
+            raise BadInput(f"{where}.thickness", self.thickness, mend)
+
+    def placed(self, x: float, site: KnownSite, zone: BarrierZone) -> Self:
+        """Return it at another chainage, as thick as its height needs.
+
+        It is at most as high as the greatest thickness allows.
+        """
+        tall = min(self.height, zone.max_thickness / SLENDER)
+        thick = max(self.thickness, SLENDER * tall)
+        return msgspec.structs.replace(self, x=x, height=tall, thickness=thick)
+
+    def thickest(self, zone: BarrierZone) -> Self:
+        """Return it as thick as the zone allows."""
+        return msgspec.structs.replace(self, thickness=zone.max_thickness)
 
     def sizes(self, metres: Callable[[float], str]) -> str:
         """Return its sizes in words."""

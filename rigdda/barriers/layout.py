@@ -12,7 +12,7 @@ import msgspec
 import tomli_w
 
 from rigdda import check
-from rigdda.barriers.base import Floats
+from rigdda.barriers.base import Barrier, Earthwork, Floats, Standing
 from rigdda.barriers.ditch import Ditch
 from rigdda.barriers.embankment import Embankment
 from rigdda.barriers.fence import Fence
@@ -24,19 +24,17 @@ from rigdda.errors import BadInput
 from rigdda.files import atomic, read
 from rigdda.model.terrain import Terrain
 
-Built = Wall | GravityWall | Fence | Ditch | Embankment
-"""What a scene has: all but mesh."""
+Built = Standing | Earthwork
+"""What a scene has: all kinds but mesh."""
 
-Barrier = Built | Mesh
 Layout = tuple[Barrier, ...]
-
-Earthwork = Ditch | Embankment
 
 KINDS: dict[str, type[Barrier]] = {
     str(kind.__struct_config__.tag): kind
-    for kind in (Wall, GravityWall, Fence, Ditch, Embankment, Mesh)
+    for kind in (Fence, Ditch, Embankment, GravityWall, Wall, Mesh)
 }
-"""Class of every kind, by its name in layout files."""
+"""Registered kinds of barrier by their names in layout files, in the order of the numbers of a
+design. A kind is registered here and nowhere else."""
 
 
 def earthworks(
@@ -72,7 +70,7 @@ def earthworks(
 
 @lru_cache(maxsize=64)
 def _graded(
-    terrain: Terrain, works: tuple[Ditch | Embankment, ...], surface: str
+    terrain: Terrain, works: tuple[Earthwork, ...], surface: str
 ) -> tuple[Terrain, tuple[Floats, ...]]:
     """Return the ground after earthworks, and their outlines: asked for by every release."""
     outlines: list[Floats] = []
@@ -122,6 +120,11 @@ def from_table(where: str, table: Any) -> Barrier:
 def to_tables(layout: Sequence[Barrier]) -> list[dict[str, Any]]:
     """Return the tables of a layout file; `from_table` gives each barrier back."""
     return [msgspec.to_builtins(barrier) for barrier in layout]
+
+
+def standing(layout: Iterable[Barrier]) -> tuple[Built, ...]:
+    """Return the barriers of a layout that are in a scene, in its order: all but meshes."""
+    return tuple(barrier for barrier in layout if isinstance(barrier, Built))
 
 
 def describe(barrier: Barrier, digits: int = 1) -> str:

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import msgspec
 
 from rigdda import check
-from rigdda.barriers.base import BarrierBase, Floats, PricedSite
+from rigdda.barriers.base import Barrier, Floats, KnownSite
 from rigdda.errors import BadInput
 
 
-class Mesh(BarrierBase, frozen=True, tag="mesh"):
+class Mesh(Barrier, frozen=True, tag="mesh"):
     """Mesh, one of a site's options. It is not part of a scene: it changes how often rock falls.
 
     Parameters
@@ -44,10 +44,15 @@ class Mesh(BarrierBase, frozen=True, tag="mesh"):
         """Length that it takes up among barriers on the slope [m]: none."""
         return 0.0
 
-    def price(self, site: PricedSite, outline: Floats | None) -> float:
+    def price(self, site: KnownSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, of its option [EUR/m]."""
         option = site.mesh(self.option)
         return option.area * option.price
+
+    @property
+    def label(self) -> str:
+        """Kind and option in words."""
+        return f"mesh: {self.option}"
 
     def left_height(self, displacement: float) -> float:
         """Return 0: it has none [m]."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import ClassVar
 
-from rigdda.barriers.base import Floats, PricedSite, Standing
+from rigdda.barriers.base import Floats, KnownSite, Standing
 
 
 class Wall(Standing, frozen=True, tag="wall"):
@@ -26,11 +27,13 @@ class Wall(Standing, frozen=True, tag="wall"):
     """
 
     thickness: float = 1.0
+    designed: ClassVar[bool] = False
+    steepest: ClassVar[float | None] = 30.0
 
     def __post_init__(self) -> None:
         self._check("height", "thickness")
 
-    def price(self, site: PricedSite, outline: Floats | None) -> float:
+    def price(self, site: KnownSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, that of its concrete [EUR/m]."""
         return site.prices.concrete * self.height * self.thickness
 

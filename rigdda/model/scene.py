@@ -22,7 +22,7 @@ from rigdda.barriers import (
     Earthwork,
     Fence,
     GravityWall,
-    Mesh,
+    Standing,
     Wall,
     earthworks,
     from_table,
@@ -355,7 +355,7 @@ class Scene:
             if isinstance(barrier, Earthwork):
                 x = self._moved[barrier][:, 0]
                 even.append((float(x.min()), float(x.max())))
-            elif not isinstance(barrier, Mesh):
+            elif isinstance(barrier, Standing):
                 even.append((barrier.x, barrier.x + barrier.extent))
         return self.roughness.applied(ground, even)
 
@@ -377,7 +377,7 @@ class Scene:
         what = self.barriers[barrier]
         if isinstance(what, Earthwork):
             return self._moved[what]
-        assert self._smooth is not None and not isinstance(what, Mesh)
+        assert self._smooth is not None and isinstance(what, Standing)
         if barrier not in self._outlines:
             corners = what.outline(self._smooth)
             corners.setflags(write=False)

@@ -16,7 +16,7 @@ import numpy as np
 import tomli_w
 
 from rigdda import check
-from rigdda.barriers import Barrier, Built, Layout, Mesh, as_layout, earthworks
+from rigdda.barriers import Barrier, Built, Layout, Mesh, as_layout, earthworks, standing
 from rigdda.check import mistyped
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, read
@@ -210,18 +210,19 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If a barrier stands where loose rock lies, or a mesh is not one of the options.
         """
-        standing: list[Built] = []
+        found: list[Built] = []
         taken = _taken(self)
         for i, barrier in enumerate(as_layout(layout)):
             if isinstance(barrier, Mesh):
                 self.mesh(barrier.option)
+            if not isinstance(barrier, Built):
                 continue
             for low, high in taken:
                 if barrier.x < high - ROUNDING and barrier.x + barrier.extent > low + ROUNDING:
                     mend = f"put it outside x = {low:.2f} to {high:.2f}, where loose rock lies"
                     raise BadInput(f"barriers[{i}].x", barrier.x, mend)
-            standing.append(barrier.for_width(width))
-        return tuple(standing)
+            found.append(barrier.for_width(width))
+        return tuple(found)
 
     def scene(self, drawn: Drawn, barriers: Sequence[Built] = ()) -> Scene:
         """Return the scene of what was drawn, with barriers as `built` gives them."""
@@ -303,9 +304,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If a barrier has no price, or an earthwork does not fit.
         """
-        standing = as_layout(layout)
-        _, moved = earthworks(self.profile, standing, self.soil)
-        return [b.price(self, moved.get(b)) * self.access(b.x) for b in standing]
+        barriers = as_layout(layout)
+        _, moved = earthworks(self.profile, barriers, self.soil)
+        return [b.price(self, moved.get(b)) * self.access(b.x) for b in barriers]
 
     def capital(self, layout: Sequence[Barrier]) -> float:
         """Return what a layout costs to build [EUR per metre of road].
@@ -322,8 +323,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
         Raises as `capital` does.
         """
-        standing = as_layout(layout)
-        each = zip(standing, self.capitals(standing), strict=True)
+        barriers = as_layout(layout)
+        each = zip(barriers, self.capitals(barriers), strict=True)
         return float(sum(price * self.prices.annual(b.kind) for b, price in each))
 
     def bill(self, layout: Sequence[Barrier], outcome: Outcome) -> Bill:
@@ -337,7 +338,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         volume, reached = outcome.road_volume, outcome.reached
         repair = self.prices.removal * outcome.held_fraction * outcome.released_volume
         if any(found.failed for found in outcome.barriers):
-            built = [b for b in layout if not isinstance(b, Mesh)]
+            built = standing(layout)
             cost = _capital_of(self, layout)
             for barrier, found in zip(built, outcome.barriers, strict=True):
                 if not found.failed:

@@ -61,7 +61,8 @@ def test_a_design_that_stops_keeps_its_evaluations_and_goes_on(
     monkeypatch.setattr(DesignProblem, "evaluate", stop)
     assert cli.main(arguments) == code
     err = capsys.readouterr().err
-    assert err.count("\n") == 1 and "kept in o: evaluations.csv, evaluations.jsonl" in err
+    err = err.splitlines()[-1]  # a slow machine shows progress before
+    assert err.startswith("rigdda: ") and "kept in o: evaluations.csv, evaluations.jsonl" in err
     assert len(Path("o/evaluations.jsonl").read_text().splitlines()) == 3
     assert len(Path("o/evaluations.csv").read_text().splitlines()) == 4
     left[0] = 1000

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 import rigdda
 from rigdda import BadInput, Layout, Outcome, Site, check
 from rigdda.agents import limits
-from rigdda.agents.designers.store import mechanics
 from rigdda.agents.reports.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from rigdda.agents.reports.wording import euros, span
 from rigdda.barriers import from_table, standing
 from rigdda.check import mistyped
 from rigdda.envs.cost import Account, Facts, learn, stratified
+from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import read
 
 if TYPE_CHECKING:

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from rigdda import BadInput, __version__, check, sites
 from rigdda.agents import designers, limits
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.designers.store import mechanics
 from rigdda.agents.policy import SLOTS, Network, decide, features
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import barrier_free
 from rigdda.envs.observation import observe
+from rigdda.envs.outcome_cache import mechanics
 from rigdda.envs.site_sampling import pose
 from rigdda.files import atomic
 

@@ -5,19 +5,16 @@ Known once a site, and kept on disk in the user's cache: every reward is measure
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
-import rigdda
 from rigdda import Outcome, Site
 from rigdda.envs import outcome_cache
 from rigdda.envs.cost import Evaluation, Facts, account, judge, learn
@@ -149,33 +146,26 @@ def _shared(shares: Mapping[str, float], releases: int) -> dict[str, int]:
     return {name: math.ceil(share * releases) for name, share in shares.items()}
 
 
-@lru_cache(maxsize=1)
-def _sources() -> str:
-    """Return a hash of all that decides what is kept: the mechanics and the estimator."""
-    own = [
-        Path(__file__).parent / f"{n}.py"
-        for n in ("accounts", "ensemble", "estimator", "intervals")
-    ]
-    digest = hashlib.sha256()
-    for path in [*sorted(Path(rigdda.__file__).parent.rglob("*.py")), *own]:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 def _path(key: bytes) -> Path:
     """Return the file of a site, beside the compiled kernels."""
     kernels = cache_directory()
-    return kernels.parent / f"nothing-{_sources()}-{kernels.name[-16:]}" / f"{key.hex()}.msgpack"
+    return (
+        kernels.parent
+        / f"nothing-{outcome_cache.mechanics()}-{kernels.name[-16:]}"
+        / f"{key.hex()}.msgpack"
+    )
 
 
 def _read(key: bytes) -> Ensemble | None:
     """Return what is kept on disk, None if that is nothing or no longer sound."""
+    path = _path(key)
     with suppress(OSError, msgspec.DecodeError):
-        return msgspec.msgpack.decode(_path(key).read_bytes(), type=Ensemble)
+        return msgspec.msgpack.decode(path.read_bytes(), type=Ensemble)
     return None
 
 
 def _write(key: bytes, known: Ensemble) -> None:
     """Keep it on disk; a disk that is full costs time later, no result now."""
-    with suppress(OSError), atomic(_path(key)) as part:
+    path = _path(key)
+    with suppress(OSError), atomic(path) as part:
         part.write_bytes(msgspec.msgpack.encode(known))

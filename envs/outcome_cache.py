@@ -14,7 +14,9 @@ from collections import OrderedDict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
+from pathlib import Path
 from threading import Lock
 from typing import Generic, NamedTuple, TypeVar
 
@@ -29,8 +31,21 @@ from rigdda import (
     Site,
 )
 from rigdda.barriers import Built, Standing, earthworks, standing
+from rigdda.kernel import source_hash
 from rigdda.model.settings import EARTH
 from rigdda.model.terrain import REACH
+
+
+@cache
+def mechanics() -> str:
+    """Return a hash of all sources, and numba's version, that an evaluation depends on."""
+    digest = hashlib.sha256(source_hash().encode())
+    for folder in (Path(rigdda.__file__).parent, Path(__file__).parent):
+        for path in sorted(folder.rglob("*.py")):
+            if path.relative_to(folder).parts[0] not in ("agents", "envs", "validation"):
+                digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")

@@ -37,9 +37,10 @@ from rigdda import BadInput, Layout, sites
 from rigdda.agents import designers
 from rigdda.agents.cli import BUDGET
 from rigdda.agents.designers.protocol import verify
-from rigdda.agents.designers.store import Store, mechanics
+from rigdda.agents.designers.store import Store
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.outcome_cache import mechanics
 
 COLOURS = {
     "race": RED, "random": GREY, "constant": "black", "rule": ORANGE, "cma": BLUE, "tpe": GREEN,

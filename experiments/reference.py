@@ -28,9 +28,10 @@ from rigdda import Layout, Site, sites
 from rigdda.agents.designers.constant import CONSTANTS, constant, place
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import verify
-from rigdda.agents.designers.store import Store, mechanics
+from rigdda.agents.designers.store import Store
 from rigdda.barriers import describe, from_table, to_tables
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.outcome_cache import mechanics
 
 STATIONS, QUICK_STATIONS = 24, 6
 """Chainages across the zone at which singles are tried."""

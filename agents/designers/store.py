@@ -11,18 +11,15 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
-import rigdda
-import rigdda.envs
 from rigdda import BadInput, Layout, Outcome, __version__
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import atomic
-from rigdda.kernel import source_hash
 
 FILE = "problem.json"
 
@@ -250,16 +247,3 @@ def _key(problem: DesignProblem, layout: Layout, seeds: Any) -> str:
     """Return a hash of all that an evaluation depends on."""
     asked = [__version__, mechanics(), problem.site, problem.targets, list(layout), seeds]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:32]
-
-
-@cache
-def mechanics() -> str:
-    """Return a hash of all sources, and numba's version, that an evaluation depends on."""
-    digest = hashlib.sha256(source_hash().encode())
-    for name in (rigdda.__file__, rigdda.envs.__file__):
-        assert name is not None
-        folder = Path(name).parent
-        for path in sorted(folder.rglob("*.py")):
-            if path.relative_to(folder).parts[0] not in ("agents", "envs", "validation"):
-                digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]

@@ -15,7 +15,7 @@ from experiments.outcome_cost.cost import Sample, judge, sampled
 from experiments.outcome_cost.engines import CORE, REFERENCE, Setting, settings
 from experiments.outcome_cost.sample import Core, Peer, Points, Release
 from experiments.script import say
-from rigdda.agents.designers.store import mechanics
+from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import atomic
 
 JUDGED = 0.03

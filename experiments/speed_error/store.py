@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.agents.designers.store import mechanics
+from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import atomic
 
 Outcomes = tuple[NDArray[np.float64], float]

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 import multiprocessing
+import os
 import pickle
+import subprocess
+import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -238,6 +241,24 @@ def test_without_prices_the_reward_is_the_share_of_debris_kept_off() -> None:
     assert problem.reward(found) == pytest.approx(1.0 - found.debris / problem.nothing.debris)
     clean = problem.judge(FENCE, hand_made({}))
     assert problem.reward(clean) == 1.0
+
+
+@pytest.mark.slow
+def test_the_cost_of_nothing_is_found_again_by_another_process(tmp_path: Path) -> None:
+    program = (
+        "import time, warnings; from rigdda.envs import DesignProblem, ensemble\n"
+        "warnings.simplefilter('ignore'); ensemble.FIRST, ensemble.ALL = 2, 8\n"
+        "print(DesignProblem('verge').nothing.simulated, ensemble._path(b'').parent.exists())\n"
+        "ensemble._simulate = None\n"
+        "ensemble.memory = type(ensemble.memory)(4)\n"
+        "print(DesignProblem('verge', 2).nothing.objective)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
+                         env={**os.environ, "XDG_CACHE_HOME": str(tmp_path)})  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    simulated, kept = run.stdout.split()[:2]
+    assert int(simulated) >= 8 and kept == "True"
+    assert len(list(tmp_path.rglob("nothing-*/*.msgpack"))) == 1
 
 
 def test_nothing_is_kept_on_disk(problem: DesignProblem, monkeypatch: pytest.MonkeyPatch) -> None:

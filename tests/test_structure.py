@@ -1,7 +1,10 @@
 """The structure of the package: no circles of imports, no name twice."""
 
+import ast
+import importlib.util
 from collections import Counter
 from graphlib import TopologicalSorter
+from pathlib import Path
 
 import grimp
 import pytest
@@ -25,3 +28,14 @@ def test_no_file_name_occurs_twice(graph: grimp.ImportGraph) -> None:
     assert any(name.startswith("rigdda.envs.") for name in files)
     names = Counter(name.rpartition(".")[2] for name in files)
     assert [name for name, count in names.items() if count > 1] == []
+
+
+def test_no_class_name_occurs_twice(graph: grimp.ImportGraph) -> None:
+    found = Counter[str]()
+    for name in graph.modules:
+        module = importlib.util.find_spec(name)
+        assert module is not None and module.origin is not None
+        tree = ast.parse(Path(module.origin).read_text(encoding="utf-8"))
+        found.update(node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+    assert found["Barrier"] == 1
+    assert [name for name, count in found.items() if count > 1] == []

@@ -14,7 +14,7 @@ from rigdda.replay.recording import (
     PLACEMENT,
     TIMELINE,
     Marks,
-    Motion,
+    RecordedMotion,
     log_run,
     recording,
     slope_view,
@@ -35,7 +35,7 @@ class Placement:
         Of the placement; at the start, without barriers, the reward is 0.
     """
 
-    run: Motion
+    run: RecordedMotion
     layout: str
     reward: float
     objective: float

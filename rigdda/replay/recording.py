@@ -34,7 +34,7 @@ Colour = tuple[int, int, int]
 Floats = NDArray[np.float64]
 
 
-class Motion(Protocol):
+class RecordedMotion(Protocol):
     """What a replay shows: the motion of a scene, as a `rigdda.Run` has recorded it."""
 
     @property
@@ -167,7 +167,7 @@ PLOTS = {
 """Title and colour of every scalar."""
 
 
-def scalars(run: Motion, marks: Marks) -> dict[str, Floats]:
+def scalars(run: RecordedMotion, marks: Marks) -> dict[str, Floats]:
     """Return the (T,) numbers of every plot, of the free blocks; debris where there is a road."""
     free = np.array([not block.fixed for block in run.scene.blocks])
     shapes = [polygon_properties(block.vertices) for block in run.scene.blocks]
@@ -194,7 +194,7 @@ PLACEMENT = "placement"
 """Timeline of an episode in which barriers are placed one by one."""
 
 
-def slope_view(run: Motion, name: str, root: str = "") -> rrb.Spatial2DView:
+def slope_view(run: RecordedMotion, name: str, root: str = "") -> rrb.Spatial2DView:
     """Return the view on the slope of a run that is logged below the entity `root`."""
     left, bottom, right, top = frame(run.scene)
     return rrb.Spatial2DView(
@@ -206,7 +206,7 @@ def slope_view(run: Motion, name: str, root: str = "") -> rrb.Spatial2DView:
     )
 
 
-def run_blueprint(run: Motion, marks: Marks) -> rrb.Blueprint:
+def run_blueprint(run: RecordedMotion, marks: Marks) -> rrb.Blueprint:
     """Return the layout: the slope, beside it the notes and the plots."""
     slope = slope_view(run, marks.title)
     plots = {
@@ -238,7 +238,9 @@ Clock = Callable[[Sequence[float] | Floats], list[rr.TimeColumn]]
 """Gives the time columns of rows at some times [s]."""
 
 
-def write_rerun(run: Motion, path: str | os.PathLike[str], marks: Marks | None = None) -> None:
+def write_rerun(
+    run: RecordedMotion, path: str | os.PathLike[str], marks: Marks | None = None
+) -> None:
     """Write `run` as a rerun recording with geometry, poses, scalars and a blueprint.
 
     Parameters
@@ -277,7 +279,11 @@ def recording(
 
 
 def log_run(
-    rec: rr.RecordingStream, run: Motion, marks: Marks, root: str = "", placement: int | None = None
+    rec: rr.RecordingStream,
+    run: RecordedMotion,
+    marks: Marks,
+    root: str = "",
+    placement: int | None = None,
 ) -> None:
     """Log a whole run below the entity `root`; its frames are those of a `placement`, if any.
 
@@ -312,7 +318,7 @@ def log_run(
     rec.log(f"{root}/notes", page, static=True)
 
 
-def _log_setting(rec: rr.RecordingStream, world: str, run: Motion, marks: Marks) -> None:
+def _log_setting(rec: rr.RecordingStream, world: str, run: RecordedMotion, marks: Marks) -> None:
     """Log what never changes: the camera, the ground as it is at the end and the road."""
     left, bottom, right, top = frame(run.scene)
     rec.log(world, rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
@@ -339,7 +345,9 @@ def _log_setting(rec: rr.RecordingStream, world: str, run: Motion, marks: Marks)
         rec.log(f"{world}/road", line, static=True)
 
 
-def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Motion, i: int) -> None:
+def _log_barrier(
+    rec: rr.RecordingStream, entity: str, clock: Clock, run: RecordedMotion, i: int
+) -> None:
     """Log barrier `i`: a gravity wall moves, what fails turns pale, a ditch is a line."""
     barrier, z = run.scene.barriers[i], LAYER["barriers"]
     outline = run.scene.outline(i)
@@ -362,7 +370,7 @@ def _log_barrier(rec: rr.RecordingStream, entity: str, clock: Clock, run: Motion
 
 
 def _log_state(
-    rec: rr.RecordingStream, entity: str, clock: Clock, run: Motion, i: int, label: str
+    rec: rr.RecordingStream, entity: str, clock: Clock, run: RecordedMotion, i: int, label: str
 ) -> None:
     """Log what barrier `i` is and in which state, over time, above its top."""
     outline, changes = run.scene.outline(i), run.states(i)
@@ -397,7 +405,9 @@ def _log_motion(
     rec.send_columns(entity, when, columns)
 
 
-def _log_block(rec: rr.RecordingStream, entity: str, clock: Clock, run: Motion, i: int) -> None:
+def _log_block(
+    rec: rr.RecordingStream, entity: str, clock: Clock, run: RecordedMotion, i: int
+) -> None:
     """Log block `i`: its polygon about its centroid once, and where that is in every frame."""
     block = run.scene.blocks[i]
     body = block.vertices - polygon_properties(block.vertices)[1]

@@ -149,7 +149,7 @@ def load(path: Path) -> list[dict[str, str]]:
     """Return the rows of a former run that were made by the mechanics of today."""
     if not path.is_file():
         return []
-    with path.open(newline="") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         return [r for r in csv.DictReader(file) if r["mechanics"] == mechanics()]
 
 

@@ -75,5 +75,5 @@ def made_by(folder: Path) -> dict[str, str]:
     path = folder / KERNELS
     if not path.exists():
         return {}
-    with path.open(newline="") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         return {row["table"]: row["kernels"] for row in csv.DictReader(file)}

@@ -166,7 +166,7 @@ def recorded(out: Path) -> dict[str, str]:
     path = out / TABLE
     if not path.exists():
         return {}
-    with path.open(newline="") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         return {row["what"]: row["digest"] for row in csv.DictReader(file)}
 
 

@@ -129,7 +129,7 @@ def load(path: Path) -> list[dict[str, str]]:
     """Return the rows of a recorded reference, none where there is none."""
     if not path.is_file():
         return []
-    with path.open(newline="") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 

@@ -125,7 +125,7 @@ def put(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
     What is not a number does not apply: its cell is empty.
     """
-    with atomic(path) as part, part.open("w", newline="") as file:
+    with atomic(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         for row in rows:

@@ -41,7 +41,7 @@ def tabulate(
         Cases that are measured at once; more than one only if each is a process of its own.
     """
     kept = path.with_name(f"{path.stem}-{kernels_hash()}.part.json")
-    rows: list[Row] = json.loads(kept.read_text()) if kept.exists() else []
+    rows: list[Row] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else []
     by_case = {key(row, cases[0]): row for row in rows}
     todo = [case for case in cases if key(case, case) not in by_case]
     if by_case:
@@ -49,7 +49,8 @@ def tabulate(
     for case, found in zip(todo, several(todo, measure, processes), strict=True):
         row = by_case[key(case, case)] = case | found
         with atomic(kept) as part:
-            part.write_text(json.dumps(list(by_case.values()), default=lambda x: x.item()))
+            done = json.dumps(list(by_case.values()), default=lambda x: x.item())
+            part.write_text(done, encoding="utf-8")
         say(f"{path.stem}: {told(row)}")
     rows = [by_case[key(case, case)] for case in cases]
     write(path, rows)

@@ -254,6 +254,9 @@ def test_bad_input_is_refused(run: Run, tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["other.rrd"]
 
 
+unix = pytest.mark.skipif(os.name == "nt", reason="the stand-in for the viewer is a shell script")
+
+
 def fake_viewer(monkeypatch: pytest.MonkeyPatch, folder: Path, script: str) -> None:
     starter = folder / "starter"
     starter.write_text(f"#!/bin/sh\n{script}\n")
@@ -261,13 +264,10 @@ def fake_viewer(monkeypatch: pytest.MonkeyPatch, folder: Path, script: str) -> N
     monkeypatch.setattr(viewer.sys, "executable", str(starter))
 
 
-def test_interrupt_ends_the_viewer_behind_its_starter(
-    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    note = tmp_path / "pid"
-    fake_viewer(
-        monkeypatch, tmp_path, f"sleep 60 & echo $! > {note}.part; mv {note}.part {note}; wait"
-    )
+def interrupted(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> int:
+    """Press Ctrl-C while a script stands in for the viewer; return the process that it noted."""
+    note = folder / "pid"
+    fake_viewer(monkeypatch, folder, script.format(note=f"{note}.part; mv {note}.part {note}"))
 
     def press_ctrl_c() -> None:
         while not note.exists():
@@ -277,11 +277,27 @@ def test_interrupt_ends_the_viewer_behind_its_starter(
 
     threading.Thread(target=press_ctrl_c).start()
     open_viewer(file)
-    pid = int(note.read_text())
+    return int(note.read_text())
+
+
+@unix
+def test_interrupt_ends_the_viewer_behind_its_starter(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pid = interrupted(file, tmp_path, monkeypatch, "sleep 60 & echo $! > {note}; wait")
     deadline = time.monotonic() + 5
     while alive(pid) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert not alive(pid)
+
+
+@unix
+def test_interrupt_ends_the_viewer_where_processes_have_no_groups(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on Windows, where `os` has no `killpg`."""
+    monkeypatch.delattr(os, "killpg", raising=False)
+    assert not alive(interrupted(file, tmp_path, monkeypatch, "echo $$ > {note}; exec sleep 60"))
 
 
 def alive(pid: int) -> bool:
@@ -290,6 +306,7 @@ def alive(pid: int) -> bool:
     return bool(state.stdout.strip()) and not state.stdout.startswith("Z")
 
 
+@unix
 def test_viewer_is_local_and_its_failure_is_told(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

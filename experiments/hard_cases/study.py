@@ -90,7 +90,7 @@ def run(quick: bool, out: Path) -> Number:
         rows = tabulate(out / "hard_cases.csv", cases, worker.measure, told)
     results = [Result(**row) for row in rows]
     with atomic(out / "hard_cases.md") as part:
-        part.write_text(table(results))
+        part.write_text(table(results), encoding="utf-8")
     draw(out / "hard_cases.png", (9.0, 11.0), lambda figure: verdicts(figure, results))
     return Number(
         f"share of {len(results)} trials that are not as they should be",

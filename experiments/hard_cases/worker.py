@@ -22,20 +22,29 @@ IDLE = 20.0
 more than a busy machine makes of it."""
 
 
+def limit_processor_time(seconds: float) -> None:
+    """End this process, even within a kernel, when it has computed for so long; 0 lifts the limit.
+
+    Other load on the machine does not change processor time. Windows has no timer of it: there
+    only the time that `Worker.run` waits ends a trial that hangs.
+    """
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+
+
 def serve(pipe: Connection, limit: float) -> None:
     """Run trials as they are asked for, by name and step; scenes cannot be sent.
 
-    The timer counts processor time, which other load does not change, and ends the process even
-    within a kernel.
+    A trial that computes for longer than `limit` [s of processor time] ends the process.
     """
     cases = {case.name: case for case in CASES}
     Simulation(Scene(Terrain(FLAT), (box(0.0, 0.5),))).step()  # compiled, or loaded, before times
     pipe.send(None)
     while True:
         name, dt = pipe.recv()
-        signal.setitimer(signal.ITIMER_PROF, limit)
+        limit_processor_time(limit)
         result = trial(cases[name], dt)
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        limit_processor_time(0.0)
         pipe.send(result)
 
 
@@ -67,7 +76,7 @@ class Worker:
         except (EOFError, OSError):
             self._process.join()
             code = self._process.exitcode
-            late = code == -signal.SIGPROF
+            late = hasattr(signal, "SIGPROF") and code == -signal.SIGPROF
             note = f"no end within {self._limit:g} s" if late else f"the process died: {code}"
         self.stop()
         return Result(name, dt, FAILS, note=note)

@@ -163,7 +163,7 @@ def sample(
         return np.array(outcomes), float(np.mean(cpu))
 
     name = f"{module.NAME}-{choice.knob}-{choice.value:g}".replace(" ", "-")
-    adapter = Path(module.__file__).read_text()
+    adapter = Path(module.__file__).read_text(encoding="utf-8")
     what = (dt, options, releases, area, duration, BARRIER, SITE, adapter)
     outcomes, cpu = kept(folder, name, what, compute)
     return Sample(module.NAME, choice.knob, choice.value, choice.default, outcomes, cpu)

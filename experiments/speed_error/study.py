@@ -78,7 +78,8 @@ def run(quick: bool, out: Path) -> Number:
     write(out / "highway.csv", highway_rows([*samples, reference], reference))
     draw(out / "highway.png", (13.0, 8.0), lambda f: pictures.highway(f, samples, reference))
     with atomic(out / "speed_error.md") as part:
-        part.write_text(f"{closed_table(points)}\n{highway_table(samples, reference)}")
+        tables = f"{closed_table(points)}\n{highway_table(samples, reference)}"
+        part.write_text(tables, encoding="utf-8")
     default = next(s for s in samples if s.default)
     value, known = worst_bias(default, reference)
     return Number(

@@ -43,7 +43,7 @@ def main() -> None:
 def stand_in_for_gdal() -> None:
     """Set up what its import of GDAL finds."""
     command = Path("gdal-config")
-    command.write_text("#!/bin/sh\necho 0\n")
+    command.write_text("#!/bin/sh\necho 0\n", encoding="utf-8")
     command.chmod(0o755)
     os.environ["PATH"] = f"{Path.cwd()}{os.pathsep}{os.environ['PATH']}"
     osgeo = types.ModuleType("osgeo")
@@ -61,7 +61,7 @@ def run(objects, simulations, asked: dict, volume: float) -> list[float]:
     points = asked["points"]
     shift = points[0][0]  # its chainages begin at 0
     lines = [f"{x - shift}\t{z}\n" for x, z in points]
-    Path("terrain.csv").write_text("X\tZ\n" + "".join(lines))
+    Path("terrain.csv").write_text("X\tZ\n" + "".join(lines), encoding="utf-8")
     low, high = (x - shift for x in asked["band"])
     start = {
         "nb_rocks": asked["releases"],

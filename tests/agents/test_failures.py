@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +82,7 @@ def test_a_fault_of_the_programme_is_not_called_bad_input(
         cli.main(["simulate", str(chute), "--layout", "x"])
 
 
-@pytest.mark.parametrize("out", ["chute.toml/o", "/proc/nowhere/o", "long" * 100])
+@pytest.mark.parametrize("out", ["chute.toml/o", f"{os.devnull}/o", "long" * 100])
 def test_a_folder_that_cannot_be_written_is_one_line(
     out: str, chute: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

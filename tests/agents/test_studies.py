@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import importlib.util
-import signal
 import time
 from pathlib import Path
 from types import ModuleType
@@ -87,7 +86,7 @@ def test_a_killed_study_goes_on_and_ends_the_same(folder: Path) -> None:
     while not (file.is_file() and file.read_bytes().count(b"\n") > 3):
         assert killed.poll() is None
         time.sleep(0.02)
-    killed.send_signal(signal.SIGKILL)
+    killed.kill()
     killed.communicate()
     (folder / "study.toml").write_text(text)
     again = run("study", "study.toml", "--out", "k", folder=folder)

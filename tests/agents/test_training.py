@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import signal
 import time
 import zipfile
 from pathlib import Path
@@ -53,7 +52,7 @@ def test_a_killed_training_goes_on(trained: tuple[Path, str], tmp_path: Path) ->
     while not checkpoint.is_file():
         assert killed.poll() is None
         time.sleep(0.02)
-    killed.send_signal(signal.SIGKILL)
+    killed.kill()
     killed.communicate()
     assert run("train", *more, "--out", "o", folder=tmp_path).startswith(
         "share that layouts take off Z"

@@ -136,7 +136,7 @@ def test_a_replay_that_cannot_be_written_costs_no_step(tmp_path: Path) -> None:
     assert os.listdir(tmp_path / "replays") == ["episode-000001.rrd"]
 
 
-@pytest.mark.parametrize("folder", ["/proc/nowhere/o", __file__, f"{__file__}/o"])
+@pytest.mark.parametrize("folder", [f"{os.devnull}/o", __file__, f"{__file__}/o"])
 def test_a_folder_that_cannot_be_made_is_refused(folder: str) -> None:
     with pytest.raises(BadInput, match=r"record = .*: name a folder"):
         BarrierDesign(CUT, **FENCE, record=folder)

@@ -27,7 +27,7 @@ from experiments.hard_cases.picture import verdicts
 from experiments.hard_cases.stacks import cards, moved
 from experiments.hard_cases.suite import CASES
 from experiments.hard_cases.trial import growth, lost, play, trial
-from experiments.hard_cases.worker import Worker
+from experiments.hard_cases.worker import Worker, limit_processor_time
 from rigdda import Scene, Simulation, Terrain
 from rigdda.geometry import polygon_properties
 from rigdda.validation.scenes import FLAT, box, rock
@@ -55,7 +55,7 @@ def loop(pipe, limit) -> None:
     """Compute for ever."""
     pipe.send(None)
     pipe.recv()
-    signal.setitimer(signal.ITIMER_PROF, limit)
+    limit_processor_time(limit)
     while True:
         pass
 
@@ -126,7 +126,13 @@ def test_work_of_shaking_is_no_growth_of_energy():
     ("target", "told"),
     [
         (hang, "no end within 2 s"),
-        (loop, "no end within 0.1 s"),
+        pytest.param(
+            loop,
+            "no end within 0.1 s",
+            marks=pytest.mark.skipif(
+                not hasattr(signal, "setitimer"), reason="needs a timer of processor time"
+            ),
+        ),
         (die, "the process died: 1"),
     ],
 )
@@ -138,6 +144,15 @@ def test_a_process_that_hangs_or_dies_is_a_result(target, told):
         assert result.note.startswith(told)
     finally:
         worker.stop()
+
+
+def test_without_a_timer_of_processor_time_trials_run_all_the_same(monkeypatch):
+    """As on Windows, where the module has neither the timer nor its signal."""
+    for name in ("setitimer", "SIGPROF", "ITIMER_PROF"):
+        monkeypatch.delattr(signal, name, raising=False)
+    limit_processor_time(0.1)
+    with Worker(0.1, die) as worker:
+        assert worker.run("stack-50", 0.005).note == "the process died: 1"
 
 
 def mechanism_load(haunch: int) -> float:

@@ -122,7 +122,8 @@ def test_else_it_is_in_a_temporary_folder_of_the_user(places, double, monkeypatc
     cache, temporary = places
     spoil(cache, monkeypatch)
     folder = kernel.cache_directory()
-    assert folder == temporary / f"rigdda-{os.getuid()}" / "kernels-0" and folder.is_dir()
+    own = f"rigdda-{os.getuid()}" if hasattr(os, "getuid") else "rigdda"
+    assert folder == temporary / own / "kernels-0" and folder.is_dir()
     assert double()(3.0) == 6.0
     again = double()
     assert again(3.0) == 6.0 and hits(again) == 1
@@ -130,10 +131,11 @@ def test_else_it_is_in_a_temporary_folder_of_the_user(places, double, monkeypatc
 
 def test_users_without_a_number_have_one_temporary_folder(places, monkeypatch):
     without_home(places[0], monkeypatch)
-    monkeypatch.delattr(os, "getuid")
+    monkeypatch.delattr(os, "getuid", raising=False)
     assert kernel.cache_directory() == places[1] / "rigdda" / "kernels-0"
 
 
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="users have no numbers")
 def test_a_temporary_folder_of_another_user_is_not_taken(places, monkeypatch):
     cache, temporary = places
     without_home(cache, monkeypatch)

@@ -5,6 +5,6 @@ A name of `rigdda.__all__` is imported when it is first used; `__init__.pyi` lis
 
 import lazy_loader
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,8 +6,20 @@
 from __future__ import annotations
 
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from rigdda.agents.designers import DESIGNERS, module
+
+if TYPE_CHECKING:  # `as`: type checkers take these for names of this package
+    from rigdda.agents.designers import cma as cma
+    from rigdda.agents.designers import constant as constant
+    from rigdda.agents.designers import convex as convex
+    from rigdda.agents.designers import pareto as pareto
+    from rigdda.agents.designers import ppo as ppo
+    from rigdda.agents.designers import race as race
+    from rigdda.agents.designers import random as random
+    from rigdda.agents.designers import rule as rule
+    from rigdda.agents.designers import tpe as tpe
 
 __all__ = ["DESIGNERS"]
 

@@ -16,9 +16,13 @@ clips = pytest.importorskip("moviepy", reason="needs the extra video")
 
 def test_a_video_shows_every_step_of_an_episode(tmp_path: Path) -> None:
     env = gymnasium.make(
-        "rigdda/BarrierPlacement-v0", site=cut(), releases=1, max_barriers=2, render_mode="rgb_array"
+        "rigdda/BarrierPlacement-v0",
+        site=cut(),
+        releases=1,
+        max_barriers=2,
+        render_mode="rgb_array",
     )
-    film = RecordVideo(env, str(tmp_path), episode_trigger=lambda episode: True)
+    film = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda episode: True)
     film.action_space.seed(0)
     film.reset(seed=0)
     steps, ended = 0, False
@@ -27,7 +31,7 @@ def test_a_video_shows_every_step_of_an_episode(tmp_path: Path) -> None:
         ended, steps = terminated or truncated, steps + 1
     height, width, _ = env.render().shape
     film.close()
-    (file,) = tmp_path.iterdir()
+    (file,) = (tmp_path / "videos").iterdir()
     with clips.VideoFileClip(str(file)) as clip:
         assert clip.n_frames == 1 + steps
         assert clip.size == [width, height]

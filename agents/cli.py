@@ -101,6 +101,21 @@ def sites() -> None:
 
 
 @cli.command()
+@click.argument("file", type=click.Choice(("site", "layout")), default="site")
+def schema(file: str) -> None:
+    """Print the JSON Schema of site files, or of layout files.
+
+    With it an editor shows what the keys of a file mean and marks mistakes. Write it to a file, for
+    example site.schema.json, and begin your site file with the line "#:schema ./site.schema.json".
+    """
+    import json
+
+    from rigdda.sites.schema import schema as of
+
+    click.echo(json.dumps(of(file), indent=2))
+
+
+@cli.command()
 @click.argument("site")
 @layout_option
 @click.option(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from rigdda import BadInput, Site, check, release_many
+from rigdda import BadInput, Site, check, fields, release_many
 from rigdda.agents.reports.tables import write_rows
 from rigdda.files import read as read_text
 from rigdda.lumped_mass import lumped
@@ -112,15 +112,7 @@ def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[fl
             mend = "name a number of the site file, such as surfaces.soil.restitution"
             raise BadInput("--parameters", parameter.path, mend)
         table[last] = float(value)
-    try:
-        return msgspec.convert(tables, Site)
-    except msgspec.ValidationError as error:
-        bad = error.__cause__
-        if not isinstance(bad, BadInput):
-            raise BadInput("--parameters", parameters[0].path, str(error)) from None
-        given = [p.path for p, value in zip(parameters, values, strict=True) if value == bad.value]
-        where = next((name for name in given if name.endswith(f".{bad.field}")), bad.field)
-        raise BadInput(where, bad.value, bad.mend) from None
+    return fields.read(Site, tables)
 
 
 Floats = NDArray[np.float64]

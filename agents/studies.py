@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import numpy as np
@@ -22,9 +22,9 @@ from rigdda.agents import limits
 from rigdda.agents.reports.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
 from rigdda.agents.reports.wording import euros, span
 from rigdda.barriers import from_table, standing
-from rigdda.check import mistyped
 from rigdda.envs.cost import Account, Facts, learn, stratified
 from rigdda.envs.outcome_cache import mechanics
+from rigdda.fields import about, checked, parse
 from rigdda.files import read
 
 if TYPE_CHECKING:
@@ -56,15 +56,15 @@ class Study:
 
 
 class _LayoutTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    name: str
-    barriers: tuple[dict[str, Any], ...] = ()
-    file: str | None = None
+    name: Annotated[str, about("Name of the layout.")]
+    barriers: Annotated[tuple[dict[str, Any], ...], about("The barriers.")] = ()
+    file: Annotated[str | None, about("Instead of them, a layout file.")] = None
 
 
 class _StudyFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    site: str
-    layouts: tuple[_LayoutTable, ...]
-    releases: int = 16
+    site: Annotated[str, about("Name of a site, or a site file.")]
+    layouts: Annotated[tuple[_LayoutTable, ...], about("The layouts, each with a name.")]
+    releases: Annotated[int, about("Releases of each event with each layout.", ge=1)] = 16
 
 
 def load(path: str | os.PathLike[str]) -> Study:
@@ -78,13 +78,7 @@ def load(path: str | os.PathLike[str]) -> Study:
     file = Path(path)
     if not file.is_file():
         raise BadInput("study", str(path), "name an existing TOML file")
-    try:
-        data = msgspec.toml.decode(read("study", file), type=_StudyFile)
-    except msgspec.ValidationError as error:
-        bad = mistyped(str(error), msgspec.toml.decode(read("study", file)))
-        raise bad or BadInput("study", str(path), str(error)) from None
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise BadInput("study", str(path), f"mend its TOML: {error}") from None
+    data = _StudyFile(**checked(_StudyFile, parse("study", str(path), read("study", file))))
     near = file.parent / data.site
     site = Site.load(near if near.suffix == ".toml" else data.site)
     layouts: dict[str, Layout] = {}
@@ -96,7 +90,7 @@ def load(path: str | os.PathLike[str]) -> Study:
             site.realise(layouts[table.name])  # what cannot be built is said before all
             check.number("capital", site.capital(layouts[table.name]))
         except BadInput as bad:
-            raise BadInput(f"layouts[{i}].{bad.field}", bad.value, bad.mend) from None
+            raise BadInput(f"layouts.{table.name}.{bad.field}", bad.value, bad.mend) from None
     if not layouts:
         raise BadInput("layouts", 0, "give at least one table [[layouts]]")
     most = limits.RELEASES // len(layouts) // len(site.events)

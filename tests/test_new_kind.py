@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import gymnasium
 import numpy as np
@@ -12,18 +12,16 @@ from rigdda import Run, Site, load_layout, release, save_layout
 from rigdda.agents.designers import module
 from rigdda.agents.reports.wording import order
 from rigdda.barriers import KINDS, Ditch, Standing, describe
-from rigdda.barriers.base import Floats, KnownSite
+from rigdda.barriers.base import Floats, KnownSite, Metres
 from rigdda.envs import DesignProblem
 from rigdda.envs.encoding import decode, encode, slot_size
+from rigdda.fields import about
 
 
 class Gabions(Standing, frozen=True, tag="gabions"):
     """Baskets of stone, which stand on any ground."""
 
-    thickness: float = 1.0
-
-    def __post_init__(self) -> None:
-        self._check("height", "thickness")
+    thickness: Annotated[Metres, about("Extent downhill of `x`.", "m")] = 1.0
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
         return 150.0 * self.height * self.thickness

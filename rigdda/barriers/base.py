@@ -6,14 +6,15 @@ import copy
 import math
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import ClassVar, Literal, NamedTuple, Protocol, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple, Protocol, Self
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check
+from rigdda import fields
 from rigdda.errors import BadInput
+from rigdda.fields import about
 from rigdda.geometry import polygon_properties
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.prices import Prices
@@ -35,6 +36,8 @@ ELEMENT = 5.0
 THINNEST, LARGEST = 1e-3, 1e3
 """Least and greatest length of a barrier [m]: beyond them it is a slip of the pen, and a face that
 thin is lost in rounding."""
+
+Metres = Annotated[float, about(ge=THINNEST, le=LARGEST)]
 
 
 class Reach(NamedTuple):
@@ -177,7 +180,7 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
         The lengths that a design decides, its height or depth first, at most two.
     """
 
-    x: float
+    x: Annotated[float, about("Chainage of its uphill face.", "m")]
     fails: ClassVar[str] = "failed"
     repaired: ClassVar[float] = ELEMENT
     drawn: ClassVar[Drawn] = "solid"
@@ -187,6 +190,9 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
     steepest: ClassVar[float | None] = None
     has_sides: ClassVar[bool] = False
     lengths: ClassVar[tuple[Length, ...]] = ()
+
+    def __post_init__(self) -> None:
+        fields.check(self, f"{self.words} ")
 
     @property
     def end(self) -> float:
@@ -338,16 +344,6 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
         """Return it as it resists, per metre, an event of this width [m]."""
         return self
 
-    def _check(self, *lengths: str) -> None:
-        """Check and set where it is and its lengths."""
-        check.set_number(self, "x", field=f"{self.words} x")
-        for name in lengths:
-            self._check_number(name, THINNEST, LARGEST)
-
-    def _check_number(self, name: str, low: float, high: float = math.inf) -> None:
-        """Check and set a field."""
-        check.set_number(self, name, low, high, open_low=low == 0.0, field=f"{self.words} {name}")
-
     def _with(self, **values: float | None) -> Self:
         """Return it with other values, which are known to be sound and are not checked."""
         other = copy.copy(self)
@@ -430,7 +426,7 @@ on ground that gives."""
 class Standing(Barrier, frozen=True):
     """A barrier that stands on the ground: two vertical faces and a level top."""
 
-    height: float
+    height: Annotated[Metres, about("Height above the highest ground under it.", "m")]
     lengths: ClassVar[tuple[Length, ...]] = (
         Length("height", "max_height"),
         Length("thickness", "max_thickness", "min_thickness", 0.5 * STEP),

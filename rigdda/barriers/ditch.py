@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import msgspec
 import numpy as np
@@ -16,10 +16,12 @@ from rigdda.barriers.base import (
     Floats,
     KnownSite,
     Length,
+    Metres,
     Reach,
 )
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
 from rigdda.errors import BadInput
+from rigdda.fields import about, documented
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
@@ -31,39 +33,34 @@ DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0), (2.0, 3.0, 4.0, 5.0,
 """Depths and widths of ditches of the catalogue of a search [m]."""
 
 
+@documented
 class Ditch(Earthwork, frozen=True, tag="ditch"):
     """A ditch with a level floor, cut into the terrain. Its surface is that of the terrain.
-
-    Parameters
-    ----------
-    x : float
-        Chainage of its uphill edge [m].
-    depth : float
-        Depth of the floor below the lower of its edges [m].
-    width : float
-        Distance of its edges along x [m].
-    side_slope : float
-        Run over rise of its sides [-]; 0.25 is usual for a cut in rock.
 
     Raises
     ------
     BadInput
-        If a value is not finite or outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    depth: float
-    width: float
-    side_slope: float = 0.25
+    x: Annotated[float, about("Chainage of its uphill edge.", "m")]
+    depth: Annotated[Metres, about("Depth of the floor below the lower of its edges.", "m")]
+    width: Annotated[Metres, about("Horizontal distance between its edges.", "m")]
+    side_slope: Annotated[
+        float,
+        about(
+            "Run over rise of its sides; 0.25 is usual for a cut in rock.",
+            "-",
+            ge=LEAST_SLOPE,
+            le=FLATTEST_SLOPE,
+        ),
+    ] = 0.25
     drawn: ClassVar[Drawn] = "line"
     steepest: ClassVar[float | None] = 30.0
     lengths: ClassVar[tuple[Length, ...]] = (
         Length("depth", "max_depth"),
         Length("width", "max_width", "min_width"),
     )
-
-    def __post_init__(self) -> None:
-        self._check("depth", "width")
-        self._check_number("side_slope", LEAST_SLOPE, FLATTEST_SLOPE)
 
     @property
     def end(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import msgspec
 import numpy as np
@@ -15,6 +15,7 @@ from rigdda.barriers.base import (
     Floats,
     KnownSite,
     Length,
+    Metres,
     Reach,
     Subsoil,
     base_friction,
@@ -22,6 +23,7 @@ from rigdda.barriers.base import (
 )
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
 from rigdda.errors import BadInput
+from rigdda.fields import about, documented
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
@@ -29,6 +31,7 @@ CREST = 1.0
 """Least width of the crest of an embankment in a search [m]: a machine builds it from above."""
 
 
+@documented
 class Embankment(Earthwork, frozen=True, tag="embankment"):
     """A dam of earth with a level crest, raised on the terrain.
 
@@ -36,30 +39,28 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
     of what lies and strikes on it, as a mean over a second, exceeds its weight times the friction
     of its base, it is pushed away, and gone.
 
-    Parameters
-    ----------
-    x : float
-        Chainage of its uphill toe [m].
-    height : float
-        Height of the crest above the ground at `x` [m].
-    width : float
-        Width of the crest [m].
-    side_slope : float
-        Run over rise of its sides [-]; 0.5 is usual for reinforced earth. The downhill side goes
-        on until it meets the ground.
-    density : float
-        Density [kg/m3]; 1900 is compacted soil.
-
     Raises
     ------
     BadInput
-        If a value is not finite or outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    height: float
-    width: float = 1.0
-    side_slope: float = 0.5
-    density: float = 1900.0
+    x: Annotated[float, about("Chainage of its uphill toe.", "m")]
+    height: Annotated[Metres, about("Height of the crest above the ground at `x`.", "m")]
+    width: Annotated[Metres, about("Width of the crest.", "m")] = 1.0
+    side_slope: Annotated[
+        float,
+        about(
+            "Run over rise of its sides; 0.5 is usual for reinforced earth. The downhill side ends "
+            "where it meets the ground.",
+            "-",
+            ge=LEAST_SLOPE,
+            le=FLATTEST_SLOPE,
+        ),
+    ] = 0.5
+    density: Annotated[
+        float, about("Density of the earth; 1900 is compacted soil.", "kg/m3", gt=0.0)
+    ] = 1900.0
     fails: ClassVar[str] = "pushed"
     fallible: ClassVar[bool] = True
     by_friction: ClassVar[bool] = True
@@ -69,11 +70,6 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         Length("height", "max_height"),
         Length("width", "max_thickness", "min_thickness"),
     )
-
-    def __post_init__(self) -> None:
-        self._check("height", "width")
-        self._check_number("side_slope", LEAST_SLOPE, FLATTEST_SLOPE)
-        self._check_number("density", 0.0)
 
     def for_width(self, width: float) -> Self:
         """Return the embankment that resists what is so wide [m].

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterator
-from typing import ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import msgspec
 
@@ -17,12 +17,14 @@ from rigdda.barriers.base import (
     Floats,
     KnownSite,
     Length,
+    Metres,
     Standing,
     Subsoil,
     at_ends,
     share_of,
 )
 from rigdda.errors import BadInput, DoubtfulInput
+from rigdda.fields import about, documented
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
@@ -74,7 +76,11 @@ kits; heights and elongations are orders of magnitude, from memory."""
 CLASSES = tuple(FENCE_CLASSES)
 """Energy classes of fences, ascending [kJ]."""
 
+Capacity = Annotated[float, about(ge=LEAST_CAPACITY)]
+Elongation = Annotated[float, about(ge=SHORTEST)]
 
+
+@documented
 class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     """A flexible fence, which brakes rock with a constant force over its elongation.
 
@@ -85,28 +91,11 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     surface and without friction, and the mass of its net moves with the rock. What pushes it uphill
     does not move it.
 
-    Parameters
-    ----------
-    x : float
-        Chainage of its uphill face [m].
-    height : float
-        Height above the highest ground under it [m].
-    capacity : float, optional
-        Energy that it absorbs before it fails [J per metre of slope width].
-    energy_class : int, optional
-        In place of the capacity, one of `FENCE_CLASSES` [kJ]; `for_width` gives the fence of a
-        scene.
-    thickness : float
-        Extent downhill of `x` [m].
-    elongation : float, optional
-        Distance over which it takes its capacity [m]; that of the class where there is one, by
-        default that of the next class with a panel of 10 m.
-
     Raises
     ------
     BadInput
-        If a value is not finite or outside its range, the height is more than its class has, or
-        there is not either a capacity or a class.
+        If a value is of the wrong type or outside its range, the height is more than its
+        class has, or there is not either a capacity or a class.
 
     Warns
     -----
@@ -114,38 +103,53 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         If the capacity is below 10 kJ/m.
     """
 
-    capacity: float | None = None
-    energy_class: int | None = None
-    thickness: float = 0.2
-    elongation: float | None = None
+    capacity: Annotated[
+        Capacity | None,
+        about(
+            "Energy that the fence absorbs before it fails, per metre of road. Give either "
+            "this or `energy_class`.",
+            "J/m",
+        ),
+    ] = None
+    energy_class: Annotated[
+        int | None,
+        about(
+            "Energy class of a certified fence. `for_width` gives the capacity that it has in "
+            "a scene.",
+            "kJ",
+            choices=FENCE_CLASSES,
+        ),
+    ] = None
+    thickness: Annotated[Metres, about("Extent downhill of `x`.", "m")] = 0.2
+    elongation: Annotated[
+        Elongation | None,
+        about(
+            "Distance over which it absorbs its capacity. The default is that of its class or, "
+            "with a capacity, of the next class with a panel of 10 m.",
+            "m",
+        ),
+    ] = None
     repaired: ClassVar[float] = PANEL
     fallible: ClassVar[bool] = True
     lengths: ClassVar[tuple[Length, ...]] = (Length("height", "max_height"),)
 
     def __post_init__(self) -> None:
-        self._check("height", "thickness")
+        super().__post_init__()
         if (self.capacity is None) == (self.energy_class is None):
             given = (self.capacity, self.energy_class)
             raise BadInput("fence capacity, energy_class", given, "give one of them")
-        if self.capacity is not None:
-            self._check_number("capacity", LEAST_CAPACITY)
-            if self.capacity < WEAK:
-                told = f"fence capacity = {self.capacity:g}: is it meant? It is in J per metre"
-                warnings.warn(told, DoubtfulInput, stacklevel=3)
-            if self.elongation is None:
-                msgspec.structs.force_setattr(self, "elongation", _usual_elongation(self.capacity))
-        else:
+        if self.capacity is None:
             self._check_class()
-        self._check_number("elongation", SHORTEST)
+        elif self.elongation is None:
+            msgspec.structs.force_setattr(self, "elongation", _usual_elongation(self.capacity))
+        if self.capacity is not None and self.capacity < WEAK:
+            told = f"fence capacity = {self.capacity:g}: is it meant? It is in J per metre"
+            warnings.warn(told, DoubtfulInput, stacklevel=3)
 
     def _check_class(self) -> None:
-        """Check the class and the height, and set the elongation."""
-        if self.energy_class not in tuple(FENCE_CLASSES):
-            known = ", ".join(str(name) for name in FENCE_CLASSES)
-            raise BadInput("fence energy_class", self.energy_class, f"give one of {known} kJ")
-        energy_class = int(self.energy_class)
-        msgspec.structs.force_setattr(self, "energy_class", energy_class)  # 1000.0 is in it, too
-        found = FENCE_CLASSES[energy_class]
+        """Check the height, and set the elongation."""
+        assert self.energy_class is not None
+        found = FENCE_CLASSES[self.energy_class]
         if self.height > found.height:
             mend = f"give at most {found.height:g} m, or a higher class than {self.energy_class} kJ"
             raise BadInput("fence height", self.height, mend)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import msgspec
 import numpy as np
@@ -18,11 +18,13 @@ from rigdda.barriers.base import (
     Drawn,
     Floats,
     KnownSite,
+    Metres,
     Standing,
     Subsoil,
     base_friction,
 )
 from rigdda.errors import BadInput
+from rigdda.fields import about, documented
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
@@ -31,6 +33,7 @@ SLID = 0.1
 load is a hundredth of it."""
 
 
+@documented
 class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     """A concrete block that stands on the terrain by its weight, and can slide and overturn.
 
@@ -38,33 +41,21 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     between its faces or, where that would dip into the ground, the edge of the ground's convex
     hull below its middle.
 
-    Parameters
-    ----------
-    x : float
-        Chainage of its uphill face [m].
-    height : float
-        Height above the higher end of its base [m].
-    thickness : float
-        Extent downhill of `x` [m].
-    density : float
-        Density [kg/m3]; 2400 is plain concrete.
-
     Raises
     ------
     BadInput
-        If a value is not finite or outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    thickness: float = 1.0
-    density: float = 2400.0
+    height: Annotated[Metres, about("Height above the higher end of its base.", "m")]
+    thickness: Annotated[Metres, about("Extent downhill of `x`.", "m")] = 1.0
+    density: Annotated[
+        float, about("Density of the wall; 2400 is plain concrete.", "kg/m3", gt=0.0)
+    ] = 2400.0
     drawn: ClassVar[Drawn] = "moving"
     fallible: ClassVar[bool] = True
     by_friction: ClassVar[bool] = True
     steepest: ClassVar[float | None] = 30.0
-
-    def __post_init__(self) -> None:
-        self._check("height", "thickness")
-        self._check_number("density", 0.0)
 
     def for_width(self, width: float) -> Self:
         """Return the wall that resists what is so wide [m]: its elements of 5 m act whole."""

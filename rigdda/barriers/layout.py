@@ -6,12 +6,12 @@ import os
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 import tomli_w
 
-from rigdda import check
+from rigdda import check, fields
 from rigdda.barriers.base import Barrier, Earthwork, Floats, Standing
 from rigdda.barriers.ditch import Ditch
 from rigdda.barriers.embankment import Embankment
@@ -19,8 +19,8 @@ from rigdda.barriers.fence import Fence
 from rigdda.barriers.gravity_wall import GravityWall
 from rigdda.barriers.mesh import Mesh
 from rigdda.barriers.wall import Wall
-from rigdda.check import mistyped
 from rigdda.errors import BadInput
+from rigdda.fields import about
 from rigdda.files import atomic, read
 from rigdda.model.terrain import Terrain
 
@@ -104,17 +104,13 @@ def from_table(where: str, table: Any) -> Barrier:
     """
     if not isinstance(table, dict):
         raise BadInput(where, table, "give a table")
-    kind = check.one_of(f"{where}.kind", table.get("kind", "wall"), KINDS)
+    kind = KINDS[check.one_of(f"{where}.kind", table.get("kind", "wall"), KINDS)]
+    given = {name: value for name, value in table.items() if name != "kind"}
+    values = fields.checked(kind, given, where)
     try:
-        return msgspec.convert({**table, "kind": kind}, KINDS[kind])
-    except msgspec.ValidationError as error:
-        if isinstance(error.__cause__, BadInput):
-            bad = error.__cause__
-            raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
-        wrong = mistyped(str(error), table)
-        if wrong is not None:
-            raise BadInput(f"{where}.{wrong.field}", wrong.value, wrong.mend) from None
-        raise BadInput(where, table, f"mend it: {error}") from None
+        return kind(**values)
+    except BadInput as bad:
+        raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
 
 
 def to_tables(layout: Sequence[Barrier]) -> list[dict[str, Any]]:
@@ -150,15 +146,10 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     file = Path(path)
     if not file.is_file():
         raise BadInput("layout", str(path), "name an existing TOML or JSON file")
-    decode = msgspec.json.decode if file.suffix == ".json" else msgspec.toml.decode
-    try:
-        tables = decode(read("layout", file), type=_LayoutFile).barriers
-        return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))
-    except msgspec.ValidationError as error:
-        bad = mistyped(str(error), decode(read("layout", file)))
-        raise bad or BadInput("layout", str(path), str(error)) from None
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise BadInput("layout", str(path), f"mend the file: {error}") from None
+    form = "JSON" if file.suffix == ".json" else "TOML"
+    tables = fields.parse("layout", str(path), read("layout", file), form)
+    layout = fields.read(_LayoutFile, tables).barriers
+    return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(layout))
 
 
 def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None:
@@ -174,4 +165,4 @@ def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None
 class _LayoutFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """An empty file is no layout; `barriers = []` is one without barriers."""
 
-    barriers: tuple[dict[str, Any], ...]
+    barriers: Annotated[tuple[dict[str, Any], ...], about("The barriers; there may be none.")]

@@ -3,36 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Annotated
 
 import msgspec
 
-from rigdda import check
+from rigdda import fields
 from rigdda.barriers.base import Barrier, Floats, KnownSite
-from rigdda.errors import BadInput
+from rigdda.fields import about, documented
 
 
+@documented
 class Mesh(Barrier, frozen=True, tag="mesh"):
     """Mesh, one of a site's options. It is not part of a scene: it changes how often rock falls.
-
-    Parameters
-    ----------
-    x : float
-        Chainage of its middle [m]: the higher above the road, the dearer.
-    option : str
-        Name of an option of the site.
 
     Raises
     ------
     BadInput
-        If `x` is not finite or `option` is no text.
+        If a value is of the wrong type.
     """
 
-    option: str
-
-    def __post_init__(self) -> None:
-        self._check()
-        if not isinstance(self.option, str):
-            raise BadInput("mesh option", self.option, "name a mesh option of the site")
+    x: Annotated[
+        float, about("Chainage of its middle, whose height above the road sets the price.", "m")
+    ]
+    option: Annotated[str, about("Name of one of the meshes of the site.")]
 
     @property
     def end(self) -> float:
@@ -63,36 +56,26 @@ class Mesh(Barrier, frozen=True, tag="mesh"):
         return self.option
 
 
+Factor = Annotated[float, about(ge=0.0, le=1.0)]
+
+
+@documented
 class MeshOption(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A mesh that a site offers.
-
-    Parameters
-    ----------
-    name : str
-        Its name in layouts.
-    area : float
-        Area of mesh per metre of road [m2/m].
-    price : float
-        Price [EUR/m2].
-    factors : table
-        Factor on the rate of each event that it changes, by the event's name [-], 0 to 1.
 
     Raises
     ------
     BadInput
-        If a value is outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    name: str
-    area: float
-    price: float
-    factors: dict[str, float]
+    name: Annotated[str, about("Name of the mesh, to which layouts refer.")]
+    area: Annotated[float, about("Area of mesh per metre of road.", "m2/m", gt=0.0, le=1000.0)]
+    price: Annotated[float, about("Price of the mesh.", "EUR/m2", ge=0.0, le=10_000.0)]
+    factors: Annotated[
+        dict[str, Factor],
+        about("Factor on the rate of each event that it makes rarer, by the event's name.", "-"),
+    ]
 
     def __post_init__(self) -> None:
-        where = f"meshes.{self.name}"
-        check.number(f"{where}.area", self.area, 0.0, 1000.0, open_low=True)
-        check.number(f"{where}.price", self.price, 0.0, 10_000.0)
-        if not isinstance(self.factors, dict):
-            raise BadInput(f"{where}.factors", self.factors, "give a table of events and factors")
-        for event, factor in self.factors.items():
-            check.number(f"{where}.factors.{event}", factor, 0.0, 1.0)
+        fields.check(self, f"meshes.{self.name}.")

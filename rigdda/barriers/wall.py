@@ -3,35 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from rigdda.barriers.base import Floats, KnownSite, Standing
+from rigdda.barriers.base import Floats, KnownSite, Metres, Standing
+from rigdda.fields import about, documented
 
 
+@documented
 class Wall(Standing, frozen=True, tag="wall"):
     """A rigid retaining wall that stands on the terrain and cannot be moved.
-
-    Parameters
-    ----------
-    x : float
-        Chainage of its uphill face [m].
-    height : float
-        Height above the highest ground under it [m].
-    thickness : float
-        Extent downhill of `x` [m].
 
     Raises
     ------
     BadInput
-        If a value is not finite or outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    thickness: float = 1.0
+    thickness: Annotated[Metres, about("Extent downhill of `x`.", "m")] = 1.0
     designed: ClassVar[bool] = False
     steepest: ClassVar[float | None] = 30.0
-
-    def __post_init__(self) -> None:
-        self._check("height", "thickness")
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
         """Return the price at the height of the road, that of its concrete [EUR/m]."""

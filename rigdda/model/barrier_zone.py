@@ -2,55 +2,63 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import msgspec
 
-from rigdda import check
+from rigdda import check, fields
+from rigdda.fields import about, documented
 
 
+@documented
 class BarrierZone(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where barriers may stand, and how large they may be.
-
-    Parameters
-    ----------
-    start : float
-        Chainage where it begins [m]. No barrier stands in a band of loose rock within the zone.
-    end : float
-        Chainage where it ends, at the road at the latest [m].
-    max_height : float
-        Greatest height of all kinds but ditches [m].
-    min_thickness : float
-        Least thickness of walls, the width of an embankment's crest included [m].
-    max_thickness : float
-        Greatest of these [m].
-    max_depth : float
-        Greatest depth of ditches [m].
-    min_width : float
-        Least width of ditches [m].
-    max_width : float
-        Greatest width of ditches [m].
 
     Raises
     ------
     BadInput
-        If a value is outside its range.
+        If a value is of the wrong type or outside its range, or a greatest size is less than the
+        least.
     """
 
-    start: float
-    end: float
-    max_height: float = 5.0
-    min_thickness: float = 0.5
-    max_thickness: float = 2.0
-    max_depth: float = 3.0
-    min_width: float = 1.0
-    max_width: float = 8.0
+    start: Annotated[
+        float,
+        about(
+            "Chainage where the zone begins. No barrier may stand in a band of loose rock, even "
+            "where it lies within the zone.",
+            "m",
+        ),
+    ]
+    end: Annotated[
+        float, about("Chainage where the zone ends, which is not beyond the edge of the road.", "m")
+    ]
+    max_height: Annotated[
+        float, about("Greatest height of barriers of all kinds but ditches.", "m", gt=0.5, le=100.0)
+    ] = 5.0
+    min_thickness: Annotated[
+        float,
+        about(
+            "Least thickness of walls and least width of the crest of embankments.",
+            "m",
+            gt=0.0,
+            le=100.0,
+        ),
+    ] = 0.5
+    max_thickness: Annotated[
+        float,
+        about(
+            "Greatest thickness of walls and greatest width of the crest of embankments.",
+            "m",
+            gt=0.0,
+            le=100.0,
+        ),
+    ] = 2.0
+    max_depth: Annotated[float, about("Greatest depth of ditches.", "m", gt=0.5, le=100.0)] = 3.0
+    min_width: Annotated[float, about("Least width of ditches.", "m", gt=0.0, le=100.0)] = 1.0
+    max_width: Annotated[float, about("Greatest width of ditches.", "m", gt=0.0, le=100.0)] = 8.0
 
     def __post_init__(self) -> None:
-        for name, low in (
-            ("max_height", 0.5),
-            ("min_thickness", 0.0),
-            ("max_depth", 0.5),
-            ("min_width", 0.0),
-        ):
-            check.number(f"barrier_zone.{name}", getattr(self, name), low, 100.0, open_low=True)
-        for name, low in (("max_thickness", self.min_thickness), ("max_width", self.min_width)):
-            check.number(f"barrier_zone.{name}", getattr(self, name), low, 100.0)
+        fields.check(self, "barrier_zone.")
+        for size in ("thickness", "width"):
+            least, most = getattr(self, f"min_{size}"), getattr(self, f"max_{size}")
+            check.number(f"barrier_zone.max_{size}", most, least, 100.0)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rigdda import check
+from rigdda import fields
 from rigdda.errors import BadInput
+from rigdda.fields import about, documented
 from rigdda.geometry import FLAT, without_straight_corners
 
 SLIVER = 0.35
@@ -31,37 +32,47 @@ NEAR = 1e-7
 """Distance over the perimeter of a cell up to which a corner lies on an edge [-]: rounding."""
 
 
+@documented
 class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A set of nearly parallel joints.
-
-    Parameters
-    ----------
-    dip_deg : float
-        Dip below the horizontal towards +x [deg], -90 to 90.
-    spacing : float
-        Mean spacing [m]; all sets are scaled together to give the wanted block area.
-    scatter : float
-        Standard deviation of the spacing over its mean [-], at most 0.4.
-    persistence : float
-        Share of the joint that is open [-]; across the rest blocks stay joined, two by two, where
-        the block that they make is convex.
 
     Raises
     ------
     BadInput
-        If a value is not finite or outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    dip_deg: float
-    spacing: float = 1.0
-    scatter: float = 0.0
-    persistence: float = 1.0
+    dip_deg: Annotated[
+        float,
+        about("Dip of the joints below the horizontal, towards +x.", "deg", ge=-90.0, le=90.0),
+    ]
+    spacing: Annotated[
+        float,
+        about(
+            "Mean spacing. The spacings of all sets are scaled by one factor, so that blocks have "
+            "the mean area that the source gives.",
+            "m",
+            ge=1e-3,
+            le=1e3,
+        ),
+    ] = 1.0
+    scatter: Annotated[
+        float,
+        about("Standard deviation of the spacing over its mean.", "-", ge=0.0, le=0.4),
+    ] = 0.0
+    persistence: Annotated[
+        float,
+        about(
+            "Share of a joint that is open. Across the rest, pairs of blocks stay joined where "
+            "they make a convex block.",
+            "-",
+            gt=0.0,
+            le=1.0,
+        ),
+    ] = 1.0
 
     def __post_init__(self) -> None:
-        check.number("joint set: dip_deg", self.dip_deg, -90.0, 90.0)
-        check.number("joint set: spacing", self.spacing, 1e-3, 1e3)
-        check.number("joint set: scatter", self.scatter, 0.0, 0.4)
-        check.number("joint set: persistence", self.persistence, 0.0, 1.0, open_low=True)
+        fields.check(self, "joint set: ")
 
 
 def cut(

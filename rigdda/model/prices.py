@@ -9,12 +9,13 @@ over barriers b and events k. All prices are orders of magnitude and a user's to
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
 
-from rigdda import check
+from rigdda import fields
+from rigdda.fields import about, documented
 
 ACCESS_HEIGHT = 60.0
 """Height above the road at which access costs `Prices.access` times the price at the road [m]."""
@@ -45,72 +46,72 @@ UPKEEP = {
 }
 
 
+Price = Annotated[float, about(ge=0.0, le=MOST)]
+EnergyClass = Annotated[str, about(choices=FENCES)]
+Upkeep = Annotated[float, about(ge=0.0, le=0.5)]
+Protection = Annotated[str, about(choices=UPKEEP)]
+
+
+@documented
 class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What barriers cost.
-
-    Parameters
-    ----------
-    fence : table
-        Price of a fence by its energy class [EUR/m2].
-    fence_base : float
-        And per metre: foundations [EUR/m].
-    ditch : table
-        Price of digging by the surface of the ground [EUR/m3]; one that is not listed is dug at the
-        price of the dearest.
-    ditch_base : float
-        And per metre [EUR/m].
-    embankment : float
-        Price of reinforced earth [EUR/m3].
-    concrete : float
-        Price of walls [EUR/m3].
-    removal : float
-        Price of emptying what holds rock [EUR/m3].
-    access : float
-        The price rises by this factor for 60 m of height above the road [-].
-    interest : float
-        Rate of interest, after inflation [1/year].
-    life : float
-        Life of barriers [years].
-    upkeep : table
-        Upkeep by kind, "shed" included [1/year of the capital]; one that is not listed has none.
-    shed : float
-        Price of a rock shed over the road, the reference that always works [EUR/m].
-    source : str
-        Where the prices are from.
 
     Raises
     ------
     BadInput
-        If a price is outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    fence: dict[str, float] = msgspec.field(default_factory=lambda: dict(FENCES))
-    fence_base: float = 300.0
-    ditch: dict[str, float] = msgspec.field(default_factory=lambda: dict(DITCHES))
-    ditch_base: float = 20.0
-    embankment: float = 80.0
-    concrete: float = 350.0
-    removal: float = 100.0
-    access: float = 1.5
-    interest: float = 0.03
-    life: float = 50.0
-    upkeep: dict[str, float] = msgspec.field(default_factory=lambda: dict(UPKEEP))
-    shed: float = 25_000.0
-    source: str = "orders of magnitude, from memory"
+    fence: Annotated[
+        dict[EnergyClass, Price], about("Price of a fence by its energy class in kJ.", "EUR/m2")
+    ] = msgspec.field(default_factory=lambda: dict(FENCES))
+    fence_base: Annotated[
+        Price,
+        about("Price of a fence per metre of road, for foundations.", "EUR/m"),
+    ] = 300.0
+    ditch: Annotated[
+        dict[str, Price],
+        about(
+            "Price of digging by the surface of the ground. Other surfaces cost as much as the "
+            "dearest in the table.",
+            "EUR/m3",
+        ),
+    ] = msgspec.field(default_factory=lambda: dict(DITCHES))
+    ditch_base: Annotated[Price, about("Price of a ditch per metre of road.", "EUR/m")] = 20.0
+    embankment: Annotated[Price, about("Price of reinforced earth.", "EUR/m3")] = 80.0
+    concrete: Annotated[Price, about("Price of the concrete of walls.", "EUR/m3")] = 350.0
+    removal: Annotated[Price, about("Price of removing the rock that barriers hold.", "EUR/m3")] = (
+        100.0
+    )
+    access: Annotated[
+        float,
+        about(
+            "Share by which prices rise for each 60 m of height above the road.",
+            "-",
+            ge=0.0,
+            le=20.0,
+        ),
+    ] = 1.5
+    interest: Annotated[
+        float, about("Rate of interest after inflation.", "1/year", ge=0.0, le=0.5)
+    ] = 0.03
+    life: Annotated[float, about("Service life of barriers.", "years", ge=1.0, le=1000.0)] = 50.0
+    upkeep: Annotated[
+        dict[Protection, Upkeep],
+        about(
+            "Yearly upkeep as a share of the capital, by the kind of barrier. A kind that is not "
+            "in the table has none.",
+            "1/year",
+        ),
+    ] = msgspec.field(default_factory=lambda: dict(UPKEEP))
+    shed: Annotated[
+        Price,
+        about("Price of a rock shed over the road, the reference that nothing passes.", "EUR/m"),
+    ] = 25_000.0
+    source: Annotated[str, about("Where the prices are from.")] = "orders of magnitude, from memory"
 
     def __post_init__(self) -> None:
-        for name in ("fence_base", "ditch_base", "embankment", "concrete", "removal", "shed"):
-            check.number(f"prices.{name}", getattr(self, name), 0.0, MOST)
-        for name, most in (("fence", MOST), ("ditch", MOST), ("upkeep", 0.5)):
-            for key, price in getattr(self, name).items():
-                check.number(f"prices.{name}.{key}", price, 0.0, most)
-        for kind in self.fence:
-            check.one_of("prices.fence", kind, FENCES)
-        for kind in self.upkeep:
-            check.one_of("prices.upkeep", kind, UPKEEP)
-        check.number("prices.access", self.access, 0.0, 20.0)
-        check.number("prices.interest", self.interest, 0.0, 0.5)
-        check.number("prices.life", self.life, 1.0, 1000.0)
+        fields.check(self, "prices.")
 
     @property
     def annuity(self) -> float:
@@ -124,46 +125,45 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return float(self.annuity + self.upkeep.get(kind, 0.0))
 
 
+@documented
 class Consequences(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What rock on the road costs.
 
     The road is closed for days_base + days_factor V^days_exponent days, V being the volume that
     came onto it [m3].
 
-    Parameters
-    ----------
-    closure : float
-        A day of closure, detours and risk to life included [EUR/day].
-    days_base : float
-        Days of closure whatever the volume [days].
-    days_factor : float
-        And for a cubic metre [days].
-    days_exponent : float
-        Exponent of the volume [-].
-    clearing : float
-        Clearing the road [EUR/m3].
-    source : str
-        Where these are from.
-
     Raises
     ------
     BadInput
-        If a value is outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    closure: float = 50_000.0
-    days_base: float = 0.2
-    days_factor: float = 0.15
-    days_exponent: float = 0.6
-    clearing: float = 300.0
-    source: str = "orders of magnitude, from memory"
+    closure: Annotated[
+        float,
+        about(
+            "Cost of a day of closure, including detours and the risk to life.",
+            "EUR/day",
+            ge=0.0,
+            le=1e9,
+        ),
+    ] = 50_000.0
+    days_base: Annotated[
+        float, about("Days of closure whatever the volume.", "days", ge=0.0, le=1000.0)
+    ] = 0.2
+    days_factor: Annotated[
+        float, about("Further days of closure for 1 m3 of rock.", "days", ge=0.0, le=1000.0)
+    ] = 0.15
+    days_exponent: Annotated[
+        float,
+        about("Exponent with which these days grow with the volume.", "-", ge=0.0, le=2.0),
+    ] = 0.6
+    clearing: Annotated[Price, about("Cost of clearing the road.", "EUR/m3")] = 300.0
+    source: Annotated[str, about("Where these costs are from.")] = (
+        "orders of magnitude, from memory"
+    )
 
     def __post_init__(self) -> None:
-        check.number("consequences.closure", self.closure, 0.0, 1e9)
-        check.number("consequences.days_base", self.days_base, 0.0, 1000.0)
-        check.number("consequences.days_factor", self.days_factor, 0.0, 1000.0)
-        check.number("consequences.days_exponent", self.days_exponent, 0.0, 2.0)
-        check.number("consequences.clearing", self.clearing, 0.0, MOST)
+        fields.check(self, "consequences.")
 
     def harm(self, volume: float, reached: bool) -> float:
         """Return the cost of so much rock on the road [EUR]; `volume` in m3."""

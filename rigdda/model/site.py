@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -15,9 +14,8 @@ import msgspec
 import numpy as np
 import tomli_w
 
-from rigdda import check
+from rigdda import check, fields
 from rigdda.barriers import Barrier, Built, Layout, Mesh, as_layout, earthworks, standing
-from rigdda.check import mistyped
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, read
 from rigdda.geometry import polygon_properties
@@ -30,7 +28,7 @@ from rigdda.model.random_streams import stream
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
 from rigdda.model.site_generator import generate
-from rigdda.model.site_tables import Drawn, Event, Rebound, SiteTables
+from rigdda.model.site_tables import Drawn, Event, SiteTables
 from rigdda.model.soundness import check_damping, check_site
 from rigdda.model.source import Source
 from rigdda.model.surface import MOST_DAMPING, Surface, smaller
@@ -63,6 +61,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """
 
     def __post_init__(self) -> None:
+        fields.check(self)
         if not self.events:
             usual = tuple(Event(s.name, 1.0, s.name) for s in self.sources if s.band is None)
             if not usual:
@@ -103,15 +102,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If it is not a sound site.
         """
-        try:
-            return msgspec.toml.decode(text, type=cls)
-        except msgspec.ValidationError as error:
-            if isinstance(error.__cause__, BadInput):
-                raise _placed(error.__cause__, str(error), text) from None
-            bad = mistyped(str(error), msgspec.toml.decode(text))
-            raise bad or BadInput("site file", name, str(error)) from None
-        except (msgspec.DecodeError, RecursionError) as error:
-            raise BadInput("site file", name, f"mend its TOML: {error}") from None
+        return fields.read(cls, fields.parse("site file", name, text))
 
     @classmethod
     def named(cls, name: str) -> Site:
@@ -378,30 +369,6 @@ def _with_damping(surfaces: dict[str, Surface]) -> dict[str, Surface]:
             )
             found[name] = msgspec.structs.replace(surface, damping=value)
     return found
-
-
-def _placed(bad: BadInput, told: str, text: str) -> BadInput:
-    """Return an error with the table that its field is of, if it is a bare name.
-
-    `told` is what msgspec says of it, which ends with the path, but for the keys of tables.
-    """
-    path = told.rpartition(" - at `$.")[2].rstrip("`")
-    if not bad.field.isidentifier() or not path or " " in path:
-        return bad
-    head = path.partition("[...]")[0]
-    if head != path:
-        kind = {"surfaces": Surface, "lumped": Rebound}.get(head)
-        tables = tomllib.loads(text)[head] if kind is not None else {}
-        head = next((f"{head}.{name}" for name in tables if _is_bad(tables[name], kind)), head)
-    return BadInput(f"{head}.{bad.field}", bad.value, bad.mend)
-
-
-def _is_bad(table: object, kind: type | None) -> bool:
-    try:
-        msgspec.convert(table, kind)
-    except msgspec.ValidationError:
-        return True
-    return False
 
 
 @lru_cache(maxsize=4096)

@@ -5,70 +5,71 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 
-from rigdda import check
+from rigdda import check, fields
 from rigdda.barriers import MeshOption
 from rigdda.errors import BadInput
+from rigdda.fields import about, documented
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.block import Block
 from rigdda.model.prices import Consequences, Prices
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
 from rigdda.model.source import Point, Source
-from rigdda.model.surface import Interface, Surface
+from rigdda.model.surface import Damping, Interface, Surface
 from rigdda.model.terrain import Roughness, Terrain
 
 
+@documented
 class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A stretch of the slope with a surface of its own.
-
-    Parameters
-    ----------
-    start : float
-        Chainage where it begins [m].
-    end : float
-        Chainage where it ends [m].
-    surface : str
-        Name of its surface.
-    """
-
-    start: float
-    end: float
-    surface: str
-
-
-class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The ground.
-
-    Parameters
-    ----------
-    points : sequence of (x, y)
-        Corners from the crest down to at least 30 m beyond the road, x growing downhill [m]. There
-        may be overhangs, as the base of a toppling slope has; earthworks and bands need ground
-        without.
-    toe : float
-        Chainage where the slope ends [m].
-    surface : str
-        Name of the surface of all that `surfaces` leaves out.
-    surfaces : tables
-        Stretches with surfaces of their own.
 
     Raises
     ------
     BadInput
-        If a stretch ends before it starts, or two overlap.
+        If a value is of the wrong type.
     """
 
-    points: tuple[Point, ...]
-    toe: float
-    surface: str = "rock"
-    surfaces: tuple[Stretch, ...] = ()
+    start: Annotated[float, about("Chainage where the stretch begins.", "m")]
+    end: Annotated[float, about("Chainage where the stretch ends.", "m")]
+    surface: Annotated[str, about("Name of the surface of the stretch.")]
 
     def __post_init__(self) -> None:
-        points = check.points("slope.points", self.points, 2)
-        msgspec.structs.force_setattr(self, "points", tuple(map(tuple, points.tolist())))
+        fields.check(self, "stretch: ")
+
+
+@documented
+class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The ground.
+
+    Raises
+    ------
+    BadInput
+        If a value is of the wrong type, a stretch ends before it starts, or two overlap.
+    """
+
+    points: Annotated[
+        tuple[Point, ...],
+        about(
+            "Corners [x, y] of the ground, from the crest downhill to at least 30 m beyond the "
+            "road. The ground may overhang, but not where there are earthworks or a band of loose "
+            "rock.",
+            "m",
+            least=2,
+        ),
+    ]
+    toe: Annotated[float, about("Chainage of the foot of the slope.", "m")]
+    surface: Annotated[
+        str, about("Name of the surface of the ground outside the stretches in `surfaces`.")
+    ] = "rock"
+    surfaces: Annotated[
+        tuple[Stretch, ...], about("Stretches of the ground that have another surface.")
+    ] = ()
+
+    def __post_init__(self) -> None:
+        fields.check(self, "slope.")
         last = -check.LARGEST
         for i, stretch in enumerate(self.surfaces):
             where = f"slope.surfaces[{i}]"
@@ -107,58 +108,74 @@ LARGEST_AREA, WIDEST = 1000.0, 1000.0
 """Greatest area of a block [m2] and width of an event [m]."""
 
 
+Area = Annotated[float, about(ge=1e-4, le=LARGEST_AREA)]
+Width = Annotated[float, about(gt=0.0, le=WIDEST)]
+Count = Annotated[int, about(ge=1, le=1000)]
+
+
+@documented
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What comes down, and how often.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    rate : float
-        How often it happens [1/year per 100 m of slope].
-    source : str
-        Name of the source that it comes from.
-    area : (least, greatest)
-        Area of each block of a band [m2], of one without `edges`.
-    exponent : float
-        The number of blocks larger than a volume V falls as V to the power of minus this [-],
-        within `area`: 0.4 to 0.8 as a rule.
-    number : (least, most)
-        Number of blocks of a band, each number as likely.
-    width : float
-        Its width along the road [m]. Of a single block by default the root of its area, of a mass
-        10 m.
-    design : bool
-        Whether it is a design event, for which targets are set.
 
     Raises
     ------
     BadInput
-        If a value is outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    name: str
-    rate: float
-    source: str = "rock"
-    area: tuple[float, float] | None = None
-    exponent: float = 0.6
-    number: tuple[int, int] = (1, 1)
-    width: float | None = None
-    design: bool = False
+    name: Annotated[str, about("Name of the event.")]
+    rate: Annotated[
+        float,
+        about(
+            "How often the event happens on 100 m of slope.",
+            "1/year per 100 m of slope",
+            ge=0.0,
+            le=MOST_OFTEN,
+        ),
+    ]
+    source: Annotated[str, about("Name of the source that the rock comes from.")] = "rock"
+    area: Annotated[
+        tuple[Area, Area] | None,
+        about(
+            "Least and greatest cross-sectional area of a block. Needed for a band, unless "
+            "the band gives `edges`.",
+            "m2",
+            rising=True,
+        ),
+    ] = None
+    exponent: Annotated[
+        float,
+        about(
+            "Exponent b of the distribution of block volumes within `area`: the number of blocks "
+            "larger than V falls as V to the power of -b. Usual values are 0.4 to 0.8.",
+            "-",
+            ge=0.0,
+            le=5.0,
+        ),
+    ] = 0.6
+    number: Annotated[
+        tuple[Count, Count],
+        about(
+            "Least and greatest number of blocks that come from a band at once. All numbers "
+            "between them are equally likely.",
+            "-",
+            rising=True,
+        ),
+    ] = (1, 1)
+    width: Annotated[
+        Width | None,
+        about(
+            "Width of the event along the road. Needed if several blocks come from a band. "
+            "The default for a single block is the root of its area, for a mass 10 m.",
+            "m",
+        ),
+    ] = None
+    design: Annotated[
+        bool, about("Whether it is a design event, for which targets can be set.")
+    ] = False
 
     def __post_init__(self) -> None:
-        where = self.words
-        check.number(f"{where}.rate", self.rate, 0.0, MOST_OFTEN)
-        check.number(f"{where}.exponent", self.exponent, 0.0, 5.0)
-        if self.area is not None:
-            check.interval(f"{where}.area", self.area, 1e-4, LARGEST_AREA)
-        check.interval(f"{where}.number", self.number)
-        for count in self.number:
-            check.integer(f"{where}.number", count, 1, 1000)
-        if self.width is not None:
-            check.number(f"{where}.width", self.width, 0.0, WIDEST, open_low=True)
-        if not isinstance(self.design, bool):
-            raise BadInput(f"{where}.design", self.design, "give true or false")
+        fields.check(self, f"{self.words}.")
 
     @property
     def words(self) -> str:
@@ -225,103 +242,128 @@ DURATION = (1.0, 3600.0)
 """Least and greatest `motion.duration` [s]: in less than a second hardly a block reaches a road."""
 
 
+@documented
 class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The road.
 
-    Parameters
-    ----------
-    start : float
-        Chainage of its uphill edge [m].
-    end : float
-        Chainage of its downhill edge [m].
+    Raises
+    ------
+    BadInput
+        If a value is of the wrong type.
     """
 
-    start: float
-    end: float
+    start: Annotated[float, about("Chainage of the uphill edge of the road.", "m")]
+    end: Annotated[float, about("Chainage of the downhill edge of the road.", "m")]
+
+    def __post_init__(self) -> None:
+        fields.check(self, "road.")
 
 
+@documented
 class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How releases are computed.
 
-    Parameters
-    ----------
-    damping : float or None
-        Mass-proportional damping [1/s] of surfaces that have none of their own. None: that of the
-        ground that the name of the surface suggests, with a notice.
-    damping_when : str
-        "contact": of blocks that touch something, or did within 0.1 s; "always": the paper's, in
-        flight, too, with which energies at a barrier are four to ten times too low.
-    duration : float
-        Longest simulated time [s].
-    dt : float
-        Time step [s], of small blocks the longest whole part of it that suits their size.
-
     Raises
     ------
     BadInput
-        If a value is outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    damping: float | None = None
-    damping_when: str = "contact"
-    duration: float = 25.0
-    dt: float = USUAL_DT
+    damping: Annotated[
+        Damping | None,
+        about(
+            "Mass-proportional damping on surfaces that give none of their own. The default "
+            "is the damping of the ground that the name of the surface suggests, with a "
+            "warning.",
+            "1/s",
+        ),
+    ] = None
+    damping_when: Annotated[
+        str,
+        about(
+            'When blocks are damped. With "contact", while they touch something and for 0.1 s '
+            'after. With "always", in flight, too, as in the paper: energies at a barrier are then '
+            "four to ten times too low.",
+            choices=("always", "contact"),
+        ),
+    ] = "contact"
+    duration: Annotated[
+        float, about("Longest simulated time.", "s", ge=DURATION[0], le=DURATION[1])
+    ] = 25.0
+    dt: Annotated[
+        float,
+        about(
+            "Time step. For small blocks it is divided by the least whole number that makes it "
+            "short enough for their size.",
+            "s",
+            ge=SHORTEST_DT,
+            le=LARGEST_DT,
+        ),
+    ] = USUAL_DT
 
     def __post_init__(self) -> None:
-        if self.damping is not None:
-            check.number("motion.damping", self.damping, 0.0, 100.0)
-        check.one_of("motion.damping_when", self.damping_when, ("always", "contact"))
-        check.number("motion.duration", self.duration, *DURATION)
-        check.number("motion.dt", self.dt, SHORTEST_DT, LARGEST_DT)
+        fields.check(self, "motion.")
 
 
+@documented
 class Rebound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How a point of the lumped-mass model rebounds from a surface, see `rigdda.lumped`.
 
-    Parameters
-    ----------
-    normal : float
-        Normal coefficient of restitution [-].
-    tangential : float
-        Tangential coefficient of restitution [-]: the share of its speed along the ground that a
-        point keeps in an impact.
-    friction_deg : float
-        Friction angle at which it slides on, or rolls, when it no longer bounces [deg].
-
     Raises
     ------
     BadInput
-        If a value is outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    normal: float = 0.35
-    tangential: float = 0.85
-    friction_deg: float = 30.0
+    normal: Annotated[float, about("Normal coefficient of restitution.", "-", ge=0.0, le=1.0)] = (
+        0.35
+    )
+    tangential: Annotated[
+        float,
+        about(
+            "Tangential coefficient of restitution: the share of its speed along the ground that a "
+            "point keeps in an impact.",
+            "-",
+            ge=0.0,
+            le=1.0,
+        ),
+    ] = 0.85
+    friction_deg: Annotated[
+        float,
+        about(
+            "Angle of friction of a point that slides or rolls after its last bounce.",
+            "deg",
+            ge=0.0,
+            le=80.0,
+        ),
+    ] = 30.0
 
     def __post_init__(self) -> None:
-        check.number("normal", self.normal, 0.0, 1.0)
-        check.number("tangential", self.tangential, 0.0, 1.0)
-        check.number("friction_deg", self.friction_deg, 0.0, 80.0)
+        fields.check(self)
 
 
+@documented
 class Scatter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What varies at random from release to release, beside the blocks.
 
-    Parameters
-    ----------
-    friction_deg : float
-        Standard deviation of the friction angles, all surfaces together [deg].
-
     Raises
     ------
     BadInput
-        If it is outside its range.
+        If a value is of the wrong type or outside its range.
     """
 
-    friction_deg: float = 0.0
+    friction_deg: Annotated[
+        float,
+        about(
+            "Standard deviation of the friction angles. All surfaces vary together.",
+            "deg",
+            ge=0.0,
+            le=10.0,
+        ),
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        check.number("scatter.friction_deg", self.friction_deg, 0.0, 10.0)
+        fields.check(self, "scatter.")
 
 
 STEEP_SIDES, FLAT_SIDE = {"rock": 0.25}, 0.67
@@ -329,64 +371,53 @@ STEEP_SIDES, FLAT_SIDE = {"rock": 0.25}, 0.67
 all else is taken for soil."""
 
 
+@documented
 class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A slope, its loose rock and how often it falls, the road below, and what protection costs.
+    """A slope, its loose rock and how often it falls, the road below, and what protection costs."""
 
-    Parameters
-    ----------
-    name : str
-        Its name.
-    description : str
-        What it is, and what of it is assumed.
-    family : str
-        Family of sites that it belongs to; "paper" for scenes of publications.
-    slope : table
-        The ground.
-    sources : tables
-        Where rock starts.
-    events : tables
-        What comes down and how often. By default each source that is no band, once a year on
-        100 m of slope.
-    road : table
-        The road.
-    barrier_zone : table
-        Where barriers may stand.
-    surfaces : tables
-        The surfaces, by name. "soil" is that of
-        embankments, "concrete" that of walls and fences, and of embankments where "soil" is
-        missing; "rock" where they are missing.
-    interfaces : tables
-        How two surfaces meet.
-    prices : table
-        What barriers cost.
-    consequences : table
-        What rock on the road costs.
-    meshes : tables
-        Mesh that may be hung over the face.
-    motion : table
-        How releases are computed.
-    scatter : table
-        What varies at random.
-    lumped : tables
-        How points of the lumped-mass model rebound, by the name of the surface.
-    """
-
-    name: str
-    description: str
-    family: str = ""
-    slope: Slope
-    sources: tuple[Source, ...]
-    events: tuple[Event, ...] = ()
-    road: Road
-    barrier_zone: BarrierZone
-    surfaces: dict[str, Surface]
-    interfaces: tuple[Interface, ...] = ()
-    prices: Prices = msgspec.field(default_factory=Prices)
-    consequences: Consequences = Consequences()
-    meshes: tuple[MeshOption, ...] = ()
-    motion: Motion = Motion()
-    scatter: Scatter = Scatter()
-    lumped: dict[str, Rebound] = {}
+    name: Annotated[str, about("Name of the site.")]
+    description: Annotated[str, about("What the site is, and what about it is assumed.")]
+    family: Annotated[
+        str,
+        about('Family of sites that it belongs to. "paper" is for scenes of publications.'),
+    ] = ""
+    slope: Annotated[Slope, about("The ground.")]
+    sources: Annotated[tuple[Source, ...], about("Where rock starts.")]
+    events: Annotated[
+        tuple[Event, ...],
+        about(
+            "What comes down, and how often. By default each source that is not a band releases "
+            "its rock once a year on 100 m of slope."
+        ),
+    ] = ()
+    road: Annotated[Road, about("The road.")]
+    barrier_zone: Annotated[
+        BarrierZone, about("Where barriers may stand, and how large they may be.")
+    ]
+    surfaces: Annotated[
+        dict[str, Surface],
+        about(
+            'The surfaces by name. "concrete" is that of walls and fences, "soil" that of '
+            'embankments; where "soil" is missing, embankments have "concrete", and where that is '
+            'missing, too, all barriers have "rock".'
+        ),
+    ]
+    interfaces: Annotated[
+        tuple[Interface, ...], about("How two surfaces meet, where it is known.")
+    ] = ()
+    prices: Annotated[Prices, about("What barriers cost.")] = msgspec.field(default_factory=Prices)
+    consequences: Annotated[Consequences, about("What rock on the road costs.")] = Consequences()
+    meshes: Annotated[
+        tuple[MeshOption, ...], about("Kinds of mesh that may be hung over the face.")
+    ] = ()
+    motion: Annotated[Motion, about("How releases are computed.")] = Motion()
+    scatter: Annotated[
+        Scatter, about("What varies at random from release to release, beside the blocks.")
+    ] = Scatter()
+    lumped: Annotated[
+        dict[str, Rebound],
+        about("How points of the lumped-mass model rebound, by the name of the surface."),
+    ] = {}
 
     @property
     def profile(self) -> Terrain:

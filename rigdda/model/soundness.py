@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 import shapely
 
-from rigdda import check
+from rigdda import check, fields
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
 from rigdda.model import loose_blocks
@@ -107,13 +107,10 @@ def _check_surfaces(site: SiteTables) -> None:
     for i, stretch in enumerate(site.slope.surfaces):
         check.one_of(f"slope.surfaces[{i}].surface", stretch.surface, site.surfaces)
     for i, pair in enumerate(site.interfaces):
+        fields.check(pair, f"interfaces[{i}].")
         check.one_of(f"interfaces[{i}].first", pair.first, site.surfaces)
         check.one_of(f"interfaces[{i}].second", pair.second, site.surfaces)
-        try:
-            surface = pair.surface
-        except BadInput as bad:
-            raise BadInput(f"interfaces[{i}].{bad.field}", bad.value, bad.mend) from None
-        check_surface(f"interfaces[{i}]", surface)
+        check_surface(f"interfaces[{i}]", pair.surface)
     pairs = [frozenset((pair.first, pair.second)) for pair in site.interfaces]
     for i, names in enumerate(pairs):
         if names in pairs[:i]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import msgspec
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rigdda import check
+from rigdda import check, fields
 from rigdda.errors import BadInput
+from rigdda.fields import about, documented
 from rigdda.geometry import overlap, without_straight_corners
 from rigdda.model.block import convex_polygon, simple_polygon
 from rigdda.model.joints import JointSet, cut
@@ -28,85 +30,113 @@ MOST_BLOCKS = 1e5
 """Most blocks that a mass may be cut into: more would take days to simulate."""
 
 
+Edge = Annotated[float, about(ge=0.01, le=30.0)]
+Corners = Annotated[int, about(ge=4, le=12)]
+Ratio = Annotated[float, about(ge=1.0, le=4.0)]
+Speed = Annotated[float, about(ge=0.0, le=50.0)]
+
+
+@documented
 class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where rock starts: a band of loose blocks, a jointed mass, or blocks as they are.
-
-    Parameters
-    ----------
-    name : str
-        Its name in `events`.
-    band : (low, high)
-        Chainages between which loose blocks lie on the ground at random places [m]; how many and
-        how large is up to the event.
-    polygon : sequence of (x, y)
-        Instead of a band: corners of a convex mass [m], cut by `joints` into blocks whose mean
-        area is `block_area`.
-    joints : tables
-        At least two joint sets of different dip.
-    blocks : sequence of sequences of (x, y)
-        Instead of both: corners of each block [m], as surveyed.
-    disturbance : float
-        Greatest speed of such a block at the start, in any direction [m/s]. Jointed rock is
-        chaotic: with so little, releases are an ensemble of what the slope may do. 0: all releases
-        are the same, one outcome of many.
-    block_area : float
-        Mean area of the blocks of a mass [m2].
-    density : float
-        Density [kg/m3].
-    surface : str
-        Name of its surface, where blocks touch blocks; on the ground the ground's decides.
-    corners : (least, most)
-        Number of corners of a block of a band.
-    aspect : (least, greatest)
-        Length over breadth of a block of a band [-].
-    edges : (a, b, c)
-        Edges of the box around a block that was measured [m], instead of the `area` of the events
-        and of `aspect`: each release sees one of its three faces at random.
-    spin : float
-        Greatest rate of rotation of a block of a band at the start, either way [rad/s].
-    speed : (least, greatest)
-        Speed of a block of a band at the start, horizontally off the face [m/s].
 
     Raises
     ------
     BadInput
-        If a value is outside its range, blocks overlap, or there is not one of the three.
+        If a value is of the wrong type or outside its range, blocks overlap, or there is not one of
+        `band`, `polygon` and `blocks`.
     """
 
-    name: str = "rock"
-    band: tuple[float, float] | None = None
-    polygon: tuple[Point, ...] = ()
-    joints: tuple[JointSet, ...] = ()
-    blocks: tuple[tuple[Point, ...], ...] = ()
-    disturbance: float = 1e-4
-    block_area: float = 2.0
-    density: float = 2600.0
-    surface: str = "rock"
-    corners: tuple[int, int] = (5, 8)
-    aspect: tuple[float, float] = (1.0, 1.5)
-    edges: tuple[float, float, float] | None = None
-    spin: float = 0.5
-    speed: tuple[float, float] = (0.2, 1.0)
+    name: Annotated[str, about("Name of the source, to which `events` refer.")] = "rock"
+    band: Annotated[
+        tuple[float, float] | None,
+        about(
+            "Chainages between which loose blocks lie at random places on the ground. The "
+            "events give their number and size.",
+            "m",
+        ),
+    ] = None
+    polygon: Annotated[
+        tuple[Point, ...],
+        about(
+            "Instead of a band, the corners [x, y] of a convex mass of rock. `joints` cut it into "
+            "blocks whose mean area is `block_area`.",
+            "m",
+        ),
+    ] = ()
+    joints: Annotated[
+        tuple[JointSet, ...],
+        about("Joint sets of a mass, at least two of different dip."),
+    ] = ()
+    blocks: Annotated[
+        tuple[tuple[Point, ...], ...],
+        about("Instead of a band or a mass, the surveyed corners [x, y] of each block.", "m"),
+    ] = ()
+    disturbance: Annotated[
+        float,
+        about(
+            "Greatest speed of surveyed blocks at the start, in a random direction. Jointed rock "
+            "is chaotic, so that even a small speed makes each release differ. With 0, all "
+            "releases are the same.",
+            "m/s",
+            ge=0.0,
+            le=1.0,
+        ),
+    ] = 1e-4
+    block_area: Annotated[float, about("Mean area of the blocks of a mass.", "m2", gt=0.0)] = 2.0
+    density: Annotated[
+        float,
+        about("Density of the rock, about 2600.", "kg/m3", ge=LIGHTEST, le=DENSEST),
+    ] = 2600.0
+    surface: Annotated[
+        str,
+        about(
+            "Name of the surface of the rock, which counts between blocks. Between a block and the "
+            "ground, the surface of the ground counts."
+        ),
+    ] = "rock"
+    corners: Annotated[
+        tuple[Corners, Corners],
+        about("Least and greatest number of corners of a block of a band.", "-", rising=True),
+    ] = (5, 8)
+    aspect: Annotated[
+        tuple[Ratio, Ratio],
+        about("Least and greatest length over breadth of a block of a band.", "-", rising=True),
+    ] = (1.0, 1.5)
+    edges: Annotated[
+        tuple[Edge, Edge, Edge] | None,
+        about(
+            "Edges of the box around a measured block of a band, instead of `aspect` and the "
+            "`area` of events. Each release sees one of the three faces of the box at random.",
+            "m",
+        ),
+    ] = None
+    spin: Annotated[
+        float,
+        about(
+            "Greatest rate of rotation of a block of a band at the start, in either direction.",
+            "rad/s",
+            ge=0.0,
+            le=20.0,
+        ),
+    ] = 0.5
+    speed: Annotated[
+        tuple[Speed, Speed],
+        about(
+            "Least and greatest speed of a block of a band at the start, which is horizontal and "
+            "off the face.",
+            "m/s",
+            rising=True,
+        ),
+    ] = (0.2, 1.0)
 
     def __post_init__(self) -> None:
         where = self.words
-        check.number(f"{where}.block_area", self.block_area, 0.0, open_low=True)
-        density = check.number(f"{where}.density", self.density, 0.0, DENSEST, open_low=True)
-        if density < LIGHTEST:
-            raise BadInput(f"{where}.density", density, "give kg/m3: about 2600 for rock")
-        check.number(f"{where}.disturbance", self.disturbance, 0.0, 1.0)
-        check.number(f"{where}.spin", self.spin, 0.0, 20.0)
-        check.interval(f"{where}.speed", self.speed, 0.0, 50.0)
-        check.interval(f"{where}.aspect", self.aspect, 1.0, 4.0)
-        check.interval(f"{where}.corners", self.corners)
-        for count in self.corners:
-            check.integer(f"{where}.corners", count, 4, 12)
+        fields.check(self, f"{where}.")
         if self.edges is not None:
             if self.band is None:
                 mend = "leave it out: only blocks of a band have edges"
                 raise BadInput(f"{where}.edges", self.edges, mend)
-            for edge in self.edges:
-                check.number(f"{where}.edges", edge, 0.01, 30.0)
         given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
         mend = "give one of band, polygon with joints, blocks"
         if not given:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
-from rigdda import check
+from rigdda import fields
 from rigdda.errors import BadInput
+from rigdda.fields import about, documented
 from rigdda.model.grounds import GROUNDS
 
 MOST_DAMPING = 100.0
@@ -29,74 +30,108 @@ PLAIN = {
 """Values of a surface that names no ground."""
 
 
+Damping = Annotated[float, about(ge=0.0, le=MOST_DAMPING)]
+Share = Annotated[float, about(ge=0.0, le=1.0)]
+
+
+@documented
 class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Strength, rebound and loss of a surface.
 
-    The standard deviations and the roughness are drawn by `Site.realise` for each release; a scene
-    that is built by hand uses the other values as they are.
-
-    Parameters
-    ----------
-    friction_deg : float
-        Coulomb friction angle [deg], from 0 to below 90. Without a ground 30.
-    cohesion, tension : float
-        Strength of a joint that is closed at the start, in shear beside friction and in tension
-        [Pa]; it breaks once, as a whole.
-    restitution : float or None
-        Coefficient of restitution of a central impact, 0 (plastic) to 1. Without a ground 0. None:
-        the paper's plain penalty contact, whose rebound is what step and stiffness make of it; in
-        Python only, site files have no word for it.
-    damping : float or None
-        Mass-proportional damping [1/s] of a block that touches the surface, or did within 0.1 s.
-        None, the default without a ground: the damping of the scene or of the site. If a block
-        touches several surfaces, the greatest damping counts.
-    friction_sd_deg, restitution_sd, damping_sd : float
-        Standard deviations of friction [deg], restitution [-] and damping [1/s] from release to
-        release. Without a ground 0.
-    roughness : float
-        Root-mean-square depth of pits in the ground [m], one in each length of a block. Without a
-        ground 0. Ground that overhangs, or is steeper than 79 degrees, has no pits.
-    ground : str
-        Name of its ground in the library (`rigdda.grounds`), whose typical values it takes where
-        the others are not given. To change the ground of a surface, make a new one: a copy with
-        another ground keeps its values.
+    A surface that names a `ground` of the library takes from it what it does not give itself.
+    `Site.realise` draws the values that have a standard deviation, and the pits of the ground, for
+    each release. A scene that is built by hand uses the values as they are. In Python `restitution`
+    may be None: the plain penalty contact of the paper, whose rebound follows from step and
+    stiffness. Damping None is the damping of the scene or of the site.
 
     Raises
     ------
     BadInput
-        If a value is not finite or outside its range, or the library has no such ground.
+        If a value is of the wrong type or outside its range, or the library has no such ground.
     """
 
-    friction_deg: float = _OPEN
-    cohesion: float = 0.0
-    tension: float = 0.0
-    restitution: float | None = _OPEN
-    damping: float | None = _OPEN
-    friction_sd_deg: float = _OPEN
-    restitution_sd: float = _OPEN
-    damping_sd: float = _OPEN
-    roughness: float = _OPEN
-    ground: str = ""
+    friction_deg: Annotated[
+        float, about("Angle of Coulomb friction. Without a ground 30.", "deg", ge=0.0, le=89.9)
+    ] = _OPEN
+    cohesion: Annotated[
+        float,
+        about(
+            "Shear strength, beside friction, of a joint that is closed at the start. The joint "
+            "breaks as a whole, once and for all.",
+            "Pa",
+            ge=0.0,
+        ),
+    ] = 0.0
+    tension: Annotated[
+        float,
+        about("Tensile strength of a joint that is closed at the start.", "Pa", ge=0.0),
+    ] = 0.0
+    restitution: Annotated[
+        Share | None,
+        about(
+            "Coefficient of restitution of a central impact; 0 is plastic. Without a ground 0.",
+            "-",
+        ),
+    ] = _OPEN
+    damping: Annotated[
+        Damping | None,
+        about(
+            "Mass-proportional damping of a block while it touches the surface, and for 0.1 s "
+            "after. If a block touches several surfaces, the greatest damping counts. Without "
+            "a ground, the damping of the site.",
+            "1/s",
+        ),
+    ] = _OPEN
+    friction_sd_deg: Annotated[
+        float,
+        about(
+            "Standard deviation of the friction angle from release to release. Without a ground 0.",
+            "deg",
+            ge=0.0,
+            le=15.0,
+        ),
+    ] = _OPEN
+    restitution_sd: Annotated[
+        float,
+        about(
+            "Standard deviation of the restitution from release to release. Without a ground 0.",
+            "-",
+            ge=0.0,
+            le=0.5,
+        ),
+    ] = _OPEN
+    damping_sd: Annotated[
+        Damping,
+        about(
+            "Standard deviation of the damping from release to release. Without a ground 0.", "1/s"
+        ),
+    ] = _OPEN
+    roughness: Annotated[
+        float,
+        about(
+            "Root-mean-square depth of pits in the ground, which are as far apart as blocks are "
+            "long. Ground that overhangs or is steeper than 79 degrees has none. Without a "
+            "ground 0.",
+            "m",
+            ge=0.0,
+            le=2.0,
+        ),
+    ] = _OPEN
+    ground: Annotated[
+        str,
+        about(
+            "Name of a ground in the library, whose typical values count where no others are "
+            "given. In Python, a copy of a surface with another ground keeps its values.",
+            choices=(*GROUNDS, ""),
+        ),
+    ] = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.ground, str) or self.ground not in ("", *GROUNDS):
-            raise BadInput("ground", self.ground, f"choose one of {', '.join(GROUNDS)}")
-        msgspec.structs.force_setattr(self, "ground", str(self.ground))
+        fields.check(self)
         usual = GROUNDS[self.ground].values if self.ground else PLAIN
         for name, value in usual.items():
             if getattr(self, name) is msgspec.UNSET:
                 msgspec.structs.force_setattr(self, name, value)
-        check.set_number(self, "friction_deg", 0.0, 89.9)
-        check.set_number(self, "cohesion", 0.0)
-        check.set_number(self, "tension", 0.0)
-        if self.restitution is not None:
-            check.set_number(self, "restitution", 0.0, 1.0)
-        if self.damping is not None:
-            check.set_number(self, "damping", 0.0, MOST_DAMPING)
-        check.set_number(self, "friction_sd_deg", 0.0, 15.0)
-        check.set_number(self, "restitution_sd", 0.0, 0.5)
-        check.set_number(self, "damping_sd", 0.0, MOST_DAMPING)
-        check.set_number(self, "roughness", 0.0, 2.0)
 
     @property
     def varies(self) -> bool:
@@ -121,36 +156,37 @@ def smaller(a: Surface, b: Surface) -> Surface:
     )
 
 
+@documented
 class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How two surfaces meet, instead of what follows from each.
+    """How two surfaces meet.
 
-    Without one, rock on the ground meets the ground's surface, and otherwise the smaller of each
-    property counts.
-
-    Parameters
-    ----------
-    first : str
-        Name of the one surface.
-    second : str
-        Name of the other.
-    friction_deg : float
-        Coulomb friction angle [deg].
-    cohesion, tension : float
-        Strength of a joint that is closed at the start [Pa].
-    restitution : float
-        Coefficient of restitution [-].
-    damping : float
-        Mass-proportional damping of blocks that touch [1/s]; by default that which the two would
-        have without this table.
+    Without such a table, rock on the ground has the surface of the ground, and any other pair has
+    the smaller of each property. The values are checked with the site.
     """
 
-    first: str
-    second: str
-    friction_deg: float = 30.0
-    cohesion: float = 0.0
-    tension: float = 0.0
-    restitution: float | None = 0.0
-    damping: float | None = None
+    first: Annotated[str, about("Name of one of the surfaces.")]
+    second: Annotated[str, about("Name of the other surface.")]
+    friction_deg: Annotated[float, about("Angle of Coulomb friction.", "deg", ge=0.0, le=89.9)] = (
+        30.0
+    )
+    cohesion: Annotated[
+        float,
+        about("Shear strength, beside friction, of a joint closed at the start.", "Pa", ge=0.0),
+    ] = 0.0
+    tension: Annotated[
+        float, about("Tensile strength of a joint that is closed at the start.", "Pa", ge=0.0)
+    ] = 0.0
+    restitution: Annotated[
+        Share | None, about("Coefficient of restitution of a central impact.", "-")
+    ] = 0.0
+    damping: Annotated[
+        Damping | None,
+        about(
+            "Mass-proportional damping of blocks that touch. The default is the damping that "
+            "the two surfaces have without this table.",
+            "1/s",
+        ),
+    ] = None
 
     @property
     def surface(self) -> Surface:

@@ -1,19 +1,18 @@
 """The reference of site files, written from the classes that read them.
 
-`python -m rigdda.sites.document` writes docs/site.md; a test says when it is stale.
+`python -m rigdda.sites.document` writes docs/site.md; a test tells when it is out of date.
 """
 
 from __future__ import annotations
 
-import inspect
 import re
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from rigdda import sites
 from rigdda.barriers import KINDS, MeshOption
+from rigdda.fields import Described, described
 from rigdda.files import atomic
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
@@ -68,11 +67,11 @@ design with both ends of its range.
 LAYOUT = """\
 ## Layout files
 
-What `--layout` and the `barriers` of a study take: a table `[[barriers]]` for each barrier in TOML
-(or a list `barriers` in JSON), with its `kind` (without one
-it is a wall) and the keys below. `rigdda design` writes one,
-`layout.toml`. A layout that may not be built is computed as it is given, and `simulate`, `study`
-and the notes of a replay say so.
+A layout file lists barriers, in TOML with a table `[[barriers]]` for each or in JSON with a list
+`barriers`. Each has its `kind`, by default "wall", and the keys below. The option `--layout` takes
+such a file, and the `barriers` of a study have the same keys. `rigdda design` writes its result as
+`layout.toml`. A layout that breaks a rule of the site is computed nevertheless; `simulate`, `study`
+and the notes of a replay then say which rule.
 
 ```toml
 [[barriers]]
@@ -88,15 +87,35 @@ HEAD = """\
 
 <!-- Written by `python -m rigdda.sites.document` from the classes that read the files. -->
 
-A site is a TOML file: what an engineer knows about a slope. `rigdda design my-site.toml` designs
-its protection, `rigdda.Site.load("my-site.toml")` reads it. Lengths in m, angles in degrees where a
-name ends in `_deg`, money in EUR; x grows downhill, everything is per metre of road unless said.
-A key that is not listed here is refused, and so is a value that cannot be meant; the message names
-both and says how to mend it. The smallest file has what has no default. Begin with one of the
-built-in sites ({names}), all of which are files in `rigdda/sites/`.
+A site file describes a slope in TOML. `rigdda design my-site.toml` designs its protection, and
+`rigdda.Site.load("my-site.toml")` reads it in Python. Chainages grow downhill. Units are those of
+the tables below.
 
-The order of tables in a file is free but for one rule of TOML: plain keys come before the first
-table.
+A file must have the keys that are marked "needed"; all others have a default. Keys that are not
+listed here and values outside their range are refused: the message names the key and its value, and
+says what to write instead. A whole number may stand for a float. Tables may come in any order, but
+TOML requires plain keys to come before the first table.
+
+The easiest start is a copy of a built-in site. They are files in `rigdda/sites/`: {names}.
+
+## Help from your editor
+
+Editors with support for TOML, such as VS Code with the extension Even Better TOML, show what a key
+means and mark mistakes while you type, if they know the schema of the file. Write it next to your
+site file:
+
+```
+rigdda schema > site.schema.json
+```
+
+and begin the site file with this line:
+
+```toml
+#:schema ./site.schema.json
+```
+
+`rigdda schema layout` does the same for layout files. A schema cannot tell whether values fit
+together, for example whether the barrier zone lies uphill of the road; reading the file does.
 """
 
 
@@ -105,11 +124,11 @@ def document() -> str:
     names = ", ".join(f"`{name}`" for name in sites.names())
     parts = [HEAD.format(names=names)]
     for title, table in TABLES:
-        parts.append(f"## {title}\n\n{summary(table)}\n\n{_fields(table)}")
+        parts.append(f"## {title}\n\n{summary(table.__doc__)}\n\n{_fields(table)}")
     parts.append(f"{GROUND_TEXT}\n{grounds()}")
     parts.append(LAYOUT)
     for name, kind in KINDS.items():
-        parts.append(f'### `kind = "{name}"`\n\n{summary(kind)}\n\n{_fields(kind)}')
+        parts.append(f'### `kind = "{name}"`\n\n{summary(kind.__doc__)}\n\n{_fields(kind)}')
     parts.append(f"## An example\n\n```toml\n{sites.text('narrow')}```\n")
     return "\n".join(parts)
 
@@ -133,47 +152,31 @@ def grounds() -> str:
     return "\n".join([*rows, "", *sources]) + "\n"
 
 
-def summary(table: type) -> str:
+def summary(docstring: str | None) -> str:
     """Return what a docstring says before its sections, as one paragraph."""
-    text = (inspect.getdoc(table) or "").split("\nParameters\n")[0]
+    text = re.split(r"\n\s*(?:Parameters|Raises)\n", docstring or "")[0]
     return re.sub(r"\s*\n\s*", " ", text).strip()
-
-
-def meanings(table: type) -> dict[str, tuple[str, str]]:
-    """Return type and meaning of each parameter that a docstring lists."""
-    text = (inspect.getdoc(table) or "").split("\nParameters\n----------\n")[-1]
-    text = re.split(r"\n\n\w+\n-+\n", text)[0]
-    found: dict[str, tuple[str, str]] = {}
-    for entry in re.split(r"\n(?=\S)", text):
-        head, _, body = entry.partition("\n")
-        names, _, kind = head.partition(" : ")
-        for name in names.split(","):
-            found[name.strip()] = kind.strip(), re.sub(r"\s*\n\s*", " ", body).strip()
-    return found
 
 
 def _fields(table: type[msgspec.Struct]) -> str:
     """Return the keys of a table as a Markdown table."""
-    said = meanings(table)
-    rows = ["| key | type | default | meaning |", "|---|---|---|---|"]
-    for field in msgspec.structs.fields(table):
-        kind, meaning = said[field.name]
-        rows.append(f"| `{field.name}` | {kind} | {_default(field)} | {meaning} |")
+    rows = ["| key | type | unit | range | default | meaning |", "|---|---|---|---|---|---|"]
+    for field in described(table):
+        cells = field.kind, field.unit, field.range, _default(field), field.text
+        rows.append(f"| `{field.name}` | {' | '.join(cells)} |")
     return "\n".join(rows) + "\n"
 
 
-def _default(field: Any) -> str:
+def _default(field: Described) -> str:
     """Return the default of a field as it would be in a file."""
     value = field.default
-    if field.default_factory is not msgspec.NODEFAULT:
-        value = field.default_factory()
-    if value is msgspec.NODEFAULT:
+    if field.needed:
         return "needed"
     if value is msgspec.UNSET:
-        return "its ground's"
+        return "that of its ground"
     if isinstance(value, msgspec.Struct):
         return "see below"
-    if value is None or value == () or value == "":
+    if value in (None, (), {}, ""):
         return "none"
     if isinstance(value, dict):
         return ", ".join(f"{key}: {item:g}" for key, item in value.items())

@@ -164,7 +164,7 @@ def test_a_file_of_somebody_else_is_left_alone(content: bytes, folder: Path) -> 
         (("releases = 6", "releases = 0"), ("releases", "0")),
         (("releases = 6", "relases = 6"), ("relases",)),
         (('name = "one"', 'name = "nothing"'), ("layouts[1].name", "nothing")),
-        (("energy_class = 500", "energy_class = 7"), ("fence energy_class", "7")),
+        (("energy_class = 500", "energy_class = 7"), ("layouts.one.barriers[0].energy_class", "7")),
         (("x = 18.0", "x = 500.0"), ("x", "500", "terrain")),
         (("walls.json", "none.json"), ("none.json", "existing")),
         (("chute.toml", "nowhere.toml"), ("nowhere.toml", "existing")),

@@ -278,15 +278,26 @@ def described(table: type[msgspec.Struct]) -> tuple[Described, ...]:
 
 def documented(table: type[Table]) -> type[Table]:
     """Add the fields of a struct to its docstring, as parameters."""
-    before, *after = (table.__doc__ or "").partition("    Raises\n")
-    lines = ["    Parameters", "    ----------"]
-    for field in described(table):
-        limits = f", {field.range} {field.unit}".rstrip(" -") if field.range else ""
-        unit = f", in {field.unit}" if field.unit not in ("", "-") and not limits else ""
-        lines.append(f"    {field.name} : {field.kind}{limits or unit}")
-        lines += textwrap.wrap(field.text, 92, initial_indent=8 * " ", subsequent_indent=8 * " ")
-    table.__doc__ = "\n".join([before.rstrip(), "", *lines, "", "".join(after)])
+    table.__doc__ = _Docstring(table.__doc__ or "")  # type: ignore[assignment]
     return table
+
+
+class _Docstring:
+    """A docstring with the fields of a struct, written when it is asked for: imports stay quick."""
+
+    def __init__(self, text: str):
+        self.before, *self.after = text.partition("    Raises\n")
+
+    def __get__(self, _: object, table: type[msgspec.Struct]) -> str:
+        lines = ["    Parameters", "    ----------"]
+        for field in described(table):
+            limits = f", {field.range} {field.unit}".rstrip(" -") if field.range else ""
+            unit = f", in {field.unit}" if field.unit not in ("", "-") and not limits else ""
+            lines.append(f"    {field.name} : {field.kind}{limits or unit}")
+            lines += textwrap.wrap(
+                field.text, 92, initial_indent=" " * 8, subsequent_indent=" " * 8
+            )
+        return "\n".join([self.before.rstrip(), "", *lines, "", "".join(self.after)])
 
 
 def _bare(kind: kinds.Type) -> kinds.Type:

@@ -93,9 +93,9 @@ the tables below.
 
 A file must have the keys that are marked "needed"; all others have a default. Keys that are not
 listed here and values outside their range are refused: the message names the key and its value, and
-says what to write instead. `str` is a text in quotes, and a whole number may stand for a float. A
-list of tables is written with double brackets, such as `[[events]]`, once for each table. Tables may
-come in any order, but TOML requires plain keys to come before the first table.
+says what to write instead. `str` is a text in quotes, and a whole number may stand for a float.
+A list of tables is written with double brackets, such as `[[events]]`, once for each table. Tables
+may come in any order, but TOML requires plain keys to come before the first table.
 
 The easiest start is a copy of a built-in site. They are files in `rigdda/sites/`: {names}.
 

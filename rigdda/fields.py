@@ -85,18 +85,21 @@ def check(record: msgspec.Struct, prefix: str = "") -> None:
             msgspec.structs.force_setattr(record, name, sound(prefix + name, value))
 
 
-def parse(what: str, name: str, text: str, form: str = "TOML") -> Any:
+def parse(what: str, name: str, text: str, form: str = "TOML") -> dict[str, Any]:
     """Return the tables of a TOML or JSON text; errors call it `what` = `name`.
 
     Raises
     ------
     BadInput
-        If it is not TOML or JSON.
+        If it is not TOML or JSON, or holds no table.
     """
     try:
-        return (msgspec.json if form == "JSON" else msgspec.toml).decode(text)
+        found = (msgspec.json if form == "JSON" else msgspec.toml).decode(text)
     except (msgspec.DecodeError, RecursionError) as error:
         raise BadInput(what, name, f"mend its {form}: {error}") from None
+    if not isinstance(found, dict):
+        raise BadInput(what, name, "put what it holds into a table, {...}")
+    return found
 
 
 def read(table: type[Table], value: Any, where: str = "") -> Table:
@@ -120,7 +123,7 @@ def checked(table: type[msgspec.Struct], value: Any, where: str = "") -> dict[st
         outside its range.
     """
     if not isinstance(value, Mapping):
-        raise BadInput(where or "file", value, "give a table")
+        raise BadInput(where, value, "give a table")
     prefix, checks = f"{where}." if where else "", _checks(table)
     for key in value:
         if key not in checks:

@@ -138,6 +138,13 @@ def test_malformed_layouts_are_refused_by_both(table, field, tmp_path):
     assert caught.value.field == field
 
 
+def test_a_layout_file_holds_a_table(tmp_path):
+    (tmp_path / "layout.json").write_text("[]")
+    assert list(LAYOUT.iter_errors([]))
+    with pytest.raises(BadInput, match=r"layout\.json': put what it holds into a table"):
+        load_layout(tmp_path / "layout.json")
+
+
 def beyond(part: dict) -> list:
     """Return values that a part of a schema refuses: of another type, and beyond its bounds."""
     if "items" in part:

@@ -102,7 +102,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If it is not a sound site.
         """
-        return fields.read(cls, fields.parse("site file", name, text))
+        return cls(**fields.checked(cls, fields.parse("site file", name, text)))
 
     @classmethod
     def named(cls, name: str) -> Site:

@@ -6,37 +6,36 @@ draft 7, which the TOML plug-ins of editors understand.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from functools import reduce
+from operator import or_
+from typing import Any
 
 import msgspec
 
-from rigdda.barriers import Barrier
-from rigdda.fields import about
+from rigdda.barriers import KINDS
 from rigdda.model.site_tables import SiteTables
 from rigdda.sites.document import summary
 
 
-class _Layout(msgspec.Struct, forbid_unknown_fields=True):
-    """A layout of barriers."""
-
-    barriers: Annotated[tuple[Barrier, ...], about("The barriers; there may be none.")]
-
-
-FILES: dict[str, type[msgspec.Struct]] = {"site": SiteTables, "layout": _Layout}
-"""What each kind of file holds."""
-
-
 def schema(name: str) -> dict[str, Any]:
     """Return the JSON Schema of "site" or "layout" files."""
-    _, tables = msgspec.json.schema_components([FILES[name]], ref_template="#/definitions/{name}")
-    if name == "layout":
+    held: Any = SiteTables if name == "site" else list[reduce(or_, KINDS.values())]  # type: ignore[misc]
+    (whole,), tables = msgspec.json.schema_components([held], ref_template="#/definitions/{name}")
+    if name == "site":
+        whole = tables.pop(SiteTables.__name__)
+    else:
         tables["Wall"]["required"].remove("kind")  # a barrier without a kind is a wall
-    whole = _plain(tables.pop(FILES[name].__name__))
+        whole = {
+            "description": "A layout of barriers, of which there may be none.",
+            "type": "object",
+            "properties": {"barriers": whole},
+            "required": ["barriers"],
+            "additionalProperties": False,
+        }
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
-        **whole,
+        **_plain(whole),
         "title": f"A {name} file of rigdda",
-        "description": summary(FILES[name].__doc__),
         "definitions": {title: _plain(table) for title, table in tables.items()},
     }
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from rigdda import BadInput, Ditch, Embankment, Fence, GravityWall, Layout, Mesh, Wall, sites
+from rigdda.barriers.fence import CLASSES
 from rigdda.envs import encoding
 from rigdda.envs.problem import DesignProblem
 
@@ -123,7 +124,7 @@ def test_the_range_of_every_kind() -> None:
 
 def test_the_size_of_a_fence_is_its_class_which_limits_its_height() -> None:
     classes = [alone("fence", -0.9, 1.0, size)[0].energy_class for size in np.linspace(-1, 1, 91)]
-    assert sorted(set(classes)) == list(encoding.CLASSES)
+    assert sorted(set(classes)) == list(CLASSES)
     assert classes == sorted(classes)
     assert [alone("fence", -0.9, 1.0, s)[0].height for s in (-1.0, -0.6)] == [2.5, 3.0]
     assert alone("fence", -0.9, -1.0, -1.0)[0].height == 0.5

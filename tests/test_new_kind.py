@@ -61,6 +61,9 @@ def test_it_stops_rock_and_has_a_price(problem: DesignProblem, tmp_path: Path) -
     site, zone = problem.site, problem.zone
     wall = Gabions(zone.end - 1.5, zone.max_height)
     assert site.capital((wall,)) == pytest.approx(150.0 * wall.height * site.access(wall.x))
+    assert site.annual((wall,)) == pytest.approx(
+        site.capital((wall,)) * (site.prices.annuity + 0.01)
+    )
     assert problem.check((wall,)) == (wall,)
     kinds = DesignProblem(site, kinds=("wall",))
     rigid = KINDS["wall"](x=wall.x, height=wall.height)

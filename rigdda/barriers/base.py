@@ -170,6 +170,8 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
         Whether designers choose it unless they are told which kinds to choose from.
     fallible : bool
         Whether it can fail.
+    upkeep : float
+        Upkeep of a kind that the table `Prices.upkeep` does not know [1/year of the capital].
     by_friction : bool
         Whether its resistance depends on the friction of the ground.
     steepest : float or None
@@ -186,6 +188,7 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
     drawn: ClassVar[Drawn] = "solid"
     designed: ClassVar[bool] = True
     fallible: ClassVar[bool] = False
+    upkeep: ClassVar[float] = 0.01
     by_friction: ClassVar[bool] = False
     steepest: ClassVar[float | None] = None
     has_sides: ClassVar[bool] = False

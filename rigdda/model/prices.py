@@ -120,9 +120,12 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             return 1.0 / self.life
         return self.interest / -np.expm1(-self.life * np.log1p(self.interest))
 
-    def annual(self, kind: str) -> float:
-        """Return what a barrier of a kind costs a year, as a share of its capital [1/year]."""
-        return float(self.annuity + self.upkeep.get(kind, 0.0))
+    def annual(self, kind: str, usual: float = 0.0) -> float:
+        """Return what a barrier of a kind costs a year, as a share of its capital [1/year].
+
+        `usual` is the upkeep of a kind that the table `upkeep` does not know.
+        """
+        return float(self.annuity + self.upkeep.get(kind, 0.0 if kind in UPKEEP else usual))
 
 
 @documented

@@ -316,7 +316,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """
         barriers = as_layout(layout)
         each = zip(barriers, self.capitals(barriers), strict=True)
-        return float(sum(price * self.prices.annual(b.kind) for b, price in each))
+        return float(sum(price * self.prices.annual(b.kind, b.upkeep) for b, price in each))
 
     def bill(self, layout: Sequence[Barrier], outcome: Outcome) -> Bill:
         """Return what a release with a layout costs [EUR per occurrence of its event].

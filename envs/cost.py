@@ -6,6 +6,7 @@ evaluation of a layout: expected harm, repair and capital, and the chances in de
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import BadInput, Layout, Outcome, Site
+from rigdda import BadInput, Layout, Outcome, Site, display
+from rigdda.barriers import describe
 from rigdda.barriers.fence import PANEL
 from rigdda.envs.intervals import Estimate, Interval, Known, Mean, cost, estimate, pair, total
 
@@ -99,6 +101,30 @@ class Evaluation:
         volume = np.array([self.outcomes[i].road_volume for i in own])
         return self.seeds[own[int(np.argmin(np.abs(volume - volume.mean())))]], event
 
+    def _repr_html_(self) -> str:
+        """Return the figures as a table, for notebooks."""
+        unit = "EUR per metre and year"
+        rows = [
+            ("Z", f"{self.objective:,.1f}", _span(self.ci), unit),
+            ("capital and upkeep", f"{self.capital:,.1f}", "", unit),
+            ("harm on the road", f"{self.harm:,.1f}", _span(self.harm_ci), unit),
+            ("repair", f"{self.repair:,.1f}", _span(self.repair_ci), unit),
+            ("cost to build", f"{self.cost:,.0f}", "", "EUR per metre"),
+            ("rock on the road", f"{self.debris:.3g}", _span(self.debris_ci, ".3g"),
+             "m3 per metre and year"),
+        ]  # fmt: skip
+        for words, seen in (("reaches the road", self.reach), ("a barrier fails", self.failure)):
+            for event, chance in seen.items():
+                ends = _span((chance.low, chance.high), ".1%")
+                name = f"{event}: {words}"
+                rows.append((name, f"{chance.probability:.1%}", ends, "of releases"))
+        if self.targets is not None:
+            rows.append(("targets", self.targets, "", ""))
+        rows.append(("releases", f"{self.releases:,}", "", ""))
+        words = "; ".join(map(describe, self.layout)) or "no barrier"
+        head = ("", "mean", "95 % interval", "unit")
+        return f"<p>{html.escape(words)}</p>" + display.table(head, rows)
+
     def gain(self, nothing: Evaluation) -> float:
         """Return the fall of Z over Z of nothing, see `DesignProblem.reward`."""
         if nothing.objective > 0.0:
@@ -106,6 +132,12 @@ class Evaluation:
         if self.objective > 0.0:
             return -1.0
         return 1.0 - self.debris_share if nothing.debris else 0.0
+
+
+def _span(ends: Interval, form: str = ",.1f") -> str:
+    """Return an interval in words; one without ends is empty."""
+    low, high = ends
+    return f"{low:{form}} to {high:{form}}" if math.isfinite(high - low) else ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from rigdda import (
     BadInput,
     Layout,
+    Site,
     check,
+    display,
 )
 from rigdda.agents.designers.menu import on_bound
 from rigdda.agents.designers.store import Store, StoredEvaluation
@@ -154,6 +156,8 @@ class DesignResult:
 
     Parameters
     ----------
+    site : Site
+        The site that it designed for; not compared.
     layout : Layout
         The chosen layout.
     evaluation : Evaluation
@@ -171,6 +175,7 @@ class DesignResult:
         Processor time, all cores together; not compared.
     """
 
+    site: Site = field(compare=False, repr=False)
     layout: Layout
     evaluation: Evaluation
     history: History
@@ -178,6 +183,12 @@ class DesignResult:
     origin: Origin
     on_bound: tuple[str, ...]
     seconds: float = field(compare=False)
+
+    def _repr_html_(self) -> str:
+        """Return a picture of the layout and the table of its evaluation, for notebooks."""
+        title = f"{self.site.name}: layout found with {self.simulations:,} releases"
+        picture = display.png(self.site.section(self.layout), title)
+        return display.image(picture, title) + self.evaluation._repr_html_()
 
 
 Progress = Callable[[Entry], None]
@@ -278,6 +289,7 @@ class Ledger:
         """Return the result whose layout has this evaluation, by default from where it is known."""
         layout = evaluation.layout
         return DesignResult(
+            site=self.problem.site,
             layout=layout,
             evaluation=evaluation,
             history=History(tuple(self.entries)),

@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rigdda import display
 from rigdda.barriers import Fence, GravityWall
 from rigdda.barriers.base import STANDS
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
@@ -150,6 +151,13 @@ class Run:
         cos, sin = np.cos(theta), np.sin(theta)
         return (corners - start[:2]) @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
 
+    def corners(self, block: int, frame: int = -1) -> NDArray[np.float64]:
+        """Return the (n, 2) corners of a block in a frame [m]; the first frame is turned by 0."""
+        x, y, theta = self.poses[frame, block]
+        cos, sin = np.cos(theta), np.sin(theta)
+        turn = np.array([[cos, sin], [-sin, cos]])
+        return (self.scene.blocks[block].vertices - self.poses[0, block, :2]) @ turn + [x, y]
+
     @property
     def ground(self) -> Terrain | None:
         """The ground at the end: without the embankments that were pushed away."""
@@ -218,3 +226,15 @@ class Run:
         from rigdda.replay.recording import write_rerun
 
         write_rerun(self, path, marks)
+
+    def _repr_png_(self) -> bytes:
+        """Return a picture of the last frame, for notebooks."""
+        ground, scene = self.ground, self.scene
+        blocks = [self.corners(i) for i in range(len(scene.blocks))]
+        barriers = [
+            display.Outline(self.outline(i), filled=barrier.drawn != "line")
+            for i, barrier in enumerate(scene.barriers)
+        ]
+        points = np.concatenate(blocks) if ground is None else ground.points
+        section = display.Section(points, blocks=blocks, barriers=barriers)
+        return display.png(section, f"{len(blocks)} blocks after {self.times[-1]:.1f} s")

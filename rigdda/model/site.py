@@ -14,8 +14,17 @@ import msgspec
 import numpy as np
 import tomli_w
 
-from rigdda import check, fields
-from rigdda.barriers import Barrier, Built, Layout, Mesh, as_layout, earthworks, standing
+from rigdda import check, display, fields
+from rigdda.barriers import (
+    Barrier,
+    Built,
+    Layout,
+    Mesh,
+    as_layout,
+    describe,
+    earthworks,
+    standing,
+)
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, read
 from rigdda.geometry import polygon_properties
@@ -346,6 +355,34 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         A reference: nothing reaches the road below it.
         """
         return self.prices.shed * self.prices.annual("shed")
+
+    def section(self, layout: Sequence[Barrier] = ()) -> display.Section:
+        """Return what a picture of the slope shows, with the barriers of a layout.
+
+        Raises
+        ------
+        BadInput
+            If a barrier does not stand on the slope or stands where loose rock lies.
+        """
+        scene = self.realise(layout)
+        barriers = [
+            display.Outline(scene.outline(i), describe(barrier), barrier.drawn != "line")
+            for i, barrier in enumerate(standing(as_layout(layout)))
+        ]
+        ground, sources = self.profile.points, []
+        for source in self.sources:
+            if source.band is None:
+                pieces = [np.array(piece, dtype=np.float64) for _, piece in source.pieces()]
+                sources += [np.concatenate([piece, piece[:1]]) for piece in pieces]
+            else:
+                sources.append(display.along(ground, source.band))
+        road = self.road.start, self.road.end
+        zone = self.barrier_zone.start, self.barrier_zone.end
+        return display.Section(ground, road, zone, sources, barriers=barriers)
+
+    def _repr_png_(self) -> bytes:
+        """Return a picture of the slope, for notebooks."""
+        return display.png(self.section(), self.name)
 
 
 def _with_damping(surfaces: dict[str, Surface]) -> dict[str, Surface]:

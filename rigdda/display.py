@@ -1,0 +1,151 @@
+"""How objects show themselves in a notebook: pictures of a section and tables as HTML.
+
+`Site`, `Run`, `Evaluation` and `DesignResult` have `_repr_png_` or `_repr_html_`, which notebooks
+call; what these share is here. Matplotlib is imported when a picture is drawn.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Floats = NDArray[np.float64]
+
+WIDTH = 8.0
+"""Width of a picture [inch], 100 pixels each."""
+
+LOWEST, HIGHEST = 2.6, 5.5
+"""Least and greatest height of a picture [inch]; between them a section is to scale."""
+
+GROUND, ROCK, BARRIER, ROAD, ZONE = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04", "#7fb2dd"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outline:
+    """A barrier in a picture.
+
+    Parameters
+    ----------
+    corners : (n, 2) array
+        Its outline [m].
+    label : str
+        What is written above it.
+    filled : bool
+        Whether it is solid and hidden below the ground; a ditch or an embankment is drawn as a
+        line on it.
+    """
+
+    corners: Floats
+    label: str = ""
+    filled: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Section:
+    """What a picture of a slope shows, in metres.
+
+    Parameters
+    ----------
+    ground : (m, 2) array
+        Corners of the ground.
+    road, zone : (float, float), optional
+        Chainages between which the road lies, and between which barriers may stand.
+    sources : sequence of (n, 2) array
+        Where rock starts: polygons, or the line of the ground in a band.
+    blocks : sequence of (n, 2) array
+        Corners of each block.
+    barriers : sequence of Outline
+        What stands.
+    """
+
+    ground: Floats
+    road: tuple[float, float] | None = None
+    zone: tuple[float, float] | None = None
+    sources: Sequence[Floats] = ()
+    blocks: Sequence[Floats] = ()
+    barriers: Sequence[Outline] = ()
+
+
+def png(section: Section, title: str = "") -> bytes:
+    """Return a picture of a section as PNG, to scale."""
+    from matplotlib.figure import Figure
+
+    wide, high = np.ptp(section.ground, axis=0)
+    height = min(max(LOWEST, 1.6 + WIDTH * high / wide), HIGHEST)
+    figure = Figure((WIDTH, height), dpi=100, layout="constrained")  # unknown to pyplot
+    axes = figure.subplots()
+    draw(axes, section)
+    if title:
+        axes.set_title(title, loc="left", fontsize=10)
+    handles, _ = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(loc="outside lower center", ncols=len(handles), frameon=False, fontsize=9)
+    target = io.BytesIO()
+    figure.savefig(target, format="png")
+    return target.getvalue()
+
+
+def draw(axes: Axes, section: Section) -> None:
+    """Draw a section into axes."""
+    x, y = section.ground.T
+    axes.fill_between(x, y, y.min() - 0.05 * np.ptp(y), color=GROUND, linewidth=0)
+    for name, span, colour in (
+        ("barriers may stand here", section.zone, ZONE),
+        ("road", section.road, ROAD),
+    ):
+        if span is not None:
+            axes.plot(*along(section.ground, span).T, color=colour, linewidth=4, label=name)
+    for i, corners in enumerate(section.sources):
+        label = "rock starts here" if i == 0 else None
+        axes.plot(*corners.T, color="black", linewidth=2.5, label=label)
+    for corners in section.blocks:
+        axes.fill(*corners.T, facecolor=ROCK, edgecolor=ROCK, linewidth=0.8)
+    for barrier in section.barriers:
+        face = BARRIER if barrier.filled else "white"
+        axes.fill(*barrier.corners.T, facecolor=face, edgecolor=BARRIER, linewidth=2.0,
+                  zorder=0.9 if barrier.filled else 3.0)  # fmt: skip
+        if barrier.label:
+            axes.annotate(
+                barrier.label, (barrier.corners[:, 0].mean(), barrier.corners[:, 1].max()),
+                xytext=(0, 10), textcoords="offset points", fontsize=9, color=BARRIER, zorder=4,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
+            )  # fmt: skip
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+
+
+def along(ground: Floats, span: tuple[float, float]) -> Floats:
+    """Return the (n, 2) corners of the ground between two chainages, both included [m]."""
+    x, y = ground.T
+    inner = (x > span[0]) & (x < span[1])
+    ends = np.interp(span, x, y)
+    return np.array([(span[0], ends[0]), *ground[inner], (span[1], ends[1])])
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return an HTML table; the first cell of each row is its name."""
+    top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
+    body = "".join(
+        f"<tr><th>{html.escape(name)}</th>"
+        + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells)
+        + "</tr>"
+        for name, *cells in rows
+    )
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def image(picture: bytes, words: str) -> str:
+    """Return an HTML image that holds a PNG; `words` say what it shows."""
+    data = base64.b64encode(picture).decode("ascii")
+    return f'<img src="data:image/png;base64,{data}" alt="{html.escape(words, quote=True)}">'

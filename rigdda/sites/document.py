@@ -87,6 +87,9 @@ HEAD = """\
 
 <!-- Written by `python -m rigdda.sites.document` from the classes that read the files. -->
 
+This page is for looking up the keys of site files and of layout files. To write your first site
+file, [begin here](howto/site_file.md).
+
 A site file describes a slope in TOML. `rigdda design my-site.toml` designs its protection, and
 `rigdda.Site.load("my-site.toml")` reads it in Python. Chainages grow downhill. Units are those of
 the tables below.

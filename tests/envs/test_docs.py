@@ -9,7 +9,7 @@ import pytest
 
 from rigdda.envs.observation import BOUND, FIELDS, LOOKED
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs/environments"
 ROW = re.compile(
     r"^\| `(\w+)` \| ([^|]+) \| ([-\d.]+) \| ([-\d.]+) \| ([-\d.]+) \| ([^|]+) \|$", re.M
 )

@@ -115,9 +115,9 @@ class Evaluation:
         ]  # fmt: skip
         for words, seen in (("reaches the road", self.reach), ("a barrier fails", self.failure)):
             for event, chance in seen.items():
-                ends = _span((chance.low, chance.high), ".1%")
-                name = f"{event}: {words}"
-                rows.append((name, f"{chance.probability:.1%}", ends, "of releases"))
+                ends = _span((100.0 * chance.low, 100.0 * chance.high), ".1f")
+                share = f"{100.0 * chance.probability:.1f}" if chance.releases else ""
+                rows.append((f"{event}: {words}", share, ends, "% of releases"))
         if self.targets is not None:
             rows.append(("targets", self.targets, "", ""))
         rows.append(("releases", f"{self.releases:,}", "", ""))

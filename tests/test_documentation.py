@@ -123,7 +123,7 @@ def run_command(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     program, *arguments = shlex.split(command)
     assert program.removeprefix(".venv/bin/") == "rigdda", f"no rule for: {command}"
     opened: list[Path] = []
-    monkeypatch.setattr("rigdda.results.viewer.open_viewer", opened.append)
+    monkeypatch.setattr("rigdda.replay.viewer.open_viewer", opened.append)
     assert cli.main([*arguments, *SMALL.get(arguments[0], [])]) == 0, command
     assert all(path.is_file() for path in opened)
 

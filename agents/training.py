@@ -124,7 +124,7 @@ def problem(name: str) -> DesignProblem:
 
 def see(posed: DesignProblem) -> NDArray[np.float32]:
     """Return the features of a problem."""
-    return features(observe(posed, posed.nothing, np.zeros(0)))
+    return features(observe(posed))
 
 
 def scaling(

@@ -262,12 +262,13 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
     def _show(self) -> tuple[Observation, Info]:
         """Return the observation and the info of what stands."""
         now, self._shown = self._stages[-1], None
-        left = 1.0 - len(self._numbers) / self.slots.size
-        stands = self.slots.encode(self.problem, now.layout)
-        seen = observation.observe(self.problem, now, stands)
+        seen = observation.observe(self.problem)
         if self.looks:
-            count = self.slots.count
-            seen |= observation.looked(self.problem, now.layout, self._looked, count, left)
+            left = 1.0 - len(self._numbers) / self.slots.size
+            stands = self.slots.encode(self.problem, observation.mesh_last(now.layout))
+            seen |= observation.looked(
+                self.problem, now, stands, self._looked, self.slots.count, left
+            )
         info: Info = {
             "site": self.problem.site.name,
             "layout": now.layout,
@@ -341,7 +342,7 @@ class BarrierDesign(BarrierEnv):
         reads them; size is 4 max_barriers for one kind, else (4 + kinds) max_barriers.
     Observation
         Dict of 1-D float32 arrays, see `rigdda.envs.observation`, or these as one array if `flat`.
-        It depends on the site and on what stands, not on the episode's releases.
+        It describes the site, and depends neither on the episode's releases nor on the action.
     Reward
         (Z of nothing - Z of the layout) / Z of nothing, a float. Z of nothing is the site's cached
         mean, Z of the layout that of the episode's releases.

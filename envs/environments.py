@@ -23,7 +23,7 @@ from rigdda.envs import encoding, observation, outcome_cache
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.envelope import FIRST, barrier_free
 from rigdda.envs.outcome_cache import Sample
-from rigdda.envs.problem import DesignProblem
+from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.rendering import Recorder, Shown, Trigger, picture
 from rigdda.envs.site_sampling import Place, Venue
 
@@ -155,13 +155,14 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         max_barriers: int = 3,
         kinds: Sequence[str] | None = None,
         releases: int = 4,
+        targets: Targets | Mapping[str, float | None] | None = None,
         fidelity: str = "full",
         flat: bool = False,
         record: str | os.PathLike[str] | None = None,
         record_trigger: Trigger | None = None,
         render_mode: str | None = None,
     ):
-        self.venue = Venue(site, max_barriers, kinds, fidelity)
+        self.venue = Venue(site, max_barriers, kinds, fidelity, targets)
         self.problem, self.slots = self.venue.first, self.venue.slots
         self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
         if record is None and record_trigger is not None:
@@ -273,6 +274,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
             "site": self.problem.site.name,
             "layout": now.layout,
             "dropped": self.slots.dropped(self.problem, self._numbers),
+            "targets": now.targets,
             "outcomes": plain(now.outcomes),
             **{name: float(getattr(now, name)) for name in TOLD},
         }
@@ -345,13 +347,16 @@ class BarrierDesign(BarrierEnv):
         It describes the site, and depends neither on the episode's releases nor on the action.
     Reward
         (Z of nothing - Z of the layout) / Z of nothing, a float. Z of nothing is the site's cached
-        mean, Z of the layout that of the episode's releases.
+        mean, Z of the layout that of the episode's releases. With targets, a layout that misses
+        one in the episode's releases counts -1 less its excess in place of that, and so does
+        nothing, see `DesignProblem.reward`: the reward is the difference from nothing.
     Termination
         After one step. Truncated by a TimeLimit only.
     Info
         At reset without barriers, at step with the layout: `site` (name), `layout` (tuple of
         Barrier), `dropped` (tuple of str: barriers that were asked for and are not built, each
-        with the reason), `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
+        with the reason), `targets` ("met", "missed", "undecided", None if nothing is asked),
+        `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
         (floats), `outcomes`: plain numbers of each release, none at reset.
     Randomness
         `reset` draws the seeds of the episode's releases and, if there is a choice, the site;
@@ -362,7 +367,7 @@ class BarrierDesign(BarrierEnv):
     site : str, path or Site
         As `DesignProblem` takes it; "train", "validation" or "test": another site of the split in
         every episode; "random" is "train". `reset(options={"site": ...})` takes the same.
-    max_barriers, kinds, fidelity
+    max_barriers, kinds, targets, fidelity
         See `DesignProblem`. Where every episode draws its site, all kinds by default; mesh is
         not offered where a site has none.
     releases : int
@@ -408,8 +413,7 @@ class BarrierPlacement(BarrierEnv):
         the episode's releases.
     Reward
         The fall of Z that the step caused over Z of nothing, a float. Every step is scored on the
-        same releases, those of the episode, so that its rewards add up to
-        (Z of nothing - Z of the layout) / Z of nothing.
+        same releases, those of the episode, so that its rewards add up to that of `BarrierDesign`.
     Termination
         When a step adds no barrier or the last slot is used. Truncated by a TimeLimit only.
     Info
@@ -420,7 +424,7 @@ class BarrierPlacement(BarrierEnv):
 
     Parameters
     ----------
-    site, max_barriers, kinds, releases, fidelity, flat, record_trigger, render_mode
+    site, max_barriers, kinds, releases, targets, fidelity, flat, record_trigger, render_mode
         See `BarrierDesign`.
     record : path, optional
         Folder for a replay of each episode: the release that stands for the others in the end,

@@ -203,6 +203,20 @@ def test_a_target_of_failure_asks_for_the_failures_of_design_events(site: Site) 
     assert problem.judge(FENCE, hand_made(counts, {"small": 10})).targets != "missed"
 
 
+def test_missed_targets_are_rewarded_behind_all_that_is_not_ruinous(site: Site) -> None:
+    """By the excess of the probability over the target, whatever the layout costs."""
+    problem = DesignProblem(site, targets={"reach": 0.2})
+    assert problem.targets == Targets(reach=0.2)
+    met, poor, worse = (
+        problem.judge(FENCE, 3 * hand_made({"block": n, "group": 0})) for n in (0, 6, 9)
+    )
+    assert [found.targets for found in (met, poor, worse)] == ["met", "missed", "missed"]
+    assert problem.reward(met) == DesignProblem(site).reward(met)
+    for missed in (poor, worse):
+        assert problem.reward(missed) == -1.0 - (missed.reach["block"].probability - 0.2)
+    assert problem.reward(met) > -1.0 > problem.reward(poor) > problem.reward(worse)
+
+
 @pytest.mark.parametrize(
     ("targets", "reached", "state"),
     [
@@ -339,7 +353,9 @@ def test_kinds_are_all_but_the_rigid_wall(site: Site) -> None:
         ({"zone": (0, 10)}, "zone = 0"),
         ({"zone": 5}, r"zone = 5: give two numbers \[low, high\]"),
         ({"zone": (6.2, 6.8)}, r"zone = \(6\.2, 6\.8\): leave room in"),
-        ({"targets": 0.1}, "targets = 0.1: give envs.Targets"),
+        ({"targets": 0.1}, "targets = 0.1: give rigdda.envs.Targets"),
+        ({"targets": {"reech": 0.1}}, "targets = .*reech.*: give rigdda.envs.Targets"),
+        ({"targets": {"reach": 2}}, r"targets\.reach = 2"),
     ],
 )
 def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:

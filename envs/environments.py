@@ -24,7 +24,8 @@ from rigdda.envs.cost import Evaluation
 from rigdda.envs.envelope import FIRST, barrier_free
 from rigdda.envs.outcome_cache import Sample
 from rigdda.envs.problem import DesignProblem, Targets
-from rigdda.envs.rendering import Recorder, Shown, Trigger, picture
+from rigdda.envs.recorder import Recorder, Shown, Trigger
+from rigdda.envs.rendering import picture
 from rigdda.envs.site_sampling import Place, Venue
 
 
@@ -292,9 +293,9 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         now, site = self._stages[-1], self.problem.site
         if self._shown is None:
             self._shown = rigdda.release(site, now.layout, *self.typical)[0]
-        road = (site.road.start, site.road.end)
         title = f"{site.name}: {now.objective:.0f} EUR per metre and year"
-        return picture(self._shown, road, f"{title}, to build {now.cost:.0f} EUR per metre")
+        title += f", to build {now.cost:.0f} EUR per metre"
+        return picture(self._shown, site, now.layout, title)
 
     @property
     def typical(self) -> tuple[int, str]:

@@ -16,8 +16,8 @@ import numpy as np
 from rigdda import BadInput, Layout, Site, check, sites
 from rigdda.barriers import KINDS as ALL
 from rigdda.envs.encoding import NUMBERS, Floats, encode, slot_size
-from rigdda.envs.problem import USUAL_KINDS as USUAL
 from rigdda.envs.problem import FIDELITIES, DesignProblem, Targets, read_targets
+from rigdda.envs.problem import USUAL_KINDS as USUAL
 
 Place = str | os.PathLike[str] | Site
 """Name of a built-in or generated site, a TOML file, a site, or what `drawn_from` knows."""

@@ -26,6 +26,7 @@ from rigdda.envs.outcome_cache import Sample
 from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.recorder import Recorder, Shown, Trigger
 from rigdda.envs.rendering import picture
+from rigdda.envs.repetition import EpisodeRecord, Versions, as_json
 from rigdda.envs.site_sampling import Place, Venue
 
 
@@ -147,6 +148,9 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
 
+    name: ClassVar[str]
+    """Under which it is registered."""
+
     looks: ClassVar[bool]
     """Whether what stands is looked at after every step, to be seen before the next."""
 
@@ -179,6 +183,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self._episode = 0
         self._numbers = np.zeros(0)  # of this episode's actions
         self._asked = self._numbers  # and those of the one that is being simulated
+        self._seed: int | None = None  # of the reset that began the episode
         self.seeds: tuple[int, ...] = ()
         self._stages: list[Evaluation] = []  # without barriers, then after each step
         self._rewards: list[float] = []  # of each step
@@ -200,6 +205,10 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         `options`: `site`, as the keyword, for this episode.
         """
         self.draw(seed, options)
+        return self.begin()
+
+    def begin(self) -> tuple[Observation, Info]:
+        """Look at the site of the episode that was drawn, and start it."""
         (looked,) = look_ahead([(self.problem, self.sights)])
         return self.start(looked)
 
@@ -212,7 +221,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         """Draw a new episode."""
         self._cut_off()
         super().reset(seed=seed)
-        self.open = False
+        self.open, self._seed = False, seed
         self.problem = self.venue.draw(self.np_random, options)
         self.seeds = tuple(self.np_random.integers(SCORED_SEEDS, size=self.releases).tolist())
 
@@ -308,6 +317,28 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         """That release, for a replay."""
         return Shown(self.problem.site, *self.typical, self.releases)
 
+    @property
+    def record(self) -> EpisodeRecord:
+        """What it takes to compute this episode again as far as it has come."""
+        shown = self.shown
+        return EpisodeRecord(
+            environment=self.name,
+            max_barriers=self.slots.count,
+            kinds=list(self.slots.kinds),
+            releases=self.releases,
+            targets=self.venue.targets,
+            fidelity=self.venue.fidelity,
+            site=self.problem.site,
+            episode=self._episode,
+            seed=self._seed,
+            release_seeds=list(self.seeds),
+            shown_seed=shown.seed,
+            shown_event=shown.event,
+            actions=self._numbers.reshape(-1, self.width).tolist(),
+            rewards=self._rewards,
+            versions=Versions.of_today(),
+        )
+
     def _end(self) -> None:
         """End the episode; write its replay if that is wanted.
 
@@ -388,6 +419,7 @@ class BarrierDesign(BarrierEnv):
         If a keyword is unsound or, in `step`, the action.
     """
 
+    name = "rigdda/BarrierDesign-v0"
     looks = False
 
     @property
@@ -396,7 +428,8 @@ class BarrierDesign(BarrierEnv):
         return self.slots.size
 
     def _record(self, recorder: Recorder) -> None:
-        recorder.write(self._episode, self.shown, self._stages, self._rewards)
+        record = as_json(self.record)
+        recorder.write(self._episode, self.shown, self._stages, self._rewards, record)
 
 
 class BarrierPlacement(BarrierEnv):
@@ -437,6 +470,7 @@ class BarrierPlacement(BarrierEnv):
         If a keyword is unsound or, in `step`, the action.
     """
 
+    name = "rigdda/BarrierPlacement-v0"
     looks = True
 
     @property
@@ -445,4 +479,5 @@ class BarrierPlacement(BarrierEnv):
         return self.slots.width
 
     def _record(self, recorder: Recorder) -> None:
-        recorder.write_placements(self._episode, self.shown, self._stages, self._rewards)
+        record = as_json(self.record)
+        recorder.write_placements(self._episode, self.shown, self._stages, self._rewards, record)

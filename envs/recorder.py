@@ -70,7 +70,12 @@ class Recorder:
         return self.trigger is None or bool(self.trigger(episode))
 
     def write(
-        self, episode: int, shown: Shown, stages: Sequence[Evaluation], rewards: Sequence[float]
+        self,
+        episode: int,
+        shown: Shown,
+        stages: Sequence[Evaluation],
+        rewards: Sequence[float],
+        record: str,
     ) -> Path:
         """Write the replay of an episode of one step and return its path; no stream stays open.
 
@@ -84,6 +89,8 @@ class Recorder:
             What stood at the start, nothing, and in the end.
         rewards : sequence of float
             Of each step.
+        record : str
+            What it takes to compute the episode again, see `rigdda.envs.repetition`.
         """
         from rigdda.replay.recording import Marks
 
@@ -98,11 +105,17 @@ class Recorder:
             "cost": f"{end.cost:.2f}",
         }
         path = self._path(episode)
-        run.to_rerun(path, Marks((site.road.start, site.road.end), notes, _title(site, episode)))
+        road = site.road.start, site.road.end
+        run.to_rerun(path, Marks(road, notes, _title(site, episode), record=record))
         return path
 
     def write_placements(
-        self, episode: int, shown: Shown, stages: Sequence[Evaluation], rewards: Sequence[float]
+        self,
+        episode: int,
+        shown: Shown,
+        stages: Sequence[Evaluation],
+        rewards: Sequence[float],
+        record: str,
     ) -> Path:
         """Write the replay of an episode of several steps and return its path.
 
@@ -110,7 +123,7 @@ class Recorder:
 
         Parameters
         ----------
-        episode, shown, rewards
+        episode, shown, rewards, record
             See `write`.
         stages : sequence of Evaluation
             What stood at the start, nothing, and after each step.
@@ -130,7 +143,7 @@ class Recorder:
             for now, reward in zip(stages, (0.0, *rewards), strict=True)
         ]
         path, road = self._path(episode), (site.road.start, site.road.end)
-        write_episode(path, placements, road, shown.words, _title(site, episode))
+        write_episode(path, placements, road, shown.words, _title(site, episode), record)
         return path
 
     def _path(self, episode: int) -> Path:

@@ -457,7 +457,8 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
 
     The policy sees what comes down the site without barriers. Writes policy.safetensors, for
     `rigdda evaluate --policy`, and logs for TensorBoard. A training that was interrupted continues
-    where it stopped. Requires the extra `rl`.
+    where it stopped, with the same result. One that is complete continues if --episodes is larger
+    than before. Requires the extra `rl`.
     """
     from rigdda.agents import training
 

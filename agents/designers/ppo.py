@@ -212,7 +212,7 @@ def learn(model: PPO, episodes: int, checkpoint: Path, tick: Callable[[int], Non
 class _Moment:
     """What a training's next rollout depends on beside its networks and their optimiser.
 
-    Stable-Baselines3 draws from the generators of torch and, for the order of its batches, of numpy.
+    Stable-Baselines3 draws from the generators of torch and, for its batches, of numpy.
     """
 
     def __init__(self, model: PPO):

@@ -212,6 +212,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     import rigdda
     from rigdda.agents.reports import findings
     from rigdda.barriers import standing
+    from rigdda.envs.repetition import release_record
     from rigdda.replay.recording import Marks
     from rigdda.replay.viewer import open_viewer
 
@@ -235,8 +236,29 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     if words := findings.of_layout(where, barriers, event):
         notes["doubt"] = words
     road, labels = (where.road.start, where.road.end), tuple(b.label for b in standing(barriers))
-    run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels))
+    record = release_record(where, barriers, seed, event, outcome)
+    run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels, record))
     click.echo(folder / "episode.rrd")
+
+
+@cli.command()
+@click.argument("file", metavar="EPISODE.rrd", type=click.Path(path_type=Path))
+def repeat(file: Path) -> None:
+    """Compute the episode or release of a replay again and compare it bit for bit.
+
+    The file is a replay that an environment, `rigdda design` or `rigdda replay SITE` recorded; it
+    holds the site, the actions and the seeds. The exit code is 1 if anything differs. Other
+    versions than those of the recording are listed.
+    """
+    from rigdda.envs import repetition
+
+    found = repetition.load(file).repeat()
+    click.echo(found.what)
+    for words in found.other_versions:
+        note(f"other version: {words}")
+    if not found.same:
+        raise Stopped(f"it differs: recorded {found.recorded}, computed {found.computed}", 1)
+    click.echo(f"the same to the last bit: {found.computed}")
 
 
 BUDGET = 20_000
@@ -450,7 +472,8 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
 
     The policy sees what comes down the site without barriers. Writes policy.safetensors, for
     `rigdda evaluate --policy`, and logs for TensorBoard. A training that was interrupted continues
-    where it stopped. Requires the extra `rl`.
+    where it stopped, with the same result. One that is complete continues if --episodes is larger
+    than before. Requires the extra `rl`.
     """
     from rigdda.agents import training
 

@@ -118,7 +118,7 @@ def _in_order(raw: bytes) -> bytes:
     return len(header).to_bytes(8, "little") + header + raw[8 + size :]
 
 
-NAMES = tuple(name for name in FIELDS if name not in ("layout", "spent"))
+NAMES = tuple(FIELDS)
 """Arrays of an observation, in the order in which they are put together."""
 
 WIDTH = sum(FIELDS[name].size for name in NAMES)
@@ -183,7 +183,7 @@ def decide(network: Network, problem: DesignProblem) -> Layout:
         raise BadInput("kinds", problem.kinds, mend)
     site = replace(problem.site, barrier_zone=problem.zone)  # what is seen is seen across it
     posed = DesignProblem(site, min(problem.max_barriers, SLOTS.count), kinds)
-    seen = features(observe(posed, problem.nothing, np.zeros(0)))
+    seen = features(observe(posed))
     numbers = np.clip(ANCHOR + network(seen), -1.0, 1.0)
     return SLOTS.decode(posed, numbers[: posed.max_barriers * SLOTS.width])
 

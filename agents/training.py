@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -88,17 +89,21 @@ class Trained:
 
 
 def train(terms: Terms, out: Path, tick: Tick) -> Trained:
-    """Train a policy, or go on with a training that was stopped.
+    """Train a policy, or go on with a training that was stopped, or was of fewer episodes.
+
+    One that was stopped ends as if it had not been. Steps shrink to nothing over the episodes asked
+    for, so that one that was given more ends elsewhere than one that was asked for all at once.
 
     Raises
     ------
     BadInput
-        If the folder holds a damaged training or one on other terms, or torch is not installed.
+        If the folder holds a damaged training, one on other terms or of more episodes, or torch is
+        not installed.
     Diverged
         If a simulation diverges.
     """
     ppo = designers.module("ppo")
-    _same(terms, out)
+    stages = _stages(terms, out)
     names = sites.split(SPLIT)
     pool = [problem(name) for name in names[: terms.sites]]
     barrier_free([posed.site for posed in pool])
@@ -106,7 +111,7 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     copies = ppo.Featured(ppo.pool(names[: terms.sites], FIDELITY), mean, scale)
     with closing(copies):
         model = ppo.learner(copies, terms.seed, out)
-        notes = _notes(terms)
+        notes = _notes(terms, stages)
         start = ppo.export(model, mean, scale, notes)
         if (out / "checkpoint.zip").is_file():
             model = ppo.resume(out / "checkpoint.zip", copies)
@@ -124,7 +129,7 @@ def problem(name: str) -> DesignProblem:
 
 def see(posed: DesignProblem) -> NDArray[np.float32]:
     """Return the features of a problem."""
-    return features(observe(posed, posed.nothing, np.zeros(0)))
+    return features(observe(posed))
 
 
 def scaling(
@@ -142,32 +147,44 @@ def examine(network: Network, problems: list[DesignProblem]) -> float:
     return float(np.mean([p.reward(e) for p, e in zip(problems, built, strict=True)]))
 
 
-def _notes(terms: Terms) -> dict[str, str]:
-    """Return what a policy's file says of its making."""
-    options = " ".join(f"--{name} {value}" for name, value in asdict(terms).items())
-    return {"command": f"rigdda train {options}", "version": __version__} | {
+def _notes(terms: Terms, stages: list[int]) -> dict[str, str]:
+    """Return what a policy's file says of its making: a command for each number of episodes."""
+    commands = [
+        f"rigdda train --sites {terms.sites} --episodes {episodes} --seed {terms.seed}"
+        for episodes in stages
+    ]
+    return {"command": "; ".join(commands), "version": __version__} | {
         name: str(value) for name, value in asdict(terms).items()
     }
 
 
-def _same(terms: Terms, out: Path) -> None:
-    """Write the terms into a folder, or check that a sound training on them is in it."""
+def _stages(terms: Terms, out: Path) -> list[int]:
+    """Return the numbers of episodes that a training was asked for, one after the other.
+
+    Writes the terms into the folder, or checks that a sound training on them is in it.
+    """
     file = out / "training.json"
-    asked = asdict(terms) | {"version": __version__, "mechanics": mechanics()}
+    asked: dict[str, Any] = asdict(terms) | {"version": __version__, "mechanics": mechanics()}
     _whole(out / "checkpoint.zip")
+    stages = [asked.pop("episodes")]
     if file.is_file():
         try:
-            found = msgspec.json.decode(file.read_bytes())
-        except (msgspec.DecodeError, RecursionError) as error:
+            found = msgspec.json.decode(file.read_bytes(), type=dict[str, Any])
+            before = msgspec.convert(found.pop("episodes"), list[int])
+        except (msgspec.MsgspecError, KeyError, RecursionError) as error:
             raise BadInput("terms", str(file), f"{ANEW} ({error})") from None
         if found != asked:
             mend = f"give the terms of the training in {out} ({found}), or another folder"
             raise BadInput("terms", asked, mend)
-        return
-    if (out / "checkpoint.zip").is_file():
+        if terms.episodes < before[-1]:
+            mend = f"give at least the {before[-1]} of the training in {out}, or another folder"
+            raise BadInput("episodes", terms.episodes, mend)
+        stages = sorted({*before, *stages})
+    elif (out / "checkpoint.zip").is_file():
         raise BadInput("terms", str(file), f"{ANEW} (it is missing beside checkpoint.zip)")
     with atomic(file) as part:
-        part.write_bytes(msgspec.json.encode(asked))
+        part.write_bytes(msgspec.json.encode(asked | {"episodes": stages}))
+    return stages
 
 
 def _whole(checkpoint: Path) -> None:

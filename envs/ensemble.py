@@ -1,6 +1,6 @@
 """What falls without barriers: the cost of nothing, and how releases spread over events.
 
-Known once a site, and kept on disk in the user's cache: every reward is measured against it.
+Known once a site, and kept on disk: every reward is measured against it.
 """
 
 from __future__ import annotations
@@ -8,19 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from rigdda import Outcome, Site
-from rigdda.envs import outcome_cache
+from rigdda.envs import outcome_cache, site_store
 from rigdda.envs.cost import Evaluation, Facts, account, judge, learn
 from rigdda.envs.outcome_cache import Memory, Sample
-from rigdda.files import atomic
-from rigdda.kernel import cache_directory
 
 SEEDS = 2**33
 """First seed of the releases without barriers that a site is known by. Episodes score releases of
@@ -57,6 +52,9 @@ class Ensemble:
     shares: dict[str, float]
 
 
+NAME = "ensemble"
+"""Of what is kept on disk, see `rigdda.envs.site_store`."""
+
 memory: Memory[bytes, Ensemble] = Memory(4096)
 """Ensembles by site, about 3 kB each."""
 
@@ -78,10 +76,10 @@ def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
     """
     known = memory.recall([key]).get(key)
     if known is None:
-        known = _read(key)
+        known = site_store.read(NAME, key, Ensemble)
         if known is None:
             known = _simulate(site, executor)
-            _write(key, known)
+            site_store.write(NAME, key, known)
         memory.remember({key: known})
     return known
 
@@ -144,28 +142,3 @@ def _time(fact: Facts) -> float:
 
 def _shared(shares: Mapping[str, float], releases: int) -> dict[str, int]:
     return {name: math.ceil(share * releases) for name, share in shares.items()}
-
-
-def _path(key: bytes) -> Path:
-    """Return the file of a site, beside the compiled kernels."""
-    kernels = cache_directory()
-    return (
-        kernels.parent
-        / f"nothing-{outcome_cache.mechanics()}-{kernels.name[-16:]}"
-        / f"{key.hex()}.msgpack"
-    )
-
-
-def _read(key: bytes) -> Ensemble | None:
-    """Return what is kept on disk, None if that is nothing or no longer sound."""
-    path = _path(key)
-    with suppress(OSError, msgspec.DecodeError):
-        return msgspec.msgpack.decode(path.read_bytes(), type=Ensemble)
-    return None
-
-
-def _write(key: bytes, known: Ensemble) -> None:
-    """Keep it on disk; a disk that is full costs time later, no result now."""
-    path = _path(key)
-    with suppress(OSError), atomic(path) as part:
-        part.write_bytes(msgspec.msgpack.encode(known))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Run, Simulation, Site
+from rigdda.envs import site_store
 from rigdda.envs.outcome_cache import Memory, fingerprint
 from rigdda.geometry import polygon_properties
 
@@ -76,6 +77,32 @@ class Transit(NamedTuple):
     deposit: Floats
 
 
+class Kept(NamedTuple):
+    """An envelope as it is kept on disk: its arrays as lists."""
+
+    often: list[list[float]]
+    energy: list[list[float]]
+    bounce: list[list[float]]
+    deposit: list[float]
+
+    @classmethod
+    def of(cls, found: Envelope) -> Kept:
+        """Return an envelope as it is kept."""
+        parts = (found.often, found.energy, found.bounce, found.deposit)
+        return cls(*(part.tolist() for part in parts))
+
+    @property
+    def envelope(self) -> Envelope:
+        """The envelope, to the last bit."""
+        arrays = [np.array(values) for values in self]
+        for array in arrays:
+            array.setflags(write=False)
+        return Envelope(*arrays)
+
+
+NAME = "envelope"
+"""Of what is kept on disk, see `rigdda.envs.site_store`."""
+
 memory: Memory[bytes, Envelope] = Memory(8192)
 """Envelopes by site, about 3 kB each."""
 
@@ -117,6 +144,11 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
     """
     keys = [fingerprint(site) for site in sites]
     known = memory.recall(keys)
+    for key in {*keys} - known.keys():
+        kept = site_store.read(NAME, key, Kept)
+        if kept is not None:
+            known[key] = kept.envelope
+            memory.remember({key: known[key]})
     new = {key: site for key, site in zip(keys, sites, strict=True) if key not in known}
     jobs = {key: _jobs(site) for key, site in new.items()}
     with nullcontext(executor) if executor else ThreadPoolExecutor() as pool:
@@ -125,6 +157,8 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
             key: _summary(new[key], own, list(islice(transits, len(own))))
             for key, own in jobs.items()
         }
+    for key, found in fresh.items():
+        site_store.write(NAME, key, Kept.of(found))
     memory.remember(fresh)
     known |= fresh
     return [known[key] for key in keys]

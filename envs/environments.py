@@ -23,8 +23,10 @@ from rigdda.envs import encoding, observation, outcome_cache
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.envelope import FIRST, barrier_free
 from rigdda.envs.outcome_cache import Sample
-from rigdda.envs.problem import DesignProblem
-from rigdda.envs.rendering import Recorder, Shown, Trigger, picture
+from rigdda.envs.problem import DesignProblem, Targets
+from rigdda.envs.recorder import Recorder, Shown, Trigger
+from rigdda.envs.rendering import picture
+from rigdda.envs.repetition import EpisodeRecord, Versions, as_json
 from rigdda.envs.site_sampling import Place, Venue
 
 
@@ -146,6 +148,9 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
 
+    name: ClassVar[str]
+    """Under which it is registered."""
+
     looks: ClassVar[bool]
     """Whether what stands is looked at after every step, to be seen before the next."""
 
@@ -155,13 +160,14 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         max_barriers: int = 3,
         kinds: Sequence[str] | None = None,
         releases: int = 4,
+        targets: Targets | Mapping[str, float | None] | None = None,
         fidelity: str = "full",
         flat: bool = False,
         record: str | os.PathLike[str] | None = None,
         record_trigger: Trigger | None = None,
         render_mode: str | None = None,
     ):
-        self.venue = Venue(site, max_barriers, kinds, fidelity)
+        self.venue = Venue(site, max_barriers, kinds, fidelity, targets)
         self.problem, self.slots = self.venue.first, self.venue.slots
         self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
         if record is None and record_trigger is not None:
@@ -177,6 +183,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self._episode = 0
         self._numbers = np.zeros(0)  # of this episode's actions
         self._asked = self._numbers  # and those of the one that is being simulated
+        self._seed: int | None = None  # of the reset that began the episode
         self.seeds: tuple[int, ...] = ()
         self._stages: list[Evaluation] = []  # without barriers, then after each step
         self._rewards: list[float] = []  # of each step
@@ -198,6 +205,10 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         `options`: `site`, as the keyword, for this episode.
         """
         self.draw(seed, options)
+        return self.begin()
+
+    def begin(self) -> tuple[Observation, Info]:
+        """Look at the site of the episode that was drawn, and start it."""
         (looked,) = look_ahead([(self.problem, self.sights)])
         return self.start(looked)
 
@@ -210,7 +221,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         """Draw a new episode."""
         self._cut_off()
         super().reset(seed=seed)
-        self.open = False
+        self.open, self._seed = False, seed
         self.problem = self.venue.draw(self.np_random, options)
         self.seeds = tuple(self.np_random.integers(SCORED_SEEDS, size=self.releases).tolist())
 
@@ -262,16 +273,18 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
     def _show(self) -> tuple[Observation, Info]:
         """Return the observation and the info of what stands."""
         now, self._shown = self._stages[-1], None
-        left = 1.0 - len(self._numbers) / self.slots.size
-        stands = self.slots.encode(self.problem, now.layout)
-        seen = observation.observe(self.problem, now, stands)
+        seen = observation.observe(self.problem)
         if self.looks:
-            count = self.slots.count
-            seen |= observation.looked(self.problem, now.layout, self._looked, count, left)
+            left = 1.0 - len(self._numbers) / self.slots.size
+            stands = self.slots.encode(self.problem, observation.mesh_last(now.layout))
+            seen |= observation.looked(
+                self.problem, now, stands, self._looked, self.slots.count, left
+            )
         info: Info = {
             "site": self.problem.site.name,
             "layout": now.layout,
             "dropped": self.slots.dropped(self.problem, self._numbers),
+            "targets": now.targets,
             "outcomes": plain(now.outcomes),
             **{name: float(getattr(now, name)) for name in TOLD},
         }
@@ -289,9 +302,9 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         now, site = self._stages[-1], self.problem.site
         if self._shown is None:
             self._shown = rigdda.release(site, now.layout, *self.typical)[0]
-        road = (site.road.start, site.road.end)
         title = f"{site.name}: {now.objective:.0f} EUR per metre and year"
-        return picture(self._shown, road, f"{title}, to build {now.cost:.0f} EUR per metre")
+        title += f", to build {now.cost:.0f} EUR per metre"
+        return picture(self._shown, site, now.layout, title)
 
     @property
     def typical(self) -> tuple[int, str]:
@@ -303,6 +316,28 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
     def shown(self) -> Shown:
         """That release, for a replay."""
         return Shown(self.problem.site, *self.typical, self.releases)
+
+    @property
+    def record(self) -> EpisodeRecord:
+        """What it takes to compute this episode again as far as it has come."""
+        shown = self.shown
+        return EpisodeRecord(
+            environment=self.name,
+            max_barriers=self.slots.count,
+            kinds=list(self.slots.kinds),
+            releases=self.releases,
+            targets=self.venue.targets,
+            fidelity=self.venue.fidelity,
+            site=self.problem.site,
+            episode=self._episode,
+            seed=self._seed,
+            release_seeds=list(self.seeds),
+            shown_seed=shown.seed,
+            shown_event=shown.event,
+            actions=self._numbers.reshape(-1, self.width).tolist(),
+            rewards=self._rewards,
+            versions=Versions.of_today(),
+        )
 
     def _end(self) -> None:
         """End the episode; write its replay if that is wanted.
@@ -341,16 +376,19 @@ class BarrierDesign(BarrierEnv):
         reads them; size is 4 max_barriers for one kind, else (4 + kinds) max_barriers.
     Observation
         Dict of 1-D float32 arrays, see `rigdda.envs.observation`, or these as one array if `flat`.
-        It depends on the site and on what stands, not on the episode's releases.
+        It describes the site, and depends neither on the episode's releases nor on the action.
     Reward
         (Z of nothing - Z of the layout) / Z of nothing, a float. Z of nothing is the site's cached
-        mean, Z of the layout that of the episode's releases.
+        mean, Z of the layout that of the episode's releases. With targets, a layout that misses
+        one in the episode's releases counts -1 less its excess in place of that, and so does
+        nothing, see `DesignProblem.reward`: the reward is the difference from nothing.
     Termination
         After one step. Truncated by a TimeLimit only.
     Info
         At reset without barriers, at step with the layout: `site` (name), `layout` (tuple of
         Barrier), `dropped` (tuple of str: barriers that were asked for and are not built, each
-        with the reason), `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
+        with the reason), `targets` ("met", "missed", "undecided", None if nothing is asked),
+        `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
         (floats), `outcomes`: plain numbers of each release, none at reset.
     Randomness
         `reset` draws the seeds of the episode's releases and, if there is a choice, the site;
@@ -361,7 +399,7 @@ class BarrierDesign(BarrierEnv):
     site : str, path or Site
         As `DesignProblem` takes it; "train", "validation" or "test": another site of the split in
         every episode; "random" is "train". `reset(options={"site": ...})` takes the same.
-    max_barriers, kinds, fidelity
+    max_barriers, kinds, targets, fidelity
         See `DesignProblem`. Where every episode draws its site, all kinds by default; mesh is
         not offered where a site has none.
     releases : int
@@ -381,6 +419,7 @@ class BarrierDesign(BarrierEnv):
         If a keyword is unsound or, in `step`, the action.
     """
 
+    name = "rigdda/BarrierDesign-v0"
     looks = False
 
     @property
@@ -389,7 +428,8 @@ class BarrierDesign(BarrierEnv):
         return self.slots.size
 
     def _record(self, recorder: Recorder) -> None:
-        recorder.write(self._episode, self.shown, self._stages, self._rewards)
+        record = as_json(self.record)
+        recorder.write(self._episode, self.shown, self._stages, self._rewards, record)
 
 
 class BarrierPlacement(BarrierEnv):
@@ -407,8 +447,7 @@ class BarrierPlacement(BarrierEnv):
         the episode's releases.
     Reward
         The fall of Z that the step caused over Z of nothing, a float. Every step is scored on the
-        same releases, those of the episode, so that its rewards add up to
-        (Z of nothing - Z of the layout) / Z of nothing.
+        same releases, those of the episode, so that its rewards add up to that of `BarrierDesign`.
     Termination
         When a step adds no barrier or the last slot is used. Truncated by a TimeLimit only.
     Info
@@ -419,7 +458,7 @@ class BarrierPlacement(BarrierEnv):
 
     Parameters
     ----------
-    site, max_barriers, kinds, releases, fidelity, flat, record_trigger, render_mode
+    site, max_barriers, kinds, releases, targets, fidelity, flat, record_trigger, render_mode
         See `BarrierDesign`.
     record : path, optional
         Folder for a replay of each episode: the release that stands for the others in the end,
@@ -431,6 +470,7 @@ class BarrierPlacement(BarrierEnv):
         If a keyword is unsound or, in `step`, the action.
     """
 
+    name = "rigdda/BarrierPlacement-v0"
     looks = True
 
     @property
@@ -439,4 +479,5 @@ class BarrierPlacement(BarrierEnv):
         return self.slots.width
 
     def _record(self, recorder: Recorder) -> None:
-        recorder.write_placements(self._episode, self.shown, self._stages, self._rewards)
+        record = as_json(self.record)
+        recorder.write_placements(self._episode, self.shown, self._stages, self._rewards, record)

@@ -1,4 +1,7 @@
-"""What a designer sees of a site: 1-D float32 arrays of about unit spread over sites."""
+"""What a designer sees of a site and of what stands on it.
+
+1-D float32 arrays of about unit spread, none of whose entries is always the same.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from rigdda import Barrier, Fence, Mesh, Outcome, Site
+from rigdda import Fence, Layout, Mesh, Outcome, Site
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.envelope import BINS, STATIONS, Envelope, envelope, largest, stations
 from rigdda.envs.outcome_cache import Memory
@@ -77,20 +80,28 @@ FIELDS: dict[str, Field] = {
         "greatest share of Z without barriers that an option of mesh takes off, and what that one "
         "costs a year over Z",
     ),
-    "spent": Field(1, 0.0, 0.5, "what stands costs a year, over Z without barriers"),
-    "layout": Field(0, 0.0, 1.0, "what stands, encoded as the actions of an episode"),
 }  # fmt: skip
-"""What is seen before a whole layout is designed, and when barriers are placed one by one."""
+"""What is seen of a site, in both environments."""
 
 LOOKED: dict[str, Field] = {
+    "spent": Field(1, 0.0, 0.5, "what stands costs a year, over Z without barriers"),
+    "layout": Field(
+        0, 0.0, 1.0, "what stands, downhill and mesh last, encoded as the actions of an episode"
+    ),
     "harm_now": Field(1, 0.5, 0.5, "harm and repair of what stands over Z without barriers"),
     "reached_now": Field(2, 0.5, 0.5, "share of single blocks, and of groups, that reach the road"),
-    "taken": Field(-1, 3.0, 3.0, "greatest energy at each barrier, downhill: log10(1 + E / J)"),
+    "taken": Field(
+        -1, 3.0, 3.0, "greatest energy at each barrier, downhill without mesh: log10(1 + E / J)"
+    ),
     "topped": Field(-1, 0.0, 0.5, "share of releases in which a block passes over each barrier"),
     "broken": Field(-1, 0.0, 0.5, "share of releases in which each barrier fails"),
     "slots_left": Field(1, 0.5, 0.5, "share of the slots that may still be filled"),
-}
-"""What is seen as well when barriers are placed one by one. A size of -1 is one entry a slot."""
+}  # fmt: skip
+"""What is seen of what stands, where barriers are placed one by one. A size of -1: one a slot.
+
+An episode that designs a whole layout in one step begins where nothing stands: there these would
+never change.
+"""
 
 
 Arrays = dict[str, NDArray[np.float32]]
@@ -117,63 +128,68 @@ def space(size: int, slots: int, looks: bool) -> spaces.Dict:
     )
 
 
-def observe(problem: DesignProblem, now: Evaluation, stands: ArrayLike) -> Arrays:
-    """Return the observation of a problem with a layout in place, in arrays of its own.
+def observe(problem: DesignProblem) -> Arrays:
+    """Return what is seen of the site of a problem, in arrays of its own.
 
     The first observation of a site in a process simulates its envelope.
-
-    Parameters
-    ----------
-    problem : DesignProblem
-        The site.
-    now : Evaluation
-        Of what stands.
-    stands : (size,) array
-        That as the numbers of all slots.
 
     Raises
     ------
     Diverged
         If a simulation diverges.
     """
-    lasting = {name: array.copy() for name, array in _lasting(problem).items()}
-    return lasting | _scaled({"spent": [now.capital / _worth(problem)], "layout": stands})
+    return {name: array.copy() for name, array in _lasting(problem).items()}
+
+
+def mesh_last(layout: Layout) -> Layout:
+    """Return a layout in the order in which it is seen.
+
+    Downhill mesh would come first, so that the later slots would never tell of it.
+    """
+    return tuple(sorted(layout, key=lambda barrier: (isinstance(barrier, Mesh), barrier.x)))
 
 
 def looked(
-    problem: DesignProblem, layout: Sequence[Barrier], outcomes: Sequence[Outcome],
+    problem: DesignProblem, now: Evaluation, stands: ArrayLike, outcomes: Sequence[Outcome],
     slots: int, left: float,
 ) -> Arrays:  # fmt: skip
     """Return what is seen of what stands when barriers are placed one by one.
 
     Parameters
     ----------
+    problem : DesignProblem
+        The site.
+    now : Evaluation
+        Of the layout that stands.
+    stands : (size,) array
+        The layout in the order of `mesh_last`, as the numbers of all slots.
     outcomes : sequence of Outcome
-        Of releases of every event with `layout` in place.
+        Of releases of every event with this layout in place.
     slots : int
         Barriers that may stand.
     left : float
         Share of them that may still be placed.
     """
-    site = problem.site
+    site, layout = problem.site, now.layout
     names = [outcome.event for outcome in outcomes]
     weights = np.array([site.rate(name, layout) / names.count(name) for name in names])
     bills = np.array([sum(site.bill(layout, outcome)) for outcome in outcomes])
     reached = np.array([outcome.reached for outcome in outcomes], dtype=float)
     groups = np.array([largest(site, name) > 1 for name in names])
     values: Values = {
+        "spent": [now.capital / _worth(problem)],
+        "layout": stands,
         "harm_now": [weights @ bills / _worth(problem)],
         "reached_now": [_mean(reached, weights * mine) for mine in (~groups, groups)],
         "slots_left": [left],
     }
-    standing = [i for i, barrier in enumerate(layout) if not isinstance(barrier, Mesh)]
     for name in ("taken", "topped", "broken"):
         values[name] = np.zeros(slots)
-    for k, i in enumerate(standing):
+    for k in range(sum(not isinstance(barrier, Mesh) for barrier in layout)):
         took = [outcome.barriers[k] for outcome in outcomes]
-        values["taken"][i] = math.log10(1.0 + max(one.max_energy for one in took))  # type: ignore[index]
-        values["topped"][i] = np.mean([one.overtopped > 0 for one in took])  # type: ignore[index]
-        values["broken"][i] = np.mean([one.failed for one in took])  # type: ignore[index]
+        values["taken"][k] = math.log10(1.0 + max(one.max_energy for one in took))  # type: ignore[index]
+        values["topped"][k] = np.mean([one.overtopped > 0 for one in took])  # type: ignore[index]
+        values["broken"][k] = np.mean([one.failed for one in took])  # type: ignore[index]
     return _scaled(values)
 
 

@@ -165,13 +165,28 @@ def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
     return names
 
 
-def checked_targets(site: Site, targets: Targets | None) -> Targets:
-    """Return what is asked of a layout: nothing by default."""
+def read_targets(targets: Targets | Mapping[str, float | None] | None) -> Targets:
+    """Return targets that were given as such, or as a mapping of their names to numbers.
+
+    Raises
+    ------
+    BadInput
+        If they are neither.
+    """
     if targets is None:
         return Targets()
-    if not isinstance(targets, Targets):
-        raise BadInput("targets", targets, "give envs.Targets(reach=..., failure=...)")
-    if not any(event.design for event in site.events):
+    if isinstance(targets, Targets):
+        return targets
+    if not isinstance(targets, Mapping) or not set(targets) <= {"reach", "failure"}:
+        mend = "give rigdda.envs.Targets(reach=..., failure=...), or a mapping of these names"
+        raise BadInput("targets", targets, mend)
+    return Targets(**targets)
+
+
+def checked_targets(site: Site, given: Targets | Mapping[str, float | None] | None) -> Targets:
+    """Return what is asked of a layout on a site: nothing by default."""
+    targets = read_targets(given)
+    if targets != Targets() and not any(event.design for event in site.events):
         raise BadInput("targets", targets, f"mark an event of {site.name} with design = true")
     return targets
 
@@ -258,8 +273,8 @@ class DesignProblem:
     kinds : sequence of str, optional
         Kinds of barrier to choose from: "fence", "ditch", "embankment", "gravity_wall", "mesh",
         "wall"; None: all but the last, mesh where the site has options.
-    targets : Targets, optional
-        What is asked of the design events beside a low cost.
+    targets : Targets or mapping, optional
+        What is asked of the design events beside a low cost, such as {"reach": 0.01}.
     fidelity : {"full", "fast"}
         At "fast" a cheaper site stands for it, see `rigdda.envs.problem`.
     zone : (start, end), optional
@@ -283,7 +298,7 @@ class DesignProblem:
         site: str | os.PathLike[str] | Site,
         max_barriers: int = 3,
         kinds: Sequence[str] | None = None,
-        targets: Targets | None = None,
+        targets: Targets | Mapping[str, float | None] | None = None,
         fidelity: str = "full",
         zone: tuple[float, float] | None = None,
     ):
@@ -462,12 +477,31 @@ class DesignProblem:
         """Return the fall of Z over Z of nothing; without prices the share of debris kept off.
 
         Of a slope from which nothing comes onto the road it is 0, and -1 of whatever is built.
+        Of a layout that misses a target it is -1 less the greatest excess of a probability over its
+        target, whatever the layout costs.
         """
+        if evaluation.targets == MISSED:
+            return -1.0 - self._excess(evaluation)
         return evaluation.gain(self._known.nothing)
 
+    def _excess(self, evaluation: Evaluation) -> float:
+        """Return the most by which a probability in a design event exceeds its target [-]."""
+        return max(
+            seen[name].probability - greatest
+            for greatest, seen in (
+                (self.targets.reach, evaluation.reach),
+                (self.targets.failure, evaluation.failure),
+            )
+            if greatest is not None
+            for name in self._design_events
+        )
+
+    @property
+    def _design_events(self) -> list[str]:
+        return [event.name for event in self.site.events if event.design]
+
     def _state(self, found: Evaluation) -> str | None:
-        design = [event.name for event in self.site.events if event.design]
-        return self.targets.state(design, found.reach, found.failure)
+        return self.targets.state(self._design_events, found.reach, found.failure)
 
     def _standing(self, layout: Sequence[Barrier] | ArrayLike) -> Layout:
         """Return the layout of a vector, or one that was checked."""

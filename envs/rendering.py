@@ -1,32 +1,52 @@
-"""Pictures of releases and replays of episodes.
+"""Pictures of a slope: the ground, the road, what stands and where blocks lie.
 
-Matplotlib and the replay writer are imported when they are used.
+Matplotlib is imported when it is used.
 """
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-import rigdda
-from rigdda import BadInput, Run, Site
-from rigdda.barriers import Earthwork, describe
-from rigdda.envs.cost import Evaluation
+from rigdda import Barrier, Fence, Layout, Mesh, Run, Site
+from rigdda.barriers import standing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.transforms import Bbox
+
+Floats = NDArray[np.float64]
 
 SIZE = (8.0, 4.5)
 """Width and height of a picture [inch], 100 pixels each."""
-GROUND, ROCK, BARRIER, ROAD = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04"
-BROKEN = "#b0b6bc"
+
+PROPORTION = 2.0
+"""Width over height of what is shown: the picture less its title and numbers."""
+
+GROUND, ROCK, BARRIER, ROAD, ZONE = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04", "#9dc3e6"
+CUT, BROKEN = "#dbe7f3", "#d62846"
+"""Colours of the inside of a ditch and of what has failed."""
+
+POST = 5.0
+"""Width of the post of a fence [points]: wide enough to be seen on a slope of 200 m."""
+
+BAND = 0.02
+"""Thickness of the band that stands for mesh, as a share of the height of the picture."""
+
+GAP = 16.0
+"""Distance of a label from the top of its barrier [points]."""
+
+
+class Label(NamedTuple):
+    """Words about a barrier, and the point to which they belong [m]."""
+
+    words: str
+    at: tuple[float, float]
+    colour: str = BARRIER
 
 
 def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> None:
@@ -46,186 +66,208 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
     terrain = run.ground
     assert terrain is not None
     x, y = terrain.points.T
-    for i, barrier in enumerate(run.scene.barriers):
-        colour = BARRIER if run.times[frame] < run.failure(i) else BROKEN
-        axes.fill(
-            *run.outline(i, frame).T,
-            facecolor="none" if barrier.drawn == "line" else colour,
-            edgecolor=colour,
-            linewidth=1.0 if barrier.drawn == "line" else 0.0,
-            zorder=3.0 if isinstance(barrier, Earthwork) else 1.0,
-        )
-    axes.fill_between(x, y, y.min() - 0.05 * np.ptp(y), color=GROUND, linewidth=0)
+    axes.fill_between(x, y, y.min() - np.ptp(y), color=GROUND, linewidth=0)
     inner = x[(x > road[0]) & (x < road[1])]
     lane = [road[0], *inner, road[1]]
-    axes.plot(lane, [terrain.height(at) for at in lane], color=ROAD, linewidth=4)
+    axes.plot(lane, [terrain.height(at) for at in lane], color=ROAD, linewidth=5,
+              solid_capstyle="butt")  # fmt: skip
+    for i, barrier in enumerate(run.scene.barriers):
+        colour = BARRIER if run.times[frame] < run.failure(i) else BROKEN
+        draw_barrier(axes, barrier, run.outline(i, frame), colour)
     for i in range(len(run.scene.blocks)):
-        axes.fill(*_corners(run, frame, i).T, color=ROCK, edgecolor="white", linewidth=0.2)
+        axes.fill(*_corners(run, frame, i).T, color=ROCK, edgecolor="white", linewidth=0.2,
+                  zorder=4)  # fmt: skip
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
 
 
-def picture(run: Run, road: tuple[float, float], title: str) -> NDArray[np.uint8]:
-    """Return the last frame of a run as an RGB image, (450, 800, 3)."""
+def draw_barrier(axes: Axes, barrier: Barrier, outline: Floats, colour: str = BARRIER) -> None:
+    """Draw what stands: a fence as a post, a ditch as a shaded cut, all else as a body.
+
+    Parameters
+    ----------
+    axes : matplotlib axes
+        Where to draw.
+    barrier : Barrier
+        What it is, all but mesh.
+    outline : (n, 2) array
+        Its corners, of an earthwork those of the earth that was moved [m].
+    colour : str
+        Of its faces and edges.
+    """
+    if isinstance(barrier, Fence):
+        (x, _), (top_x, top) = outline[:2].mean(axis=0), outline[2:].mean(axis=0)
+        axes.plot([x, top_x], [top - barrier.height, top], color=colour, linewidth=POST,
+                  solid_capstyle="butt", zorder=3.5)  # fmt: skip
+    elif barrier.drawn == "line":
+        axes.fill(*outline.T, facecolor=CUT, edgecolor=colour, hatch="////", linewidth=1.5,
+                  zorder=3)  # fmt: skip
+    else:
+        axes.fill(*outline.T, facecolor=colour, edgecolor=colour, linewidth=1.5, zorder=3)
+
+
+def draw_mesh(axes: Axes, site: Site, mesh: Mesh, thickness: float) -> tuple[float, float]:
+    """Draw mesh as a hatched band over the rock that it holds; return its lower end.
+
+    Parameters
+    ----------
+    thickness : float
+        Of the band [m].
+    """
+    held = {event.source for event in site.events if event.name in site.mesh(mesh.option).factors}
+    bands = [source.band for source in site.sources if source.name in held and source.band]
+    start, end = min(band[0] for band in bands), max(band[1] for band in bands)
+    x, y = ground_between(site, start, end)
+    axes.fill_between(x, y, y + thickness, facecolor="white", edgecolor=BARRIER, hatch="xxxx",
+                      linewidth=1.0, zorder=3.5)  # fmt: skip
+    return float(x[-1]), float(y[-1] + thickness)
+
+
+def ground_between(site: Site, start: float, end: float) -> tuple[Floats, Floats]:
+    """Return the ground between two chainages, x and y [m]."""
+    inner = [x for x, _ in site.slope.points if start < x < end]
+    at = np.array([start, *inner, end])
+    return at, np.array([site.profile.height(x) for x in at])
+
+
+def name_places(axes: Axes, site: Site, zone: tuple[float, float]) -> None:
+    """Draw the zone as a line on the ground, and write its name and the road's below it."""
+    x, y = ground_between(site, *zone)
+    axes.plot(x, y, color=ZONE, linewidth=5, solid_capstyle="butt", zorder=2.5)
+    for words, (start, end), side in (
+        ("barrier zone", zone, "right"),
+        ("road", (site.road.start, site.road.end), "center"),
+    ):
+        middle = 0.5 * (start + end)
+        axes.annotate(
+            words,
+            (middle, site.profile.height(middle)),
+            xytext=(-6 if side == "right" else 0, -8),
+            textcoords="offset points",
+            ha=side,
+            va="top",
+            fontsize=9,
+            zorder=6,
+        )
+
+
+def write_labels(axes: Axes, labels: Sequence[Label]) -> None:
+    """Write labels above what they belong to, so that none lies on another.
+
+    Limits and size of the axes must be final. Each label begins above its point, further up where
+    another is in the way, and moves left where it would leave the axes.
+    """
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()
+    frame, point = axes.get_window_extent(), figure.dpi / 72.0
+    font: dict[str, Any] = {"fontsize": 9, "fontweight": "bold"}
+    taken: list[Bbox] = []
+    for label in sorted(labels, key=lambda one: -one.at[0]):
+        x, y = axes.transData.transform(label.at)
+        measured = axes.text(*label.at, label.words, **font)
+        box = measured.get_window_extent()
+        measured.remove()
+        left = max(min(x, frame.x1 - box.width), frame.x0)
+        bottom = min(_free(taken, left, box, y + GAP * point), frame.y1 - box.height)
+        begins = min(max((x - left) / box.width, 0.0), 1.0)  # where the label is above its point
+        axes.annotate(
+            label.words,
+            label.at,
+            xytext=((left - x) / point, (bottom - y) / point),
+            textcoords="offset points",
+            va="bottom",
+            color=label.colour,
+            zorder=7,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+            arrowprops={
+                "arrowstyle": "-", "color": label.colour, "shrinkA": 0.0, "shrinkB": 0.0,
+                "relpos": (begins, 0.0),
+            },
+            **font,
+        ).set_in_layout(False)  # fmt: skip
+        taken.append(box.translated(left - box.x0, bottom - box.y0))
+
+
+def _free(taken: Sequence[Bbox], left: float, box: Bbox, bottom: float) -> float:
+    """Return the least height from `bottom` on at which a label meets no other [pixels]."""
+    for other in sorted(taken, key=lambda one: one.y0):
+        apart = left >= other.x1 + 4.0 or left + box.width <= other.x0 - 4.0
+        if not apart and bottom < other.y1 + 2.0 and bottom + box.height > other.y0 - 2.0:
+            bottom = other.y1 + 4.0
+    return bottom
+
+
+def picture(run: Run, site: Site, layout: Layout, title: str) -> NDArray[np.uint8]:
+    """Return the last frame of a release as an RGB image, (450, 800, 3).
+
+    Parameters
+    ----------
+    run : Run
+        A release on the site with the layout.
+    site, layout : Site, tuple of Barrier
+        Where, and what stands.
+    title : str
+        Words above the picture.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(SIZE, dpi=100, layout="constrained")  # unknown to pyplot: nothing to close
     canvas = FigureCanvasAgg(figure)
     axes = figure.subplots()
-    draw(axes, run, road)
+    draw(axes, run, (site.road.start, site.road.end))
+    name_places(axes, site, (site.barrier_zone.start, site.barrier_zone.end))
     axes.set_title(title)
+    left, right, bottom, top = window(run, site)
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    labels = [
+        Label(barrier.label, top_of(run.outline(i)))
+        if math.isinf(run.failure(i))
+        else Label(f"{barrier.label}: {barrier.fails}", top_of(run.outline(i)), BROKEN)
+        for i, barrier in enumerate(standing(layout))
+    ]
+    for barrier in layout:
+        if isinstance(barrier, Mesh):
+            labels.append(
+                Label(barrier.label, draw_mesh(axes, site, barrier, BAND * (top - bottom)))
+            )
+    write_labels(axes, labels)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _corners(run: Run, frame: int, block: int) -> NDArray[np.float64]:
+def top_of(outline: Floats) -> tuple[float, float]:
+    """Return the middle of the top of what stands [m]."""
+    return float(outline[:, 0].mean()), float(outline[:, 1].max())
+
+
+def window(run: Run, site: Site) -> tuple[float, float, float, float]:
+    """Return left, right, bottom, top of what is to be seen of a run's last frame [m].
+
+    From the highest source or block to beyond the road, or to where the last block lies.
+    """
+    blocks = np.concatenate(
+        [_corners(run, f, i) for i in range(len(run.scene.blocks)) for f in (0, -1)]
+    )
+    points = np.array(site.slope.points)
+    left = min(blocks[:, 0].min(), site.barrier_zone.start)
+    right = max(blocks[:, 0].max(), site.road.end)
+    way = right - left
+    left, right = max(left - 0.08 * way, points[0, 0]), min(right + 0.06 * way, points[-1, 0])
+    _, y = ground_between(site, left, right)
+    high = max(float(y.max()), blocks[:, 1].max())
+    tall = high - y.min()
+    bottom, top = float(y.min()) - 0.15 * tall, high + 0.2 * tall
+    wider = max(PROPORTION * (top - bottom) - (right - left), 0.0)
+    taller = max((right - left) / PROPORTION - (top - bottom), 0.0)
+    return left - 0.5 * wider, right + 0.5 * wider, bottom - 0.3 * taller, top + 0.7 * taller
+
+
+def _corners(run: Run, frame: int, block: int) -> Floats:
     """Return the (n, 2) corners of a block in a frame; the first frame is turned by 0."""
     x, y, theta = run.poses[frame, block]
     cos, sin = np.cos(theta), np.sin(theta)
     turn = np.array([[cos, -sin], [sin, cos]])
     return (run.scene.blocks[block].vertices - run.poses[0, block, :2]) @ turn.T + [x, y]
-
-
-Trigger = Callable[[int], bool]
-
-
-class Shown(NamedTuple):
-    """The release of an episode that its replay shows, of so many."""
-
-    site: Site
-    seed: int
-    event: str
-    releases: int
-
-    @property
-    def words(self) -> str:
-        """Say which it is."""
-        return f"{self.seed}, event {self.event}, which stands for the {self.releases} scored"
-
-
-@dataclass(frozen=True, slots=True)
-class Recorder:
-    """Writes replays into a folder.
-
-    Parameters
-    ----------
-    folder : path
-        Where `episode-NNNNNN.rrd` goes; made when it is needed. No file is overwritten: the
-        second of the same number, of another copy of the environment or of a former run, is
-        `episode-NNNNNN-2.rrd`.
-    trigger : callable, optional
-        Whether to record an episode, by its number from 0; None: every one.
-
-    Raises
-    ------
-    BadInput
-        If the folder is a file or cannot be made, or the trigger cannot be called.
-    """
-
-    folder: Path
-    trigger: Trigger | None = None
-
-    def __init__(self, folder: str | os.PathLike[str], trigger: Trigger | None = None):
-        if not isinstance(folder, str | os.PathLike):
-            raise BadInput("record", folder, "name a folder or give None")
-        _check_room(Path(folder))
-        if trigger is not None and not callable(trigger):
-            raise BadInput("record_trigger", trigger, "give a function of the episode's number")
-        object.__setattr__(self, "folder", Path(folder))
-        object.__setattr__(self, "trigger", trigger)
-
-    def wants(self, episode: int) -> bool:
-        """Return whether episode number `episode` is to be recorded."""
-        return self.trigger is None or bool(self.trigger(episode))
-
-    def write(
-        self, episode: int, shown: Shown, stages: Sequence[Evaluation], rewards: Sequence[float]
-    ) -> Path:
-        """Write the replay of an episode of one step and return its path; no stream stays open.
-
-        Parameters
-        ----------
-        episode : int
-            Its number.
-        shown : Shown
-            The release to show.
-        stages : sequence of Evaluation
-            What stood at the start, nothing, and in the end.
-        rewards : sequence of float
-            Of each step.
-        """
-        from rigdda.replay.recording import Marks
-
-        end, site = stages[-1], shown.site
-        run, _ = rigdda.release(site, end.layout, shown.seed, shown.event)
-        notes = {
-            "seed": shown.words,
-            "layout": _words(end),
-            "reward": f"{sum(rewards):+.4f}",
-            "objective": f"{end.objective:.4f}",
-            "debris": f"{end.debris:.4f}",
-            "cost": f"{end.cost:.2f}",
-        }
-        path = self._path(episode)
-        run.to_rerun(path, Marks((site.road.start, site.road.end), notes, _title(site, episode)))
-        return path
-
-    def write_placements(
-        self, episode: int, shown: Shown, stages: Sequence[Evaluation], rewards: Sequence[float]
-    ) -> Path:
-        """Write the replay of an episode of several steps and return its path.
-
-        All stages show one release.
-
-        Parameters
-        ----------
-        episode, shown, rewards
-            See `write`.
-        stages : sequence of Evaluation
-            What stood at the start, nothing, and after each step.
-        """
-        from rigdda.replay.episode import Placement, write_episode
-
-        site = shown.site
-        placements = [
-            Placement(
-                run=rigdda.release(site, now.layout, shown.seed, shown.event)[0],
-                layout=_words(now),
-                reward=reward,
-                objective=now.objective,
-                debris=now.debris,
-                cost=now.cost,
-            )
-            for now, reward in zip(stages, (0.0, *rewards), strict=True)
-        ]
-        path, road = self._path(episode), (site.road.start, site.road.end)
-        write_episode(path, placements, road, shown.words, _title(site, episode))
-        return path
-
-    def _path(self, episode: int) -> Path:
-        """Return the name of a new file: copies of an environment may share the folder."""
-        path, number = self.folder / f"episode-{episode:06d}.rrd", 2
-        while path.exists():
-            path = path.with_name(f"episode-{episode:06d}-{number}.rrd")
-            number += 1
-        return path
-
-
-def _check_room(folder: Path) -> None:
-    """Check that a folder can be made and written into; it is made when it is needed."""
-    try:
-        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-        tempfile.TemporaryDirectory(dir=there).cleanup()
-    except OSError as error:
-        mend = f"name a folder that can be made and written into ({error.strerror})"
-        raise BadInput("record", str(folder), mend) from None
-
-
-def _words(now: Evaluation) -> str:
-    return "; ".join(describe(barrier, 2) for barrier in now.layout) or "no barrier"
-
-
-def _title(site: Site, episode: int) -> str:
-    return f"{site.name}, episode {episode}"

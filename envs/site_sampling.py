@@ -16,7 +16,7 @@ import numpy as np
 from rigdda import BadInput, Layout, Site, check, sites
 from rigdda.barriers import KINDS as ALL
 from rigdda.envs.encoding import NUMBERS, Floats, encode, slot_size
-from rigdda.envs.problem import FIDELITIES, DesignProblem
+from rigdda.envs.problem import FIDELITIES, DesignProblem, Targets, read_targets
 from rigdda.envs.problem import USUAL_KINDS as USUAL
 
 Place = str | os.PathLike[str] | Site
@@ -121,7 +121,13 @@ def drawn_from(site: Place) -> tuple[str, ...]:
     return _split("train" if site == RANDOM else site)
 
 
-def pose(site: Place, slots: int, kinds: Sequence[str] | None, fidelity: str) -> DesignProblem:
+def pose(
+    site: Place,
+    slots: int,
+    kinds: Sequence[str] | None,
+    fidelity: str,
+    targets: Targets | None = None,
+) -> DesignProblem:
     """Return the problem of a site; that of a name is made once a process.
 
     Raises
@@ -130,13 +136,15 @@ def pose(site: Place, slots: int, kinds: Sequence[str] | None, fidelity: str) ->
         As `DesignProblem` does.
     """
     if isinstance(site, str) and not os.path.exists(site) and isinstance(kinds, tuple | None):
-        return _named(site, slots, kinds, fidelity)
-    return DesignProblem(site, slots, kinds, fidelity=fidelity)
+        return _named(site, slots, kinds, fidelity, targets)
+    return DesignProblem(site, slots, kinds, targets, fidelity)
 
 
 @lru_cache(MOST_POSED)
-def _named(site: str, slots: int, kinds: tuple[str, ...] | None, fidelity: str) -> DesignProblem:
-    return DesignProblem(site, slots, kinds, fidelity=fidelity)
+def _named(
+    site: str, slots: int, kinds: tuple[str, ...] | None, fidelity: str, targets: Targets | None
+) -> DesignProblem:
+    return DesignProblem(site, slots, kinds, targets, fidelity)
 
 
 class Venue:
@@ -146,7 +154,7 @@ class Venue:
     ----------
     site : Place
         Where.
-    max_barriers, kinds, fidelity
+    max_barriers, kinds, fidelity, targets
         As of `DesignProblem`; where every episode draws its site, all kinds by default.
 
     Attributes
@@ -164,7 +172,15 @@ class Venue:
         As `DesignProblem` does.
     """
 
-    def __init__(self, site: Place, max_barriers: int, kinds: Sequence[str] | None, fidelity: str):
+    def __init__(
+        self,
+        site: Place,
+        max_barriers: int,
+        kinds: Sequence[str] | None,
+        fidelity: str,
+        targets: Targets | Mapping[str, float | None] | None = None,
+    ):
+        self.targets = read_targets(targets)
         self.fidelity = check.one_of("fidelity", fidelity, FIDELITIES)
         self.home: DesignProblem | None = None
         self._drawn = drawn_from(site)
@@ -172,14 +188,15 @@ class Venue:
             self.slots = Slots(named(KINDS if kinds is None else kinds), max_barriers)
             self.first = self.pose(self._drawn[0])
         else:
-            self.first = self.home = pose(site, max_barriers, kinds, fidelity)
+            self.first = self.home = pose(site, max_barriers, kinds, fidelity, self.targets)
             self.slots = Slots(self.first.kinds, max_barriers)
 
     def pose(self, site: Place) -> DesignProblem:
         """Return the problem of a site, of the kinds that it offers."""
         count = self.slots.count
         whole = pose(site, count, None, self.fidelity)
-        return pose(site, count, self.slots.shared(whole.site), self.fidelity)
+        kinds = self.slots.shared(whole.site)
+        return pose(site, count, kinds, self.fidelity, self.targets)
 
     def settle(self, site: Place) -> None:
         """Play here from the next episode on."""

@@ -24,7 +24,7 @@ from rigdda.envs.environments import (
     look_ahead,
     simulate,
 )
-from rigdda.envs.rendering import Recorder
+from rigdda.envs.recorder import Recorder
 
 MASK = "reset_mask"
 """Option of `reset` that says which copies start anew."""

@@ -199,11 +199,34 @@ def test_pictures_show_every_kind(released, seed):
     from rigdda.envs.rendering import picture
 
     run, _ = released
-    image = picture(run, (QUICK.road.start, QUICK.road.end), "all")
-    bare = picture(
-        rigdda.release(QUICK, (), seed, "mass")[0], (QUICK.road.start, QUICK.road.end), "all"
-    )
-    assert image.shape == bare.shape and np.abs(image.astype(int) - bare).sum() > 0
+    image = picture(run, QUICK, LAYOUT, "all")
+    bare = picture(rigdda.release(QUICK, (), seed, "mass")[0], QUICK, (), "all")
+    assert image.shape == bare.shape == (450, 800, 3)
+    assert np.abs(image.astype(int) - bare).sum() > 0
+
+
+@pytest.mark.parametrize("size", [(6.0, 4.0), (12.0, 5.0)])
+def test_labels_of_a_picture_do_not_overlap(size):
+    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+
+    from rigdda.envs.rendering import Label, write_labels
+
+    figure = Figure(size, dpi=100, layout="constrained")
+    axes = figure.subplots()
+    axes.set(xlim=(0.0, 100.0), ylim=(0.0, 50.0))
+    places = [(10.0, 40.0), (60.0, 8.0), (62.0, 5.0), (90.0, 3.0), (91.0, 3.0), (99.0, 3.0)]
+    write_labels(axes, [Label(f"fence 1,000 kJ, {x:.1f} m high", (x, y)) for x, y in places])
+    figure.draw_without_rendering()
+    boxes = [
+        Annotation.get_bbox_patch(text).get_window_extent()
+        for text in axes.texts
+        if isinstance(text, Annotation)
+    ]
+    frame = axes.get_window_extent()
+    assert len(boxes) == len(places)
+    assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
+    assert all(box.x0 > frame.x0 - 3.0 and box.x1 < frame.x1 + 3.0 for box in boxes)
 
 
 def test_a_fence_that_stands_holds_what_a_failed_one_does_not():

@@ -143,6 +143,23 @@ class Featured(VecEnvWrapper):
         self.usual += RECENT * better
         return self._scaled(seen), better.astype(np.float32), dones, infos
 
+    @property
+    def state(self) -> dict[str, Any]:
+        """All that the next steps depend on, between episodes."""
+        return {
+            "usual": self.usual.copy(),
+            "random": [rng.bit_generator.state for rng in self.get_attr("np_random")],
+            "seeds": self.get_attr("seeds"),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Start every copy where `state` was taken."""
+        self.reset()
+        self.usual = state["usual"].copy()
+        for i, rng in enumerate(self.get_attr("np_random")):
+            rng.bit_generator.state = state["random"][i]
+            self.set_attr("seeds", state["seeds"][i], i)
+
     def _scaled(self, seen: Any) -> Floats:
         plain = [features({k: v[i] for k, v in seen.items()}) for i in range(self.num_envs)]
         return np.stack([scaled(one, self.mean, self.scale) for one in plain])
@@ -192,11 +209,34 @@ def learn(model: PPO, episodes: int, checkpoint: Path, tick: Callable[[int], Non
         )
 
 
+class _Moment:
+    """What a training's next rollout depends on beside its networks and their optimiser.
+
+    Stable-Baselines3 draws from the generators of torch and, for its batches, of numpy.
+    """
+
+    def __init__(self, model: PPO):
+        self.torch, self.numpy = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
+        env = model.get_env()
+        self.copies = env.state if isinstance(env, Featured) else None
+
+    def restore(self, copies: VecEnv) -> None:
+        """Go back to it."""
+        if isinstance(copies, Featured) and self.copies is not None:
+            copies.restore(self.copies)
+        torch.set_rng_state(self.torch)
+        np.random.set_state(self.numpy)  # noqa: NPY002
+
+
 def resume(checkpoint: Path, copies: VecEnv) -> PPO:
-    """Return the trainer that was kept in a file; it goes on with other random numbers."""
+    """Return the trainer that was kept in a file; it goes on as if it had not been stopped.
+
+    With the same number of episodes it ends where an uninterrupted training ends, to the last bit.
+    With more, its steps begin anew with the size that the share of episodes left asks for.
+    """
     torch.set_num_threads(1)
-    model = PPO.load(checkpoint, copies, device="cpu")
-    model.set_random_seed(((model.seed or 0) + model.num_timesteps) % 2**32)
+    model = PPO.load(checkpoint, copies, device="cpu", force_reset=False)
+    model.moment.restore(copies)  # type: ignore[attr-defined]  # kept by `_Keep`
     return model
 
 
@@ -218,6 +258,8 @@ class _Keep(BaseCallback):
         self._save()
 
     def _save(self) -> None:
+        assert isinstance(self.model, PPO)
+        self.model.moment = _Moment(self.model)  # type: ignore[attr-defined]
         with atomic(self.checkpoint) as part, part.open("wb") as file:
             self.model.save(file)
 

@@ -12,6 +12,7 @@ from rigdda.agents.reports import findings, pictures
 from rigdda.agents.reports.pictures import BLOCKS, Flights, Panel, fly, section
 from rigdda.agents.reports.wording import euros, span
 from rigdda.barriers import standing
+from rigdda.envs.repetition import release_record
 from rigdda.replay.recording import Marks
 
 FILES = (
@@ -85,4 +86,5 @@ def _replay(done: DesignStudy, path: Path, seed: int) -> None:
     }
     labels = tuple(barrier.label for barrier in standing(layout))
     road = site.road.start, site.road.end
-    run.to_rerun(path, Marks(road, notes, f"{site.name}: {chosen.name}", labels))
+    record = release_record(site, layout, drawn, event, outcome)
+    run.to_rerun(path, Marks(road, notes, f"{site.name}: {chosen.name}", labels, record))

@@ -14,20 +14,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import Barrier, Fence, Layout, Run, Simulation, Site
+from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
 from rigdda.barriers import Earthwork, earthworks, standing
 from rigdda.envs import Evaluation
-from rigdda.envs.rendering import GROUND, ROAD
+from rigdda.envs.rendering import (
+    BAND,
+    BARRIER,
+    GROUND,
+    ROAD,
+    ZONE,
+    Label,
+    draw_barrier,
+    draw_mesh,
+    ground_between,
+    name_places,
+    top_of,
+    write_labels,
+)
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
 from rigdda.model.site_tables import BarrierZone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
+    from matplotlib.figure import Figure, FigureBase
 
 Floats = NDArray[np.float64]
 
@@ -159,7 +169,7 @@ def _size(vertices: Floats) -> tuple[float, float]:
 
 __all__ = ["BARRIER", "DPI", "FONT", "GROUND", "ROAD", "ZONE", "Point", "colours", "cost", "save"]
 
-BARRIER, ZONE, TRIED, EQUAL = "#14213d", "#9dc3e6", "#9aa5b1", "#c8ccd0"
+TRIED, EQUAL = "#9aa5b1", "#c8ccd0"
 EVENTS = ("#0072b2", "#d0312d", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b4fb0", "#6b4226")
 """Colours of events, told apart by the colour-blind as far as eight can be."""
 
@@ -296,9 +306,6 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
 DRAWN = 30
 """Ways of an event that are drawn: with more the eye sees no less, and no more."""
 
-APART = 8.0
-"""Distance of two barriers below which their labels are put one below the other [m]."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
@@ -345,8 +352,9 @@ def section(
         parts: Any = figure.subfigures(2, height_ratios=[rows * (tall + 0.5) + 0.4, 4.4])
         upper, lower = parts
         grid = upper.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        labels = []
         for axes, panel in zip(grid.flat, panels, strict=True):
-            _slope(axes, site, zone, panel, bottom)
+            labels.append(_slope(axes, site, zone, panel, window))
             axes.set(xlim=(left, right), ylim=(bottom, top))
             axes.label_outer()
         heights, energies = lower.subplots(1, 2, sharex=True)
@@ -355,6 +363,8 @@ def section(
             axes.axvspan(zone.start, zone.end, color=ZONE, alpha=0.25, lw=0)
         _envelopes(heights, energies, site, panels[-1].layout, envelopes)
         _key(lower, site, envelopes)
+        for axes, own in zip(grid.flat, labels, strict=True):
+            write_labels(axes, own)
         save(figure, path)
 
 
@@ -393,65 +403,44 @@ def _window(site: Site) -> tuple[float, float, float, float]:
     return left, right, low - 0.1 * (high - low), high + 0.05 * (high - low)
 
 
-def _slope(axes: Axes, site: Site, zone: BarrierZone, panel: Panel, bottom: float) -> None:
-    """Draw one slope: its ground, zone, road and sources, the ways of blocks, what stands."""
+def _slope(
+    axes: Axes, site: Site, zone: BarrierZone, panel: Panel, window: tuple[float, ...]
+) -> list[Label]:
+    """Draw one slope: its ground, zone, road and sources, the ways of blocks, what stands.
+
+    Returns the labels of what stands, to be written when the size of the axes is final.
+    """
     built, moved = earthworks(site.profile, standing(panel.layout), site.slope.surface)
     x, y = built.points.T
+    *_, bottom, top = window
     axes.fill_between(x, y, bottom, color=GROUND, linewidth=0, zorder=2)
-    axes.plot(*_along(site, zone.start, zone.end), color=ZONE, linewidth=5, zorder=2.5,
-              solid_capstyle="butt")  # fmt: skip
-    axes.plot(*_along(site, site.road.start, site.road.end), color=ROAD, linewidth=5, zorder=3,
-              solid_capstyle="butt")  # fmt: skip
+    axes.plot(*ground_between(site, site.road.start, site.road.end), color=ROAD, linewidth=5,
+              zorder=3, solid_capstyle="butt")  # fmt: skip
+    name_places(axes, site, (zone.start, zone.end))
     for flights, colour in zip(panel.flights, colours(len(panel.flights)), strict=True):
         for way in flights.ways[:: max(1, len(flights.ways) // DRAWN)]:
             axes.plot(*way.T, color=colour, linewidth=0.6, alpha=0.55, zorder=4)
     for corners in sources(site):
         axes.plot(*corners.T, color="black", linewidth=2.0, zorder=4.5)
-    _barriers(axes, site, panel, moved)
     axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]")
     axes.set_title(panel.title, loc="left", fontsize=11)
+    return _barriers(axes, site, panel.layout, moved, BAND * (top - bottom))
 
 
-def _along(site: Site, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return the ground between two chainages, x and y [m]."""
-    inner = [x for x, _ in site.slope.points if start < x < end]
-    at = np.array([start, *inner, end])
-    return at, np.array([site.profile.height(x) for x in at])
-
-
-def _barriers(axes: Axes, site: Site, panel: Panel, moved: Mapping[Barrier, Floats]) -> None:
-    """Draw what stands and say what it is, in the ground, where nothing else is drawn."""
-    outlines = [
-        moved[b] if isinstance(b, Earthwork) else b.outline(site.profile)
-        for b in standing(panel.layout)
-    ]
-    for i, (barrier, outline) in enumerate(zip(standing(panel.layout), outlines, strict=True)):
-        dug = barrier.drawn == "line"
-        axes.fill(*outline.T, facecolor="white" if dug else BARRIER, edgecolor=BARRIER,
-                  linewidth=1.4 if dug else 2.0, zorder=5)  # fmt: skip
-        foot = outline[np.argmin(outline[:, 0])]
-        axes.annotate(
-            barrier.label.replace(", ", ",\n"),
-            foot,
-            xytext=(-34, -16 - 36 * _near(outlines[:i], outline)),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            color=BARRIER,
-            fontweight="bold",
-            zorder=7,
-            arrowprops={"arrowstyle": "-", "color": BARRIER, "linewidth": 0.9, "shrinkB": 0},
-        )
-    for i, mesh in enumerate(set(panel.layout) - set(standing(panel.layout))):
-        axes.text(0.98, 0.93 - 0.09 * i, mesh.label, ha="right", color=BARRIER,
-                  fontweight="bold", transform=axes.transAxes, zorder=7)  # fmt: skip
-
-
-def _near(others: Sequence[Floats], outline: Floats) -> int:
-    """Return how many barriers before one are so near that their labels would meet it."""
-    x, y = outline.mean(axis=0)
-    return sum(abs(o[:, 0].mean() - x) < APART and abs(o[:, 1].mean() - y) < APART for o in others)
+def _barriers(
+    axes: Axes, site: Site, layout: Layout, moved: Mapping[Barrier, Floats], thickness: float
+) -> list[Label]:
+    """Draw what stands, mesh as a band of this thickness [m]; return its labels."""
+    labels = []
+    for barrier in layout:
+        if isinstance(barrier, Mesh):
+            labels.append(Label(barrier.label, draw_mesh(axes, site, barrier, thickness)))
+    for built in standing(layout):
+        outline = moved[built] if isinstance(built, Earthwork) else built.outline(site.profile)
+        draw_barrier(axes, built, outline)
+        labels.append(Label(built.label, top_of(outline)))
+    return labels
 
 
 def _envelopes(

@@ -15,6 +15,7 @@ from rigdda.replay.recording import (
     TIMELINE,
     Marks,
     RecordedMotion,
+    log_record,
     log_run,
     recording,
     slope_view,
@@ -52,6 +53,7 @@ def write_episode(
     road: tuple[float, float],
     seed: str,
     title: str,
+    record: str = "",
 ) -> None:
     """Write an episode as a rerun recording.
 
@@ -71,6 +73,8 @@ def write_episode(
         The seed of the release, in words.
     title : str
         Name of the recording.
+    record : str
+        All that it takes to compute the episode again, as JSON; kept in the file, not shown.
 
     Raises
     ------
@@ -91,6 +95,7 @@ def write_episode(
                 rec.log(f"episode/{name}", rr.Scalars(getattr(placement, name)))
         page = rr.TextDocument(_words(placements, seed, title), media_type="text/markdown")
         rec.log("notes", page, static=True)
+        log_record(rec, record)
 
 
 def _root(k: int) -> str:

@@ -19,6 +19,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 import shapely
 from numpy.typing import NDArray
+from rerun.chunk import RrdReader
 
 from rigdda import check
 from rigdda.barriers import describe
@@ -120,6 +121,8 @@ class Marks:
     labels : sequence of str
         What each barrier of the scene is called, a fence with its class; without any, the words
         that the scene has for them.
+    record : str
+        All that it takes to compute the episode again, as JSON; kept in the file, not shown.
 
     Raises
     ------
@@ -131,6 +134,7 @@ class Marks:
     notes: Mapping[str, str] = field(default_factory=dict)
     title: str = "rockfall"
     labels: Sequence[str] = ()
+    record: str = ""
 
     def __post_init__(self) -> None:
         if self.road is None:
@@ -261,6 +265,40 @@ def write_rerun(
     with recording(path, run_blueprint(run, marks)) as rec:
         rec.send_recording_name(marks.title)
         log_run(rec, run, marks)
+        log_record(rec, marks.record)
+
+
+RECORD = "/record"
+"""Entity of what it takes to compute an episode again."""
+
+
+def log_record(rec: rr.RecordingStream, record: str) -> None:
+    """Log what it takes to compute an episode again, if there is anything."""
+    if record:
+        rec.log(RECORD, rr.TextDocument(record, media_type="application/json"), static=True)
+
+
+def read_record(path: str | os.PathLike[str]) -> str:
+    """Return what a replay holds to compute its episode again.
+
+    Raises
+    ------
+    BadInput
+        If the file is missing, is not a replay or holds nothing of that kind.
+    """
+    file = rrd_path(path)
+    if not file.is_file():
+        raise BadInput("replay file", str(path), "name an existing .rrd file")
+    try:
+        chunks = RrdReader(file).stream().filter(content=RECORD, is_static=True).to_chunks()
+    except (ValueError, RuntimeError, OSError) as error:
+        mend = f"name a whole .rrd file that rigdda recorded ({error})"
+        raise BadInput("replay file", str(path), mend) from None
+    if not chunks:
+        mend = "name one that an environment, `rigdda design` or `rigdda replay SITE` recorded"
+        raise BadInput("replay file", str(path), mend)
+    ((text,),) = chunks[0].to_record_batch().column("TextDocument:text").to_pylist()
+    return str(text)
 
 
 @contextlib.contextmanager

@@ -33,15 +33,15 @@ def saying(*slots: tuple[float, float, float, float, str]) -> Network:
 
 
 def seen_at(problem: DesignProblem) -> np.ndarray:
-    return features(observe(problem, problem.nothing, np.zeros(0)))
+    return features(observe(problem))
 
 
 def test_features_are_what_is_seen_of_the_site(site: Site) -> None:
     problem = DesignProblem(site)
-    seen = observe(problem, problem.nothing, np.zeros(0))
+    seen = observe(problem)
     line = features(seen)
     assert line.shape == (WIDTH,) and line.dtype == np.float32 and np.isfinite(line).all()
-    assert set(FIELDS) - set(NAMES) == {"layout", "spent"}
+    assert set(seen) == set(NAMES)
     np.testing.assert_array_equal(line[: FIELDS[NAMES[0]].size], seen[NAMES[0]])
 
 

@@ -64,6 +64,45 @@ def test_a_killed_training_goes_on(trained: tuple[Path, str], tmp_path: Path) ->
     assert "terms" in line and "another folder" in line
 
 
+@pytest.mark.parametrize("rollouts", [1, 5])
+def test_a_training_that_was_stopped_ends_as_if_it_had_not_been(
+    rollouts: int, tmp_path: Path
+) -> None:
+    terms = training.Terms(2, 40, 3)
+    whole = training.train(terms, tmp_path / "whole", lambda done: None)
+
+    def stop(done: int) -> None:
+        if done > 4 * rollouts:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        training.train(terms, tmp_path / "stopped", stop)
+    np.random.seed(99)  # noqa: NPY002
+    seen: list[int] = []
+    rest = training.train(terms, tmp_path / "stopped", seen.append)
+    assert seen[0] == 4 * rollouts + 2
+    for (weight, bias), (other, last) in zip(
+        whole.network.layers, rest.network.layers, strict=True
+    ):
+        assert (weight == other).all() and (bias == last).all()
+    files = [tmp_path / name / "policy.safetensors" for name in ("whole", "stopped")]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_a_training_goes_on_with_more_episodes(trained: tuple[Path, str], tmp_path: Path) -> None:
+    folder = tmp_path / "o"
+    shutil.copytree(trained[0], folder)
+    before = Network.load(folder / "policy.safetensors").layers[-1][0]
+    run("train", *SMALL[:2], "--episodes", 32, "--out", folder, folder=tmp_path)
+    assert ppo.PPO.load(folder / "checkpoint.zip").num_timesteps == 32
+    after = Network.load(folder / "policy.safetensors")
+    assert (after.layers[-1][0] != before).any()
+    one = "rigdda train --sites 2 --episodes {} --seed 0"
+    assert after.notes["command"] == f"{one.format(16)}; {one.format(32)}"
+    line = refused("train", *SMALL, "--out", folder, folder=tmp_path)
+    assert "episodes = 16: give at least the 32" in line and "another folder" in line
+
+
 def test_bad_terms_are_one_line(tmp_path: Path) -> None:
     line = refused("train", "--sites", 100_000, folder=tmp_path)
     assert "sites" in line and "100000" in line

@@ -17,8 +17,8 @@ from gymnasium.utils.env_checker import data_equivalence
 
 import rigdda
 from rigdda import BadInput, Fence, sites
-from rigdda.envs import DesignProblem
-from rigdda.envs.environments import BarrierDesign
+from rigdda.envs import DesignProblem, Targets
+from rigdda.envs.environments import BarrierDesign, BarrierEnv, BarrierPlacement
 
 CUT = cut()
 TERMS: dict[str, Any] = {"max_barriers": 2, "kinds": ("fence",), "releases": 10}
@@ -85,6 +85,36 @@ def test_without_prices_the_reward_is_the_debris_kept_off() -> None:
     env.reset(seed=0)
     _, reward, *_, info = env.step(ACTION)
     assert reward == pytest.approx(1.0 - info["debris_share"])
+
+
+@pytest.mark.parametrize("env_class", [BarrierDesign, BarrierPlacement])
+def test_the_expected_reward_ranks_as_a_problem_with_targets(env_class: type[BarrierEnv]) -> None:
+    """A low fence misses the target: it ranks behind a tall one."""
+    terms: dict[str, Any] = {"max_barriers": 1, "kinds": ("fence", "ditch")}
+    actions = np.array(
+        [[1, 1.0, -0.2, 0.2, 1, 0], [1, -0.9, -1.0, -1.0, 1, 0], [-1, 0, 0, 0, 0, 0]], np.float32
+    )
+    env = env_class(CUT, **terms, releases=160, targets={"reach": 0.3})
+    problem = DesignProblem(CUT, **terms, targets=Targets(reach=0.3))
+    found = [problem.evaluate(problem.decode(action), range(2000)) for action in actions]
+    rewards = np.zeros((len(actions), 4))
+    for i, action in enumerate(actions):
+        for seed in range(4):
+            env.reset(seed=seed)
+            _, rewards[i, seed], *_, info = env.step(action)
+            assert info["targets"] in ("met", "missed", "undecided")
+    expected = rewards.mean(axis=1)
+    wanted = np.array([problem.reward(one) - problem.reward(problem.nothing) for one in found])
+    assert [one.targets for one in found] == ["met", "missed", "missed"]
+    np.testing.assert_allclose(expected, wanted, atol=0.1)
+    assert expected[2] == 0.0
+
+
+def test_targets_survive_as_json() -> None:
+    for targets in ({"reach": 0.01}, Targets(reach=0.01, failure=0.05)):
+        env = gymnasium.make("rigdda/BarrierDesign-v0", site="quick", targets=targets)
+        again = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+        assert again.unwrapped.problem.targets == env.unwrapped.problem.targets != Targets()
 
 
 def test_info_holds_plain_values(env: BarrierDesign) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput, Ditch, Fence, Outcome, Site, Wall
-from rigdda.envs import compare, ensemble
+from rigdda.envs import compare, ensemble, site_store
 from rigdda.envs.outcome_cache import Memory
 from rigdda.envs.problem import DesignProblem, Targets, events_of_seeds
 
@@ -37,7 +37,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Nothing is read from, or left in, the user's cache; few releases tell of the site."""
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("nothing")
-        patch.setattr(ensemble, "_path", lambda key: folder / key.hex())
+        patch.setattr(site_store, "path_of", lambda name, key: folder / f"{name}-{key.hex()}")
         patch.setattr(ensemble, "memory", Memory(64))
         patch.setattr(ensemble, "FIRST", 6)
         patch.setattr(ensemble, "ALL", 60)
@@ -203,6 +203,20 @@ def test_a_target_of_failure_asks_for_the_failures_of_design_events(site: Site) 
     assert problem.judge(FENCE, hand_made(counts, {"small": 10})).targets != "missed"
 
 
+def test_missed_targets_are_rewarded_behind_all_that_is_not_ruinous(site: Site) -> None:
+    """By the excess of the probability over the target, whatever the layout costs."""
+    problem = DesignProblem(site, targets={"reach": 0.2})
+    assert problem.targets == Targets(reach=0.2)
+    met, poor, worse = (
+        problem.judge(FENCE, 3 * hand_made({"block": n, "group": 0})) for n in (0, 6, 9)
+    )
+    assert [found.targets for found in (met, poor, worse)] == ["met", "missed", "missed"]
+    assert problem.reward(met) == DesignProblem(site).reward(met)
+    for missed in (poor, worse):
+        assert problem.reward(missed) == -1.0 - (missed.reach["block"].probability - 0.2)
+    assert problem.reward(met) > -1.0 > problem.reward(poor) > problem.reward(worse)
+
+
 @pytest.mark.parametrize(
     ("targets", "reached", "state"),
     [
@@ -246,9 +260,10 @@ def test_without_prices_the_reward_is_the_share_of_debris_kept_off() -> None:
 @pytest.mark.slow
 def test_the_cost_of_nothing_is_found_again_by_another_process(tmp_path: Path) -> None:
     program = (
-        "import time, warnings; from rigdda.envs import DesignProblem, ensemble\n"
+        "import warnings; from rigdda.envs import DesignProblem, ensemble, site_store\n"
         "warnings.simplefilter('ignore'); ensemble.FIRST, ensemble.ALL = 2, 8\n"
-        "print(DesignProblem('verge').nothing.simulated, ensemble._path(b'').parent.exists())\n"
+        "where = site_store.path_of('ensemble', b'').parent\n"
+        "print(DesignProblem('verge').nothing.simulated, where.exists())\n"
         "ensemble._simulate = None\n"
         "ensemble.memory = type(ensemble.memory)(4)\n"
         "print(DesignProblem('verge', 2).nothing.objective)\n"
@@ -258,7 +273,7 @@ def test_the_cost_of_nothing_is_found_again_by_another_process(tmp_path: Path) -
     assert run.returncode == 0, run.stderr
     simulated, kept = run.stdout.split()[:2]
     assert int(simulated) >= 8 and kept == "True"
-    assert len(list(tmp_path.rglob("nothing-*/*.msgpack"))) == 1
+    assert len(list(tmp_path.rglob("sites-*/ensemble-*.msgpack"))) == 1
 
 
 def test_nothing_is_kept_on_disk(problem: DesignProblem, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -266,10 +281,10 @@ def test_nothing_is_kept_on_disk(problem: DesignProblem, monkeypatch: pytest.Mon
     monkeypatch.setattr(ensemble, "memory", Memory(4))
     monkeypatch.setattr(ensemble, "_simulate", lambda *_: pytest.fail("simulated again"))
     assert ensemble.of(problem.site, problem.key) == first
-    path = ensemble._path(problem.key)
+    path = site_store.path_of("ensemble", problem.key)
     whole = path.read_bytes()
     path.write_bytes(whole[:-20])  # cut off: known to be unsound
-    assert ensemble._read(problem.key) is None
+    assert site_store.read("ensemble", problem.key, ensemble.Ensemble) is None
     path.write_bytes(whole)
 
 
@@ -339,7 +354,9 @@ def test_kinds_are_all_but_the_rigid_wall(site: Site) -> None:
         ({"zone": (0, 10)}, "zone = 0"),
         ({"zone": 5}, r"zone = 5: give two numbers \[low, high\]"),
         ({"zone": (6.2, 6.8)}, r"zone = \(6\.2, 6\.8\): leave room in"),
-        ({"targets": 0.1}, "targets = 0.1: give envs.Targets"),
+        ({"targets": 0.1}, "targets = 0.1: give rigdda.envs.Targets"),
+        ({"targets": {"reech": 0.1}}, "targets = .*reech.*: give rigdda.envs.Targets"),
+        ({"targets": {"reach": 2}}, r"targets\.reach = 2"),
     ],
 )
 def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:

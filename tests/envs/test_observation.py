@@ -13,8 +13,8 @@ import rigdda
 from rigdda import Site, sites
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import FIRST, STATIONS, barrier_free, envelope, largest, stations
-from rigdda.envs.environments import SCORED_SEEDS
-from rigdda.envs.observation import BOUND, FIELDS, observe, space
+from rigdda.envs.environments import SCORED_SEEDS, BarrierDesign, BarrierEnv, BarrierPlacement
+from rigdda.envs.observation import BOUND, FIELDS, LOOKED, observe, space
 
 CUT = cut()
 SEEN_AT_SITES = 30
@@ -22,16 +22,13 @@ SEEN_AT_SITES = 30
 
 def raw(seen: dict[str, np.ndarray], name: str) -> np.ndarray:
     """Return what an array says, in its own units."""
-    return FIELDS[name].centre + FIELDS[name].spread * seen[name].astype(float)
-
-
-def nothing(problem: DesignProblem) -> dict[str, np.ndarray]:
-    return observe(problem, problem.nothing, np.full(problem.size, -1.0))
+    field = (FIELDS | LOOKED)[name]
+    return field.centre + field.spread * seen[name].astype(float)
 
 
 def test_the_site_is_told() -> None:
     problem = DesignProblem(CUT, 2)
-    seen, worth = nothing(problem), problem.nothing.objective
+    seen, worth = observe(problem), problem.nothing.objective
     x = np.linspace(-10.0, 18.0, 17)[:-1]
     height = np.interp(x, *np.transpose(CUT.slope.points)) + 0.1
     rates = np.log10([1e-3 + 1.7, 1e-3 + 0.05])
@@ -48,8 +45,6 @@ def test_the_site_is_told() -> None:
         "groups": [problem.nothing.by_event["group"] / worth],
         "rates": rates,
         "prices": np.log10(1e-6 + np.array(bought) / worth),
-        "spent": [0.0],
-        "layout": np.full(problem.size, -1.0),
     }
     for name, values in expected.items():
         np.testing.assert_allclose(raw(seen, name), values, rtol=1e-5, atol=1e-5, err_msg=name)
@@ -79,7 +74,7 @@ def test_what_falls_without_barriers_is_told() -> None:
         for k in range(STATIONS):
             assert seen.energy[group, k] in (energies[group][k] or [0.0])
     assert seen.deposit.sum() == pytest.approx(1.0)
-    told = nothing(DesignProblem(CUT))
+    told = observe(DesignProblem(CUT))
     np.testing.assert_allclose(raw(told, "often"), np.log10(1e-3 + often).ravel(), atol=1e-5)
 
 
@@ -104,18 +99,19 @@ def test_no_block_passes_means_zero() -> None:
 
 
 def test_what_stands_and_what_it_costs_is_told() -> None:
-    problem = DesignProblem(CUT, 1, ("gravity_wall",))
-    layout = problem.decode([1.0, 0.8, 0.0, 0.0])
-    found = problem.evaluate(layout, range(10))
-    seen = observe(problem, found, problem.encode(layout))
-    np.testing.assert_allclose(seen["layout"], [1.0, 0.8, 0.0, 0.0], atol=1e-6)
-    share = CUT.annual(layout) / problem.nothing.objective
+    env = BarrierPlacement(CUT, 2, ("gravity_wall",), releases=1)
+    before, _ = env.reset(seed=0)
+    assert raw(before, "spent") == pytest.approx([0.0])
+    np.testing.assert_array_equal(before["layout"], np.full(8, -1.0))
+    seen, *_, info = env.step(np.array([1.0, 0.8, 0.0, 0.0], np.float32))
+    np.testing.assert_allclose(seen["layout"], [1.0, 0.8, 0.0, 0.0, *[-1.0] * 4], atol=1e-6)
+    share = CUT.annual(info["layout"]) / env.problem.nothing.objective
     assert raw(seen, "spent")[0] == pytest.approx(share)
 
 
 def test_extremes_stay_in_bounds() -> None:
     problem = DesignProblem(cut(FREE, HARMLESS))
-    seen = nothing(problem)
+    seen = observe(problem)
     assert seen in space(problem.size, 3, False)
     assert {array.dtype for array in seen.values()} == {np.dtype(np.float32)}
     assert max(abs(array).max() for array in seen.values()) <= BOUND
@@ -123,20 +119,43 @@ def test_extremes_stay_in_bounds() -> None:
 
 def test_observations_are_copies() -> None:
     problem = DesignProblem(CUT)
-    for array in nothing(problem).values():
+    for array in observe(problem).values():
         array[:] = 0.0
-    assert nothing(problem)["energy"].any()
+    assert observe(problem)["energy"].any()
+
+
+def episodes(env: BarrierEnv, names: list[str], each: int) -> dict[str, np.ndarray]:
+    """Return every observation of random episodes on some sites, (n, size) by array."""
+    env.action_space.seed(0)
+    seen = []
+    for i, name in enumerate(each * names):
+        seen.append(env.reset(seed=i, options={"site": name})[0])
+        ended = False
+        while not ended:
+            action = env.action_space.sample()
+            action[0] = abs(action[0])  # the last slots are used, too
+            observation, _, ended, *_ = env.step(action)
+            seen.append(observation)
+    return {name: np.array([one[name] for one in seen], dtype=float) for name in seen[0]}
+
+
+@pytest.mark.parametrize("env_class", [BarrierDesign, BarrierPlacement])
+def test_no_entry_is_always_the_same(env_class: type[BarrierEnv]) -> None:
+    """Over a built-in and a generated site of every family but that of large, slow masses."""
+    families = [name for name in sites.FAMILIES if name != "shu-hwa"]
+    names = [*families, *(sites.split("validation", family)[0] for family in families)]
+    env = env_class("validation", releases=1, fidelity="fast")
+    for name, values in episodes(env, names, 6).items():
+        assert (np.ptp(values, axis=0) > 1e-3).all(), name
 
 
 @pytest.mark.slow
-def test_every_entry_moves_over_sites_by_about_its_spread() -> None:
-    """Over 30 sites of the splits; of what stands, that is decided and not of the site."""
-    third = SEEN_AT_SITES // 3
-    names = [n for split in ("train", "validation", "test") for n in sites.split(split)[:third]]
-    problems = [DesignProblem(name, fidelity="fast") for name in names]
+@pytest.mark.parametrize("split", ["train", "validation", "test"])
+def test_every_entry_moves_over_sites_by_about_its_spread(split: str) -> None:
+    problems = [DesignProblem(name, fidelity="fast") for name in sites.split(split)[:SEEN_AT_SITES]]
     barrier_free([problem.site for problem in problems])
-    seen = [nothing(problem) for problem in problems]
-    for name in FIELDS.keys() - {"layout", "spent"}:
+    seen = [observe(problem) for problem in problems]
+    for name in FIELDS:
         values = np.array([one[name] for one in seen], dtype=float)
         assert (values.std(axis=0) > 0.02).all(), name
         assert 0.4 < values.std() < 2.5, name

@@ -1,0 +1,173 @@
+"""Replays of episodes, written as they end.
+
+The replay writer is imported when it is used.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import rigdda
+from rigdda import BadInput, Site
+from rigdda.barriers import describe
+from rigdda.envs.cost import Evaluation
+
+Trigger = Callable[[int], bool]
+
+
+class Shown(NamedTuple):
+    """The release of an episode that its replay shows, of so many."""
+
+    site: Site
+    seed: int
+    event: str
+    releases: int
+
+    @property
+    def words(self) -> str:
+        """Say which it is."""
+        return f"{self.seed}, event {self.event}, which stands for the {self.releases} scored"
+
+
+@dataclass(frozen=True, slots=True)
+class Recorder:
+    """Writes replays into a folder.
+
+    Parameters
+    ----------
+    folder : path
+        Where `episode-NNNNNN.rrd` goes; made when it is needed. No file is overwritten: the
+        second of the same number, of another copy of the environment or of a former run, is
+        `episode-NNNNNN-2.rrd`.
+    trigger : callable, optional
+        Whether to record an episode, by its number from 0; None: every one.
+
+    Raises
+    ------
+    BadInput
+        If the folder is a file or cannot be made, or the trigger cannot be called.
+    """
+
+    folder: Path
+    trigger: Trigger | None = None
+
+    def __init__(self, folder: str | os.PathLike[str], trigger: Trigger | None = None):
+        if not isinstance(folder, str | os.PathLike):
+            raise BadInput("record", folder, "name a folder or give None")
+        _check_room(Path(folder))
+        if trigger is not None and not callable(trigger):
+            raise BadInput("record_trigger", trigger, "give a function of the episode's number")
+        object.__setattr__(self, "folder", Path(folder))
+        object.__setattr__(self, "trigger", trigger)
+
+    def wants(self, episode: int) -> bool:
+        """Return whether episode number `episode` is to be recorded."""
+        return self.trigger is None or bool(self.trigger(episode))
+
+    def write(
+        self,
+        episode: int,
+        shown: Shown,
+        stages: Sequence[Evaluation],
+        rewards: Sequence[float],
+        record: str,
+    ) -> Path:
+        """Write the replay of an episode of one step and return its path; no stream stays open.
+
+        Parameters
+        ----------
+        episode : int
+            Its number.
+        shown : Shown
+            The release to show.
+        stages : sequence of Evaluation
+            What stood at the start, nothing, and in the end.
+        rewards : sequence of float
+            Of each step.
+        record : str
+            What it takes to compute the episode again, see `rigdda.envs.repetition`.
+        """
+        from rigdda.replay.recording import Marks
+
+        end, site = stages[-1], shown.site
+        run, _ = rigdda.release(site, end.layout, shown.seed, shown.event)
+        notes = {
+            "seed": shown.words,
+            "layout": _words(end),
+            "reward": f"{sum(rewards):+.4f}",
+            "objective": f"{end.objective:.4f}",
+            "debris": f"{end.debris:.4f}",
+            "cost": f"{end.cost:.2f}",
+        }
+        path = self._path(episode)
+        road = site.road.start, site.road.end
+        run.to_rerun(path, Marks(road, notes, _title(site, episode), record=record))
+        return path
+
+    def write_placements(
+        self,
+        episode: int,
+        shown: Shown,
+        stages: Sequence[Evaluation],
+        rewards: Sequence[float],
+        record: str,
+    ) -> Path:
+        """Write the replay of an episode of several steps and return its path.
+
+        All stages show one release.
+
+        Parameters
+        ----------
+        episode, shown, rewards, record
+            See `write`.
+        stages : sequence of Evaluation
+            What stood at the start, nothing, and after each step.
+        """
+        from rigdda.replay.episode import Placement, write_episode
+
+        site = shown.site
+        placements = [
+            Placement(
+                run=rigdda.release(site, now.layout, shown.seed, shown.event)[0],
+                layout=_words(now),
+                reward=reward,
+                objective=now.objective,
+                debris=now.debris,
+                cost=now.cost,
+            )
+            for now, reward in zip(stages, (0.0, *rewards), strict=True)
+        ]
+        path, road = self._path(episode), (site.road.start, site.road.end)
+        write_episode(path, placements, road, shown.words, _title(site, episode), record)
+        return path
+
+    def _path(self, episode: int) -> Path:
+        """Return the name of a new file: copies of an environment may share the folder."""
+        path, number = self.folder / f"episode-{episode:06d}.rrd", 2
+        while path.exists():
+            path = path.with_name(f"episode-{episode:06d}-{number}.rrd")
+            number += 1
+        return path
+
+
+def _check_room(folder: Path) -> None:
+    """Check that a folder can be made and written into; it is made when it is needed."""
+    try:
+        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        tempfile.TemporaryDirectory(dir=there).cleanup()
+    except OSError as error:
+        mend = f"name a folder that can be made and written into ({error.strerror})"
+        raise BadInput("record", str(folder), mend) from None
+
+
+def _words(now: Evaluation) -> str:
+    return "; ".join(describe(barrier, 2) for barrier in now.layout) or "no barrier"
+
+
+def _title(site: Site, episode: int) -> str:
+    return f"{site.name}, episode {episode}"

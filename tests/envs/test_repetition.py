@@ -1,0 +1,146 @@
+"""Replays hold what it takes to compute them again, and `rigdda repeat` does so."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import msgspec
+import numpy as np
+import pytest
+from cases import cut
+
+import rigdda
+from rigdda import BadInput, Fence, Site
+from rigdda.envs import repetition
+from rigdda.envs.registration import ENVIRONMENTS
+from rigdda.envs.repetition import EpisodeRecord, ReleaseRecord, as_json, release_record
+from rigdda.replay.recording import Marks
+
+CUT = cut()
+LAYOUT = (Fence(12.0, 2.0, energy_class=250),)
+every = pytest.mark.parametrize("name", ENVIRONMENTS)
+
+
+def repeat(path: Path) -> tuple[int, str, str]:
+    """Return exit code, standard output and standard error of `rigdda repeat`."""
+    root = str(Path(rigdda.__file__).parents[1])
+    paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+    process = subprocess.run(
+        [sys.executable, "-m", "rigdda.agents.cli", "repeat", str(path)],
+        env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    return process.returncode, process.stdout, process.stderr
+
+
+def played(name: str, folder: Path, **keywords: Any) -> tuple[Path, list[float]]:
+    """Return the replay of an episode of random actions, and its rewards."""
+    env = gymnasium.make(name, record=folder, **keywords)
+    env.action_space.seed(4)
+    env.reset(seed=11)
+    rewards, ended = [], False
+    while not ended:
+        action = env.action_space.sample()
+        action[0] = abs(action[0])
+        _, reward, ended, *_ = env.step(action)
+        rewards.append(reward)
+    env.close()
+    (path,) = folder.iterdir()
+    return path, rewards
+
+
+@every
+@pytest.mark.parametrize(
+    "keywords",
+    [
+        {"site": CUT, "releases": 2},
+        {"site": CUT, "releases": 20, "targets": {"reach": 0.2}, "kinds": ("fence",)},
+        {"site": "validation", "releases": 1, "fidelity": "fast", "max_barriers": 2},
+    ],
+)
+def test_an_episode_is_repeated_to_the_last_bit(
+    name: str, keywords: dict[str, Any], tmp_path: Path
+) -> None:
+    path, rewards = played(name, tmp_path, **keywords)
+    record = repetition.load(path)
+    assert isinstance(record, EpisodeRecord)
+    assert (record.environment, record.rewards, record.seed) == (name, rewards, 11)
+    assert len(record.release_seeds) == keywords["releases"]
+    found = record.repeat()
+    assert found.same and not found.other_versions
+
+
+@every
+def test_episodes_of_copies_are_repeated(name: str, tmp_path: Path) -> None:
+    batch = gymnasium.make_vec(
+        name, 2, vectorization_mode="vector_entry_point", site=CUT, max_barriers=1, releases=1,
+        record=tmp_path, autoreset_mode="NextStep",
+    )  # fmt: skip
+    batch.reset(seed=3)
+    batch.action_space.seed(1)
+    _, rewards, *_ = batch.step(batch.action_space.sample())
+    for i in range(2):
+        (path,) = (tmp_path / f"copy-{i}").iterdir()
+        record = repetition.load(path)
+        assert isinstance(record, EpisodeRecord) and record.rewards == [rewards[i]]
+        assert record.repeat().same
+
+
+def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> None:
+    path, (reward,) = played("rigdda/BarrierDesign-v0", tmp_path, site=CUT, releases=2)
+    code, out, _ = repeat(path)
+    assert code == 0 and f"the same to the last bit: reward {reward!r}" in out
+
+    record = repetition.load(path)
+    wrong = float(np.nextafter(reward, 1.0))
+    versions = msgspec.structs.replace(record.versions, kernels="0" * 16)
+    other = msgspec.structs.replace(record, rewards=[wrong], versions=versions)
+    run, _ = rigdda.release(CUT, (), 0)
+    run.to_rerun(tmp_path / "other.rrd", Marks(record=as_json(other)))
+    code, out, err = repeat(tmp_path / "other.rrd")
+    assert code == 1
+    assert f"it differs: recorded reward {wrong!r}, computed reward {reward!r}" in err
+    assert f"other version: kernels {'0' * 16}, now {record.versions.kernels}" in out
+
+
+@pytest.mark.parametrize("event", [None, "block"])
+def test_a_release_is_repeated(event: str | None, tmp_path: Path) -> None:
+    run, outcome = rigdda.release(CUT, LAYOUT, 5, event)
+    record = release_record(CUT, LAYOUT, 5, event, outcome)
+    run.to_rerun(tmp_path / "it.rrd", Marks(record=record))
+    found = repetition.load(tmp_path / "it.rrd")
+    assert isinstance(found, ReleaseRecord) and found.site == CUT
+    assert found.barriers[0]["kind"] == "fence"
+    assert found.repeat().same
+    assert not msgspec.structs.replace(found, seed=6).repeat().same
+
+
+def test_every_built_in_site_survives_in_a_record() -> None:
+    for name in rigdda.sites.names():
+        site = Site.load(name)
+        assert msgspec.json.decode(msgspec.json.encode(site), type=Site) == site
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "name an existing .rrd file"),
+        (b"no replay", "name a whole .rrd file"),
+        ("", "recorded"),
+        ("{}", "this version of rigdda recorded"),
+    ],
+)
+def test_another_file_is_refused(content: bytes | str | None, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "it.rrd"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content is not None:
+        run, _ = rigdda.release(CUT, (), 0)
+        run.to_rerun(path, Marks(record=content))
+    with pytest.raises(BadInput, match=words) as caught:
+        repetition.load(path)
+    assert "\n" not in str(caught.value)

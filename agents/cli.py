@@ -212,7 +212,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     import rigdda
     from rigdda.agents.reports import findings
     from rigdda.barriers import standing
-    from rigdda.envs.repetition import release_record
+    from rigdda.envs.replay_record import release_record
     from rigdda.replay.recording import Marks
     from rigdda.replay.viewer import open_viewer
 
@@ -250,9 +250,9 @@ def repeat(file: Path) -> None:
     holds the site, the actions and the seeds. The exit code is 1 if anything differs. Other
     versions than those of the recording are listed.
     """
-    from rigdda.envs import repetition
+    from rigdda.envs import repetition, replay_record
 
-    found = repetition.load(file).repeat()
+    found = repetition.repeat(replay_record.load(file))
     click.echo(found.what)
     for words in found.other_versions:
         note(f"other version: {words}")

@@ -26,7 +26,7 @@ from rigdda.envs.outcome_cache import Sample
 from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.recorder import Recorder, Shown, Trigger
 from rigdda.envs.rendering import picture
-from rigdda.envs.repetition import EpisodeRecord, Versions, as_json
+from rigdda.envs.replay_record import EpisodeRecord, Versions, as_json
 from rigdda.envs.site_sampling import Place, Venue
 
 

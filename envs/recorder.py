@@ -90,7 +90,7 @@ class Recorder:
         rewards : sequence of float
             Of each step.
         record : str
-            What it takes to compute the episode again, see `rigdda.envs.repetition`.
+            What it takes to compute the episode again, see `rigdda.envs.replay_record`.
         """
         from rigdda.replay.recording import Marks
 

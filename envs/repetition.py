@@ -1,159 +1,17 @@
-"""What a replay holds to compute its episode or release again, and doing so.
-
-A record has the whole site, so that it needs no other file, and what was computed, to the last bit.
-"""
+"""Computing the episode or the release of a replay again, from the record that it holds."""
 
 from __future__ import annotations
 
-import os
-import platform
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import msgspec
-import numba
 import numpy as np
 
 import rigdda
-from rigdda import BadInput, Layout, Outcome, Site, __version__
-from rigdda.barriers import from_table, to_tables
-from rigdda.envs.problem import Targets
+from rigdda.barriers import from_table
+from rigdda.envs import environments
 from rigdda.envs.registration import ENVIRONMENTS
-from rigdda.kernel import source_hash
-
-if TYPE_CHECKING:
-    from rigdda.envs.environments import BarrierEnv
-
-
-class Versions(msgspec.Struct, frozen=True):
-    """Programs that computed a record, and a hash of the kernels' sources."""
-
-    rigdda: str
-    kernels: str
-    numba: str
-    numpy: str
-    python: str
-    machine: str
-
-    @classmethod
-    def of_today(cls) -> Versions:
-        """Return those of this process."""
-        return cls(
-            rigdda=__version__,
-            kernels=source_hash(),
-            numba=numba.__version__,
-            numpy=np.__version__,
-            python=platform.python_version(),
-            machine=f"{platform.system()} {platform.machine()}",
-        )
-
-
-class EpisodeRecord(msgspec.Struct, frozen=True, tag="episode", forbid_unknown_fields=True):
-    """An episode of an environment.
-
-    Parameters
-    ----------
-    environment : str
-        Its registered name.
-    max_barriers, kinds, releases, targets
-        Keywords of the environment.
-    fidelity : str
-        That of the site, which is kept as it was simulated.
-    site : Site
-        Where the episode played.
-    episode, seed : int
-        Its number in the environment, and the seed of its `reset`, None if it went on with the
-        random numbers of the episode before.
-    release_seeds : list of int
-        Of the scored releases.
-    shown_seed, shown_event : int, str
-        The release that the replay shows.
-    actions : list of list of float
-        Of every step, clipped to [-1, 1].
-    rewards : list of float
-        Of every step.
-    versions : Versions
-        Of what computed it.
-    """
-
-    environment: str
-    max_barriers: int
-    kinds: list[str]
-    releases: int
-    targets: Targets
-    fidelity: str
-    site: Site
-    episode: int
-    seed: int | None
-    release_seeds: list[int]
-    shown_seed: int
-    shown_event: str
-    actions: list[list[float]]
-    rewards: list[float]
-    versions: Versions
-
-    def repeat(self) -> Repetition:
-        """Compute the episode again."""
-        env = self._environment()
-        env.draw(self.seed, {"site": self.site})
-        env.seeds = tuple(self.release_seeds)
-        env.begin()
-        rewards = [env.step(np.array(action))[1] for action in self.actions]
-        return Repetition(
-            what=f"{self.environment}, site {self.site.name}, {len(rewards)} steps",
-            recorded="reward " + " ".join(map(repr, self.rewards)),
-            computed="reward " + " ".join(map(repr, rewards)),
-            versions=self.versions,
-        )
-
-    def _environment(self) -> BarrierEnv:
-        """Return an environment with the keywords; the site is that of the episode."""
-        from rigdda.envs import environments
-
-        name = ENVIRONMENTS[self.environment][0].rpartition(":")[2]
-        made: BarrierEnv = getattr(environments, name)(
-            "random",
-            max_barriers=self.max_barriers,
-            kinds=tuple(self.kinds),
-            releases=self.releases,
-            targets=self.targets,
-        )
-        return made
-
-
-class ReleaseRecord(msgspec.Struct, frozen=True, tag="release", forbid_unknown_fields=True):
-    """A release of a site with a layout.
-
-    Parameters
-    ----------
-    site, seed, event
-        As `rigdda.release` takes them.
-    barriers : list of dict
-        What stands, a table each as in layout files.
-    outcome : str
-        Its outcome as JSON.
-    versions : Versions
-        Of what computed it.
-    """
-
-    site: Site
-    barriers: list[dict[str, Any]]
-    seed: int
-    event: str | None
-    outcome: str
-    versions: Versions
-
-    def repeat(self) -> Repetition:
-        """Compute the release again."""
-        tables = enumerate(self.barriers)
-        layout = tuple(from_table(f"barriers[{i}]", table) for i, table in tables)
-        _, outcome = rigdda.release(self.site, layout, self.seed, self.event)
-        return Repetition(
-            what=f"release {self.seed} of {self.site.name}, event {outcome.event}",
-            recorded=f"outcome {self.outcome}",
-            computed=f"outcome {as_json(outcome)}",
-            versions=self.versions,
-        )
+from rigdda.envs.replay_record import EpisodeRecord, ReleaseRecord, Versions, as_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,32 +35,47 @@ class Repetition:
         return [f"{name} {then[name]}, now {now[name]}" for name in then if then[name] != now[name]]
 
 
-def as_json(value: Outcome | EpisodeRecord | ReleaseRecord) -> str:
-    """Return a record or an outcome as JSON, in which numbers are exact."""
-    return msgspec.json.encode(value).decode()
+def repeat(record: EpisodeRecord | ReleaseRecord) -> Repetition:
+    """Compute an episode or a release again."""
+    if isinstance(record, EpisodeRecord):
+        return _repeat_episode(record)
+    return _repeat_release(record)
 
 
-def release_record(
-    site: Site, layout: Layout, seed: int, event: str | None, outcome: Outcome
-) -> str:
-    """Return the record of a release that gave an outcome, for a replay of it."""
-    tables, found = to_tables(layout), as_json(outcome)
-    made = ReleaseRecord(site, tables, seed, event, found, Versions.of_today())
-    return as_json(made)
+def _repeat_episode(record: EpisodeRecord) -> Repetition:
+    env = _environment(record)
+    env.draw(record.seed, {"site": record.site})
+    env.seeds = tuple(record.release_seeds)
+    env.begin()
+    rewards = [env.step(np.array(action))[1] for action in record.actions]
+    return Repetition(
+        what=f"{record.environment}, site {record.site.name}, {len(rewards)} steps",
+        recorded="reward " + " ".join(map(repr, record.rewards)),
+        computed="reward " + " ".join(map(repr, rewards)),
+        versions=record.versions,
+    )
 
 
-def load(path: str | os.PathLike[str]) -> EpisodeRecord | ReleaseRecord:
-    """Return the record that a replay holds.
+def _environment(record: EpisodeRecord) -> environments.BarrierEnv:
+    """Return an environment with the keywords of a record; the site is that of the episode."""
+    name = ENVIRONMENTS[record.environment][0].rpartition(":")[2]
+    made: environments.BarrierEnv = getattr(environments, name)(
+        "random",
+        max_barriers=record.max_barriers,
+        kinds=tuple(record.kinds),
+        releases=record.releases,
+        targets=record.targets,
+    )
+    return made
 
-    Raises
-    ------
-    BadInput
-        If the file is missing, is not a replay, or holds no record of this version.
-    """
-    from rigdda.replay.recording import read_record
 
-    try:
-        return msgspec.json.decode(read_record(path), type=EpisodeRecord | ReleaseRecord)
-    except msgspec.MsgspecError as error:
-        mend = f"name one that this version of rigdda recorded ({error})"
-        raise BadInput("replay file", str(path), mend) from None
+def _repeat_release(record: ReleaseRecord) -> Repetition:
+    tables = enumerate(record.barriers)
+    layout = tuple(from_table(f"barriers[{i}]", table) for i, table in tables)
+    _, outcome = rigdda.release(record.site, layout, record.seed, record.event)
+    return Repetition(
+        what=f"release {record.seed} of {record.site.name}, event {outcome.event}",
+        recorded=f"outcome {record.outcome}",
+        computed=f"outcome {as_json(outcome)}",
+        versions=record.versions,
+    )

@@ -16,9 +16,10 @@ from cases import cut
 
 import rigdda
 from rigdda import BadInput, Fence, Site
-from rigdda.envs import repetition
+from rigdda.envs import replay_record
 from rigdda.envs.registration import ENVIRONMENTS
-from rigdda.envs.repetition import EpisodeRecord, ReleaseRecord, as_json, release_record
+from rigdda.envs.repetition import repeat
+from rigdda.envs.replay_record import EpisodeRecord, ReleaseRecord, as_json, release_record
 from rigdda.replay.recording import Marks
 
 CUT = cut()
@@ -66,11 +67,11 @@ def test_an_episode_is_repeated_to_the_last_bit(
     name: str, keywords: dict[str, Any], tmp_path: Path
 ) -> None:
     path, rewards = played(name, tmp_path, **keywords)
-    record = repetition.load(path)
+    record = replay_record.load(path)
     assert isinstance(record, EpisodeRecord)
     assert (record.environment, record.rewards, record.seed) == (name, rewards, 11)
     assert len(record.release_seeds) == keywords["releases"]
-    found = record.repeat()
+    found = repeat(record)
     assert found.same and not found.other_versions
 
 
@@ -85,9 +86,9 @@ def test_episodes_of_copies_are_repeated(name: str, tmp_path: Path) -> None:
     _, rewards, *_ = batch.step(batch.action_space.sample())
     for i in range(2):
         (path,) = (tmp_path / f"copy-{i}").iterdir()
-        record = repetition.load(path)
+        record = replay_record.load(path)
         assert isinstance(record, EpisodeRecord) and record.rewards == [rewards[i]]
-        assert record.repeat().same
+        assert repeat(record).same
 
 
 def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> None:
@@ -95,7 +96,7 @@ def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> 
     code, out, _ = repeat(path)
     assert code == 0 and f"the same to the last bit: reward {reward!r}" in out
 
-    record = repetition.load(path)
+    record = replay_record.load(path)
     wrong = float(np.nextafter(reward, 1.0))
     versions = msgspec.structs.replace(record.versions, kernels="0" * 16)
     other = msgspec.structs.replace(record, rewards=[wrong], versions=versions)
@@ -112,11 +113,11 @@ def test_a_release_is_repeated(event: str | None, tmp_path: Path) -> None:
     run, outcome = rigdda.release(CUT, LAYOUT, 5, event)
     record = release_record(CUT, LAYOUT, 5, event, outcome)
     run.to_rerun(tmp_path / "it.rrd", Marks(record=record))
-    found = repetition.load(tmp_path / "it.rrd")
+    found = replay_record.load(tmp_path / "it.rrd")
     assert isinstance(found, ReleaseRecord) and found.site == CUT
     assert found.barriers[0]["kind"] == "fence"
-    assert found.repeat().same
-    assert not msgspec.structs.replace(found, seed=6).repeat().same
+    assert repeat(found).same
+    assert not repeat(msgspec.structs.replace(found, seed=6)).same
 
 
 def test_every_built_in_site_survives_in_a_record() -> None:
@@ -142,5 +143,5 @@ def test_another_file_is_refused(content: bytes | str | None, words: str, tmp_pa
         run, _ = rigdda.release(CUT, (), 0)
         run.to_rerun(path, Marks(record=content))
     with pytest.raises(BadInput, match=words) as caught:
-        repetition.load(path)
+        replay_record.load(path)
     assert "\n" not in str(caught.value)

@@ -12,7 +12,7 @@ from rigdda.agents.reports import findings, pictures
 from rigdda.agents.reports.pictures import BLOCKS, Flights, Panel, fly, section
 from rigdda.agents.reports.wording import euros, span
 from rigdda.barriers import standing
-from rigdda.envs.repetition import release_record
+from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
 
 FILES = (

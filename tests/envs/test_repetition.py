@@ -27,7 +27,7 @@ LAYOUT = (Fence(12.0, 2.0, energy_class=250),)
 every = pytest.mark.parametrize("name", ENVIRONMENTS)
 
 
-def repeat(path: Path) -> tuple[int, str, str]:
+def command(path: Path) -> tuple[int, str, str]:
     """Return exit code, standard output and standard error of `rigdda repeat`."""
     root = str(Path(rigdda.__file__).parents[1])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -93,7 +93,7 @@ def test_episodes_of_copies_are_repeated(name: str, tmp_path: Path) -> None:
 
 def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> None:
     path, (reward,) = played("rigdda/BarrierDesign-v0", tmp_path, site=CUT, releases=2)
-    code, out, _ = repeat(path)
+    code, out, _ = command(path)
     assert code == 0 and f"the same to the last bit: reward {reward!r}" in out
 
     record = replay_record.load(path)
@@ -102,7 +102,7 @@ def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> 
     other = msgspec.structs.replace(record, rewards=[wrong], versions=versions)
     run, _ = rigdda.release(CUT, (), 0)
     run.to_rerun(tmp_path / "other.rrd", Marks(record=as_json(other)))
-    code, out, err = repeat(tmp_path / "other.rrd")
+    code, out, err = command(tmp_path / "other.rrd")
     assert code == 1
     assert f"it differs: recorded reward {wrong!r}, computed reward {reward!r}" in err
     assert f"other version: kernels {'0' * 16}, now {record.versions.kernels}" in out

@@ -1,4 +1,4 @@
-"""Opens replay files in the Rerun viewer."""
+"""Launcher of the Rerun viewer for replay files."""
 
 from __future__ import annotations
 

@@ -67,9 +67,7 @@ def flight(
 
 
 def measured(lab: Lab, poses: Floats) -> tuple[Measured]:
-    """Return the distances of poses from those of the unchanged scene, over the travel
-    distances.
-    """
+    """Return the distances of poses from those of the unchanged scene, over the distances moved."""
     plain = flight(lab)
     start = np.array([polygon_properties(corners)[1] for corners, _ in parts(lab)])
     way = np.linalg.norm(plain[:, :2] - start, axis=1)

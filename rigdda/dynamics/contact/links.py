@@ -1,10 +1,10 @@
 """Supports as contacts that can pull: bolts act along their line, pins in both directions.
 
 Supports enter the system of equations, the exchange of forces and the ledger like closed contacts
-and follow the same law (`contact.law`): a pin with b = 0; a bolt with w_0 = 0, kappa = k / 4 and b
-= -T / kappa, which is its mean tension over the step, T + k d / 2, and conserves energy for any
-step length. The state of a support is decided in `open_close.next_state_of_link`, and in relaxation
-by `relaxation.aim_row` and the limits in `relaxation.sweep`.
+and follow the same law (`contact.law`). A pin has b = 0. A bolt has w_0 = 0, kappa = k / 4 and b =
+-T / kappa, so that N is minus its mean tension over the step, T + k d / 2; this conserves energy
+for any step length. The state of a support is decided in `open_close.next_state_of_link`, and in
+relaxation by `relaxation.aim_row` and the limits in `relaxation.sweep`.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ class Meeting(NamedTuple):
 class Window(NamedTuple):
     """Limits within which corners of the incident edge form contacts with the face."""
 
-    shift_x: float  # moves polygon j to the time of entry, without its rotation [m]
+    shift_x: float  # moves polygon j to its position at the time of entry, without rotation [m]
     shift_y: float
     reach: float  # greatest gap [m]
     margin: float  # how far beyond an end of the face in a notch a corner may lie [m]

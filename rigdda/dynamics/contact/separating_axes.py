@@ -24,8 +24,8 @@ TOUCH = 2e-3
 the earlier it is reached, so that of an edge and the corner at its end the edge is hit."""
 
 SQUARE = 0.2
-"""Ratio of the approach normal to a face to the total relative displacement above which the face is
-hit rather than grazed [-]."""
+"""Ratio of the approach normal to a face to the total relative displacement, above which the face
+is hit rather than grazed [-]."""
 
 NEVER = 1e3
 """Time of entry, over the step, assigned to a face that is approached too slowly to be entered
@@ -103,11 +103,11 @@ def face_of_contact(
     `approach` is the motion of j relative to i. Edges inside the body count as deeper by `sunk`
     [m], so that a real edge wins a tie.
 
-    A face that is hit, that is approached by more than `square` [m], is entered when the nearest
+    A face is hit if it is approached by more than `square` [m]; it is entered when the nearest
     corner meets it. A face that is touching or grazed is entered when the corner is deeper than the
-    margin; of two such faces, the one approached more slowly is the best. The velocity of the
-    touching corner is used for this, because the centre of a rolling block descends while its point
-    of contact does not.
+    margin; of two such faces, the one approached more slowly is the best. The approach of a
+    touching face is that of the corner that touches it, because the centre of a rolling block
+    descends while its point of contact does not.
 
     The edge above which the mean corner of j is highest is examined first, because it usually is
     the best one or rules out a contact. Another edge is examined only if the inscribed circle of j

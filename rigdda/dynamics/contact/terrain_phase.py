@@ -36,7 +36,7 @@ def over_segment(ground: GroundArrays, s: int, x: float, y: float, depth: float)
     """Return whether a point lies over segment s, extended at its ends as `depth` requires."""
     along, one = along_segment(ground, s, x, y), ground.segment[s]
     turn_end = ground.segment[s + 1].turn
-    # beyond a concave corner, a point at this depth may be nearer to this segment than to the next
+    # beyond a concave corner, count a point at this depth if this segment is nearer than the next
     if along < 0.0 and one.turn > 0.0:
         return -along <= depth * math.tan(0.5 * one.turn)
     if along > one.length and turn_end > 0.0:
@@ -101,8 +101,9 @@ def beneath_roof(
 ) -> bool:
     """Return whether a corner of block a under segment s lies in the air beneath an overhang.
 
-    In this case another segment lies between them. A corner that was pushed right through a thin
-    piece of ground does not count, because the block still extends through segment s.
+    In this case another segment lies between the corner and segment s. A corner that was pushed
+    right through a thin piece of ground does not count, because the block still extends through
+    segment s.
     """
     x, y = outlines.corner[a, vertex].x, outlines.corner[a, vertex].y
     foot_x, foot_y = x - gap * ground.segment[s].normal_x, y - gap * ground.segment[s].normal_y

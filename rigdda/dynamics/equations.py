@@ -23,8 +23,8 @@ from rigdda.kernel import inlined, kernel
 def inertia_stiffness(mass: float, damping: float, dt: float) -> float:
     """Return 2 M / dt^2 + alpha M / dt: inertia and damping on the diagonal [N/m].
 
-    With the second moment in place of the mass, it is the entry of the rotation. The submatrices
-    are integrals of T^t T over the block and are diagonal about the centroid.
+    With the second moment instead of the mass, it is the entry of the rotation. The submatrices are
+    integrals of T^t T over the block and are diagonal about the centroid.
     """
     return 2.0 * mass / (dt * dt) + damping * mass / dt
 

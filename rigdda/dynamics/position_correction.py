@@ -77,7 +77,7 @@ def list_rows(rows: Rows, count: int, reach: float) -> int:
 
 @kernel
 def part_bodies(rows: Rows, listed: int) -> None:
-    """Sweep once over the listed rows and separate their bodies by what is still missing."""
+    """Sweep once over the listed rows and separate their bodies as far as is still necessary."""
     for place in range(listed):
         k = rows.visit[place]
         row, a, b = rows.row[k], rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]

@@ -392,7 +392,8 @@ def work_from(rows: Rows, count: int, number: int, first: int) -> float:
 def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> None:
     """Prepare an island for the rebound at the end of a substep with a fraction of restitution.
 
-    Contacts with an impact keep their impulses, so that friction is limited by the whole impact.
+    Contacts with an impact keep their impulses, so that friction is limited by the total impulse of
+    the impact.
     """
     for s in range(n):
         for q in range(3):

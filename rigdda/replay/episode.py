@@ -74,7 +74,7 @@ def write_episode(
     title : str
         Name of the recording.
     record : str
-        All that it takes to compute the episode again, as JSON; kept in the file, not shown.
+        All inputs needed to compute the episode again, as JSON; stored in the file but not shown.
 
     Raises
     ------

@@ -270,22 +270,22 @@ def write_rerun(
 
 
 RECORD = "/record"
-"""Entity of what it takes to compute an episode again."""
+"""Entity of the inputs needed to compute an episode again."""
 
 
 def log_record(rec: rr.RecordingStream, record: str) -> None:
-    """Log what it takes to compute an episode again, if there is anything."""
+    """Log the inputs needed to compute an episode again, if there are any."""
     if record:
         rec.log(RECORD, rr.TextDocument(record, media_type="application/json"), static=True)
 
 
 def read_record(path: str | os.PathLike[str]) -> str:
-    """Return what a replay holds to compute its episode again.
+    """Return the inputs stored in a replay for computing its episode again, as JSON.
 
     Raises
     ------
     BadInput
-        If the file is missing, is not a replay or holds nothing of that kind.
+        If the file is missing, is not a replay or contains no such inputs.
     """
     file = rrd_path(path)
     if not file.is_file():

@@ -1,1 +1,1 @@
-"""Scripts that make the figures and studies, one each; their records are in `results`."""
+"""Scripts for figures and studies, one each; their recorded results are in `results`."""

@@ -1,14 +1,15 @@
-"""What breaks without each constant of the mechanics.
+"""Effect of each constant of the mechanics, found by neutralising it.
 
 `python -m experiments.ablated [--out DIR]`.
 
-Each is set to the value at which it does nothing, or where there is none to a half or twice. For
-each of these the closed forms, the hard cases at 10 ms, the tests of what is confined, held or
-foreseen, and a rockfall of 120 blocks are run. Two at a time it takes two hours.
+Each constant is set to a value at which it has no effect, or if there is none, to a very different
+value. For each of these variants, the script runs the closed-form cases, the hard cases at 10 ms,
+tests of fences, thrust, foreseen contacts, walls, lone blocks, sleeping and supports, and a
+rockfall of 120 blocks. With two variants at a time it takes two hours.
 
-`python -m experiments.ablated NAME=VALUE ...` runs once with other constants and prints JSON. It is
-a process of its own: kernels take constants in when they are compiled, so that constants are set
-before any kernel is read, and kernels are compiled into a folder that is thrown away.
+`python -m experiments.ablated NAME=VALUE ...` runs once with changed constants and prints JSON. It
+must be a separate process: kernels compile constants in, so constants are changed before any kernel
+is imported, and kernels are compiled into a temporary folder.
 """
 
 from __future__ import annotations
@@ -46,28 +47,29 @@ VARIANTS = (
     "APART=0",
     "LONGEST_FLIGHT=1",
 )
-"""What each constant is set to; not those that only stop a run or warn."""
+"""Changed value of each constant, except for those that only stop a run or warn."""
 
 DEAR = ("collisions", "eccentric-hits", "ritchie")
-"""How the names of dear closed forms begin that are left out: almost any constants keep them."""
+"""Prefixes of the names of expensive closed-form cases, which are left out because almost any
+constants satisfy them."""
 
 TESTS = ("test_fences", "test_thrust", "test_foreseen", "test_gravity_walls", "test_lone_block",
          "test_sleeping", "test_loads_and_supports")  # fmt: skip
-"""Tests of tests/physics that are run besides."""
+"""Additional tests from tests/physics."""
 
 HARD_STEP = 1e-2
 """Step of the hard cases [s]."""
 
 TABLE = "constants.csv"
 USUAL, NOTHING = "as it is", "LONGEST_FLIGHT=64"
-"""The row of what is unchanged, and a change that is none."""
+"""Name of the row without changes, and an assignment that changes nothing."""
 
 Row = dict[str, Any]
 
 
 def change(changes: list[str]) -> None:
-    """Put a changed copy of `rigdda.dynamics.constants` where kernels will look for it."""
-    place = importlib.util.find_spec("rigdda")  # of a module in it, this would import kernels
+    """Replace `rigdda.dynamics.constants` by a changed copy before kernels import it."""
+    place = importlib.util.find_spec("rigdda")  # for a submodule, this would import kernels
     assert place is not None and place.submodule_search_locations is not None
     path = Path(place.submodule_search_locations[0], "dynamics", "constants.py")
     spec = importlib.util.spec_from_file_location("rigdda.dynamics.constants", path)
@@ -82,19 +84,19 @@ def change(changes: list[str]) -> None:
 
 
 class Failures:
-    """Plugin of pytest that keeps the names of what failed."""
+    """Pytest plugin that collects the names of failed tests."""
 
     def __init__(self) -> None:
         self.names: list[str] = []
 
     def pytest_runtest_logreport(self, report: Any) -> None:
-        """Keep a name."""
+        """Add the name of a failed test."""
         if report.failed:
             self.names.append(report.nodeid.split("::")[-1])
 
 
 def measure() -> dict[str, Any]:
-    """Return what is amiss among the cases, and the cost and the depth of rockfalls."""
+    """Return the failures among cases and tests, and the cost and penetration of rockfalls."""
     import numpy as np
     import pytest
 
@@ -133,7 +135,7 @@ def measure() -> dict[str, Any]:
 
 
 def attempt(variant: str) -> Row:
-    """Return what came of a variant, computed in a process of its own."""
+    """Return the results of a variant, computed in a separate process."""
     command = [
         sys.executable,
         "-m",
@@ -154,7 +156,7 @@ def attempt(variant: str) -> Row:
 @click.option("--out", type=click.Path(path_type=Path), default=Path("experiments/results"),
               show_default=True, help="Folder of results.")  # fmt: skip
 def main(changes: tuple[str, ...], out: Path) -> None:
-    """Run all variants and write the table, or run once with changes and print what is found."""
+    """Run all variants and write the table, or run once with changes and print the results."""
     if changes:
         with tempfile.TemporaryDirectory() as folder:
             os.environ["XDG_CACHE_HOME"] = folder

@@ -1,13 +1,13 @@
-"""What each part of the mechanics costs: switched off where it helps, present where it is idle.
+"""Cost of each part of the mechanics: parts switched off, and idle parts added.
 
-Rockfalls down the highway slope. Of the parts that are there to save time or to be exact (islands,
-sleep, post-correction) each is switched off; of those that a scene may hold
-(bolts, loads, cohesion, motion of the base, barriers) one that does nothing is added. Processor
-time is that over the scene as it is, in the same round; the greatest penetration says what it does
-to the contacts.
+Rockfalls down the highway slope are simulated. The parts that save time or improve accuracy
+(islands, sleeping, post-correction) are switched off one by one. Of the optional parts of a scene
+(bolts, loads, cohesion, base motion, barriers), one without effect is added. The processor time is
+relative to that of the unchanged scene in the same round; the greatest penetration shows the effect
+on contacts.
 
-Judged by the dearest idle part: what a scene lacks costs it nothing, if even what is there and does
-nothing is cheap.
+Judged by the most expensive idle part: if even a part that is present without effect is cheap, then
+an absent part costs nothing.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ from experiments.script import BLUE, GREY, RED, Number, draw, main, say, write
 from rigdda import Bolt, Fence, PointLoad, Scene, Settings, Simulation, Wall
 
 IDLE = 1.25
-"""Most that an idle part may cost, over the scene as it is [-]; rounds scatter by some per cent."""
+"""Target for the cost of an idle part over that of the unchanged scene [-]; rounds scatter by some
+per cent."""
 
 
 class Part(NamedTuple):
-    """A variant: what is changed of the scene and of the settings."""
+    """A variant: changes of the scene and of the settings."""
 
     name: str
     group: str
@@ -83,9 +84,9 @@ def measure(part: Part, scene: Scene, duration: float) -> tuple[float, float]:
 
 
 def rows(blocks: int, releases: int, duration: float) -> list[dict[str, object]]:
-    """Return a row for each part: medians over the releases."""
+    """Return a row for each part, with medians over the releases."""
     found: dict[str, list[tuple[float, float, float]]] = {part.name: [] for part in PARTS}
-    measure(AS_IT_IS, rockfall_scene(blocks, 1), 0.05)  # compiled from here on
+    measure(AS_IT_IS, rockfall_scene(blocks, 1), 0.05)  # compile the kernels
     for seed in range(1, releases + 1):
         say(f"release {seed} of {releases}")
         scene, base = rockfall_scene(blocks, seed), 0.0
@@ -107,7 +108,7 @@ def rows(blocks: int, releases: int, duration: float) -> list[dict[str, object]]
 
 
 def picture(figure: Figure, table: list[dict[str, object]]) -> None:
-    """Draw the cost of each part over the scene as it is."""
+    """Draw the cost of each part over that of the unchanged scene."""
     axes = figure.subplots()
     colours = {"": GREY, "switched off": RED, "idle": BLUE}
     for place, row in enumerate(table):
@@ -127,7 +128,7 @@ def run(quick: bool, out: Path) -> Number:
     write(out / "ablation.csv", table)
     draw(out / "ablation.png", (8.0, 5.0), lambda figure: picture(figure, table))
     dearest = max(float(str(r["over_as_it_is"])) for r in table if r["group"] == "idle")
-    return Number("dearest idle part, over the scene as it is", dearest, high=IDLE)
+    return Number("cost of the most expensive idle part over the plain scene", dearest, high=IDLE)
 
 
 if __name__ == "__main__":

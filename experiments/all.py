@@ -1,7 +1,7 @@
-"""Figures, tables and studies that are judged by a number, one after the other.
+"""Run all figures, tables and studies that are judged by a number.
 
-Not those that take hours or other engines: outcome_cost, tschamut, reference, designers, bench,
-ablated.
+This excludes those that take hours or need other engines: outcome_cost, tschamut, reference,
+designers, bench, ablated.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ SCRIPTS = (
     "hard_cases",
     "speed_error",
 )
-"""Modules of `experiments` with `run(quick, out) -> Number`, in the order in which they run."""
+"""Modules of `experiments` with `run(quick, out) -> Number`, in order of execution."""
 
 
 class Result(NamedTuple):
-    """What came of a script: its number, or the error that stopped it, and processor time [s]."""
+    """Result of a script: its number, or the error that stopped it, and its processor time [s]."""
 
     script: str
     number: Number | None
@@ -51,24 +51,24 @@ class Result(NamedTuple):
 
     @property
     def passed(self) -> bool:
-        """Whether it ran and reached its target."""
+        """Whether the script ran and reached its target."""
         return self.number is not None and self.number.passed
 
 
 def attempt(script: str, quick: bool, out: Path) -> Result:
-    """Run a script, and go on if it fails."""
+    """Run a script and catch any error."""
     start = time.process_time()
     number, error = None, ""
     try:
         number = importlib.import_module(f"experiments.{script}").run(quick, out)
-    except Exception as failure:  # whatever it is, the other scripts are worth running
+    except Exception as failure:  # run the other scripts after any error
         traceback.print_exc()
         error = f"{type(failure).__name__}: {failure}"
     return Result(script, number, error, time.process_time() - start)
 
 
 def summary(results: list[Result]) -> Table:
-    """Return a table of what each script found."""
+    """Return a table of the results of all scripts."""
     table = Table("script", "what it is judged by", "value", "target", "reached", "CPU s")
     for r in results:
         what, value, target = r.error, "", ""
@@ -82,7 +82,7 @@ def summary(results: list[Result]) -> Table:
 @click.command(help=__doc__)
 @options
 def main(quick: bool, out: Path | None) -> None:
-    """Run all scripts; exits with 1 and names those that failed or missed their target."""
+    """Run all scripts; exit with 1 and name those that failed or missed their target."""
     results = []
     for i, script in enumerate(SCRIPTS):
         say(f"[{i + 1}/{len(SCRIPTS)}] {script}")

@@ -1,4 +1,4 @@
-"""A catalogue of singles and pairs, raced by sequential halving: what may be best on a site."""
+"""Candidates for the best layout of a site: a catalogue of singles and pairs, raced."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from rigdda.agents.designers.protocol import release_seeds
 from rigdda.envs import DesignProblem
 
 KEPT = 0.3
-"""Share of the candidates that goes on to the next round."""
+"""Fraction of the candidates that advances to the next round."""
 LEFT = 16
-"""Candidates that end a race."""
+"""Number of candidates at which a race ends."""
 PAIR_STATIONS = 8
-"""Parts of the zone in each of which the best single of a kind is paired with others."""
+"""Number of parts of the zone. In each part, the best single barrier of each kind is used for
+pairs."""
 PAIRS = 240
-"""Pairs that are raced, the most promising."""
+"""Number of pairs that are raced, the most promising ones."""
 CHUNK = 20_000
-"""Releases that are simulated together: their outcomes are kept until they are summed up."""
+"""Number of releases that are simulated together, whose outcomes are held in memory."""
 
 
 def kinds_of(layout: Layout) -> str:
-    """Return the kinds of a layout in words, each once."""
+    """Return the names of the kinds of a layout, each once."""
     return " + ".join(sorted({barrier.words for barrier in layout})) or "nothing"
 
 
 def catalogue(menu: Menu, stations: int) -> list[Layout]:
-    """Return all singles of a problem over so many of its stations, kind by kind."""
+    """Return all single-barrier layouts of a problem at this number of stations, kind by kind."""
     own = menu.stations[:: max(1, len(menu.stations) // stations)].tolist()
     singles: list[Barrier] = []
     for kind in menu.problem.kinds:
@@ -40,7 +41,7 @@ def catalogue(menu: Menu, stations: int) -> list[Layout]:
 
 
 class Candidate:
-    """A layout and its mean bill by event so far."""
+    """A layout and its mean costs by event so far."""
 
     def __init__(self, problem: DesignProblem, layout: Layout):
         site = problem.site
@@ -50,15 +51,16 @@ class Candidate:
 
     @property
     def z(self) -> float:
-        """Z so far [EUR per metre of road and year]."""
+        """Estimate of Z so far [EUR per metre of road and year]."""
         means = ((r, self.bills[name]) for name, r in self.rates.items())
         return self.annual + sum(r * float(np.mean(b)) for r, b in means if b)
 
 
 def look(problem: DesignProblem, field: Sequence[Candidate], n: int) -> None:
-    """Give each candidate `n` releases in all, the same for all; more than it has.
+    """Increase the number of releases of each candidate to `n`, the same ones for all.
 
-    None of an event that would have no more than two: a mass takes as long as hundreds of blocks.
+    Events that would have no more than two releases are left out, because a mass takes as long as
+    hundreds of single blocks.
     """
     counts = {name: count for name, count in problem.allocation(n).items() if count > 2}
     seeds = {name: release_seeds("search", 0, count) for name, count in counts.items()}
@@ -72,7 +74,7 @@ def look(problem: DesignProblem, field: Sequence[Candidate], n: int) -> None:
 
 
 def race(problem: DesignProblem, layouts: Iterable[Layout], first: int) -> list[Candidate]:
-    """Return all candidates of a race by sequential halving, the best of the last round first."""
+    """Return all candidates of a race by sequential halving, best first."""
     field = [Candidate(problem, layout) for layout in dict.fromkeys(layouts)]
     alive, n = field, first
     out: list[Candidate] = []
@@ -87,7 +89,7 @@ def race(problem: DesignProblem, layouts: Iterable[Layout], first: int) -> list[
 
 
 def pairs(problem: DesignProblem, singles: Sequence[Candidate]) -> list[Layout]:
-    """Return the most promising pairs: of what one lets past, the other lets past its share."""
+    """Return the most promising pairs, assuming that the barriers act independently."""
     nothing = Candidate(problem, ())
     look(problem, [nothing], max(sum(map(len, c.bills.values())) for c in singles))
     zone, best = problem.zone, dict[tuple[str, int], Candidate]()
@@ -111,7 +113,7 @@ def pairs(problem: DesignProblem, singles: Sequence[Candidate]) -> list[Layout]:
 
 
 def contenders(problem: DesignProblem, stations: int, first: int) -> list[Layout]:
-    """Return the best layouts of every combination of kinds, two each."""
+    """Return the two best layouts of every combination of kinds."""
     menu = Menu(problem)
     singles = race(problem, [(), *catalogue(menu, stations)], first)
     built = [c for c in singles if c.layout]

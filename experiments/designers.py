@@ -1,12 +1,12 @@
-"""Designers by their distance from the reference, against the releases that they may use.
+"""Distance of designers from the reference, against the number of releases that they use.
 
 `python -m experiments.designers [--quick] [--out DIR]`, after `python -m experiments.reference`. On
-every built-in design site `race` and `random` search with several seeds at two budgets, the others
-once at the default. What they find is verified on fresh releases, the reference and no barriers on
-the same ones. The distance is (Z - Z of the reference) / (Z of nothing - Z of the reference): 0 is
-as good, 1 gains nothing.
+every built-in design site, `race` and `random` search with several seeds and two budgets, the
+others once with the default budget. Their layouts are verified on fresh releases, together with the
+reference and no barriers. The distance is (Z - Z of the reference) / (Z without barriers - Z of the
+reference): 0 equals the reference, 1 means no gain.
 
-Writes designers.csv, a row a search, and designers.png. Goes on where it was stopped.
+Writes designers.csv, one row per search, and designers.png. An interrupted run is resumed.
 """
 
 from __future__ import annotations
@@ -47,22 +47,23 @@ COLOURS = {
     "convex": "#9467bd",
 }  # fmt: skip
 FREE = ("constant", "rule")
-"""Designers that search nothing: one budget and one seed tell all."""
+"""Designers that do not search; one budget and one seed suffice."""
 MANY = ("race", "random")
-"""Designers that search at every budget with every seed; the others with the default and one."""
+"""Designers that search with every budget and seed; the others use the default budget and one
+seed."""
 TICKS, APART = (2_000, 5_000, 10_000, 20_000), 1.03
-"""Marks of the axis of the picture, and the factor by which points of designers are drawn apart."""
+"""Tick labels of the axis, and the factor by which points of different designers are separated."""
 SEEDS, QUICK_SEEDS = 3, 1
 BUDGETS, QUICK_BUDGETS = (BUDGET // 10, BUDGET), (600,)
 VERIFY, QUICK_VERIFY = 6_000, 800
 FRESH = 1
-"""Seed of these releases: the reference was chosen on those of another one, as the best of many."""
+"""Seed of the verification releases, different from that by which the reference was selected."""
 TARGET = 0.05
-"""Distance of the default designer at its default budget that is asked, on five of six sites."""
+"""Target distance of the default designer with its default budget, on five of six sites."""
 
 
 def cases(quick: bool) -> list[tuple[int, int, str]]:
-    """Return seed, budget and designer of every search on a site, those that tell most first."""
+    """Return seed, budget and designer of every search on a site, most informative first."""
     budgets, seeds = (QUICK_BUDGETS, QUICK_SEEDS) if quick else (BUDGETS, SEEDS)
     found = [
         (seed, budget, name)
@@ -76,7 +77,7 @@ def cases(quick: bool) -> list[tuple[int, int, str]]:
 
 
 class Contest:
-    """A site with its reference, and all that was verified on it.
+    """A site with its reference and the layouts verified on it.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ class Contest:
     recorded : list of dict
         Rows of the reference.
     releases : int
-        Releases that every layout is verified on.
+        Number of releases for the verification of each layout.
     """
 
     def __init__(self, site: str, recorded: list[Any], releases: int):
@@ -95,11 +96,11 @@ class Contest:
         self.best = reference.layout_of(best)
 
     def verify(self, layout: Layout) -> Evaluation:
-        """Return what a layout is worth on the releases that all meet."""
+        """Return the evaluation of a layout on the common releases."""
         return verify(self.problem, layout, self.releases, FRESH, self.store)
 
     def row(self, name: str, budget: int, seed: int) -> dict[str, Any]:
-        """Let a designer search; return what it found."""
+        """Run a designer; return the row of its result."""
         say(f"{self.site}: {name}, {budget} releases, seed {seed}")
         found = designers.module(name).design(self.problem, budget, seed)
         least, nothing, e = map(self.verify, (self.best, (), found.layout))
@@ -126,7 +127,7 @@ def medians(rows: list[Any], name: str, budget: int) -> dict[str, float]:
 
 
 def picture(figure: Figure, rows: list[Any]) -> None:
-    """Draw the distance of every search against its releases, site by site."""
+    """Draw the distance of every search against its number of releases, site by site."""
     names = list(dict.fromkeys(r["site"] for r in rows))
     grid = figure.subplots(2, (len(names) + 1) // 2, squeeze=False, sharey=True).ravel()
     for axes, site in zip(grid, names, strict=False):
@@ -146,7 +147,7 @@ def picture(figure: Figure, rows: list[Any]) -> None:
 
 
 def load(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a former run that were made by the mechanics of today."""
+    """Return the rows of an earlier run that were made by the current mechanics."""
     if not path.is_file():
         return []
     with path.open(newline="", encoding="utf-8") as file:

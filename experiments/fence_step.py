@@ -1,9 +1,10 @@
-"""Barriers against step: debris and failures of layouts whose barriers can fail.
+"""Effect of the step on debris and failures of layouts whose barriers can fail.
 
-Fences of 2.5 and 3.5 m on the two benches of `shu-hwa`, of capacities at which some fail and some
-do not, and one on `quick`; a ditch, an embankment and a gravity wall. Damping in contact only.
-Both sites without barriers stand beside them: what depends on the step there is no barrier's doing.
-Judged by the greatest difference from the shortest step, over the 95 % interval of the difference.
+Layouts: fences of 2.5 and 3.5 m on the two benches of `shu-hwa` with capacities at which some fail
+and some do not, one fence on `quick`, a ditch, an embankment and a gravity wall; with contact
+damping only. Both sites are also run without barriers, to show step dependence that is not caused
+by barriers. Judged by the greatest difference from the shortest step over the 95 % interval of the
+difference.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from rigdda.releases import release_many
 
 
 def benches(upper: float, lower: float) -> Layout:
-    """Return fences of such capacities on the two benches of `shu-hwa`."""
+    """Return fences of these capacities on the two benches of `shu-hwa`."""
     return Fence(50.5, 2.5, upper), Fence(67.8, 3.5, lower)
 
 
@@ -51,19 +52,20 @@ LAYOUTS: dict[str, tuple[str, Layout]] = {
 COLOURS = ("0.1", "0.4", BLUE, RED, GREEN, ORANGE, GREY, "#7d3c98", "#148f77")
 
 STEPS, QUICK_STEPS = (1.25e-3, 2.5e-3, 5e-3, 1e-2, 2e-2), (2.5e-3, 5e-3, 1e-2)
-"""Steps [s], the shortest first: what the others are compared with."""
+"""Steps [s]; the first and shortest one is the basis of comparison."""
 
 RELEASES, QUICK_RELEASES = 24, 6
 
 MOST = 1.6
-"""Greatest difference over its interval that 72 comparisons may show by chance [-]: 3.1 standard
-deviations, which one of them exceeds in a tenth of such studies."""
+"""Greatest difference over its interval that may occur by chance in 72 comparisons [-]: 3.1
+standard deviations, which one of them exceeds in a tenth of such studies."""
 
 
 def measure(layout: str, dt_s: float, releases: int) -> Row:
-    """Return debris share and number of failures of a layout at a step [s]: means, half intervals.
+    """Return the mean debris share and number of failures of a layout at a step [s].
 
-    Where all releases are alike the interval of a failure is 3/n, the rule of three.
+    Half intervals are included. If all releases are alike, the interval of the failures is 3/n, the
+    rule of three.
     """
     name, barriers = LAYOUTS[layout]
     site = Site.load(name)
@@ -80,7 +82,7 @@ def measure(layout: str, dt_s: float, releases: int) -> Row:
 
 
 def told(row: Row) -> str:
-    """Return what the terminal says of a row."""
+    """Return a progress message for a row."""
     words = f"{row['layout']}, {1e3 * row['dt_s']:g} ms"
     return f"{words}: debris {row['debris']:.3f}, failures {row['failures']:.2f}"
 

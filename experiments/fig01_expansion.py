@@ -1,9 +1,9 @@
-"""Figs 1 to 3: a block expands as it turns by the linear displacement function, but not corrected.
+"""Figs 1 to 3: expansion of a rotating block by the linear displacement function.
 
-Equation 2 moves a corner at distance r along its tangent, by r dr: out of its circle (Fig. 1). A
-block that falls down a slope grows so (Fig. 2); corrected with equation 1 after each step it does
-not (Fig. 3). Judged by the greatest relative error of its growth over a turn against the closed
-form, and by the area with the correction.
+Equation 2 moves a corner at distance r along its tangent by r dr, out of its circle (Fig. 1). A
+block that falls down a slope expands (Fig. 2), unless equation 1 corrects it after each step (Fig.
+3). Judged by the greatest relative error of the expansion per turn compared with the closed form,
+and by the area with post-correction.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ DT = 5e-3
 """Time step [s]."""
 
 ROTATIONS = (1e-3, 3e-3, 1e-2, 3e-2, 5e-2)
-"""Rotations in a step [rad]."""
+"""Rotations per step [rad]."""
 
 SLOPE = ((-6.0, 16.0), (0.0, 16.0), (16.0, 0.0), (60.0, 0.0))
-"""Where the block falls [m]."""
+"""Corners of the slope [m]."""
 
 DURATION, FRAMES = 5.4, 9
-"""Time of its fall [s] and how often it is drawn."""
+"""Duration of the fall [s], and number of outlines that are drawn."""
 
 
 def area(sim: Simulation) -> float:
@@ -41,7 +41,7 @@ def area(sim: Simulation) -> float:
 
 
 def grown(rotation: float) -> float:
-    """Return the growth of area over a turn without the correction [-], at `rotation` a step."""
+    """Return the growth of area per turn without post-correction [-], at `rotation` per step."""
     sim = Simulation(spinning(rotation / DT), Settings(dt=DT, post_correction=False))
     before = area(sim)
     sim.step(round(2.0 * math.pi / math.atan(rotation)))
@@ -49,14 +49,14 @@ def grown(rotation: float) -> float:
 
 
 class Fall(NamedTuple):
-    """A block that fell down the slope: outlines (F, n, 2) [m], and areas (F,) over the first."""
+    """A block that fell down the slope: outlines (F, n, 2) [m], areas (F,) over the initial one."""
 
     corners: list[Floats]
     areas: Floats
 
 
 def fall(post_correction: bool) -> Fall:
-    """Let a block roll over the crest and down the slope."""
+    """Simulate a block that rolls over the crest and down the slope."""
     block = Block(ngon(7, centre=(-0.6, 17.0), angle=0.3), velocity=(1.5, 0.0, -1.5))
     scene = Scene(Terrain(SLOPE), (block,), rock(40.0, 0.3))
     sim = Simulation(scene, Settings(dt=DT, post_correction=post_correction))
@@ -69,7 +69,7 @@ def fall(post_correction: bool) -> Fall:
 
 
 def draw_growth(axes: Axes, rows: list[dict[str, Any]]) -> None:
-    """Draw the growth of area over a turn against the rotation of a step."""
+    """Draw the growth of area per turn against the rotation per step."""
     dr = np.geomspace(ROTATIONS[0] / 1.5, ROTATIONS[-1] * 1.5)
     exact = [100.0 * growth(r) for r in dr]
     axes.plot(dr, exact, color=GREY, label="$(1 + r_0^2)^{2\\pi/\\arctan r_0} - 1$")
@@ -91,7 +91,7 @@ def draw_fall(axes: Axes, found: Fall, title: str, colour: str) -> None:
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Compute, write and draw; `quick` changes nothing, it takes a second."""
+    """Compute, write and draw; `quick` has no effect, since the run takes a second."""
     rows = [
         {"rotation_rad": dr, "growth": grown(dr), "closed_form": growth(dr)} for dr in ROTATIONS
     ]

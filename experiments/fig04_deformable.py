@@ -1,8 +1,8 @@
-"""Fig. 4: processor time of a step against the number of blocks, 3N against 6N unknowns.
+"""Fig. 4: processor time per step against the number of blocks, for 3N and 6N unknowns.
 
-The same pressed pile as rigid blocks and as the original deformable ones, which share the detection
-of contacts, the penalty law, the solver and its tolerance. Judged by the least ratio of the two
-times over all sizes.
+The same loaded pile is computed with rigid blocks and with the original deformable ones. Both
+models share the contact detection, the penalty law, the solver and its tolerance. Judged by the
+least ratio of the two times over all sizes.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ COURSES, QUICK_COURSES = (2, 3, 5, 8, 11, 16, 22, 32), (2, 4, 8, 16)
 """Courses of the pile."""
 
 WARM_UP, STEPS, REPEATS, QUICK_REPEATS = 2, 20, 15, 9
-"""Steps that are not timed, steps that are, and how often from the start."""
+"""Number of steps that are not timed, of steps that are timed, and of repetitions."""
 
 
 def rigid(courses: int) -> Simulation:
-    """Return the pile as rigid blocks, all in one system."""
+    """Return the pile of rigid blocks, all in one system."""
     chosen = settings(STIFFNESS, mode="static", islands=False, solver="pcg")
     return Simulation(pile(courses), chosen)
 
 
 def deformable(courses: int) -> Deformable:
-    """Return the pile as deformable blocks."""
+    """Return the pile of deformable blocks."""
     return Deformable(pile(courses), settings(STIFFNESS, mode="static"))
 
 
 def time_of_step(model: Simulation | Deformable) -> float:
-    """Return the processor time of a step [s]."""
+    """Return the processor time per step [s]."""
     model.step(WARM_UP)
     start = time.process_time()
     model.step(STEPS)
@@ -48,9 +48,9 @@ def time_of_step(model: Simulation | Deformable) -> float:
 
 
 def row(courses: int, repeats: int) -> dict[str, Any]:
-    """Return times and iterations of both models; the least of several times counts.
+    """Return times and iterations of both models, with the least of several times.
 
-    They are timed in turns, so that other load meets both.
+    The models are timed alternately, so that other load affects both.
     """
     times = [
         (time_of_step(rigid(courses)), time_of_step(deformable(courses))) for _ in range(repeats)
@@ -99,7 +99,7 @@ def draw_times(figure: Figure, rows: list[dict[str, Any]]) -> None:
 def run(quick: bool, out: Path) -> Number:
     """Compute, write and draw."""
     rows = []
-    deformable(2).step()  # compiles
+    deformable(2).step()  # compile the kernels
     for courses in QUICK_COURSES if quick else COURSES:
         say(f"fig04: {courses} courses")
         rows.append(row(courses, QUICK_REPEATS if quick else REPEATS))

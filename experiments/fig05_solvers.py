@@ -1,16 +1,16 @@
-"""Fig. 5: successive over-relaxation against preconditioned conjugate gradients.
+"""Fig. 5: successive over-relaxation compared with preconditioned conjugate gradients.
 
-The simultaneous equations of one step of a pressed pile of bricks, all contacts closed, at three
-stiffnesses h = k_n dt^2 / (2 m) of its contacts against the inertia of its blocks. Both solvers
-start from no displacement and stop at the same residual. Over-relaxation has the one factor of
-`Settings`, as a code must choose it, and the factor that is best for each system, which is known
-only afterwards.
+The systems are those of one step of a loaded pile of bricks with all contacts closed, at three
+stiffnesses h = k_n dt^2 / (2 m) of its contacts relative to the inertia of its blocks. Both solvers
+start from zero displacement and stop at the same residual. Over-relaxation uses the fixed factor of
+`Settings`, as a program must choose it in advance, and the best factor for each system, which is
+only known afterwards.
 
-Judged by the number of blocks from which on conjugate gradients need fewer iterations than
-over-relaxation with the one factor, at h = 10. What was asked for besides, fewer iterations than at
-the best factor, is told but not reached where inertia keeps the system well conditioned: there
-over-relaxation at its best converges at up to twice the rate of conjugate gradients with the
-inverse diagonal (Young 1971, Iterative solution of large linear systems).
+Judged by the number of blocks above which conjugate gradients need fewer iterations than
+over-relaxation with the fixed factor, at h = 10. Fewer iterations than with the best factor are
+reported but not reached where inertia keeps the system well conditioned: there, optimal
+over-relaxation converges at up to twice the rate of conjugate gradients with the inverse diagonal
+(Young 1971, Iterative solution of large linear systems).
 """
 
 from __future__ import annotations
@@ -37,31 +37,31 @@ COURSES, QUICK_COURSES = (2, 3, 5, 8, 11, 16, 22, 32), (2, 4, 8, 16)
 """Courses of the pile."""
 
 TOLERANCE = 1e-7
-"""Residual at which both stop, in the norm of the inverse diagonal, over the forces [-]."""
+"""Residual at which both solvers stop, in the norm of the inverse diagonal, over the forces [-]."""
 
 FACTOR = Settings().relaxation
-"""The one factor of over-relaxation [-]."""
+"""The fixed over-relaxation factor [-]."""
 
 FACTORS = (1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7, 1.75, 1.8, 1.85, 1.9, 1.93, 1.95, 1.97, 1.98)
-"""Factors of which the best one is found [-]."""
+"""Factors among which the best one is selected [-]."""
 
 LARGEST = 256
-"""Blocks up to which conjugate gradients must have come to need fewer iterations."""
+"""Target: number of blocks above which conjugate gradients need fewer iterations."""
 
 SOLVERS = {"pcg": ("PCG", BLUE), "sor": (f"SOR {FACTOR:g}", RED), "best": ("SOR best", ORANGE)}
-"""Columns of the table and their lines."""
+"""Columns of the table with their labels and colours."""
 
 
 @entry_kernel
 def pcg(m: Matrix, scratch: Scratch, n: int, pairs: int) -> int:
-    """Solve from no displacement by conjugate gradients; returns the iterations."""
+    """Solve from zero displacement by conjugate gradients; return the iterations."""
     m.d[:] = 0.0
     return solve_pcg(m, scratch, n, pairs, TOLERANCE, False)
 
 
 @entry_kernel
 def sor(m: Matrix, scratch: Scratch, n: int, pairs: int, factor: float) -> int:
-    """Solve from no displacement by over-relaxation; returns the sweeps."""
+    """Solve from zero displacement by over-relaxation; return the sweeps."""
     m.d[:] = 0.0
     return solve_sor(m, scratch, n, pairs, TOLERANCE, factor)
 
@@ -71,7 +71,7 @@ def row(courses: int, h: float) -> dict[str, Any]:
     (matrix, scratch), n, pairs = system(pile(courses), h)
     sweeps = {factor: sor(matrix, scratch, n, pairs, factor) for factor in (*FACTORS, FACTOR)}
     best = min(sweeps, key=lambda factor: sweeps[factor])
-    found = matrix.d[:n].copy()  # by FACTOR
+    found = matrix.d[:n].copy()  # with FACTOR
     steps = pcg(matrix, scratch, n, pairs)
     solved = matrix.d[:n].copy()
     return {
@@ -89,7 +89,7 @@ def row(courses: int, h: float) -> dict[str, Any]:
 
 
 def crossing(rows: list[dict[str, Any]], h: float, other: str, what: str) -> float:
-    """Return the least number of blocks from which on PCG has less of `what`, inf if none."""
+    """Return the number of blocks above which PCG has less of `what`, inf if there is none."""
     least = math.inf
     for r in sorted((r for r in rows if r["h"] == h), key=lambda r: -r["blocks"]):
         if r[f"pcg_{what}"] >= r[f"{other}_{what}"]:
@@ -99,7 +99,7 @@ def crossing(rows: list[dict[str, Any]], h: float, other: str, what: str) -> flo
 
 
 def report(rows: list[dict[str, Any]]) -> str:
-    """Return from how many blocks on conjugate gradients are ahead."""
+    """Return the numbers of blocks above which conjugate gradients are ahead, in words."""
     lines = []
     for h in STIFFNESS:
         for other, (name, _) in list(SOLVERS.items())[1:]:
@@ -110,12 +110,12 @@ def report(rows: list[dict[str, Any]]) -> str:
                 cells.append(f"{word} {found}")
             lines.append(f"h = {h:g}: PCG against {name}: {', '.join(cells)}")
     lost = any(crossing(rows, h, "best", "iterations") == math.inf for h in STIFFNESS)
-    told = "NOT REACHED: fewer iterations than SOR at its best factor, which no code knows"
+    told = "NOT REACHED: fewer iterations than SOR at its best factor, unknown in advance"
     return "\n".join([*lines, *([told] if lost else [])])
 
 
 def draw_lines(axes: Axes, rows: list[dict[str, Any]], what: str, label: str) -> None:
-    """Draw one measure of both solvers against the number of blocks."""
+    """Draw a quantity of both solvers against the number of blocks."""
     for h, style in zip(STIFFNESS, (":", "--", "-"), strict=True):
         here = [r for r in rows if r["h"] == h]
         blocks = [r["blocks"] for r in here]

@@ -1,9 +1,9 @@
-"""Figs 6 to 8 and Table 1: a toppling slope of 16 columns against its limit equilibrium.
+"""Figs 6 to 8 and Table 1: a toppling slope of 16 columns compared with its limit equilibrium.
 
-Static mode, as in the paper; columns are 10 m wide on steps of 1 m, which is what the published
-forces belong to. Forces at the friction angle of the paper, 38.15 deg; modes just below the limit
-of 38.151 deg, where the slope moves. Judged by the greatest error of the 32 base forces; another
-mode than that of Table 1 counts as 1.
+Static mode is used, as in the paper. The columns are 10 m wide on steps of 1 m, which correspond to
+the published forces. Forces are compared at the friction angle of the paper, 38.15 deg, and modes
+just below the limit of 38.151 deg, where the slope moves. Judged by the greatest error of the 32
+base forces; a mode that differs from Table 1 counts as 1.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rigdda.validation.case import Lab, Metered
 from rigdda.validation.scenes import Floats
 
 MODES_DEG = 38.0
-"""Friction angle at which the modes are told [deg]."""
+"""Friction angle for the comparison of modes [deg]."""
 
 TABLE_1 = ("sliding",) * 3 + ("toppling",) * 10 + ("stable",) * 3
 """Modes of the columns from the toe upwards: Table 1, after Hoek and Bray (1981)."""
@@ -31,11 +31,11 @@ TABLE_1 = ("sliding",) * 3 + ("toppling",) * 10 + ("stable",) * 3
 COLOURS = {"stable": GREEN, "toppling": ORANGE, "sliding": RED}
 
 SHOWN = 4.0
-"""Displacement as which the greatest one is drawn [m]."""
+"""Length at which the greatest displacement is drawn [m]."""
 
 
 class Found(NamedTuple):
-    """What was computed: base forces (16,) [N], modes, and the slope before and after it moved."""
+    """Computed base forces (16,) [N], modes, and the slope before and after its motion."""
 
     normal: Floats
     shear: Floats
@@ -114,7 +114,7 @@ def rows(found: Found, exact: Toppling) -> list[dict[str, object]]:
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Compute, write and draw; `quick` changes nothing, it takes seconds."""
+    """Compute, write and draw; `quick` has no effect, since the run takes seconds."""
     found, exact = compute(), toppling.limit(toppling.LIMIT_DEG)
 
     def picture(figure: Figure) -> None:

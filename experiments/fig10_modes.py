@@ -1,10 +1,10 @@
 """Figs 9 and 10: rolling, bouncing and falling on slopes of 35, 60 and 80 deg.
 
-Ritchie (1963) saw rocks roll below 45 deg, bounce from 45 to 75 deg and fall above. Single blocks
-are pushed off crests of 20 m, with a prescribed restitution and with the paper's plain penalty
-contact. Judged by how far apart the 95 % intervals of the touches on the way down are, many when
-it rolls and few when it falls, for both contacts; the share of the time in which a block is farther
-from the slope than it is large, and the touches in a turn, are told beside it.
+Ritchie (1963) observed that rocks roll below 45 deg, bounce from 45 to 75 deg and fall above.
+Single blocks are pushed off crests of 20 m, with prescribed restitution and with the paper's plain
+penalty contact. Judged by the separation of the 95 % intervals of the number of touches during
+descent (many for rolling, few for falling) for both contacts. The fraction of time in which a block
+is farther from the slope than its size, and the touches per turn, are reported as well.
 """
 
 from __future__ import annotations
@@ -25,19 +25,20 @@ from rigdda.validation.case import Lab
 from rigdda.validation.scenes import Floats
 
 SLOPES_DEG = {"rolling": 35, "bouncing": 60, "falling": 80}
-"""A slope of each mode [deg]."""
+"""Slope angle of each mode [deg]."""
 
 CONTACTS = {"restitution 0.35": 0.35, "plain": None}
 
 RELEASES, QUICK_RELEASES = 64, 32
-"""Blocks pushed off each crest."""
+"""Number of blocks pushed off each crest."""
 
 DRAWN, EVERY, STRIDE, WATCHED = 3, 0.2, 4, 8.0
-"""Blocks that are drawn, how often [s], steps from point to point of a path, and how long [s]."""
+"""Number of blocks drawn, interval of outlines [s], steps between points of a path, duration
+[s]."""
 
 
 def site_of(slope_deg: int, restitution: float | None) -> Site:
-    """Return the cut with this angle, all surfaces with this restitution."""
+    """Return the cut with this angle and this restitution of all surfaces."""
     site = Site.load(f"ritchie-{slope_deg}")
     surfaces = {
         k: msgspec.structs.replace(s, restitution=restitution) for k, s in site.surfaces.items()
@@ -46,14 +47,14 @@ def site_of(slope_deg: int, restitution: float | None) -> Site:
 
 
 def descents(site: Site, slope_deg: int, releases: int) -> Floats:
-    """Return the descents of a slope, a row each with the fields of `ritchie.RitchieDescent`."""
+    """Return the descents of a slope, one row each with the fields of `ritchie.RitchieDescent`."""
     lab = Lab(Settings().dt)
     each = (ritchie.descend(lab, site, lab.random(slope_deg, i)) for i in range(releases))
     return np.array(list(each))
 
 
 def row(mode: str, contact: str, releases: int) -> dict[str, Any]:
-    """Return what a mode looks like: shares of time with their intervals, touches in a turn."""
+    """Return the results of a mode: touches with interval, time fractions, touches per turn."""
     slope_deg = SLOPES_DEG[mode]
     say(f"fig10: {mode}, {contact}")
     found = descents(site_of(slope_deg, CONTACTS[contact]), slope_deg, releases)
@@ -73,7 +74,7 @@ def row(mode: str, contact: str, releases: int) -> dict[str, Any]:
 
 
 def separation(rows: list[dict[str, Any]]) -> float:
-    """Return the least distance of neighbouring intervals of the touches; below 0: they overlap."""
+    """Return the least gap between neighbouring intervals of the touches, < 0 if they overlap."""
     gaps = [
         a["touches"] - a["half_interval"] - b["touches"] - b["half_interval"]
         for a, b in pairwise(rows)

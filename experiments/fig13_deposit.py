@@ -1,9 +1,10 @@
-"""Figs 11 to 13: rockfall on the highway site, its deposit, and the damping that it calibrates.
+"""Figs 11 to 13: rockfall on the highway site, its deposit, and the calibration of damping.
 
-The paper's damping coefficient of 0.6 1/s was found by trial, so that the debris comes to lie as it
-was found in the field: on the road and near the toe of the slope. Here alpha runs from 0 to 1.2
-1/s, with a prescribed restitution and with the paper's plain penalty contact. Judged by the share
-of the rock that lies about the toe and on the road at 0.6 1/s, the lesser of both contacts.
+The paper's damping coefficient of 0.6 1/s was found by trial, such that the debris is deposited as
+observed in the field: on the road and near the toe of the slope. Here alpha varies from 0 to 1.2
+1/s, with prescribed restitution and with the paper's plain penalty contact. Judged by the share of
+the rock that is deposited near the toe and on the road at 0.6 1/s, for the contact with the lower
+share.
 """
 
 from __future__ import annotations
@@ -23,22 +24,23 @@ ALPHAS, QUICK_ALPHAS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2), (0.0, 0.6, 1.2)
 """Damping coefficients [1/s]."""
 
 RELEASES, QUICK_RELEASES = 8, 2
-"""Releases of each variant."""
+"""Number of releases of each variant."""
 
 LEAST = 0.75
-"""Share of the rock about the toe and on the road from which on it lies as in the field [-].
+"""Target share of the rock deposited near the toe and on the road [-].
 
-Chosen: the paper gives no figure. Two releases scatter by 0.05 about the mean of many.
+It was chosen, because the paper gives no figure. The mean of two releases scatters by 0.05 about
+that of many.
 """
 
 TIMES = (8.0, 12.0, 16.0)
-"""Times at which the fall is drawn [s]."""
+"""Times at which the rockfall is drawn [s]."""
 
 COLOURS = dict(zip(ZONES, (GREY, GREEN, RED, BLUE), strict=True))
 
 
 def row(contact: str, alpha: float, runs: list[Run]) -> dict[str, Any]:
-    """Return the mean shares of the zones with their intervals, and what still moves."""
+    """Return the mean shares of the zones with their intervals, and the share still in motion."""
     found = [shares(run) for run in runs]
     moving = [(np.hypot(*run.velocities[-1, :, :2].T) > 0.1).mean() for run in runs]
     out: dict[str, Any] = {"contact": contact, "alpha_1_s": alpha, "releases": len(runs)}
@@ -49,12 +51,12 @@ def row(contact: str, alpha: float, runs: list[Run]) -> dict[str, Any]:
 
 
 def deposited(row: dict[str, Any]) -> float:
-    """Return the share of the rock about the toe and on the road [-]."""
+    """Return the share of the rock near the toe and on the road [-]."""
     return float(row["toe"] + row["road"])
 
 
 def draw_sweep(figure: SubFigure, axes: Axes, rows: list[dict[str, Any]]) -> None:
-    """Draw where the rock comes to lie against the damping coefficient."""
+    """Draw the zones of the deposit against the damping coefficient."""
     for contact, style in zip(CONTACTS, ("o-", "s--"), strict=True):
         here = [r for r in rows if r["contact"] == contact]
         alpha = [r["alpha_1_s"] for r in here]
@@ -80,7 +82,7 @@ def draw_sweep(figure: SubFigure, axes: Axes, rows: list[dict[str, Any]]) -> Non
 
 
 def draw_all(figure: Figure, first: dict[str, Run], rows: list[dict[str, Any]]) -> None:
-    """Draw the site, the fall at several times, the deposits and the sweep."""
+    """Draw the site, the rockfall at several times, the deposits and the sweep."""
     above, below = figure.subfigures(2, height_ratios=(1.0, 1.1))
     run = first["restitution 0.2"]
     for axes, time in zip(above.subplots(1, 1 + len(TIMES)), (0.0, *TIMES), strict=True):
@@ -115,7 +117,7 @@ def run(quick: bool, out: Path) -> Number:
         for r in rows
     )
     return Number(
-        f"least share of the rock about the toe and on the road at {ALPHA:g} 1/s [-]",
+        f"least share of the rock near the toe and on the road at {ALPHA:g} 1/s [-]",
         min(deposited(r) for r in here),
         low=LEAST,
         note="\n".join(told),

@@ -1,12 +1,12 @@
-"""Fig. 14: a retaining structure near the toe of the highway site keeps the rock off the road.
+"""Fig. 14: a retaining structure near the toe of the highway site keeps rock off the road.
 
-The slope above the toe is steeper than the friction angle, so nearly all of the rock comes down,
-about 250 m2: over half of it would come to rest against the foot of the slope and on top of each
-other, a third on the road and beyond (`fig13_deposit`). A structure must find room for all of it
-between its face and the slope. Its height is swept, at the uphill edge of the road, for both
-contacts.
+The slope above the toe is steeper than the friction angle, so that nearly all of the rock, about
+250 m2, comes down. Over half of it would be deposited at the foot of the slope and a third on the
+road and beyond (`fig13_deposit`). A structure needs room for all of it between its face and the
+slope. Its height is varied, at the uphill edge of the road, for both contacts.
 
-Judged by the least share of what would reach the road that a structure of the drawn height retains.
+Judged by the least share of the rock reaching the road that a structure of the drawn height
+retains.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ THICKNESS = 1.5
 """Thickness of the structure [m], its downhill face at the road's edge."""
 
 HEIGHT = 22.0
-"""Height of the structure that is drawn [m]."""
+"""Height of the drawn structure [m]."""
 
 HEIGHTS, QUICK_HEIGHTS = (2.0, 4.0, 8.0, 12.0, 16.0, 20.0, HEIGHT, 24.0), (8.0, HEIGHT)
-"""Heights that are swept [m]."""
+"""Heights [m]."""
 
 RELEASES, QUICK_RELEASES = 8, 2
-"""Releases of each layout, the same with and without it."""
+"""Number of releases of each layout, the same with and without the structure."""
 
 LEAST = 0.95
-"""Share of what would reach the road that it must retain [-]."""
+"""Target for the retained share of the rock that would reach the road [-]."""
 
 
 def structure(height: float) -> Layout:
-    """Return a wall of this height, or nothing [m]."""
+    """Return a wall of this height [m], or an empty layout for 0."""
     if height == 0.0:
         return ()
     return (Wall(x=SITE.road.start - THICKNESS, height=height, thickness=THICKNESS),)
 
 
 def rows_of(contact: str, heights: tuple[float, ...], seeds: range) -> tuple[list[dict], list[Run]]:
-    """Return a row a height, 0 first, and the first run without and with the drawn structure."""
+    """Return a row per height, 0 first, and the first runs without and with the drawn structure."""
     rows, drawn = [], []
     for height in (0.0, *heights):
         say(f"fig14: {contact}, {height:g} m")
@@ -74,13 +74,13 @@ def rows_of(contact: str, heights: tuple[float, ...], seeds: range) -> tuple[lis
 
 
 def draw_heights(axes: Axes, rows: list[dict[str, Any]]) -> None:
-    """Draw what is retained against the height."""
+    """Draw the retained share against the height."""
     for contact, colour in zip(CONTACTS, (BLUE, RED), strict=True):
         here = [r for r in rows if r["contact"] == contact]
         height = [r["height_m"] for r in here]
         kept = np.array([r["retained"] for r in here])
         base = here[0]
-        spread = [  # of a ratio, by the delta method; the share at no height is not known exactly
+        spread = [  # by the delta method; the share without a structure is uncertain, too
             math.hypot(r["half_interval"], (1.0 - r["retained"]) * base["half_interval"])
             / base["debris_fraction"]
             for r in here
@@ -118,7 +118,7 @@ def run(quick: bool, out: Path) -> Number:
         for r in rows
     )
     return Number(
-        f"least share of what would reach the road that {HEIGHT:g} m retain [-]",
+        f"least share of the rock reaching the road that {HEIGHT:g} m retain [-]",
         min(kept.values()),
         low=LEAST,
         note="\n".join(told),

@@ -1,4 +1,4 @@
-"""The front of points that are to be small in both: cost and error."""
+"""Pareto front of cost and error."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ Item = TypeVar("Item")
 
 
 def front(items: Iterable[Item], point: Callable[[Item], tuple[float, float]]) -> list[Item]:
-    """Return the items that none beats in both cost and error, from the cheapest on.
+    """Return the items that no other item beats in both cost and error, cheapest first.
 
-    `point` gives cost and error of an item; one without a finite error is not on the front.
+    `point` returns cost and error of an item; items without a finite error are left out.
     """
     best: list[Item] = []
     for item in sorted(items, key=point):

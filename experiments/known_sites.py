@@ -1,9 +1,9 @@
-"""What is known of the generated sites without barriers, for the file that ships with the package.
+"""Precomputed properties of the generated sites without barriers, shipped with the package.
 
 `python -m experiments.known_sites` computes the ensembles and envelopes of the sites of some splits
-and writes them beside `rigdda.envs.site_store`, where the first `reset` on such a site reads them
-in place of simulating two thousand releases. The file is read only while the sources are those that
-made it: make it last before a release. What is in the user's cache is not computed again.
+and writes them to the file of `rigdda.envs.site_store`. The first `reset` on such a site reads them
+instead of simulating two thousand releases. The file is only used with the sources that made it, so
+it must be made last before a release. Values in the user's cache are not computed again.
 """
 
 from __future__ import annotations

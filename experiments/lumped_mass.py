@@ -1,11 +1,11 @@
-"""The lumped mass beside the block model: the paper's highway case and Ritchie's cuts.
+"""Comparison of the lumped-mass and the block model: the paper's highway case and Ritchie's cuts.
 
-Both compute the same releases: the block model as jointed rock of rigid corners that touch one
-another, the lumped mass each block as a point of its own, with the restitution and the friction of
-the same site file and the usual tangential restitution. Neither is fitted. Shape, rotation and
-company differ, and damping: the highway case damps blocks in flight, points know none.
+Both models compute the same releases: the block model as jointed rock of rigid polygons in contact,
+the lumped-mass model as independent points, with the restitution and friction of the same site file
+and the usual tangential restitution. Neither is fitted. The models differ in shape, rotation,
+interaction, and damping: the highway case damps blocks in flight, which points do not model.
 
-Judged by whether on the highway case the difference of the debris share is certain.
+Judged by whether the difference of the debris share in the highway case is significant.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ COLOURS = {"blocks": BLUE, "lumped": GREEN}
 
 
 def cumulative(releases: list[Release], grid: Floats) -> Floats:
-    """Return the share of the rock that stops up to each chainage."""
+    """Return the share of the rock that stops before each chainage."""
     blocks = np.concatenate([r.blocks for r in releases])
     order = np.argsort(blocks[:, RUN_OUT])
     share = np.concatenate([[0.0], np.cumsum(blocks[order, MASS])]) / blocks[:, MASS].sum()
@@ -37,7 +37,7 @@ def cumulative(releases: list[Release], grid: Floats) -> Floats:
 
 
 def picture(figure: Figure, every: dict[str, tuple[Case, dict[str, list[Release]]]]) -> None:
-    """Draw the cumulative run-out by both models, a panel a site."""
+    """Draw the cumulative run-out of both models, one panel per site."""
     for axes, (name, (case, found)) in zip(
         figure.subplots(1, len(every), sharey=True), every.items(), strict=True
     ):
@@ -52,7 +52,7 @@ def picture(figure: Figure, every: dict[str, tuple[Case, dict[str, list[Release]
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Compute the releases and write the table and the picture."""
+    """Compute the releases; write the table and the picture."""
     count = QUICK_RELEASES if quick else RELEASES
     rows: list[dict[str, Any]] = []
     every, shares = dict[str, tuple[Case, dict[str, list[Release]]]](), []

@@ -1,7 +1,7 @@
-"""Which kernels made a recorded result: a hash of what they compute, and the note beside a table.
+"""Provenance of recorded results: a hash of the kernels, noted beside each table.
 
-Unlike the hash under which compiled kernels are kept, that of `kernels_hash` does not change with a
-comment or a docstring, nor with the module that a kernel is in.
+Unlike the hash for cached machine code, `kernels_hash` does not change with comments, docstrings or
+the module that contains a kernel.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ import numba
 from rigdda.kernel import sources
 
 DECORATORS = ("kernel", "inlined", "arithmetic_kernel", "stage", "entry_kernel")
-"""Of functions that are compiled."""
+"""Decorators of compiled functions."""
 
 KERNELS = "kernels.csv"
-"""Table of a folder of results that says which kernels made the others."""
+"""Table in a folder of results that records which kernels made the other tables."""
 
 
 def is_text(part: ast.AST) -> bool:
@@ -30,23 +30,23 @@ def is_text(part: ast.AST) -> bool:
 
 
 def is_kernel(part: ast.stmt) -> bool:
-    """Return whether a statement is a function that is compiled."""
+    """Return whether a statement is a compiled function."""
     if not isinstance(part, ast.FunctionDef):
         return False
     return any(isinstance(d, ast.Name) and d.id in DECORATORS for d in part.decorator_list)
 
 
 def is_driver(part: ast.stmt) -> bool:
-    """Return whether a statement is code of a module that only calls kernels."""
+    """Return whether a statement is ordinary code, as in modules that only call kernels."""
     if isinstance(part, ast.FunctionDef):
         return not part.name.startswith("_")
     return isinstance(part, ast.ClassDef) and not part.bases
 
 
 def statements(source: bytes) -> list[str]:
-    """Return the kernels, constants and layouts of arrays of a module as trees.
+    """Return the syntax trees of the kernels, constants and array layouts of a module.
 
-    Without docstrings and comments; none of a module that only calls kernels.
+    Docstrings and comments are removed. A module that only calls kernels has none.
     """
     tree = ast.parse(source)
     for node in ast.walk(tree):
@@ -62,7 +62,7 @@ def statements(source: bytes) -> list[str]:
 
 @cache
 def kernels_hash() -> str:
-    """Return a hash of numba's version and of what kernels and their constants compute."""
+    """Return a hash of numba's version and of the code of kernels and their constants."""
     parts = [part for source in sources() for part in statements(source)]
     digest = hashlib.sha256(numba.__version__.encode())
     for part in sorted(parts):
@@ -71,7 +71,7 @@ def kernels_hash() -> str:
 
 
 def made_by(folder: Path) -> dict[str, str]:
-    """Return the hash of the kernels that made each table of a folder, as far as it is known."""
+    """Return the hash of the kernels that made each table of a folder, where recorded."""
     path = folder / KERNELS
     if not path.exists():
         return {}

@@ -1,12 +1,11 @@
-"""How certain one slope is: outcomes of perturbed copies of one survey against those of others.
+"""Predictability of a single slope: outcomes of perturbed copies of one survey and of others.
 
-Each survey is a jointed mass of `quick` as one seed cuts it. Its copies differ by the speed of
-their blocks at the start, up to a disturbance. An analysis of variance tells two parts of the
-variance of the debris share: how much of it the survey decides, and how much is left to chance
-between copies.
+Each survey is a jointed mass of `quick` as cut by one seed. Its copies differ in small random
+initial velocities of their blocks. An analysis of variance splits the variance of the debris share
+into a part between surveys and a part between copies, which is chance.
 
-Judged by the share that is left to chance at the usual disturbance: where it is 1, a release of a
-surveyed slope says as little of its next one as a release of another slope.
+Judged by the share of chance at the usual disturbance. If it is 1, a release of a surveyed slope
+predicts its next release no better than a release of another slope does.
 """
 
 from __future__ import annotations
@@ -24,17 +23,17 @@ from rigdda import Site, release_many
 SITE, EVENT = "quick", "mass"
 
 DISTURBANCES = (1e-12, 1e-8, 1e-4, 1e-2)
-"""Greatest speeds at the start [m/s]."""
+"""Greatest initial speeds [m/s]."""
 
 JUDGED = 1e-4
-"""What is usual, `sources.disturbance`."""
+"""Usual value of `sources.disturbance` [m/s]."""
 
 SURVEYS, QUICK_SURVEYS = 24, 4
 COPIES, QUICK_COPIES = 40, 5
 
 
 def surveyed(seed: int, disturbance: float) -> Site:
-    """Return the site with the mass that a seed cuts, disturbed by so much [m/s]."""
+    """Return the site with the mass cut by a seed and a disturbance [m/s]."""
     site = Site.load(SITE)
     blocks = tuple(tuple(map(tuple, b.vertices.tolist())) for b in site.draw(seed, EVENT).blocks)
     sources = tuple(
@@ -55,13 +54,13 @@ def shares(disturbance: float, surveys: int, copies: int) -> np.ndarray:
 
 
 def variances(found: np.ndarray) -> tuple[float, float]:
-    """Return the variance between surveys and that between copies of one, by their mean squares."""
+    """Return the variances between surveys and between copies, from their mean squares."""
     within = float(found.var(axis=1, ddof=1).mean())
     return max(float(found.mean(axis=1).var(ddof=1)) - within / found.shape[1], 0.0), within
 
 
 def picture(figure: Figure, every: dict[float, np.ndarray]) -> None:
-    """Draw the debris shares of all copies, a column a survey, a panel a disturbance."""
+    """Draw the debris shares of all copies, a column per survey and a panel per disturbance."""
     panels = figure.subplots(1, len(every), sharey=True, squeeze=False)[0]
     for axes, (disturbance, found) in zip(panels, every.items(), strict=True):
         for k, each in enumerate(found[np.argsort(found.mean(axis=1))]):
@@ -73,7 +72,7 @@ def picture(figure: Figure, every: dict[float, np.ndarray]) -> None:
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Compute the releases and write the table and the picture."""
+    """Compute the releases; write the table and the picture."""
     surveys, copies = (QUICK_SURVEYS, QUICK_COPIES) if quick else (SURVEYS, COPIES)
     rows: list[dict[str, Any]] = []
     every = {}

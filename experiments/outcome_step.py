@@ -1,9 +1,9 @@
-"""Outcome against step: the share of the rock that passes the road's edge, without barriers.
+"""Effect of the step on the share of rock that passes the road's edge, without barriers.
 
-On `ramp`, a plane of 51 degrees above level ground, ten blocks slide down as one train, and the
-same corner hits the ground in every release: what a step makes of that blow is not averaged out.
-`quick` is the mass of the site of that name, whose releases differ. Judged by the greatest
-difference from the shortest step on either, over the 95 % interval of the difference.
+On `ramp`, a plane of 51 degrees above level ground, ten blocks slide down in a train and the same
+corner hits the ground in every release, so that the effect of the step on this impact is not
+averaged out. `quick` is the mass of the site of that name, whose releases differ. Judged by the
+greatest difference from the shortest step on either site, over the 95 % interval of the difference.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ SITES = {"ramp": RAMP, "quick": Site.load("quick")}
 COLOURS = {"ramp": BLUE, "quick": RED}
 
 STEPS, QUICK_STEPS = (1e-3, 2.5e-3, 5e-3, 1e-2, 2e-2), (2.5e-3, 5e-3, 1e-2)
-"""Steps [s], the shortest first: what the others are compared with."""
+"""Steps [s]; the shortest one is the basis of comparison."""
 
 MOST = 1.5
-"""Greatest difference over its interval that eight comparisons may show by chance [-]: 2.9 standard
-deviations, which one of them exceeds in 3 % of such studies."""
+"""Greatest difference over its interval that may occur by chance in eight comparisons [-]: 2.9
+standard deviations, which one of them exceeds in 3 % of such studies."""
 
 RELEASES, QUICK_RELEASES = {"ramp": 500, "quick": 200}, {"ramp": 40, "quick": 20}
 
@@ -62,7 +62,7 @@ def measure(site: str, dt_s: float, releases: int) -> Row:
 
 
 def told(row: Row) -> str:
-    """Return what the terminal says of a row."""
+    """Return a progress message for a row."""
     return f"{row['site']}, {1e3 * row['dt_s']:g} ms: {row['share']:.3f}"
 
 

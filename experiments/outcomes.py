@@ -1,12 +1,12 @@
-"""Outcomes that a change of structure must not change, compared bit for bit.
+"""Regression test of outcomes that a change of structure must preserve bit for bit.
 
 `python -m experiments.outcomes` computes a fixed set of releases, layouts, scenes and episodes, and
-compares a digest of each with the recorded one (`results/outcomes/outcomes.csv`). It lists what
-differs and exits with 1. `--record` records today's digests. `--carry` marks the tables of all
-results that the kernels of the record made as made by the kernels of today, if nothing that is
-computed differs: what has been renamed or moved since has changed none of them.
+compares a digest of each with the recorded one (`results/outcomes/outcomes.csv`). It lists the
+differences and exits with 1 if there are any. `--record` records the current digests. `--carry`
+marks all result tables made by the recorded kernels as made by the current kernels, provided that
+no digest differs, which shows that kernels were only renamed or moved.
 
-Digests are of all bits, so they are those of one kind of machine.
+The digests include all bits and are therefore specific to one type of machine.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from rigdda.validation.case import evaluate
 from rigdda.validation.suite import CASES
 
 TABLE = Path("outcomes/outcomes.csv")
-"""The record, below a folder of results."""
+"""Recorded digests, relative to the folder of results."""
 
 LAYOUTS: dict[str, tuple[tuple[str, Layout], ...]] = {
     "shu-hwa": (
@@ -57,12 +57,12 @@ LAYOUTS: dict[str, tuple[tuple[str, Layout], ...]] = {
         ("ditch", (Ditch(29.5, 1.0, 4.0),)),
     ),
 }
-"""Layouts of the releases by site."""
+"""Layouts of the releases, by site."""
 
 RELEASES = {"mass": 1, "group": 4}
-"""Releases of an event, by what its name begins with."""
+"""Number of releases of an event, by the prefix of its name."""
 SINGLES = 40
-"""Those of all others."""
+"""Number of releases of all other events."""
 
 CASE_NAMES = (
     "slide-35-34-2s", "joints-35-20", "joint-shear", "16-gon", "tipping", "restitution-0.5",
@@ -70,16 +70,16 @@ CASE_NAMES = (
     "wall-overturns", "fence-train", "fence-eccentric", "fence-thrust", "stack-50", "pyramid-55",
     "mass-1-1000", "pin-swing", "bolt-drop", "arch-falls", "toppling-forces", "toppling-modes",
 )  # fmt: skip
-"""Cases of `rigdda validate` that are computed, see `rigdda.validation`."""
+"""Cases of `rigdda.validation` that are included."""
 
 COSTS, EPISODES = 60, 50
-"""Random layouts of `quick` whose cost is computed, and episodes of each environment."""
+"""Number of random layouts of `quick` whose cost is computed, and of episodes per environment."""
 
 SOLVERS = ("pcg", "block-pcg", "sor", "direct")
 
 
 def digest(*parts: Any) -> str:
-    """Return a digest of arrays and of whatever has a `repr`."""
+    """Return a digest of arrays and of any objects with a `repr`."""
     whole = hashlib.sha256()
     for part in parts:
         whole.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
@@ -94,7 +94,7 @@ def outcomes_of(site: Site, layout: Layout, event: str) -> str:
 
 
 def motion_of(**settings: Any) -> str:
-    """Return the digest of where the first release of the mass of `quick` is after 4 s."""
+    """Return the digest of the state of the first mass release of `quick` after 4 s."""
     scene = Site.load("quick").realise((), 1, "mass")
     simulation = Simulation(scene, Settings(dt=1e-2, **settings))
     simulation.step(400)
@@ -102,7 +102,7 @@ def motion_of(**settings: Any) -> str:
 
 
 def motion_with_supports() -> str:
-    """Return the digest of the mass of `quick` after 4 s with a bolt and a fixed point in it."""
+    """Return the digest of the mass of `quick` after 4 s, with a bolt and a fixed point."""
     scene = Site.load("quick").realise((), 1, "mass")
     (x, y), last = (scene.blocks[i].vertices.mean(axis=0) for i in (0, -1))
     bolt = Bolt(0, (x, y), None, (x, y + 30.0), 1e6)
@@ -130,7 +130,7 @@ def episodes_of(name: str) -> str:
 
 
 def costs_of(site: Site) -> str:
-    """Return the digest of what random layouts cost, with their intervals."""
+    """Return the digest of the costs of random layouts, with their intervals."""
     problem = DesignProblem(site)
     low, high = problem.bounds
     random = np.random.default_rng(5)
@@ -140,7 +140,7 @@ def costs_of(site: Site) -> str:
 
 
 def computed() -> Iterator[tuple[str, Callable[[], str]]]:
-    """Yield the name of everything that is computed, and the call that returns its digest."""
+    """Yield the name of every computation and the function that returns its digest."""
     for name, layouts in LAYOUTS.items():
         site = Site.load(name)
         for words, layout in layouts:
@@ -162,7 +162,7 @@ def computed() -> Iterator[tuple[str, Callable[[], str]]]:
 
 
 def recorded(out: Path) -> dict[str, str]:
-    """Return the recorded digests, none if there is no record."""
+    """Return the recorded digests, empty without a record."""
     path = out / TABLE
     if not path.exists():
         return {}
@@ -171,7 +171,7 @@ def recorded(out: Path) -> dict[str, str]:
 
 
 def carry(out: Path) -> list[Path]:
-    """Mark what the kernels of the record made as made by today's; returns these tables."""
+    """Mark tables made by the recorded kernels as made by the current ones; return these tables."""
     old, new = made_by((out / TABLE).parent).get(TABLE.name), kernels_hash()
     carried = []
     for path in sorted(out.rglob(KERNELS)):
@@ -185,12 +185,12 @@ def carry(out: Path) -> list[Path]:
 
 
 @click.command(help=__doc__)
-@click.option("--record", is_flag=True, help="Record the digests of today.")
-@click.option("--carry", "carries", is_flag=True, help="Mark recorded tables as today's.")
+@click.option("--record", is_flag=True, help="Record the current digests.")
+@click.option("--carry", "carries", is_flag=True, help="Mark recorded tables as current.")
 @click.option("--out", type=click.Path(path_type=Path), default=RESULTS, show_default=True,
               help="Folder of results.")  # fmt: skip
 def main(record: bool, carries: bool, out: Path) -> None:
-    """Compute, compare, and record or carry over."""
+    """Compute and compare the digests; record them or carry over tables."""
     before, rows, other = recorded(out), [], []
     for what, call in computed():
         found = call()
@@ -204,7 +204,7 @@ def main(record: bool, carries: bool, out: Path) -> None:
         return
     if carries and not other:
         for table in carry(out):
-            click.echo(f"{table} is as the kernels of today would make it")
+            click.echo(f"{table}: marked as made by the current kernels")
     click.echo(f"{len(other)} of {len(rows)} differ from the record")
     sys.exit(bool(other))
 

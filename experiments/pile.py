@@ -1,4 +1,4 @@
-"""A pile of bricks, pressed by its weight and a load, for measurements of one step."""
+"""A pile of bricks under its weight and a load, for measurements of one step."""
 
 from __future__ import annotations
 
@@ -18,26 +18,27 @@ from rigdda.model.scene import Surface
 from rigdda.validation.scenes import GRAVITY, box
 
 WIDTH, HEIGHT, JOINT = 2.0, 1.0, 0.01
-"""Size of a brick and width of the open joint beside it [m]."""
+"""Size of a brick and width of the open vertical joints [m]."""
 
 DT = 5e-3
 """Time step [s]."""
 
 LOAD = 10.0
-"""Load on a brick of the top course over its weight [-]."""
+"""Load on a brick of the top course, over its weight [-]."""
 
 STIR = 0.3
 """Standard deviation of random forces over the greatest force [-]."""
 
 SETTLING = 20
-"""Static steps after which every contact is pressed."""
+"""Number of static steps after which all contacts are closed."""
 
 
 def pile(courses: int) -> Scene:
-    """Return a pile of bricks in running bond on level ground, as many in a course as courses.
+    """Return a pile of bricks in running bond on level ground, with as many bricks as courses.
 
-    Every other course ends in half bricks, and the load on the top course is even: so all contacts
-    of a course bear the same, and none flips. They are the paper's plain penalty springs.
+    Every other course ends in half bricks, and the load on the top course is uniform. Therefore all
+    contacts of a course carry the same load and none changes its state. The contacts are the
+    paper's plain penalty springs.
     """
     end = courses * (WIDTH + JOINT)
     blocks = []
@@ -56,28 +57,28 @@ def pile(courses: int) -> Scene:
 
 
 def _load(index: int, block: Block) -> PointLoad:
-    """Return a load on the centroid of a block, in proportion to its weight."""
+    """Return a load on the centroid of a block, proportional to its weight."""
     area, (x, y), _ = polygon_properties(block.vertices)
     return PointLoad(index, (x, y), (0.0, -LOAD * block.density * area * GRAVITY))
 
 
 def settings(h: float, **more: object) -> Settings:
-    """Return settings with k_n dt^2 / (2 m) = h in contacts: the penetration g dt^2 / (2 h)."""
+    """Return settings with k_n dt^2 / (2 m) = h, by a penetration of g dt^2 / (2 h)."""
     return Settings(dt=DT, penetration=0.5 * GRAVITY * DT**2 / h, sleeping=False, **more)  # type: ignore[arg-type]
 
 
 def system(scene: Scene, h: float) -> tuple[tuple[Matrix, Scratch], int, int]:
-    """Return the simultaneous equations of a step of a pressed scene.
+    """Return the simultaneous equations of a step of a loaded scene.
 
-    A random force and moment on each block stand for its motion. Without them an even load leaves
-    most modes at rest, which helps conjugate gradients but not over-relaxation.
+    A random force and moment on each block represent its motion. A uniform load alone would not
+    excite most modes, which helps conjugate gradients but not over-relaxation.
 
     Returns
     -------
     system : (Matrix, Scratch)
-        The matrix is K d = F, block-sparse, and what solvers work on.
+        The equations K d = F, block-sparse, and the working arrays of the solvers.
     n, pairs : int
-        Blocks, and pairs of blocks that touch.
+        Number of blocks, and of pairs of blocks in contact.
     """
     sim = Simulation(scene, settings(h, mode="static", islands=False))
     sim.step(SETTLING)
@@ -94,7 +95,7 @@ def system(scene: Scene, h: float) -> tuple[tuple[Matrix, Scratch], int, int]:
 
 @entry_kernel
 def assemble(bodies: Bodies, contacts: Contacts, count: int, work: Work, levels: NDArray) -> int:
-    """Assemble all blocks as one island with their contacts as they are; returns the pairs."""
+    """Assemble all blocks as one island with the current contact states; return the pairs."""
     p, m = levels[0], work.matrix
     find_islands(bodies, contacts, work.begin, work.islands, p.blocks, False)
     pairs = pair_blocks(bodies, contacts, m, work.islands, 0, count)

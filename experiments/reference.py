@@ -1,13 +1,13 @@
-"""The reference of each built-in design site: a catalogue of all kinds, raced on unseen releases.
+"""Reference layout of each built-in design site: a catalogue of all kinds, raced and verified.
 
-`python -m experiments.reference [--quick] [--out DIR]`. All singles of every kind and size over 24
-stations race first, then promising pairs, then neighbours of the best. The best of every kind, the
-best for single blocks alone and the constants of `rigdda.agents.designers.constant` are verified on
-fresh releases, until half the 95 % interval of the best is below 1 % of Z of nothing. Of layouts
-that differ by less than that the one with fewest barriers is the best.
+`python -m experiments.reference [--quick] [--out DIR]`. All single barriers of every kind and size
+at 24 stations race first, then promising pairs, then neighbours of the best layouts. The best of
+every kind, the best for single blocks only and the constants of `rigdda.agents.designers.constant`
+are verified on fresh releases, until half the 95 % interval of the best is below 1 % of Z without
+barriers. Among layouts within that difference, the one with the fewest barriers is the best.
 
-Writes reference.csv, a row a layout, and reference.png. Goes on where it was stopped: a site whose
-rows were made by the kernels of today is not computed again.
+Writes reference.csv, one row per layout, and reference.png. An interrupted run is resumed: sites
+whose rows were made by the current kernels are not computed again.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.outcome_cache import mechanics
 
 STATIONS, QUICK_STATIONS = 24, 6
-"""Chainages across the zone at which singles are tried."""
+"""Number of chainages across the zone for single barriers."""
 FIRST, QUICK_FIRST = 40, 8
-"""Releases of a candidate, over all events, in the first round; twice as many in each later one."""
+"""Releases per candidate, over all events, in the first round; doubled in each later round."""
 WANTED, QUICK_WANTED = 0.01, 0.2
-"""Half of the interval of a reference over Z of nothing that ends its verification [-]."""
+"""Half interval of a reference over Z without barriers at which its verification ends [-]."""
 LEAST, MOST, QUICK_MOST = 1_500, 48_000, 1_000
-"""Releases of a layout in the verification: the first, and the most."""
+"""Releases per layout in the verification: initial number and maximum."""
 BEST = "best"
 SINGLE = "for single blocks"
 
@@ -48,7 +48,7 @@ Row = Mapping[str, Any]
 
 
 def of_single_blocks(site: Site) -> Site:
-    """Return a site on which nothing but single blocks comes down."""
+    """Return the site with its single-block events only."""
     events = tuple(e for e in site.events if single(site, e.name))
     names = {event.name for event in events}
     meshes = tuple(
@@ -59,16 +59,16 @@ def of_single_blocks(site: Site) -> Site:
 
 
 def single(site: Site, event: str) -> bool:
-    """Return whether an event is of one block."""
+    """Return whether an event always releases a single block."""
     return len(site.draw(0, event).blocks) == 1 and site.event(event).number[1] == 1
 
 
 def settle(
     problem: DesignProblem, layouts: Iterable[Layout], wanted: float, most: int
 ) -> dict[Layout, Evaluation]:
-    """Verify layouts on the same fresh releases, as many as tell the best to `wanted` of nothing.
+    """Verify layouts on the same fresh releases until the best is known to `wanted` of nothing.
 
-    Of those that the releases so far tell apart from the best, the numbers stay as they are.
+    Layouts that are already distinguishable from the best get no further releases.
     """
     store, half = Store(), wanted * problem.nothing.objective
     found: dict[Layout, Evaluation] = {}
@@ -84,7 +84,7 @@ def settle(
 
 
 def study(name: str, quick: bool) -> list[dict[str, Any]]:
-    """Return the rows of a site: nothing, the best, the best of each kind, and what to beat."""
+    """Return the rows of a site: no barriers, the best, the best of each kind and the baselines."""
     begun, problem = time.process_time(), DesignProblem(name)
     stations, first = (QUICK_STATIONS, QUICK_FIRST) if quick else (STATIONS, FIRST)
     say(f"{name}: racing")
@@ -112,7 +112,7 @@ def study(name: str, quick: bool) -> list[dict[str, Any]]:
 
 
 def row(problem: DesignProblem, what: str, e: Evaluation, seconds: float) -> dict[str, Any]:
-    """Return the row of one layout; money in EUR per metre of road and year, capital EUR/m."""
+    """Return the row of a layout; costs in EUR per metre of road and year, capital in EUR/m."""
     base = problem.nothing.objective
     groups = sum(v for k, v in problem.nothing.by_event.items() if not single(problem.site, k))
     return {
@@ -126,7 +126,7 @@ def row(problem: DesignProblem, what: str, e: Evaluation, seconds: float) -> dic
 
 
 def load(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a recorded reference, none where there is none."""
+    """Return the rows of a recorded reference, empty without a record."""
     if not path.is_file():
         return []
     with path.open(newline="", encoding="utf-8") as file:
@@ -140,7 +140,7 @@ def layout_of(recorded: Row) -> Layout:
 
 
 def picture(figure: Figure, rows: list[Row]) -> None:
-    """Draw, site by site, the best of every kind against nothing and the constants."""
+    """Draw the best layouts of every kind, no barriers and the constants, site by site."""
     names = list(dict.fromkeys(str(r["site"]) for r in rows))
     grid = figure.subplots(2, (len(names) + 1) // 2, squeeze=False).ravel()
     for axes, name in zip(grid, names, strict=False):
@@ -163,7 +163,7 @@ def picture(figure: Figure, rows: list[Row]) -> None:
 
 
 def words(recorded: Row) -> str:
-    """Return what a row is, in a line or two."""
+    """Return a short description of a row."""
     layout = layout_of(recorded)
     head = "best: " if recorded["what"] == BEST else ""
     head = f"{recorded['what']}: " if "constant" in recorded["what"] else head

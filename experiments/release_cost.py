@@ -1,8 +1,9 @@
-"""Processor time of a release in a batch: of one block or more, with and without barriers.
+"""Processor time per release in a batch, for one block or more, with and without barriers.
 
-Releases of the design site `bench` one after the other, as `rigdda.release_many` computes them in
-each of its threads, in steps of 10, 5 and 2.5 ms. The time is split into what is drawn (draw), the
-steps with what is written before and read after them (run), and what it means (outcome).
+Releases of the design site `bench` are computed one after the other, as `rigdda.release_many` does
+in each of its threads, with steps of 10, 5 and 2.5 ms. The time is split into the draw of the
+release (draw), the simulation including its set-up and read-out (run), and the measurement
+(outcome).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ LAYOUTS: dict[str, Layout] = {
 }
 PARTS = ("draw", "run", "outcome")
 WARM = 20
-"""Releases before those that are timed, by which all is packed that is packed once."""
+"""Number of untimed releases at the start, in which everything shared is packed."""
 
 
 def cost(site: Site, layout: Layout, event: str, releases: int) -> dict[str, float]:
@@ -52,7 +53,7 @@ def cost(site: Site, layout: Layout, event: str, releases: int) -> dict[str, flo
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Time releases and write them as a table."""
+    """Time releases and write the table."""
     site, rows, worst = sites.load(SITE), [], -math.inf
     for dt in (10e-3,) if quick else (10e-3, 5e-3, 2.5e-3):
         timed = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, dt=dt))

@@ -1,9 +1,9 @@
-"""Run-out of single blocks against step: small ones that bounce are most of the risk of a road.
+"""Effect of the step on the run-out of single blocks.
 
-Blocks of 0.05 to 2 m2 roll off the crest of a slope of 45 degrees, 40 m high, onto level ground.
-The same blocks start in steps of every length. Judged by the greatest difference of the mean
-run-out from that of the shortest step, as far as it is beyond the 95 % interval of the mean
-difference, over that mean run-out from the toe.
+Small bouncing blocks cause most of the risk on a road. Blocks of 0.05 to 2 m2 roll off the crest of
+a slope of 45 degrees, 40 m high, onto level ground; the same blocks are released for every step.
+Judged by the greatest difference of the mean run-out from that with the shortest step, less the 95
+% interval of the difference, over the mean run-out from the toe.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ STEPS, QUICK_STEPS = (6e-4, 2.5e-3, 1e-2), (2.5e-3, 1e-2)
 RELEASES, QUICK_RELEASES = 8_000, 1_000
 
 MOST = 0.02
-"""Greatest such difference that is asked [-]."""
+"""Target for this difference [-]."""
 
 COLOURS = (BLUE, GREEN, ORANGE, RED)
 
 
 def site(area: float, restitution: float, dt: float) -> Site:
-    """Return the slope with a block of this area [m2] and restitution [-], for steps `dt` [s]."""
+    """Return the slope with a block of this area [m2] and restitution [-], and a step `dt` [s]."""
     return Site(
         name="slope",
         description="A slope of 45 degrees, 40 m high, above level ground.",
@@ -60,7 +60,7 @@ def site(area: float, restitution: float, dt: float) -> Site:
 
 @cache
 def run_outs(area: float, restitution: float, dt: float, releases: int) -> NDArray[np.float64]:
-    """Return the run-outs from the toe of so many releases, (releases,) [m]."""
+    """Return the run-outs from the toe in this number of releases, (releases,) [m]."""
     here = site(area, restitution, dt)
     outcomes = release_many([(here, (), seed, None) for seed in range(releases)])
     return np.array([outcome.run_out[2] for outcome in outcomes]) - HEIGHT
@@ -69,7 +69,7 @@ def run_outs(area: float, restitution: float, dt: float, releases: int) -> NDArr
 def measure(
     area_m2: float, restitution: float, dt_s: float, shortest_s: float, releases: int
 ) -> Row:
-    """Return the mean run-out, and how it differs from that of the shortest step [m]."""
+    """Return the mean run-out and its difference from that with the shortest step [m]."""
     found = run_outs(area_m2, restitution, dt_s, releases)
     least = run_outs(area_m2, restitution, shortest_s, releases)
     mean, half = interval(found)
@@ -81,13 +81,13 @@ def measure(
 
 
 def told(row: Row) -> str:
-    """Return what the terminal says of a row."""
+    """Return a progress message for a row."""
     what = f"{row['area_m2']:g} m2, restitution {row['restitution']:g}, {1e3 * row['dt_s']:.3g} ms"
     return f"{what}: {row['run_out_m']:.2f} m, {row['difference_m']:+.2f} m"
 
 
 def excess(rows: list[Row]) -> float:
-    """Return the greatest share by which a mean surely differs from that of the shortest step."""
+    """Return the greatest significant relative difference of a mean from the shortest step [-]."""
     return max(
         (abs(r["difference_m"]) - r["difference_half_interval_m"])
         / (r["run_out_m"] - r["difference_m"])
@@ -96,7 +96,7 @@ def excess(rows: list[Row]) -> float:
 
 
 def picture(figure: Figure, rows: list[Row]) -> None:
-    """Draw how the mean run-outs differ from those of the shortest step, a panel an area."""
+    """Draw the differences of the mean run-outs from the shortest step, one panel per area."""
     areas = list(dict.fromkeys(r["area_m2"] for r in rows))
     for axes, area in zip(
         figure.subplots(1, len(areas), squeeze=False, sharey=True)[0], areas, strict=True

@@ -1,7 +1,7 @@
-"""What every script of a figure or a study shares: its protocol, command line, files and clock.
+"""Common parts of all scripts: their protocol, command line, files and timing.
 
-A script is a module with `run(quick, out) -> Number`. It writes a CSV and a picture of its own name
-into `out` and returns the one number that it is judged by.
+A script is a module with `run(quick, out) -> Number`. It writes a CSV file and a picture with its
+own name into `out` and returns the number by which it is judged.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rigdda.envs.intervals import quantile
 from rigdda.files import atomic
 
 RESULTS = Path("experiments/results")
-"""Where results are recorded; quick ones go into its folder `quick`."""
+"""Folder of recorded results; those of quick runs are in its subfolder `quick`."""
 
 BLUE, RED, GREEN, ORANGE, GREY = "#1c5aa0", "#c0392b", "#2e8b57", "#e85d04", "#68584a"
 """Colours of curves."""
@@ -39,18 +39,18 @@ DPI = 100
 
 
 class Number(NamedTuple):
-    """The number that a script is judged by.
+    """The number by which a script is judged.
 
     Parameters
     ----------
     what : str
-        What it is, with its unit.
+        Description with unit.
     value : float
-        What was computed.
+        Computed value.
     low, high : float
-        Between which it must be.
+        Target range.
     note : str
-        What else was found, for the reader.
+        Further results for the reader.
     """
 
     what: str
@@ -61,12 +61,12 @@ class Number(NamedTuple):
 
     @property
     def passed(self) -> bool:
-        """Whether the target is reached."""
+        """Whether the value is in the target range."""
         return self.low <= self.value <= self.high
 
     @property
     def target(self) -> str:
-        """The target in words."""
+        """The target range in words."""
         if self.low == self.high:
             return f"{self.low:g}"
         ends = (("at least", self.low), ("at most", self.high))
@@ -82,21 +82,25 @@ Run = Callable[[bool, Path], Number]
 
 
 def options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of every script to a function of (quick, out); None is where results go."""
-    quick = click.option("--quick", is_flag=True, help="Fewer sizes, releases and steps: minutes.")
+    """Add the options `--quick` and `--out` to a command; `out` is None by default."""
+    quick = click.option(
+        "--quick", is_flag=True, help="Use fewer sizes, releases and steps (minutes)."
+    )
     out = click.option(
-        "--out", type=click.Path(path_type=Path), help=f"Folder of CSV and pictures: {RESULTS}."
+        "--out",
+        type=click.Path(path_type=Path),
+        help=f"Folder for CSV files and pictures; default {RESULTS}.",
     )
     return quick(out(command))
 
 
 def folder(quick: bool, out: Path | None) -> Path:
-    """Return the folder that was asked for, or where results go."""
+    """Return the requested folder, or the default folder of results."""
     return out or (RESULTS / "quick" if quick else RESULTS)
 
 
 def main(run: Run) -> None:
-    """Run one script from the command line; exits with 1 if its target is not reached."""
+    """Run one script from the command line; exit with 1 if its target is not reached."""
 
     @click.command(help=sys.modules[run.__module__].__doc__)
     @options
@@ -109,21 +113,21 @@ def main(run: Run) -> None:
 
 
 def say(what: str) -> None:
-    """Tell on the terminal how far a script is."""
+    """Print a progress message."""
     click.echo(what, err=True)
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows as CSV and note beside it which kernels made them, see `experiments.made_by`."""
+    """Write rows as CSV and note the kernels that made them, see `experiments.made_by`."""
     put(path, rows)
     made = made_by(path.parent) | {path.name: kernels_hash()}
     put(path.parent / KERNELS, [{"table": k, "kernels": made[k]} for k in sorted(made)])
 
 
 def put(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows as CSV, a column a key, numbers to six digits; whole or not at all.
+    """Write rows as CSV atomically, one column per key, with numbers to six digits.
 
-    What is not a number does not apply: its cell is empty.
+    NaN means not applicable and gives an empty cell.
     """
     with atomic(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
@@ -133,7 +137,7 @@ def put(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def cell(value: Any) -> Any:
-    """Return what a cell of a table holds."""
+    """Return the content of a table cell."""
     if not isinstance(value, float):
         return value
     return "" if math.isnan(value) else f"{value:.6g}"
@@ -145,7 +149,7 @@ def draw(
     picture: Callable[[Figure], None],
     dpi: int = DPI,
 ) -> None:
-    """Write what `picture` draws into a figure of `size` [inch] as PNG; whole or not at all."""
+    """Write a picture drawn by `picture` on a figure of `size` [inch] as PNG, atomically."""
     with rc_context(STYLE), atomic(path) as part:
         figure = Figure(size, dpi=dpi, layout="constrained")
         picture(figure)
@@ -153,7 +157,7 @@ def draw(
 
 
 def cpu_time(call: Callable[[], object], repeats: int = 5, least: float = 0.01) -> float:
-    """Return the median processor time of a call [s], each measurement of at least `least` [s]."""
+    """Return the median processor time of a call [s], with at least `least` [s] per measurement."""
     times = []
     for _ in range(repeats):
         calls, start = 0, time.process_time()
@@ -165,7 +169,7 @@ def cpu_time(call: Callable[[], object], repeats: int = 5, least: float = 0.01) 
 
 
 def interval(values: Iterable[float]) -> tuple[float, float]:
-    """Return the mean of independent values and half of its 95 % interval, Student's."""
+    """Return the mean of independent values and half of its 95 % interval by Student's t."""
     sample = np.array(list(values), dtype=np.float64)
     n = len(sample)
     half = quantile(n - 1) * sample.std(ddof=1) / math.sqrt(n) if n > 1 else math.nan

@@ -1,7 +1,6 @@
-"""Which recorded results the kernels of today did not make.
+"""List recorded results that the current kernels did not make.
 
-`python -m experiments.stale [--out DIR]`. A table that was written before such notes were kept
-counts as made by others.
+`python -m experiments.stale [--out DIR]`. Tables without a note of their kernels count as stale.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from experiments.script import RESULTS
 
 
 def stale(folder: Path) -> list[Path]:
-    """Return the tables below a folder that other kernels made, or that nobody knows of."""
+    """Return the tables below a folder that were made by other or unknown kernels."""
     tables = sorted(path for path in folder.rglob("*.csv") if path.name != KERNELS)
     return [path for path in tables if made_by(path.parent).get(path.name) != kernels_hash()]
 
@@ -25,10 +24,10 @@ def stale(folder: Path) -> list[Path]:
 @click.option("--out", type=click.Path(path_type=Path), default=RESULTS, show_default=True,
               help="Folder of results.")  # fmt: skip
 def main(out: Path) -> None:
-    """List them; exits with 1 if there are any."""
+    """List the stale tables; exit with 1 if there are any."""
     found = stale(out)
     for path in found:
-        click.echo(f"{path}: {made_by(path.parent).get(path.name, 'not known by which kernels')}")
+        click.echo(f"{path}: {made_by(path.parent).get(path.name, 'made by unknown kernels')}")
     sys.exit(bool(found))
 
 

@@ -1,4 +1,4 @@
-"""The runner of studies: a table that grows case by case, and goes on where it was stopped."""
+"""Runner of studies that compute a table case by case and can be resumed."""
 
 from __future__ import annotations
 
@@ -22,30 +22,31 @@ def tabulate(
     told: Callable[[Row], str],
     processes: int = 1,
 ) -> list[Row]:
-    """Return a row a case, the case's own columns before what is measured, and write the table.
+    """Measure all cases, write the table and return its rows.
 
-    Until the last row is there, rows are kept beside the table under the hash of the kernels: a
-    study that was stopped goes on by the same kernels, and begins anew by others.
+    A row has the columns of its case followed by the measured ones. Until the table is complete,
+    rows are saved beside it under the hash of the kernels: an interrupted study is resumed if the
+    kernels are the same, and restarted otherwise.
 
     Parameters
     ----------
     path : Path
         The table.
     cases : sequence of dict
-        Arguments of `measure` by name, numbers and words; no two alike.
+        Keyword arguments of `measure`, numbers and strings; all different.
     measure : callable
         Returns the other columns of a case.
     told : callable
-        What the terminal says of a row.
+        Returns a progress message for a row.
     processes : int
-        Cases that are measured at once; more than one only if each is a process of its own.
+        Number of cases measured at once; more than one only if each starts its own process.
     """
     kept = path.with_name(f"{path.stem}-{kernels_hash()}.part.json")
     rows: list[Row] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else []
     by_case = {key(row, cases[0]): row for row in rows}
     todo = [case for case in cases if key(case, case) not in by_case]
     if by_case:
-        say(f"{path.stem}: goes on with {len(todo)} of {len(cases)} cases")
+        say(f"{path.stem}: resuming with {len(todo)} of {len(cases)} cases")
     for case, found in zip(todo, several(todo, measure, processes), strict=True):
         row = by_case[key(case, case)] = case | found
         with atomic(kept) as part:
@@ -59,7 +60,7 @@ def tabulate(
 
 
 def several(cases: Iterable[Row], measure: Callable[..., Row], processes: int) -> Iterator[Row]:
-    """Yield what is measured of each case, in their order."""
+    """Yield the measured columns of each case, in order."""
     if processes == 1:
         yield from (measure(**case) for case in cases)
         return
@@ -68,5 +69,5 @@ def several(cases: Iterable[Row], measure: Callable[..., Row], processes: int) -
 
 
 def key(row: Row, case: Mapping[str, Any]) -> str:
-    """Return what tells a row from the others: the columns of its case."""
+    """Return the identity of a row: the columns of its case."""
     return json.dumps({name: row[name] for name in case})

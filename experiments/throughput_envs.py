@@ -1,15 +1,16 @@
-"""Episodes a second of the environments, and the variance of their reward.
+"""Episodes per second of the environments, and the variance of their reward.
 
-Batches as Stable-Baselines3 steps them play 256 episodes or more (16 with --quick) of random
-actions of one release each, in threads over all cores; no two batches share a seed, so that none
-finds what another has simulated. On the site quick with its groups and
-its jointed mass, and on it with single blocks alone. `times_before`: episodes a second of processor
-time, which other jobs disturb less, over those of 64 copies at commit 78de9db, when every episode
-was one release of the mass of quick at fidelity "fast".
+Batches as Stable-Baselines3 steps them play at least 256 episodes (16 with --quick) of random
+actions with one release each, in threads on all cores. No two batches share a seed, so that none
+finds the cached outcomes of another. The site is quick with its groups and its jointed mass, or
+with single blocks only. `times_before`: episodes per second of processor time, which other jobs
+affect less, over those of 64 copies at commit 78de9db, when every episode was one release of the
+mass of quick at fidelity "fast".
 
-Variance: of the reward of one release against the site's mean of nothing, and against nothing in
-the same release as it was before; means over random layouts, and of the best of them, on quick and
-on generated sites. Writes throughput_envs.csv and reward_variance.csv.
+Variance: of the reward of one release relative to the site's mean without barriers, compared with
+that relative to the same release without barriers, as before; means over random layouts, and for
+the best of them, on quick and on generated sites. Writes throughput_envs.csv and
+reward_variance.csv.
 """
 
 from __future__ import annotations
@@ -31,19 +32,20 @@ from rigdda.envs.environments import Ask, simulate
 from rigdda.envs.registration import ENVIRONMENTS
 
 BATCHES = (1, 8, 64, 1)
-"""Copies of each batch; one alone is measured twice."""
+"""Number of copies in each batch; a single copy is measured twice."""
 
 EPISODES = 256
 
 BEFORE = {"rigdda/BarrierDesign-v0": 9.0, "rigdda/BarrierPlacement-v0": 5.6}
-"""Episodes a second of processor time before; 5.7 and 2.3 at fidelity "full", as is played now."""
+"""Earlier episodes per second of processor time; 5.7 and 2.3 at fidelity "full", which is used
+now."""
 
 LAYOUTS, SAMPLES, SITES = 8, 128, 6
-"""Random layouts of a site, episodes of each, and generated sites behind the variances."""
+"""Number of random layouts per site, of episodes per layout, and of generated sites."""
 
 
 def places() -> dict[str, Site]:
-    """Return the sites to play on: quick, and quick with single blocks alone."""
+    """Return the sites: quick, and quick with single blocks only."""
     quick = sites.load("quick")
     single = tuple(e for e in quick.events if e.area is not None and e.number == (1, 1))
     used = {event.source for event in single}
@@ -55,7 +57,7 @@ def places() -> dict[str, Site]:
 
 
 def play(env: Any, episodes: int) -> tuple[int, int]:
-    """Play at least so many episodes; return how many, and the steps they took."""
+    """Play at least this number of episodes; return the number of episodes and of steps."""
     ended = steps = 0
     while ended < episodes:
         actions = np.stack([env.action_space.sample() for _ in range(env.num_envs)])
@@ -65,7 +67,7 @@ def play(env: Any, episodes: int) -> tuple[int, int]:
 
 
 def measure(name: str, site: Site, copies: int, episodes: int, seed: int) -> dict[str, Any]:
-    """Return what one batch did."""
+    """Return the measurements of one batch."""
     env = rigdda.envs.sb3_vec_env(name, copies, site=site, releases=1)
     env.seed(seed)
     env.action_space.seed(seed)
@@ -75,7 +77,7 @@ def measure(name: str, site: Site, copies: int, episodes: int, seed: int) -> dic
     ended, steps = play(env, episodes)
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
     env.close()
-    comparable = len(site.events) > 1  # before, an episode was one of a mass
+    comparable = len(site.events) > 1  # earlier episodes were of a mass
     return {
         "environment": name,
         "copies": copies,
@@ -92,7 +94,7 @@ def measure(name: str, site: Site, copies: int, episodes: int, seed: int) -> dic
 
 def throughput(episodes: int) -> list[dict[str, Any]]:
     """Return the rows of all batches."""
-    measure("rigdda/BarrierPlacement-v0", places()["quick"], 2, 4, 0)  # compiles
+    measure("rigdda/BarrierPlacement-v0", places()["quick"], 2, 4, 0)  # compile the kernels
     rows: list[dict[str, Any]] = []
     for label, site in places().items():
         for name in ENVIRONMENTS:
@@ -105,7 +107,7 @@ def throughput(episodes: int) -> list[dict[str, Any]]:
 
 
 def rewards(problem: DesignProblem, layout: Layout, seeds: range) -> np.ndarray:
-    """Return the reward of a layout in each of some episodes of one release."""
+    """Return the rewards of a layout in episodes of one release."""
     asks = [Ask(problem, layout, (seed,), 0) for seed in seeds]
     answers = [answer.evaluation for answer in simulate(asks) if answer is not None]
     return np.array([problem.reward(found) for found in answers if found is not None])
@@ -140,7 +142,7 @@ def variance(name: str, layouts: int, samples: int) -> dict[str, Any]:
 @click.command(help=__doc__)
 @options
 def main(quick: bool, out: Path | None) -> None:
-    """Measure all and write the tables."""
+    """Run all measurements and write the tables."""
     to, names = folder(quick, out), ["quick", *sites.split("test")[:SITES]]
     write(to / "throughput_envs.csv", throughput(16 if quick else EPISODES))
     layouts, samples = (2, 8) if quick else (LAYOUTS, SAMPLES)

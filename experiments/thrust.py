@@ -1,12 +1,12 @@
-"""Thrust against resistance: what a mass of rock pushes with, and what the catalogue bears.
+"""Thrust of a mass of rock compared with the resistance of barriers.
 
 Embankments and gravity walls of every height of the catalogue, low walls, and fences of every class
-at their greatest height, each alone under the mass of
-`shu-hwa` and of `quick`, on a bench or at the toe, in steps of 10 and 2.5 ms. Thrust is the
-greatest mean over a second, resistance is weight times friction or the mean braking force of the
-class, see `rigdda.Scene.resistance`. Judged by the embankments and gravity walls that stand
-although the thrust was beyond what they bear. Drawn at 0.01: what failed before anything leaned on
-it.
+at their greatest height are tested one by one under the mass of `shu-hwa` and of `quick`, on a
+bench or at the toe, with steps of 10 and 2.5 ms. The thrust is the greatest mean over a second. The
+resistance is weight times friction, or the mean braking force of the fence class, see
+`rigdda.Scene.resistance`. Judged by the number of embankments and gravity walls that remain
+standing although the thrust clearly exceeded their resistance. Barriers that failed before anything
+leaned on them are drawn at 0.01.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from rigdda.barriers.base import HEIGHTS, SLENDER
 from rigdda.releases import release_many
 
 SITES = {"shu-hwa": 83.6, "quick": 23.0}
-"""Sites with a mass, and where the barriers stand [m]: at the toe, and on a bench."""
+"""Sites with a mass, and the chainages of the barriers [m]: at the toe, and on a bench."""
 STEPS, QUICK_STEPS = (1e-2, 2.5e-3), (1e-2,)
 """Steps [s]."""
 RELEASES, QUICK_RELEASES = 6, 2
 COLOURS = {"fence": BLUE, "embankment": GREEN, "gravity_wall": RED}
 BEYOND = 1.1
-"""Thrust over resistance that is clearly beyond what a barrier bears [-]: friction of rock that
-lies on a wall, and its inertia, bear a little."""
+"""Thrust over resistance that clearly exceeds the resistance [-]. Friction of the rock on a wall
+and the inertia of the wall add some resistance."""
 
 
 def barriers(x: float, highest: float) -> Iterator[Barrier]:
-    """Yield the barriers of the catalogue of every height up to the highest, at a chainage [m]."""
+    """Yield the catalogue barriers of every height up to the highest one, at a chainage [m]."""
     for name, row in FENCE_CLASSES.items():
         yield Fence(x, row.height, energy_class=name)
     for h in (0.6, *HEIGHTS):
@@ -48,7 +48,7 @@ def barriers(x: float, highest: float) -> Iterator[Barrier]:
 
 
 def catalogue() -> dict[tuple[str, str], Barrier]:
-    """Return the barriers that each site is asked about, by its name and their words."""
+    """Return the barriers tested at each site, keyed by site name and description."""
     return {
         (name, describe(b)): b
         for name, x in SITES.items()
@@ -57,14 +57,14 @@ def catalogue() -> dict[tuple[str, str], Barrier]:
 
 
 def measure(site: str, barrier: str, dt_ms: float, releases: int) -> Row:
-    """Return what a barrier bore in releases of the mass of a site; forces in kN/m."""
+    """Return the thrust and resistance of a barrier in mass releases of a site; forces in kN/m."""
     one = catalogue()[site, barrier]
     here = Site.load(site)
     here = replace(here, motion=replace(here.motion, dt=1e-3 * dt_ms))
     outcomes = release_many([(here, (one,), seed, "mass") for seed in range(releases)])
     found = [outcome.barriers[0] for outcome in outcomes]
     thrust = np.array([f.thrust for f in found])
-    # what pushes a fence on both sides, buried in a deposit, does not move it
+    # a fence buried in a deposit is pushed from both sides and does not move
     judged = not isinstance(one, Fence)
     wrong = sum(judged and f.thrust > BEYOND * f.resistance and not f.failed for f in found)
     return {
@@ -79,13 +79,13 @@ def measure(site: str, barrier: str, dt_ms: float, releases: int) -> Row:
 
 
 def told(row: Row) -> str:
-    """Return what the terminal says of a row."""
+    """Return a progress message for a row."""
     words = f"{row['site']}, {row['barrier']}, {row['dt_ms']:g} ms"
     return f"{words}: fails in {row['failed']:g} of {row['releases']:g} releases"
 
 
 def picture(figure: Figure, rows: list[Row]) -> None:
-    """Draw thrust over resistance against height, open where some stand and filled where none."""
+    """Draw thrust over resistance against height; filled marks if every release fails."""
     names = list(dict.fromkeys(r["site"] for r in rows))
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
@@ -122,7 +122,7 @@ def run(quick: bool, out: Path) -> Number:
     wrong = sum(r["stand_beyond_resistance"] for r in rows)
     ratio = [r["greatest_thrust_kn"] / r["resistance_kn"] for r in rows]
     note = f"thrust over resistance up to {max(ratio):.1f}" if math.isfinite(max(ratio)) else ""
-    return Number("barriers that stand beyond what they bear", wrong, high=0.0, note=note)
+    return Number("barriers that stand beyond their resistance", wrong, high=0.0, note=note)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Rigid-block discontinuous deformation analysis for the design of rockfall protection.
 
-A name of `rigdda.__all__` is imported when it is first used; `__init__.pyi` lists them.
+The names in `rigdda.__all__` are imported when first used; `__init__.pyi` lists them.
 """
 
 import lazy_loader

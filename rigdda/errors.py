@@ -1,4 +1,4 @@
-"""Errors raised on purpose. Every message names the field, the value and the mend."""
+"""Errors and warnings of the package. Error messages name the field, the value and the remedy."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from typing import Any
 
 
 class Error(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base class of all errors that this package raises."""
 
 
 class BadInput(Error, ValueError):
-    """Something a user wrote is wrong; raised before any computing.
+    """Invalid input, reported before any computation.
 
     Parameters
     ----------
     field : str
-        Path of the offending field, for example ``block 3: vertices``.
+        Path of the invalid field, for example ``block 3: vertices``.
     value : object
-        What was found there.
+        The value of the field.
     mend : str
         What to write instead.
     """
@@ -32,12 +32,12 @@ class BadInput(Error, ValueError):
 
 
 class Diverged(Error, RuntimeError):
-    """A simulation stopped because its numbers went bad.
+    """A simulation stopped because its velocities diverged.
 
     Attributes
     ----------
     run : Run or None
-        What was recorded up to the last sound frame.
+        The frames recorded before the divergence.
     """
 
     def __init__(self, message: str, run: Any = None):
@@ -46,8 +46,8 @@ class Diverged(Error, RuntimeError):
 
 
 class SoftContacts(UserWarning):
-    """A result leans on contacts whose penalty stiffness is too small for the load they carry."""
+    """A result depends on contacts whose penalty stiffness is too small for their load."""
 
 
 class DoubtfulInput(UserWarning):
-    """Something a user wrote is allowed and hardly meant; the message names field and mend."""
+    """Input that is valid but probably unintended; the message names the field and the remedy."""

@@ -1,4 +1,4 @@
-"""Files: texts in UTF-8, and atomic writing: a file is either the old one or the whole new one."""
+"""File access: reading of UTF-8 text, and atomic writing."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from rigdda.errors import BadInput
 
 
 def read(field: str, path: Path) -> str:
-    """Return the text of a file in UTF-8, without a byte order mark.
+    """Return the text of a UTF-8 file, without a byte order mark.
 
     Raises
     ------
     BadInput
-        If it cannot be read or is not UTF-8; the message names `field`.
+        If the file cannot be read or is not UTF-8; the message names `field`.
     """
     try:
         return path.read_text(encoding="utf-8-sig")
@@ -31,12 +31,15 @@ def read(field: str, path: Path) -> str:
 
 @contextmanager
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside `path` that replaces it when the block ends without error.
+    """Yield a temporary path that replaces `path` when the block ends without an error.
+
+    The temporary file is in the same folder, so that `path` is always either the old or the
+    complete new file.
 
     Raises
     ------
     OSError
-        If nothing can be written there; it names `path` or its folder.
+        If the file cannot be written; the error names `path` or its folder.
     """
     target = Path(path)
     if target.is_dir():

@@ -1,4 +1,4 @@
-"""Area, centroid and second moment of polygons, and their convex parts."""
+"""Area, centroid and second moment of polygons, and their decomposition into convex parts."""
 
 from __future__ import annotations
 
@@ -11,22 +11,25 @@ from numpy.typing import NDArray
 from rigdda.kernel import Direct, kernel, short_kernel
 
 CLEARLY = 1e-6
-"""Turn at a corner, or area, over the square of the perimeter that is more than rounding [-]."""
+"""Cross product of the edges at a corner, or area, over the square of the perimeter, above which it
+is more than a rounding error [-]."""
 
 FLAT = 1e-9
-"""Turn at a corner over the square of the perimeter that counts as none [-]: rounding."""
+"""Cross product of the edges at a corner over the square of the perimeter, below which it is a
+rounding error [-]."""
 
 STRAIGHT = 1e-7
-"""Distance of a corner from the line through its neighbours over the perimeter up to which it lies
-within an edge [-]: above rounding where coordinates are kilometres, below any shape of rock."""
+"""Distance of a corner from the line through its neighbours over the perimeter, below which it lies
+within an edge [-]. It is above rounding errors even for coordinates of kilometres, and below any
+feature of a rock."""
 
 GRID = 1e-9
-"""Grid of overlaps [m]: far finer than blocks, far coarser than rounding."""
+"""Grid size of polygon intersections [m], much finer than blocks and much coarser than rounding."""
 
 
 @kernel
 def moments(vertices: NDArray, low: int, high: int) -> tuple[float, float, float, float]:
-    """Return area, centroid x and y, and polar second moment of the polygon vertices[low:high]."""
+    """Return area, centroid x and y, and polar second moment of polygon vertices[low:high]."""
     x0, y0 = vertices[low, 0], vertices[low, 1]
     twice, sum_x, sum_y, second = 0.0, 0.0, 0.0, 0.0
     for k in range(low, high):
@@ -57,8 +60,9 @@ def polygon_properties(
 ) -> tuple[float, NDArray[np.float64], float]:
     """Return area [m2], centroid (2,) [m] and polar second moment of area [m4] of a polygon.
 
-    Exact sums over the edges of the (n, 2) corners, anticlockwise; the second moment is about the
-    centroid. Taken relative to the first corner, so that far coordinates cost no digits.
+    These are exact sums over the edges of the (n, 2) corners, which must be anticlockwise. The
+    second moment is about the centroid. Coordinates are taken relative to the first corner, so that
+    a distant origin does not reduce the accuracy.
     """
     area, x, y, second = _moments.call(np.array(vertices, dtype=np.float64, order="C"))
     return area, np.array([x, y]), second
@@ -66,10 +70,11 @@ def polygon_properties(
 
 @short_kernel
 def is_sound(vertices: NDArray) -> bool:
-    """Return whether a polygon is anticlockwise and clearly convex, so that it is simple.
+    """Return whether a polygon is anticlockwise and clearly convex, and therefore simple.
 
-    Every corner turns to the left by far more than rounding, and the edges go round once: their
-    direction changes from left to right only once. No edge is short and the area not small.
+    Every corner must turn left by much more than rounding errors, and the edges must go round once:
+    their direction changes from leftward to rightward only once. No edge and no area may be close
+    to zero.
     """
     n, around, twice, turned = len(vertices), 0.0, 0.0, 0
     for k in range(n):
@@ -92,32 +97,33 @@ _is_sound = Direct(is_sound)
 
 
 def clearly_convex(vertices: NDArray[np.float64]) -> bool:
-    """Return whether a polygon is surely simple, convex and anticlockwise, in a microsecond."""
+    """Return whether a polygon is certainly simple, convex and anticlockwise, in a microsecond."""
     return bool(_is_sound.call(np.array(vertices, dtype=np.float64, order="C")))
 
 
 def overlap(a: shapely.Polygon, b: shapely.Polygon) -> float:
-    """Return the area that two polygons share [m2].
+    """Return the area of the intersection of two polygons [m2].
 
-    Taken on a grid: without one GEOS 3.14 may return all of `a` where two edges nearly coincide.
+    A grid is used because without one, GEOS 3.14 may return all of `a` if two edges nearly
+    coincide.
     """
     return float(shapely.intersection(a, b, grid_size=GRID).area)
 
 
 def edges(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the edge that starts at each of the (n, 2) corners, (n, 2) [m]."""
+    """Return the edge vector that starts at each of the (n, 2) corners, (n, 2) [m]."""
     return np.concatenate([vertices[1:], vertices[:1]]) - vertices
 
 
 def turns(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the cross product of the two edges at each corner [m2], negative where concave."""
+    """Return the cross product of the two edges at each corner [m2], negative if concave."""
     edge = edges(vertices)
     before = np.concatenate([edge[-1:], edge[:-1]])
     return before[:, 0] * edge[:, 1] - before[:, 1] * edge[:, 0]
 
 
 def is_convex(vertices: NDArray[np.float64]) -> bool:
-    """Return whether an anticlockwise simple polygon is convex but for rounding."""
+    """Return whether an anticlockwise simple polygon is convex to rounding."""
     if clearly_convex(vertices):
         return True
     perimeter = np.hypot(*edges(vertices).T).sum()
@@ -127,8 +133,8 @@ def is_convex(vertices: NDArray[np.float64]) -> bool:
 def without_straight_corners(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a polygon without the corners that lie within an edge.
 
-    `shapely.simplify` leaves some of them: it never reduces a ring below four corners, and it drops
-    none from the first parts of a ring that it comes to, because the ring does not yet have four.
+    `shapely.simplify` leaves some of them, because it never reduces a ring below four corners and
+    removes none from the start of a ring until four corners have been kept.
 
     Parameters
     ----------
@@ -142,7 +148,7 @@ def without_straight_corners(vertices: NDArray[np.float64]) -> NDArray[np.float6
         neighbours, in the same order [m]; at least three.
     """
     near = STRAIGHT * np.hypot(*edges(vertices).T).sum()
-    while len(vertices) > 3:  # one at a time: of two corners that nearly coincide one must stay
+    while len(vertices) > 3:  # one at a time: one of two nearly coincident corners must stay
         across = np.roll(vertices, -1, axis=0) - np.roll(vertices, 1, axis=0)
         width = np.hypot(across[:, 0], across[:, 1])
         distance = np.abs(turns(vertices)) / np.where(width > 0.0, width, np.inf)
@@ -154,10 +160,10 @@ def without_straight_corners(vertices: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def convex_parts(vertices: NDArray[np.float64]) -> list[list[int]]:
-    """Return the corners of convex parts that together are a simple polygon.
+    """Return the corners of convex parts that together form a simple polygon.
 
-    Hertel and Mehlhorn (1983): the polygon is cut into triangles, and cuts are left out again,
-    the longest first, wherever what they join is convex; at most four times the fewest parts.
+    The polygon is triangulated, and cuts are removed again, the longest first, wherever the union
+    is convex (Hertel and Mehlhorn 1983). This gives at most four times the minimum number of parts.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""Compilation of kernels, cached under the hash of all kernel sources.
+"""Compilation of kernels, cached under a hash of all kernel sources.
 
-numba's own cache looks only at the file of the function that is called: edit a constant or a
-callee in another module and the cached caller keeps the old value. So the cache directory carries
-a hash of every source that kernels are made of. What cannot be written or read there costs the time
-to compile again, and stops nothing.
+numba's own cache only checks the file of the compiled function: after an edit of a constant or a
+callee in another module, the cached function keeps the old code. The cache directory is therefore
+named by a hash of all sources of kernels. If the cache cannot be read or written, kernels are
+compiled again.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from rigdda.errors import Error
 
 
 def sources() -> list[bytes]:
-    """Return the sources that hold kernels or their constants."""
+    """Return the sources that contain kernels or their constants."""
     found, data = [], ("constants.py", "records.py", "arrays.py")
     here = Path(__file__).parent
     folders = (here / "dynamics", here / "model")
@@ -42,7 +42,7 @@ def sources() -> list[bytes]:
 
 
 def source_hash() -> str:
-    """Return a hash of numba's version and of all that kernels are made of."""
+    """Return a hash of numba's version and of all kernel sources."""
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sources():
         digest.update(source)
@@ -50,12 +50,12 @@ def source_hash() -> str:
 
 
 def cache_directory() -> Path:
-    """Return the folder of compiled kernels, in the user's cache or else the temporary folder.
+    """Return the folder of compiled kernels, in the user's cache or a temporary folder.
 
     Raises
     ------
     Error
-        If nothing can be written in either.
+        If none of these folders is writable.
     """
     name = f"kernels-{source_hash()}"
     for find in (_cache_home, _temporary_home, _process_home):
@@ -67,7 +67,7 @@ def cache_directory() -> Path:
 
 
 def _cache_home() -> Path | None:
-    """Return the folder of this package in the user's caches, None without a home folder."""
+    """Return the folder of this package in the user's cache, None without a home folder."""
     named = os.environ.get("XDG_CACHE_HOME")
     try:
         caches = Path(named) if named else Path.home() / ".cache"
@@ -77,7 +77,7 @@ def _cache_home() -> Path | None:
 
 
 def _temporary_home() -> Path | None:
-    """Return a folder of this user in the temporary folder, None if it cannot be had."""
+    """Return a folder of this user in the temporary folder, None if it is not available."""
     user = os.getuid() if hasattr(os, "getuid") else None  # none on Windows
     try:
         own = Path(tempfile.gettempdir()) / ("rigdda" if user is None else f"rigdda-{user}")
@@ -85,13 +85,13 @@ def _temporary_home() -> Path | None:
         owner = own.lstat().st_uid
     except OSError:
         return None
-    # numba runs what it reads, so a folder that another user has put there is not taken
+    # numba executes the files that it reads, so a folder owned by another user must not be used
     return own if user is None or owner == user else None
 
 
 @functools.cache
 def _process_home() -> Path | None:
-    """Return a new temporary folder, the same throughout the process, None if none can be made."""
+    """Return a temporary folder, the same throughout the process; None if it cannot be made."""
     try:
         return Path(tempfile.mkdtemp(prefix="rigdda-"))
     except OSError:
@@ -99,9 +99,10 @@ def _process_home() -> Path | None:
 
 
 def _is_writable(folder: Path) -> bool:
-    """Make a folder if it is not there; return whether files can be made in it and its folders.
+    """Create a folder if necessary; return whether it and its subfolders are writable.
 
-    Permissions do not tell: file systems may be read-only, and root may write all the same.
+    Checking permissions is not sufficient: file systems may be read-only, and root ignores
+    permissions.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -113,10 +114,10 @@ def _is_writable(folder: Path) -> bool:
 
 
 class CheckedFile(IndexDataCacheFile):
-    """Files of a cache whose machine code carries its hash.
+    """Cache files whose machine code carries its hash.
 
-    After a crash of the machine a file may be whole in length and partly zeros. Code from such a
-    file would end the process, or compute nonsense.
+    After a crash of the machine, a file may have its full length but contain zeros. Machine code
+    from such a file would crash the process or compute wrong results.
     """
 
     def _save_data(self, name: str, data: Any) -> None:
@@ -131,9 +132,9 @@ class CheckedFile(IndexDataCacheFile):
 
 
 class KernelCache(FunctionCache):
-    """numba's cache of a function, but for files that cannot be read or written.
+    """numba's function cache, except that unreadable or unwritable files are tolerated.
 
-    numba raises whatever unpickling them does. Here they are dropped and compiled again.
+    numba raises any error from unpickling such files. Here they are deleted and compiled again.
     """
 
     def __init__(self, function: Callable[..., Any]):
@@ -142,16 +143,16 @@ class KernelCache(FunctionCache):
         self._cache_file = CheckedFile(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled function of a signature, None if it is not there or not sound."""
+        """Return the compiled function of a signature, None if it is missing or damaged."""
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # of any kind: the bytes may be anything
+        except Exception:  # damaged files may raise any exception
             with contextlib.suppress(OSError):
                 self.flush()
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function; warn if that fails, as on a full disk."""
+        """Save a compiled function; warn if that fails, for example on a full disk."""
         try:
             super().save_overload(sig, data)
         except OSError as error:
@@ -159,12 +160,12 @@ class KernelCache(FunctionCache):
 
 
 class _OptionValues:
-    """Values of all options of compilations, those left at their defaults too, kept by what is set.
+    """Cache of the values of all compilation options, including defaults.
 
-    For every operator and call in a kernel numba looks templates up in dictionaries whose keys hold
-    the options of the compilation. Each comparison of two keys reads all three dozen options of
-    both through properties, which adds up to a third of the time of compiling the kernels. Objects
-    are kept with their values, so that an identity names one object for good.
+    For every operator and call in a kernel, numba looks up templates in dictionaries whose keys
+    contain the compilation options. Each comparison of two keys reads about 36 options of both
+    through properties, which adds up to a third of the compilation time of the kernels. The objects
+    are stored with their values, so that their identities remain unique.
     """
 
     def __init__(self) -> None:
@@ -181,7 +182,7 @@ class _OptionValues:
 
 
 def _compare_quickly() -> None:
-    """Compare options of compilations as numba does, in a tenth of the time."""
+    """Replace numba's comparison of compilation options by an equivalent one, ten times faster."""
     values = _OptionValues()
 
     def equal(self: TargetConfig, other: object) -> bool:
@@ -191,7 +192,7 @@ def _compare_quickly() -> None:
         return one is two or one == two
 
     def number(self: TargetConfig) -> int:
-        return len(self.options)  # numba hashes the names of the options alone
+        return len(self.options)  # numba only hashes the names of the options
 
     Flags.__eq__, Flags.__hash__ = equal, number
 
@@ -206,51 +207,53 @@ INSIDE: dict[str, Any] = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
 }
-"""How kernels are compiled that only kernels call.
+"""Compiler options of kernels that are called by kernels only.
 
-They allocate nothing, so `_nrt=False` leaves reference counting out: its atomic operations on every
-array that a kernel passes on cost four fifths of a step. Without wrappers for calls from Python and
-C compilation takes two thirds of the time; Python that calls such a kernel crashes, see
-`from_python`."""
+Kernels allocate nothing, so reference counting is disabled by `_nrt=False`; its atomic operations
+on every array argument would take four fifths of a step. Compilation without wrappers for calls
+from Python and C takes two thirds of the time. Calling such a kernel from Python crashes, see
+`from_python`.
+"""
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that other kernels call; without fast-math, so that NaN checks hold."""
+    """Compile a kernel for calls from other kernels, without fast-math so that NaN checks work."""
     return numba.njit(**INSIDE)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a kernel into all that call it: for what is called for every block or contact.
+    """Compile a kernel into all its callers; for kernels that run for every block or contact.
 
-    A call hands over every array of a named tuple in seven words to eleven, 63 for `Matrix`, but a
-    record in one. A step of one block took twice as long when calls were handed all of `Work`.
+    A call passes every array of a named tuple in seven to eleven words, 63 for `Matrix`, but a
+    record in one. A step of one block took twice as long when calls received all of `Work`.
     """
     return numba.njit(forceinline=True, **INSIDE)(function)
 
 
 def arithmetic_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a kernel in which a product and a sum may be one operation, rounded once.
+    """Compile a kernel in which a product and a sum may be fused, with a single rounding.
 
-    The only liberty: NaN and order stay as they are. The same results on one kind of machine.
+    No other fast-math transformation is enabled, so NaN checks and the order of operations are
+    preserved. Results are reproducible on one type of machine.
     """
     return numba.njit(fastmath={"contract"}, forceinline=True, **INSIDE)(function)
 
 
 def stage(function: Callable[..., Any]) -> Any:
-    """Compile a kernel as a part of the only one that calls it.
+    """Compile a kernel as part of its only caller.
 
-    numba optimises every kernel together with all that it calls; one level less saves seconds.
+    numba optimises every kernel together with all its callees; one level fewer saves seconds.
     """
     return numba.njit(inline="always", **INSIDE)(function)
 
 
 def entry_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that Python calls, and keep the machine code on disk."""
+    """Compile a kernel for calls from Python, and store the machine code on disk."""
     return _kept(function, nogil=True)
 
 
 def short_kernel(function: Callable[..., Any]) -> Any:
-    """Compile an entry kernel of microseconds: to let other threads run meanwhile takes longer."""
+    """Compile an entry kernel that takes microseconds, too short to release the GIL."""
     return _kept(function, nogil=False)
 
 
@@ -268,10 +271,11 @@ def _kept(function: Callable[..., Any], nogil: bool) -> Any:
 
 
 class Direct:
-    """An entry kernel that is called with arguments of always the same types.
+    """An entry kernel that is always called with arguments of the same types.
 
-    numba looks at the type of every array in every call, to choose among what it has compiled; for
-    `step.advance` that takes ten times as long as the call itself. Here the first call chooses.
+    numba inspects the types of all arrays in every call to select a compiled version; for
+    `step.advance`, this takes ten times as long as the call itself. Here only the first call
+    selects a version.
 
     Attributes
     ----------
@@ -286,21 +290,21 @@ class Direct:
     def _choose(self, *arguments: Any) -> Any:
         """Call the kernel for the first time, which compiles it."""
         result = self._entry(*arguments)
-        for compiled in getattr(self._entry, "overloads", {}).values():  # none where JIT is off
+        for compiled in getattr(self._entry, "overloads", {}).values():  # none if JIT is disabled
             self.call = compiled.entry_point
         return result
 
 
 @numba.njit(inline="always", **INSIDE)
 def variable(value: int) -> int:
-    """Return a number that is given as a literal, as the first value of a variable.
+    """Return an integer literal as the initial value of a variable.
 
-    With a literal numba compiles all that the variable is handed to twice: for the literal and for
-    an integer.
+    With a plain literal, numba would compile every callee that receives the variable twice: for the
+    literal type and for integers.
     """
     return int(np.int64(value))
 
 
 def from_python(inner: Any) -> Any:
-    """Compile a kernel once more, for Python to call: for tests."""
+    """Compile a kernel again for calls from Python, for tests."""
     return numba.njit(error_model="numpy", _nrt=False)(inner.py_func)

@@ -14,17 +14,17 @@ from rigdda.errors import BadInput
 
 
 class Toppling(NamedTuple):
-    """Forces and modes of the blocks of a slope, from its toe upwards; N blocks, per metre.
+    """Forces and failure modes of the N blocks of a slope, from its toe upwards, per metre width.
 
     Parameters
     ----------
     force : (N,) array
-        What each block needs from the next lower one to stay; of the toe block, what it needs
-        from a support. Along the base [N].
+        Force along the base that each block requires from the next lower one for equilibrium; for
+        the toe block, the force required from a support [N].
     normal, shear : (N,) arrays
         Forces of the base on each block [N]; shear acts up the dip.
     mode : tuple of str
-        "stable", "toppling" or "sliding" of each block.
+        "stable", "toppling" or "sliding" for each block.
     """
 
     force: NDArray[np.float64]
@@ -43,16 +43,17 @@ def toppling(
 ) -> Toppling:
     r"""Return the limit equilibrium of columns on a stepped base.
 
-    From the top down, block n with the force P_n from the block above needs from the one below
+    From the top down, block n with the force P_n from the block above requires from the block below
+    the greater of
 
     .. math::
         P_{n-1,t} = [P_n (M_n - \Delta x \tan\phi) + \tfrac12 W_n (y_n \sin\alpha
                     - \Delta x \cos\alpha)] / L_n, \qquad
         P_{n-1,s} = P_n - W_n (\cos\alpha \tan\phi - \sin\alpha) / (1 - \tan^2\phi)
 
-    against toppling and sliding, whichever is more, and none if both are negative. Friction on the
-    sides is fully mobilised. Neighbours meet at the lower of their two tops: at M_n above the base
-    of block n on its upper side, at L_n on its lower side. (Goodman and Bray 1976, Toppling of rock
+    against toppling and sliding, and no force if both are negative. Friction on the sides is fully
+    mobilised. Neighbours are in contact at the lower of their two tops: at M_n above the base of
+    block n on its upper side, at L_n on its lower side. (Goodman and Bray 1976, Toppling of rock
     slopes, ASCE Specialty Conference on Rock Engineering, 201-234.)
 
     Parameters
@@ -87,7 +88,7 @@ def toppling(
     sin, cos = math.sin(math.radians(dip_deg)), math.cos(math.radians(dip_deg))
     tan = math.tan(math.radians(friction_deg))
     weight = unit_weight * width * y
-    upper = np.minimum(y, np.append(y[1:], 0.0) + step)  # M; nothing is above the last
+    upper = np.minimum(y, np.append(y[1:], 0.0) + step)  # M; the last column has no upper neighbour
     lower = np.minimum(y, np.append(0.0, y[:-1] - step))  # L; 0 at the toe
     force, mode = np.zeros(len(y)), []
     above = 0.0
@@ -112,8 +113,8 @@ def _mode(topple: float, slide: float) -> str:
 def columns(crest: int, above: int, rise: float, fall: float, step: float) -> list[float]:
     """Return the heights of the columns of a slope from the toe upwards [m].
 
-    Up to the `crest`-th they grow by `rise` - `step` each; the `above` ones beyond it are lower by
-    `fall` + `step` each (Goodman and Bray's a1, a2 and b).
+    Up to number `crest`, they increase by `rise` - `step` each; the `above` columns beyond it
+    decrease by `fall` + `step` each (a1, a2 and b of Goodman and Bray).
     """
     below: Sequence[float] = [n * (rise - step) for n in range(1, crest + 1)]
     return [*below, *(below[-1] - n * (fall + step) for n in range(1, above + 1))]

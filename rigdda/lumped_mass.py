@@ -1,8 +1,7 @@
-"""Releases by the lumped-mass model: a quick look, and the baseline of the block model.
+"""Releases by the lumped-mass model: a quick estimate, and the baseline of the block model.
 
-A point would be stopped by a notch of a millimetre, whose face is a wall to it. A block is not, so
-each point moves on ground without the features that are far smaller than the block that it stands
-for, see `felt`.
+A notch of a millimetre would stop a point, but not a block. Each point therefore moves on a ground
+without features that are much smaller than the block it represents, see `felt`.
 """
 
 from __future__ import annotations
@@ -38,39 +37,39 @@ from rigdda.releases import as_site
 Floats = NDArray[np.float64]
 
 STEEPEST_DEG = 80.0
-"""Friction angle up to which scatter may raise that of a surface [deg]."""
+"""Upper limit of the friction angle of a surface with random deviations [deg]."""
 
 UNFELT = 0.1
-"""Depth of the features of the ground that a block passes over as if they were not there, over its
-size [-]: it rolls over a step of a tenth of its size. Features are made of segments shorter than
-the block; a bend between two longer ones is none, however gentle."""
+"""Depth of ground features over block size below which a block is not affected by them [-]: a block
+rolls over a step of a tenth of its size. Features consist of segments shorter than the block; a
+bend between two longer segments always counts."""
 
 ROUNDING = 1e-9
-"""Height above a line up to which a corner counts as being on it [m]."""
+"""Height above a line below which a corner counts as being on it [m]."""
 
 
 class Points(NamedTuple):
-    """What became of the blocks of some releases, each a point; arrays (n,), a number a block."""
+    """Results of releases in which each block is a point; arrays (n,) with one value per block."""
 
     release: NDArray[np.int64]
-    """Which of the seeds."""
+    """Index of the seed."""
     mass: Floats
     """[kg per metre of slope]"""
     run_out: Floats
-    """Chainage at which it stops, at most the end of the ground [m]."""
+    """Chainage at which the block stops, at most the end of the ground [m]."""
     speed: Floats
-    """Where it first passes the uphill edge of the road [m/s]; NaN if it does not."""
+    """Speed at the first passage of the uphill edge of the road [m/s]; NaN without a passage."""
     height: Floats
-    """Above the ground there [m]; NaN if it does not."""
+    """Height above the ground at that passage [m]; NaN without a passage."""
 
     @property
     def reached(self) -> NDArray[np.bool_]:
-        """Whether it came onto the road."""
+        """Whether the block reached the road."""
         return ~np.isnan(self.speed)
 
     @property
     def energy(self) -> Floats:
-        """Kinetic energy there [J per metre of slope]; NaN if it does not."""
+        """Kinetic energy at that passage [J per metre of slope]; NaN without a passage."""
         return 0.5 * self.mass * self.speed**2
 
 
@@ -80,18 +79,19 @@ def lumped(
     seeds: Iterable[int] = (0,),
     event: str | None = None,
 ) -> Points:
-    """Return what becomes of releases of an event, or of those that seeds draw, as points.
+    """Simulate releases by the lumped-mass model, of a given event or of events drawn by the seeds.
 
-    Blocks start where `Site.draw` puts them, each on the ground that a block of its size feels, see
-    `felt`; the size is the side of a square of its area. They rebound by `site.lumped`; of a
-    surface that is not listed there normal restitution and friction are those of `site.surfaces`.
-    Friction and restitution vary as those of the site and its surfaces do; the ground is smooth.
+    Blocks start where `Site.draw` places them, each on the ground felt by a block of its size (see
+    `felt`), which is the side of a square of equal area. Rebound coefficients are those of
+    `site.lumped`; for surfaces not listed there, normal restitution and friction are those of
+    `site.surfaces`. Friction and restitution vary randomly as those of the site and its surfaces
+    do; the ground is smooth.
 
     Raises
     ------
     BadInput
-        If a barrier stands on the ground or where loose rock lies, the ground overhangs, there is
-        no seed, or as `Site.draw`.
+        If a barrier is not an earthwork or mesh or does not fit the site, the ground overhangs,
+        there are no seeds, or `Site.draw` fails.
     """
     site, layout = as_site(site), as_layout(layout)
     for i, barrier in enumerate(layout):
@@ -128,7 +128,7 @@ def lumped(
 
 
 def _deviations(site: Site, drawn: Drawn) -> list[tuple[float, float]]:
-    """Return how far friction [deg] and restitution [-] of each surface are off in a release."""
+    """Return the deviations of friction [deg] and restitution [-] of each surface in a release."""
     normals = drawn.strengths or ((0.0, 0.0, 0.0),) * len(site.surfaces)
     return [
         (drawn.friction_deg + normal[0] * s.friction_sd_deg, normal[1] * s.restitution_sd)
@@ -137,22 +137,23 @@ def _deviations(site: Site, drawn: Drawn) -> list[tuple[float, float]]:
 
 
 def felt(ground: Terrain, size: float) -> tuple[Floats, tuple[str, ...]]:
-    """Return the ground without features far smaller than a block.
+    """Return the ground without features that are much smaller than a block.
 
-    Corners between segments that are both as long as the block are kept. Between them the ground is
-    simplified (Douglas and Peucker 1973) to `UNFELT` times the size of the block.
+    Corners between two segments that are at least as long as the block are kept. Between these
+    corners, the ground is simplified (Douglas and Peucker 1973) with a tolerance of `UNFELT` times
+    the size of the block.
 
     Parameters
     ----------
     ground : Terrain
-        Ground whose chainages ascend.
+        Ground with ascending chainages.
     size : float
         Size of the block [m].
 
     Returns
     -------
     corners : (m, 2) array
-        Corners that are kept, and points on the lines between them where the surface changes [m].
+        The remaining corners, and points on the lines between them where the surface changes [m].
     surfaces : tuple of str
         Surface of each of the m - 1 segments.
     """
@@ -176,25 +177,25 @@ def felt(ground: Terrain, size: float) -> tuple[Floats, tuple[str, ...]]:
 def _follow(
     site: Site, ground: Terrain, starts: Floats, sizes: Floats, shifts: Floats
 ) -> NDArray[np.float64]:
-    """Follow points, each on the ground that a block of its size feels.
+    """Follow points, each on the ground felt by a block of its size.
 
     Parameters
     ----------
     site : Site
-        Its road and its laws of rebound.
+        The site, for its road and its rebound coefficients.
     ground : Terrain
         The ground with its earthworks.
     starts : (n, 4) array
-        Place [m] and velocity [m/s] of each point.
+        Position [m] and velocity [m/s] of each point.
     sizes : (n,) array
-        Size of the block that each point stands for [m].
+        Size of the block that each point represents [m].
     shifts : (n, surfaces, 2) array
-        See `_deviations`, for each point.
+        Deviations of `_deviations` for each point.
 
     Returns
     -------
     (n, 3) array
-        What `rigdda.dynamics.point_mass.trajectories` finds.
+        The results of `rigdda.dynamics.point_mass.trajectories`.
     """
     grounds: dict[bytes, tuple[Floats, tuple[str, ...]]] = {}
     members: dict[bytes, list[int]] = {}
@@ -213,7 +214,7 @@ def _follow(
         each[:, :, NORMAL] = np.clip(each[:, :, NORMAL] + off[:, :, 1], 0.0, 1.0)
         moved, results = starts[own], np.zeros((len(own), 3))
         level = np.interp(moved[:, 0], *corners.T)
-        moved[:, 1] = np.maximum(moved[:, 1], level)  # a thin slab may lie within a feature
+        moved[:, 1] = np.maximum(moved[:, 1], level)  # a thin slab may lie below this ground
         trajectories(np.array(corners), each, moved, EARTH, site.road.start, results)
         found[own] = results
     return found

@@ -1,4 +1,4 @@
-"""Measurement of a release: from a run to its outcome."""
+"""Measurement of a release: computes the outcome of a run."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ from rigdda.model.site import Site
 
 
 class BarrierEnding(NamedTuple):
-    """A barrier at the end of a release."""
+    """State of a barrier at the end of a release."""
 
     barrier: Barrier
     states: Sequence[tuple[float, str]]
-    """Its states, each with the time from which it was in it [s]; the first is "stands"."""
+    """Its successive states, each with the time at which it begins [s]; the first is "stands"."""
     reach: Reach
-    """Where it holds rock at the end if it still holds any."""
+    """Where it holds rock at the end, if it still holds any."""
     absorbed: float
-    """Energy that it took [J]."""
+    """Energy that it absorbed [J]."""
     thrust: float
-    """Greatest mean over a second of the thrust on it [N/m]."""
+    """Greatest thrust on it, averaged over a second [N/m]."""
     resistance: float
-    """Thrust that it bears [N/m]."""
+    """Thrust at which it fails [N/m]."""
     displacement: float
-    """Distance of its centroid from where it was at the start [m]."""
+    """Distance of its centroid from its initial position [m]."""
     road_area: float
     """Its area beyond the uphill edge of the road [m2]."""
 
 
 class Ending(NamedTuple):
-    """The end of a release of N blocks."""
+    """State at the end of a release of N blocks."""
 
     areas: Sequence[float]
     """Area of each block [m2]."""
     masses: Sequence[float]
-    """Mass of each block per metre of width, 0 of one that is fixed [kg]."""
+    """Mass of each block per metre of width, 0 for a fixed block [kg]."""
     starts: Sequence[float]
     """Chainage of the centroid of each block at the start [m]."""
     places: Sequence[tuple[float, float]]
@@ -55,25 +55,25 @@ class Ending(NamedTuple):
     speeds: Sequence[float]
     """Speed of each centroid at the end [m/s]."""
     log: Log
-    """What happened on the way."""
+    """Events during the release."""
     extent: tuple[float, float]
-    """Chainages between which all blocks stayed, corners included [m]."""
+    """Chainages between which all blocks stayed, including their corners [m]."""
     road_energy: float
     """Largest kinetic energy of a block over the road [J]."""
     time: float
-    """When it was [s]."""
+    """Time of the end [s]."""
     barriers: Sequence[BarrierEnding]
 
 
 def ending(run: Run, lines: Sequence[float], road_start: float) -> Ending:
-    """Return how a run ended that watched some stations, and energies over the road.
+    """Return how a run ended that recorded stations and the energies over the road.
 
     Parameters
     ----------
     run : Run
         The run.
     lines : sequence of float
-        Stations that it watched [m].
+        Its stations [m].
     road_start : float
         Chainage of the uphill edge of the road [m].
     """
@@ -98,12 +98,12 @@ def ending(run: Run, lines: Sequence[float], road_start: float) -> Ending:
 
 
 def steepest_deposit(friction_deg: Iterable[float]) -> float:
-    """Return the rise over run of the steepest deposit on surfaces of these friction angles [-]."""
+    """Return the slope of the steepest deposit on surfaces of these friction angles [-]."""
     return math.tan(math.radians(min(friction_deg)))
 
 
 def _barrier(run: Run, index: int, rise: float, road_start: float) -> BarrierEnding:
-    """Return how a barrier of a run ended; a deposit on it rises so at most [-]."""
+    """Return how a barrier of a run ended; `rise` is the greatest slope of its deposit [-]."""
     scene, barrier, outline = run.scene, run.scene.barriers[index], run.outline(index)
     return BarrierEnding(
         barrier=barrier,
@@ -128,13 +128,13 @@ def measure_barrier(
     Parameters
     ----------
     ended : BarrierEnding
-        The barrier in the end.
+        State of the barrier at the end.
     hits : sequence of (energy, height)
-        Hits of it [J, m].
+        Hits of the barrier [J, m].
     passed : iterable of (start, time)
-        Chainage of each block at the start, and when it first passed the barrier [m, s].
+        Initial chainage of each block and the time at which it first passed the barrier [m, s].
     caught : float
-        Share of the released mass that it holds at rest [-].
+        Fraction of the released mass at rest behind the barrier [-].
     """
     barrier, state = ended.barrier, ended.states[-1][1]
     gone = next((time for time, state in ended.states if state in GONE), math.inf)
@@ -164,33 +164,34 @@ def holding(ended: BarrierEnding, places: Sequence[tuple[float, float]]) -> list
 
 
 GRAIN = 2.0**40
-"""Fractions are whole multiples of 1/GRAIN, so that they add up to 1 exactly in any order."""
+"""Fractions are integer multiples of 1/GRAIN, so that they add up to exactly 1 in any order."""
 
 CUT_OFF = 2.0
-"""Speed of a block uphill of the road in the end from which on the release was cut off [m/s]: what
-creeps in a deposit is slower."""
+"""Speed of a block uphill of the road at the end of a run above which the release counts as cut off
+[m/s]. Blocks that creep in a deposit are slower."""
 
 MUCH = 0.5
-"""Share of the rock that must then move so: some of a mass of many may still roll."""
+"""Fraction of the rock that must exceed this speed for the release to count as cut off [-], because
+a few blocks of a large mass may still roll."""
 
 AT_REST = 0.1
 """Speed below which a caught block is at rest [m/s], as in replays."""
 
 
 def stations(site: Site, layout: Sequence[Barrier]) -> tuple[float, ...]:
-    """Return the ascending chainages at which a release must be watched for its outcome [m]."""
+    """Return the ascending chainages of the stations that the outcome of a release needs [m]."""
     return tuple(sorted({site.road.start, *(b.end for b in layout)}))
 
 
 def watch(site: Site) -> tuple[float, float]:
-    """Return the interval of x in which energies are watched: the road [m]."""
+    """Return the interval of x in which energies are recorded: the road [m]."""
     return site.road.start, site.road.end
 
 
 def leave(site: Site, scene: Scene) -> float:
-    """Return the chainage beyond which a block that moves on downhill matters no more [m].
+    """Return the chainage beyond which blocks that move downhill no longer matter [m].
 
-    Beyond the road, and from where on the ground does not rise, so that nothing rolls back.
+    It is beyond the road and beyond the last rise of the ground, so that no block can roll back.
     """
     ground = scene.smooth_ground or site.profile
     x, y = ground.points[:, 0], ground.points[:, 1]
@@ -199,16 +200,16 @@ def leave(site: Site, scene: Scene) -> float:
 
 
 def measure(site: Site, run: Run, event: str, width: float) -> Outcome:
-    """Return the outcome of a run that watched `stations` and `watch` of its site and layout.
+    """Return the outcome of a run that recorded `stations` and `watch` of its site and layout.
 
-    It is one of an event, so wide [m].
+    `width` is the width of its event [m].
     """
     ended = ending(run, stations(site, run.scene.barriers), site.road.start)
     return judge(site, ended, event, width)
 
 
 def judge(site: Site, ended: Ending, event: str, width: float) -> Outcome:
-    """Return the outcome of a release of an event, so wide [m], by how it ended."""
+    """Return the outcome of a release of an event of a width [m] from the state at its end."""
     road, places, areas = site.road, ended.places, ended.areas
     mass, weight = _weights(ended.masses)
     on = [2 if x > road.end else int(x >= road.start) for x, _ in places]
@@ -253,16 +254,16 @@ def judge(site: Site, ended: Ending, event: str, width: float) -> Outcome:
 
 
 def _cut_off(site: Site, ended: Ending, weight: Sequence[float]) -> bool:
-    """Return whether much of the rock still moved above the road as the time was over."""
+    """Return whether most of the rock was still moving above the road at the end of the run."""
     if ended.time < site.motion.duration - site.motion.dt:
-        return False  # nothing moved any more that matters
+        return False  # no relevant block was moving
     pairs = zip(ended.places, ended.speeds, strict=True)
     moves = [x < site.road.start and speed > CUT_OFF for (x, _), speed in pairs]
     return sum(compress(weight, moves)) > MUCH * GRAIN
 
 
 def _weights(masses: Sequence[float]) -> tuple[float, list[float]]:
-    """Return the released mass [kg/m] and whole-number weights that add up to GRAIN."""
+    """Return the released mass [kg/m] and integer weights that add up to GRAIN."""
     whole = math.fsum(masses)
     weight = [math.floor(m / whole * GRAIN) * 1.0 for m in masses]
     weight[weight.index(max(weight))] += GRAIN - sum(weight)
@@ -277,24 +278,24 @@ def _run_out(x: list[float], weight: list[float]) -> tuple[float, float, float]:
 
 
 class Log(NamedTuple):
-    """The events of a run: what happened to each barrier, and when blocks first passed stations."""
+    """Events of a run by barrier, and the times at which blocks first passed the stations."""
 
     hits: list[list[tuple[float, float]]]  # energy [J] and height [m] of each hit of a barrier
-    failed: list[float]  # when each barrier failed, inf if it did not [s]
-    passed: dict[float, list[float]]  # by station: when each block passed it, inf if it did not [s]
+    failed: list[float]  # time at which each barrier failed, inf if it did not [s]
+    passed: dict[float, list[float]]  # by station: passage time of each block, inf without one [s]
 
 
 def log_of(
     events: Iterable[tuple[Any, ...]], barriers: int, blocks: int, lines: Sequence[float]
 ) -> Log:
-    """Return what happened in a run of so many barriers and blocks that watched some stations.
+    """Return the log of a run from its events.
 
     Parameters
     ----------
     events : iterable of tuple
         Events in order of time, each with the fields of `rigdda.dynamics.run.EVENT`.
     barriers, blocks : int
-        Their numbers.
+        Numbers of barriers and blocks.
     lines : sequence of float
         The stations, ascending [m].
     """

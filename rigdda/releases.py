@@ -1,8 +1,8 @@
-"""Releases: a site with a layout, simulated for a seed, one or many.
+"""Releases: simulations of a site with a layout for one seed or many.
 
-Many releases of one site with one layout share what does not depend on the seed. Most are of a
-single block, which comes down in less than a millisecond: for these the ground, where barriers
-stand and how surfaces meet are prepared once.
+Releases of one site with one layout share everything that does not depend on the seed. Most of them
+are of a single block, whose descent is computed in less than a millisecond; for these, the ground,
+the positions of barriers and the interface properties are prepared once.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn
 
 NEVER: NDArray[np.float64] = np.zeros(0)
-"""Times of the frames that are kept on the way: none."""
+"""Times of intermediate frames that are recorded: none."""
 
 
 class StandingBarrier(NamedTuple):
-    """A barrier where it stands, as it is for all releases."""
+    """Properties of a barrier that are the same in all releases."""
 
     reach: Reach
-    """Where it holds rock, but for how steeply a deposit rises."""
+    """Where it holds rock, without the slope of the deposit."""
     area: float
     """Area of its outline [m2]."""
     base: list[tuple[int, int]]
@@ -75,10 +75,10 @@ class StandingBarrier(NamedTuple):
 
 
 def can_share(site: Site, scene: Scene) -> bool:
-    """Return whether releases of single blocks can share what a scene of one of them has.
+    """Return whether releases of single blocks can share the arrays of a scene of one of them.
 
-    Its ground must be the same in all, no gravity wall may stand in it, and contacts must rebound
-    as their restitution says.
+    This requires that the ground is the same in all releases, that there is no gravity wall, and
+    that every contact has a coefficient of restitution.
     """
     surfaces = (*site.surfaces.values(), *(pair.surface for pair in site.interfaces))
     return (
@@ -90,16 +90,16 @@ def can_share(site: Site, scene: Scene) -> bool:
 
 
 class SingleReleases:
-    """Releases of a single block of a site with a layout.
+    """Releases of a single block at a site with a layout.
 
     Parameters
     ----------
     site : Site
         The site.
     layout : list of Barrier
-        What stands, without mesh.
+        The barriers, without mesh.
     scene : Scene
-        That of one release with this layout, for which `can_share` holds.
+        Scene of one release with this layout, which must satisfy `can_share`.
     """
 
     def __init__(self, site: Site, layout: list[Built], scene: Scene):
@@ -114,7 +114,7 @@ class SingleReleases:
         self._blocks: dict[float, SingleBlock] = {}  # by the step [s]
 
     def _stand(self, index: int, names: list[str]) -> StandingBarrier:
-        """Return how a barrier stands; `names` are those of the surfaces in their order."""
+        """Return the fixed properties of a barrier; `names` lists the surfaces in order."""
         scene, barrier = self._scene, self._scene.barriers[index]
         outline, base = scene.outline(index), []
         if isinstance(barrier, Embankment):
@@ -131,7 +131,7 @@ class SingleReleases:
     def ending(self, drawn: Drawn) -> Ending | None:
         """Return how a release of a single block ends.
 
-        None where it takes a scene to tell, see `SingleBlock.run`.
+        Returns None if the release must be simulated as a scene, see `SingleBlock.run`.
         """
         (block,) = drawn.blocks
         if block.fixed or len(block.vertices) > MOST_CORNERS:
@@ -161,7 +161,7 @@ class SingleReleases:
         return self._ending(found, area, block.density, barriers, resistances)
 
     def _packed(self, drawn: Drawn, dt: float) -> SingleBlock:
-        """Return new arrays for single blocks that are computed in a step [s]."""
+        """Return new arrays for single blocks with a step [s]."""
         scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
         lines, settings = chainages(self._lines), Settings(dt=dt)
         found = SingleBlock(scene, settings, lines, watch(self._site), self._leave)
@@ -169,7 +169,7 @@ class SingleReleases:
         return found
 
     def _resistance(self, index: int, barrier: Built) -> float:
-        """Return the thrust that a barrier bears in the last release that was drawn [N/m]."""
+        """Return the thrust resistance of a barrier in the last drawn release [N/m]."""
         standing = self._standing[index]
         if not isinstance(barrier, Embankment):
             return barrier.resistance(self._scene, NEVER)
@@ -184,7 +184,7 @@ class SingleReleases:
         barriers: list[Built],
         resistances: list[float],
     ) -> Ending:
-        """Return how a release ended, by what came of its block and what barriers bear."""
+        """Return how a release ended, from the results of its block and the resistances."""
         log = log_of(found.events, len(barriers), 1, self._lines)
         rise = steepest_deposit([self._meetings.least_friction_deg])
         moved = [0.0] * len(barriers)
@@ -217,7 +217,7 @@ class SingleReleases:
 
 
 def moved_reach(barrier: Built, reach: Reach, moved: float) -> Reach:
-    """Return where a barrier holds rock after it has given way so far downhill [m]."""
+    """Return where a barrier holds rock after a downhill displacement [m]."""
     if moved == 0.0:
         return reach
     sunk = barrier.height - barrier.left_height(abs(moved)) if isinstance(barrier, Fence) else 0.0
@@ -225,16 +225,17 @@ def moved_reach(barrier: Built, reach: Reach, moved: float) -> Reach:
 
 
 EVERY = 0.05
-"""Interval of the frames of a run from which states of barriers are judged [s]."""
+"""Interval of the frames from which the states of barriers are determined [s]."""
 
 MOST_BLOCKS = 32
-"""Most blocks of a scene whose arrays are kept: packing more takes little beside simulating them.
-There are about as many kinds of them as numbers of blocks and of corners."""
+"""Maximum number of blocks of a scene whose arrays are kept for reuse. Packing a larger scene takes
+little time compared with its simulation. There are about as many sets of arrays as combinations of
+numbers of blocks and of corners."""
 
 Result = TypeVar("Result")
 
 Job = tuple[Site, Sequence[Barrier], int, str | None]
-"""A site, a layout, a seed and the name of an event, None for one that the seed draws."""
+"""A site, a layout, a seed and the name of an event, or None for an event drawn by the seed."""
 
 
 def as_site(site: Site) -> Site:
@@ -243,7 +244,7 @@ def as_site(site: Site) -> Site:
     Raises
     ------
     BadInput
-        If it is none.
+        If the argument is not a site.
     """
     if not isinstance(site, Site):
         raise BadInput("site", site, "give a site: rigdda.Site.load(name) gives one")
@@ -251,19 +252,19 @@ def as_site(site: Site) -> Site:
 
 
 class Batch:
-    """Releases of a site with a layout, one after the other.
+    """Successive releases of a site with a layout.
 
-    The ground and what stands on it are built once, by the first release. Later ones of a single
-    block go without a scene, see `SingleReleases`. Of others the blocks are checked and written
-    into the arrays of the last one, with what is drawn of the ground. Outcomes are those of
-    `rigdda.release`, whatever the order.
+    The first release builds the ground and the barriers. Later releases of a single block need no
+    scene, see `SingleReleases`. For other releases, only the blocks are checked and written into
+    the existing arrays, together with the random properties of the ground. The outcomes are those
+    of `rigdda.release`, in any order.
 
     Parameters
     ----------
     site : Site
-        Where.
+        The site.
     layout : sequence of Barrier
-        What stands.
+        The barriers.
     """
 
     def __init__(self, site: Site, layout: Sequence[Barrier]):
@@ -275,17 +276,17 @@ class Batch:
         self._templates: dict[tuple[int, int, float, int], Template] = {}
 
     def outcome(self, seed: int, event: str | None = None) -> Outcome:
-        """Return the outcome of one release. Raises as `rigdda.release` does."""
+        """Return the outcome of one release. Raises the errors of `rigdda.release`."""
         (found,) = self.outcomes([(seed, event)])
         if isinstance(found, Error):
             raise found
         return found
 
     def outcomes(self, releases: Sequence[tuple[int, str | None]]) -> list[Outcome | Error]:
-        """Return the outcomes of some releases, seeds and events, or what went wrong with them.
+        """Return the outcomes of several releases (seed, event), or the errors that they raised.
 
-        All are drawn, then all are run, then all are judged, so that what each of these needs stays
-        in the processor's caches: what is done beside the steps takes a tenth less time.
+        All are drawn, then simulated, then measured, so that the data of each stage stay in the
+        processor cache; this takes a tenth off the time spent outside the steps.
         """
         drawn = [_tried(self._site.draw, seed, event) for seed, event in releases]
         ended = [d if isinstance(d, Error) else _tried(self._drawn_ending, d) for d in drawn]
@@ -296,19 +297,19 @@ class Batch:
         return self.ending(drawn), drawn.event, drawn.width
 
     def ending(self, drawn: Drawn) -> Ending:
-        """Return how a release of what was drawn ends. Raises as `rigdda.release` does."""
+        """Return how a drawn release ends. Raises the errors of `rigdda.release`."""
         if len(drawn.blocks) == 1 and self._single is not None:
             ended = self._single.ending(drawn)
             if ended is not None:
                 return ended
         duration = self._site.motion.duration
-        # a wall that slid or overturned on the way may come to stand again
+        # intermediate frames are needed to see a wall that slides or overturns and stands again
         moving = any(isinstance(barrier, GravityWall) for barrier in self._standing)
         run = self.simulation(self.scene(drawn)).run(duration, EVERY if moving else duration)
         return ending(run, stations(self._site, run.scene.barriers), self._site.road.start)
 
     def scene(self, drawn: Drawn) -> Scene:
-        """Return the scene of what was drawn, on the ground and with the barriers of the first."""
+        """Return the scene of a drawn release, with the ground and barriers of the first one."""
         if self._base is None:
             scene = self._site.scene(drawn, self._site.built(self._layout, drawn.width))
             self._base = scene, drawn
@@ -323,7 +324,7 @@ class Batch:
         return base.with_rock(drawn.blocks, surfaces, interfaces, barriers, drawn.roughness)
 
     def simulation(self, scene: Scene) -> Simulation:
-        """Return the simulation of such a scene; that of the one before is of no more use."""
+        """Return the simulation of such a scene; it invalidates the previous one."""
         if len(scene.blocks) > MOST_BLOCKS:
             return simulation(self._site, scene)
         settings = self._site.settings(scene)
@@ -340,13 +341,13 @@ class Batch:
 
 
 def simulation(site: Site, scene: Scene) -> Simulation:
-    """Return a simulation of a scene of a site that watches what its outcome needs."""
+    """Return a simulation of a scene of a site that records everything its outcome needs."""
     lines = stations(site, scene.barriers)
     return Simulation(scene, site.settings(scene), lines, watch(site), leave(site, scene))
 
 
 def _tried(function: Callable[..., Result], *arguments: Any) -> Result | Error:
-    """Return what a function returns, or the error that it raises."""
+    """Return the result of a function, or the error that it raises."""
     try:
         return function(*arguments)
     except Error as error:
@@ -356,10 +357,10 @@ def _tried(function: Callable[..., Result], *arguments: Any) -> Result | Error:
 def outcomes(
     jobs: Sequence[Job], parts: Iterable[Sequence[int]]
 ) -> list[tuple[int, Outcome | Error]]:
-    """Return the outcomes of the jobs at some places, or what went wrong, each with its place.
+    """Return the outcomes of the jobs at some positions, or their errors, each with its position.
 
-    Several threads may share `parts`, an iterator. The jobs of a part have the same site and
-    layout, and parts with the same ones are to follow one another.
+    Several threads may share `parts`, an iterator. The jobs of a part must have the same site and
+    layout, and parts with the same site and layout should follow one another.
     """
     found: list[tuple[int, Outcome | Error]] = []
     batch, of = None, None
@@ -376,11 +377,12 @@ def outcomes(
 
 
 MANY = 0.05
-"""Share of some releases that may be cut off without a warning: one late block in a hundred."""
+"""Fraction of releases that may be cut off without a warning; it allows for occasional late
+blocks."""
 
 
 TOGETHER = 16
-"""Most releases that a thread takes at a time."""
+"""Maximum number of releases that a thread takes at a time."""
 
 
 def release(
@@ -390,29 +392,29 @@ def release(
     event: str | None = None,
     progress: bool = False,
 ) -> tuple[Run, Outcome]:
-    """Simulate one release of an event, or of one that the seed draws by rate, with a layout.
+    """Simulate one release with a layout, of a given event or of one drawn by the seed.
 
-    Events are drawn by their rates without mesh, which makes them rarer and changes no release: the
-    same seed gives the same rock with every layout.
+    Events are drawn by their rates without mesh, because mesh makes them rarer but does not change
+    a release: the same seed gives the same rock with every layout.
 
     Returns
     -------
     run : Run
-        Frames every 0.05 s; it ends when nothing moves any more but what goes on beyond the road.
+        Frames every 0.05 s. The run ends when every block is at rest or moves on beyond the road.
     outcome : Outcome
-        What it means for the road.
+        Consequences for the road and the barriers.
 
     Raises
     ------
     BadInput
-        If the layout does not stand on the slope, there is no such event or the seed is unsound.
+        If the layout does not fit the slope, the event does not exist or the seed is invalid.
     Diverged
         If the simulation diverges.
 
     Warns
     -----
     DoubtfulInput
-        If `motion.duration` cuts it off, see `Outcome.cut_off`.
+        If `motion.duration` cuts the release off, see `Outcome.cut_off`.
     """
     drawn = as_site(site).draw(seed, event)
     scene = site.scene(drawn, site.built(layout, drawn.width))
@@ -435,7 +437,7 @@ def _doubt_duration(site: Site) -> None:
 def release_outcome(
     site: Site, layout: Sequence[Barrier] = (), seed: int = 0, event: str | None = None
 ) -> Outcome:
-    """Return the outcome that `release` gives, in less time: frames on the way are not kept."""
+    """Return the outcome of `release` in less time, without intermediate frames."""
     return Batch(site, layout).outcome(seed, event)
 
 
@@ -447,17 +449,17 @@ def _job(i: int, job: Job) -> tuple[Site, Layout, int, str | None]:
 
 
 def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcome]:
-    """Return the outcomes of many releases (site, layout, seed, event), in threads.
+    """Return the outcomes of many releases (site, layout, seed, event), computed in threads.
 
-    Each outcome is the one that `release` gives. Releases of a site with a layout share what does
-    not depend on the seed.
+    Each outcome equals that of `release`. Releases of a site with a layout share everything that
+    does not depend on the seed.
 
     Parameters
     ----------
     jobs : sequence of (Site, sequence of Barrier, int, str or None)
-        Releases.
+        The releases.
     threads : int, optional
-        How many; by default one for each core.
+        Number of threads; by default one per core.
 
     Raises
     ------
@@ -467,7 +469,7 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     Warns
     -----
     DoubtfulInput
-        If `motion.duration` cuts more than one in twenty off, see `Outcome.cut_off`.
+        If `motion.duration` cuts off more than one release in twenty, see `Outcome.cut_off`.
     """
     if not isinstance(jobs, Sequence):
         raise BadInput("jobs", jobs, "give a sequence of (site, layout, seed, event)")

@@ -1,1 +1,1 @@
-"""The core of `rigdda` and other rigid-body engines side by side: error against processor time."""
+"""Benchmark of the core of `rigdda` and other rigid-body engines: error and processor time."""

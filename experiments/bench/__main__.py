@@ -1,4 +1,4 @@
-"""Run it all: `python -m experiments.bench [--quick] [--out DIR]`."""
+"""Run the benchmark: `python -m experiments.bench [--quick] [--out DIR]`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def best(settings: list[Setting], error: float, core: bool) -> Setting | None:
 
 
 def compare(console: Console, out: Path, quick: bool, say: Callable[[str], None]) -> None:
-    """Sweep all engines over all cases, and the episodes a second at what was found."""
+    """Run all engines on all cases, and measure the throughput with the settings found."""
     cases = quick_cases() if quick else all_cases()
     found = {c.name: sweep(c, load(), QUICK if quick else FULL, say) for c in cases}
     rows = [s.row(c) for c in cases for s in found[c.name]]
@@ -44,7 +44,7 @@ def compare(console: Console, out: Path, quick: bool, say: Callable[[str], None]
 
 
 def alone(console: Console, out: Path, quick: bool, say: Callable[[str], None]) -> None:
-    """Measure what concerns this core alone: growth of cost, start-up and memory."""
+    """Measure properties of this core alone: growth of cost, start-up time and memory."""
     sizes = growth.SIZES[:5] if quick else growth.SIZES
     piles = growth.measure(sizes, 1 if quick else 2, say)
     tables.write(out / "growth.csv", piles)
@@ -57,12 +57,14 @@ def alone(console: Console, out: Path, quick: bool, say: Callable[[str], None]) 
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="Ten minutes: fewer steps, releases and blocks.")
+@click.option("--quick", is_flag=True, help="Use fewer steps, releases and blocks (ten minutes).")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help=f"Folder of CSV and pictures: {RESULTS}."
+    "--out",
+    type=click.Path(path_type=Path),
+    help=f"Folder for CSV files and pictures; default {RESULTS}.",
 )
 def main(quick: bool, out: Path | None) -> None:
-    """Measure this core and the peers pymunk, Box2D v3 and MuJoCo on the same scenes."""
+    """Benchmark this core and the peers pymunk, Box2D v3 and MuJoCo on the same scenes."""
     console = Console(width=None if sys.stdout.isatty() else 160)
     out = out or (RESULTS / "quick" if quick else RESULTS)
 

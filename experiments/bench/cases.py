@@ -1,4 +1,4 @@
-"""What is computed: the same scene for every engine, and the error of what comes out."""
+"""Cases of the benchmark: the same scenes for every engine, and the errors of their results."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from rigdda.validation.scenes import FLAT, box, incline, polygon, rock
 Floats = NDArray[np.float64]
 
 LONGEST = 0.1
-"""Longest step [s]; every step is a whole part of it. The core refuses what is too long for it."""
+"""Longest step [s]; all steps divide it. The core refuses steps that are too long for it."""
 
 FRAME = 0.02
-"""Interval of the frames of a rockfall, and its longest step [s]."""
+"""Frame interval of a rockfall, which is also its longest step [s]."""
 
 RELEASE = 25.0
 """Simulated time of a rockfall [s]."""
 
 PARTS = (1, 2, 5, 6, 8, 10, 12, 15, 20, 25, 40, 50, 100)
-"""Steps of all engines, as parts of the longest one: 0.1 s to 1e-3 s."""
+"""Steps of all engines, as divisors of the longest one: 0.1 s to 1e-3 s."""
 
 FINE = (*PARTS, 200, 400, 800, 1600)
-"""Steps where closed forms are approached, down to 6.25e-5 s."""
+"""Steps for closed forms, as divisors, down to 6.25e-5 s."""
 
 QUICK_PARTS = (1, 2, 5, 6, 8, 10, 12, 15, 20, 50, 200, 800)
-"""Steps of the quick run."""
+"""Steps of the quick run, as divisors."""
 
 SETTLED = 2.0
-"""Time at the end over which the penetration of what stands is taken [s]."""
+"""Time at the end over which the penetration of stacks is measured [s]."""
 
 APART = 2e-3
-"""Least interval of the poses from which an impact is told [s]."""
+"""Least interval of the poses from which an impact is detected [s]."""
 
 STANDS = 0.1
-"""Displacement beyond which a stack counts as fallen [m]."""
+"""Displacement above which a stack counts as collapsed [m]."""
 
 RUN_OUT = 400.0
-"""The valley floor is drawn out level to here [m], so that no block leaves the terrain."""
+"""End of the extended level valley floor [m], beyond the run-out of any block."""
 
 
 @dataclass(frozen=True)
@@ -55,26 +55,28 @@ class Case:
     Parameters
     ----------
     name, quantity : str
-        Its name, and what its error is, with the unit.
+        Its name, and the definition of its error with the unit.
     scenes : tuple of Scene
-        Variants; `total` makes one error of theirs.
+        Variants; `total` combines their errors.
     duration : float
         Simulated time [s].
     every : float or None
         Interval of the frames [s]; None: every step.
     error : callable
-        Error of one scene from the times (T,) and the poses (T, N, 3) of its frames, the start
-        included.
+        Returns the error of one scene from the times (T,) and the poses (T, N, 3) of its frames,
+        including the start.
     parts : tuple of int
-        Steps, as parts of `LONGEST`.
+        Steps, as divisors of `LONGEST`.
     options : int or None
-        How many of an engine's options are tried, from the first on; None: all.
+        Number of an engine's options that are used, from the first on; None: all.
     levels : tuple of float
         Errors at which engines are compared.
     must, aim : float
-        Processor time of this core over that of the cheapest peer: what is asked, and hoped for.
+        Required and desired processor time of this core over that of the cheapest peer.
     sleeping : bool
         Whether blocks at rest may sleep.
+    total : callable
+        Combines the errors of the scenes.
     """
 
     name: str
@@ -93,18 +95,18 @@ class Case:
 
 
 def slide_error(scene: Scene, times: Floats, poses: Floats) -> float:
-    """Return the relative error of the way of a slide on 30 degrees at a friction of 20."""
+    """Return the relative error of the distance slid on 30 deg with 20 deg of friction."""
     exact = slides.slide(30.0, 20.0, times[-1])
     return abs(math.dist(poses[-1, 0, :2], poses[0, 0, :2]) / exact - 1.0)
 
 
 def creep(scene: Scene, times: Floats, poses: Floats) -> float:
-    """Return the way that a block creeps after the first second over its size, 1 m."""
+    """Return the creep of a block after the first second over its size, 1 m."""
     return math.dist(poses[-1, 0, :2], poses[np.searchsorted(times, 1.0 - 1e-9), 0, :2])
 
 
 def fall_error(scene: Scene, times: Floats, poses: Floats) -> float:
-    """Return the relative error of the way of a damped fall."""
+    """Return the relative error of the distance of a damped fall."""
     exact = free_flight.fall(scene.damping, times[-1])[0]
     return abs((poses[0, 0, 1] - poses[-1, 0, 1]) / exact - 1.0)
 
@@ -112,9 +114,9 @@ def fall_error(scene: Scene, times: Floats, poses: Floats) -> float:
 def rocking_error(scene: Scene, times: Floats, poses: Floats) -> float:
     """Return the relative error of the time in which a tilted block falls back onto its base.
 
-    The impact is in the first step in which the block does not turn faster than before; the time at
-    which its base lies flat follows from the parabola through the three poses before that step.
-    Poses are `APART`: closer, the rounding of single precision passes for an impact.
+    The impact is in the first step in which the rotation does not accelerate. The time at which the
+    base is flat follows from the parabola through the three poses before that step. The poses are
+    `APART`, because at shorter intervals rounding errors of single precision look like impacts.
     """
     thin = max(1, round(APART / times[1]))
     times, poses = times[::thin], poses[::thin]
@@ -133,7 +135,7 @@ def rocking_error(scene: Scene, times: Floats, poses: Floats) -> float:
 
 
 def sinking(scene: Scene, times: Floats, poses: Floats) -> float:
-    """Return the greatest penetration once settled [m]; infinite if the blocks do not stand."""
+    """Return the greatest penetration at the end [m], infinite if the stack has collapsed."""
     moved = np.hypot(*(poses[:, :, :2] - poses[0, :, :2]).T).max()
     if not moved <= STANDS:
         return math.inf
@@ -141,15 +143,15 @@ def sinking(scene: Scene, times: Floats, poses: Floats) -> float:
 
 
 def deepest(scene: Scene, times: Floats, poses: Floats) -> float:
-    """Return the greatest penetration of all frames [m]."""
+    """Return the greatest penetration in all frames [m]."""
     return float(penetration(scene, poses).max())
 
 
 def rockfall_scene(count: int, seed: int) -> Scene:
-    """Return about `count` blocks of 2 m2 above the slope with benches of the scene shu-hwa-paper.
+    """Return about `count` blocks of 2 m2 above the benched slope of the scene shu-hwa-paper.
 
-    Its source has about 120. A smaller one has the same shape; a larger one is thicker, as long as
-    the slope below it.
+    The source of that scene has about 120 blocks. Smaller sources have the same shape; larger ones
+    are thicker at the same length.
     """
     site = Site.load("shu-hwa-paper")
     crest, edge = np.array(site.slope.points[1:3])
@@ -172,7 +174,7 @@ def rockfall_scene(count: int, seed: int) -> Scene:
 
 
 def rockfall(count: int, seeds: int, must: float, aim: float) -> Case:
-    """Return the case of a rockfall; of its releases, the median greatest penetration counts."""
+    """Return the case of a rockfall, with the median over releases of the greatest penetration."""
     return Case(
         f"rockfall-{count}",
         "greatest penetration [m]",
@@ -181,7 +183,7 @@ def rockfall(count: int, seeds: int, must: float, aim: float) -> Case:
         FRAME,
         deepest,
         tuple(part for part in PARTS if LONGEST / part <= FRAME),
-        3 if count < 480 else 2,  # the third costs minutes and decides nothing
+        3 if count < 480 else 2,  # the third takes minutes and is never the best
         (0.05,),
         must,
         aim,
@@ -191,13 +193,13 @@ def rockfall(count: int, seeds: int, must: float, aim: float) -> Case:
 
 
 def standing(name: str, blocks: tuple[Block, ...]) -> Case:
-    """Return the case of blocks that stand on one another, awake."""
+    """Return the case of a stack of blocks, without sleeping."""
     scene = Scene(Terrain(FLAT), blocks, rock())
     return Case(name, "penetration at rest [m]", (scene,), 10.0, 0.1, sinking, PARTS)
 
 
 def tilted(tilt: float) -> Scene:
-    """Return the scene of a block 1 m wide and 4 m high that stands on one corner."""
+    """Return the scene of a block 1 m wide and 4 m high on one corner."""
     corners = [(0.0, 0.0), (rocking.WIDTH, 0.0), (rocking.WIDTH, rocking.HEIGHT)]
     block = Block(polygon([*corners, (0.0, rocking.HEIGHT)], angle=tilt))
     return Scene(Terrain(FLAT), (block,), rock(60.0))
@@ -234,10 +236,10 @@ def all_cases() -> tuple[Case, ...]:
 
 
 def quick_cases() -> tuple[Case, ...]:
-    """Return all cases but the largest, with fewer steps and fewer options each.
+    """Return all cases but the largest, with fewer steps and options.
 
-    And with one scene, but where the error is a median over scenes: in each rockfall the greatest
-    penetration is another one.
+    They have one scene each, except for rockfalls, whose error is a median over scenes because the
+    greatest penetration differs between releases.
     """
     return tuple(
         replace(

@@ -23,15 +23,15 @@ sim = rigdda.Simulation(rigdda.Scene(rigdda.Terrain([(-9, 0), (9, 0)]), (block,)
 sim.step()
 print(imported - start, time.perf_counter() - imported)
 """
-"""Prints the time of the import and of a scene with its first step [s]."""
+"""Script that prints the time of the import and of a scene with its first step [s]."""
 
 
 @dataclass(frozen=True)
 class Footprint:
     """Wall times of a fresh process [s] and memory [bytes].
 
-    `interpreter`: of Python alone. A growth is of what is allocated over a simulated minute of
-    stepping, after a first one.
+    `interpreter_s` is for Python alone. The growth is the memory allocated during a simulated
+    minute of steps, after a first one.
     """
 
     interpreter_s: float
@@ -64,7 +64,7 @@ def _allocated() -> int:
 
 
 def _memory(scene: Scene) -> tuple[float, float, float]:
-    """Return bytes per block, per block and frame, and the growth over a minute."""
+    """Return bytes per block, bytes per block and frame, and the growth over a minute."""
     blocks = len(scene.blocks)
     Simulation(scene).step()
     tracemalloc.start()
@@ -85,7 +85,7 @@ def _memory(scene: Scene) -> tuple[float, float, float]:
 
 
 def measure(cold: bool) -> Footprint:
-    """Measure; the first run ever, which compiles everything, only if `cold`."""
+    """Measure; time the first run ever, which compiles all kernels, only if `cold`."""
     _start()
     imported, stepped = (sorted(v)[1] for v in zip(*(_start() for _ in range(3)), strict=True))
     ever = float("nan")

@@ -1,4 +1,4 @@
-"""How the cost grows with the number of blocks while a pile forms."""
+"""Growth of the cost with the number of blocks while a pile forms."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ SIZES = (20, 60, 120, 240, 480, 960, 1920, 3840)
 """Numbers of blocks."""
 
 FITTED = 120
-"""Least number of blocks that the exponent is fitted to."""
+"""Least number of blocks used to fit the exponent."""
 
 AREA = 2.0
 """Area of a block [m2]."""
 
 CELL = 2.0
-"""Side of the cell of the cloud in which a block starts [m]: more than its diameter."""
+"""Side of the cell in which a block starts [m], larger than its diameter."""
 
 SLENDER = 4.0
-"""Width of the cloud over its height [-]."""
+"""Width of the initial cloud over its height [-]."""
 
 FALLS = 2.5
-"""Simulated time in times of fall from the cloud's top: what happens in it is similar (Froude)."""
+"""Simulated time over the fall time from the cloud's top, for dynamic similarity (Froude) [-]."""
 
 
 @dataclass(frozen=True)
 class Growth:
-    """A pile of so many blocks: processor time per simulated second [us/s], penetration [m]."""
+    """A pile of blocks: processor time per simulated second [us/s], penetration [m]."""
 
     blocks: int
     duration: float
@@ -48,7 +48,7 @@ class Growth:
 
 
 def rubble(rng: np.random.Generator) -> np.ndarray:
-    """Return the (n, 2) corners of a convex block of `AREA` about its centroid [m]."""
+    """Return the (n, 2) corners of a random convex block of `AREA` about its centroid [m]."""
     n = int(rng.integers(5, 8))
     turn = 2.0 * math.pi * (np.arange(n) + rng.uniform(-0.25, 0.25, n)) / n + rng.uniform(0.0, 6.0)
     corners = np.stack([np.cos(turn), np.sin(turn)], axis=1)
@@ -57,7 +57,7 @@ def rubble(rng: np.random.Generator) -> np.ndarray:
 
 
 def heap(count: int) -> tuple[Scene, float]:
-    """Return a loose cloud of blocks above level ground, and the time in which it piles up [s]."""
+    """Return a loose cloud of blocks above level ground, and the time for it to pile up [s]."""
     rng = np.random.default_rng(count)
     rows = max(2, round(math.sqrt(count / SLENDER)))
     columns = math.ceil(count / rows)
@@ -73,7 +73,7 @@ def heap(count: int) -> tuple[Scene, float]:
 
 
 def pour(scene: Scene, duration: float, dt: float) -> tuple[float, float, float]:
-    """Return processor time [s], contacts per block and step, and penetration at the end [m]."""
+    """Return processor time [s], contacts per block and step, and final penetration [m]."""
     sim = Simulation(scene, Settings(dt=dt))
     before = time.process_time()
     sim.step(round(duration / dt))
@@ -114,7 +114,7 @@ def _growth(blocks: int, duration: float, dt: float, result: np.ndarray) -> Grow
 
 
 def exponent(rows: list[Growth]) -> float:
-    """Return the exponent of the number of blocks that fits the cost of the larger piles."""
+    """Return the fitted exponent of the cost as a power of the number of blocks."""
     large = [r for r in rows if r.blocks >= FITTED]
     if len(large) < 2:
         return math.nan

@@ -1,4 +1,4 @@
-"""What was measured, and what follows from it: fronts and the table of levels."""
+"""Measured rows, and the fronts and comparisons at equal error that follow from them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ CORE = "rigdda"
 class Row:
     """One engine with one setting on one case.
 
-    Error in the unit of the case; processor time of the steps per simulated second [us/s], median,
-    least and greatest of so many runs.
+    The error is in the unit of the case; the processor time of the steps per simulated second
+    [us/s] is given as median, minimum and maximum of the runs.
     """
 
     case: str
@@ -38,10 +38,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Level:
-    """The core against the cheapest peer at one error.
+    """Comparison of this core with the cheapest peer at one error.
 
-    Processor time per simulated second [us/s], infinite where the error is not reached; a ratio
-    needs both. Where no peer reaches the error, it is enough that this core does.
+    Processor times are per simulated second [us/s], infinite if the error is not reached. The ratio
+    requires both. If no peer reaches the error, the targets are met if this core does.
     """
 
     case: str
@@ -56,7 +56,7 @@ class Level:
 
 
 def on_front(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows that none beats in both error and time, from the cheapest on."""
+    """Return the rows that no other row beats in both error and time, cheapest first."""
     return front(rows, lambda r: (r.cpu_us_per_simulated_s, r.error))
 
 
@@ -67,7 +67,7 @@ def cheapest(rows: Iterable[Row], error: float) -> Row | None:
 
 
 def level(case: Case, error: float, rows: Sequence[Row]) -> Level:
-    """Compare at one error of a case."""
+    """Compare the engines at one error of a case."""
     here = [r for r in rows if r.case == case.name]
     core = cheapest((r for r in here if r.engine == CORE), error)
     peer = cheapest((r for r in here if r.engine != CORE), error)
@@ -88,5 +88,5 @@ def level(case: Case, error: float, rows: Sequence[Row]) -> Level:
 
 
 def levels(cases: Iterable[Case], rows: Sequence[Row]) -> list[Level]:
-    """Compare at every level of every case."""
+    """Compare the engines at every level of every case."""
     return [level(case, error, rows) for case in cases for error in case.levels]

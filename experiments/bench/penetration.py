@@ -1,4 +1,4 @@
-"""How deep bodies are inside one another, from their poses: the same for all engines."""
+"""Penetration depth of bodies from their poses, computed in the same way for all engines."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Floats = NDArray[np.float64]
 
 
 class Shapes(NamedTuple):
-    """The convex blocks of a scene about their centroids and the chain of its terrain.
+    """The convex blocks of a scene about their centroids, and the chain of its terrain.
 
     Corners (N, C, 2) anticlockwise and their number (N,), radius about the centroid (N,), corners
-    of the terrain (M, 2), ground on the right [m].
+    of the terrain (M, 2) with the ground on the right [m].
     """
 
     corners: Floats
@@ -59,7 +59,7 @@ def _place(world, corners, count, pose):
 
 @numba.njit(cache=True)
 def _overlap(a, na, b, nb):
-    """Return the least overlap of two convex polygons along the normals of `a`; negative: apart."""
+    """Return the least overlap of two convex polygons along the normals of `a`, < 0 if apart."""
     least = math.inf
     for i in range(na):
         j = (i + 1) % na
@@ -83,7 +83,7 @@ def _depth_in_ground(x, y, terrain):
         t = min(max(((x - px) * ex + (y - py) * ey) / (ex * ex + ey * ey), 0.0), 1.0)
         away = math.hypot(x - px - t * ex, y - py - t * ey)
         left = (ex * (y - py) - ey * (x - px)) / math.hypot(ex, ey)
-        # of two segments that share the nearest corner, the one that the point is farther beside
+        # if two segments share the nearest corner, use the one whose line is farther away
         if away < nearest - 1e-12 or (away < nearest + 1e-12 and abs(left) > abs(side)):
             nearest, side = away, left
     return nearest if side < 0.0 else 0.0
@@ -123,11 +123,11 @@ def _deepest(poses, corners, count, radius, terrain):
 
 
 def penetration(scene: Scene, poses: Floats) -> Floats:
-    """Return the greatest depth in each frame, (T,) [m].
+    """Return the greatest penetration in each frame, (T,) [m].
 
-    Of two blocks: the least translation that separates them (over the normals of the edges of both;
-    at least the depth of the deepest vertex). Of a block and the terrain: the deepest vertex of
-    either inside the other.
+    For two blocks, it is the least translation that separates them (over the edge normals of both;
+    at least the depth of the deepest vertex). For a block and the terrain, it is the depth of the
+    deepest vertex of either one inside the other.
 
     Parameters
     ----------

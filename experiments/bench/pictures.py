@@ -1,4 +1,4 @@
-"""Error against processor time, and the growth of cost."""
+"""Pictures of error against processor time, and of the growth of cost."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from experiments.bench.levels import Row, on_front
 
 COLOURS = {"rigdda": "#c0392b", "pymunk": "#2980b9", "box2d": "#27ae60", "mujoco": "#8e44ad"}
 LEAST = 1e-8
-"""Errors below are drawn here: rounding."""
+"""Lower limit at which errors are drawn, below which they are rounding."""
 
 
 def fronts(path: Path, cases: Sequence[Case], rows: Sequence[Row]) -> None:
-    """Draw a panel a case: all settings as dots, the front of each engine as a line."""
+    """Draw a panel per case, with all settings as dots and the front of each engine as a line."""
     columns = 4
     height = math.ceil(len(cases) / columns)
     figure = Figure(figsize=(4.0 * columns, 3.4 * height), layout="constrained")

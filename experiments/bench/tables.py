@@ -16,7 +16,7 @@ from experiments.bench.levels import Level
 
 
 def write(path: Path, rows: Sequence[Any]) -> None:
-    """Write dataclasses as CSV, a column a field, see `experiments.script.write`."""
+    """Write dataclasses as CSV with a column per field, see `experiments.script.write`."""
     script.write(path, [asdict(row) for row in rows])
 
 
@@ -33,7 +33,7 @@ def show_levels(console: Console, rows: Sequence[Level]) -> None:
 
 
 def show(console: Console, title: str, row: Any) -> None:
-    """Print the fields of a dataclass, one a line."""
+    """Print the fields of a dataclass, one per line."""
     table = Table(title=title, show_header=False)
     for name, value in asdict(row).items():
         table.add_row(
@@ -43,7 +43,7 @@ def show(console: Console, title: str, row: Any) -> None:
 
 
 def show_rows(console: Console, title: str, rows: Sequence[Any]) -> None:
-    """Print dataclasses, one a line."""
+    """Print dataclasses, one per line."""
     table = Table(title=title)
     for name in asdict(rows[0]):
         table.add_column(name.replace("_", " "), justify="right")

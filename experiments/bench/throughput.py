@@ -1,4 +1,4 @@
-"""Episodes of 20 blocks a second on all cores: threads here, two processes for the peer."""
+"""Throughput of episodes with 20 blocks on all cores: threads here, processes for the peer."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ FRAME = 0.05
 """Interval of recorded frames [s]."""
 
 WORKERS = 2
-"""Processes of the peer."""
+"""Number of processes of the peer."""
 
 
 @dataclass(frozen=True)
 class Throughput:
-    """Episodes a second of wall time and processor time of an episode, medians of the rounds.
+    """Episodes per second of wall time and processor time per episode, medians of the rounds.
 
-    An episode is loaded, stepped and recorded. Where the machine's cores are shared, compare the
+    An episode is loaded, stepped and recorded. If the cores are shared with other work, compare the
     processor times: `cpu_ratio` is that of this core over the peer's.
     """
 
@@ -58,7 +58,7 @@ def episode(
 def peer_rate(
     pool: Executor, scenes: list[Scene], duration: float, peer: Setting
 ) -> tuple[float, float]:
-    """Return episodes a second and processor time of one, in processes that have started."""
+    """Return episodes per second and processor time per episode in running processes."""
     module = peer.engine.__name__.rpartition(".")[2]
     before = time.perf_counter()
     jobs = [
@@ -69,7 +69,7 @@ def peer_rate(
 
 
 def core_rate(scenes: list[Scene], duration: float, dt: float) -> tuple[float, float]:
-    """Return episodes a second of this core in threads and the processor time of one."""
+    """Return episodes per second of this core in threads and processor time per episode."""
     wall, cpu = time.perf_counter(), time.process_time()
     simulate_many(scenes, Settings(dt=dt), duration, FRAME)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
@@ -77,7 +77,7 @@ def core_rate(scenes: list[Scene], duration: float, dt: float) -> tuple[float, f
 
 
 def measure(case: Case, core: Setting, peer: Setting, episodes: int, rounds: int) -> Throughput:
-    """Measure both in turn, each at its cheapest setting that is accurate enough."""
+    """Measure both in turn, each with its cheapest setting that is accurate enough."""
     scenes = [case.scenes[i % len(case.scenes)] for i in range(episodes)]
     ours, theirs = [], []
     with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:

@@ -17,25 +17,26 @@ from rigdda import Scene
 from rigdda.errors import BadInput, Diverged
 
 TIE = 1.3
-"""A setting is timed again if its first time is at most so many times that of the cheapest at a
-level: it may be the cheapest."""
+"""Ratio of first times up to which a setting is timed again, since it may be the cheapest at a
+level."""
 
 ENOUGH = 0.25
-"""Share of the finest level of error, and of patience, after which no finer step is tried."""
+"""Fraction of the finest error level, and of the patience, below which no finer step is tried."""
 
 LEAST = 0.01
-"""Processor time that a measurement lasts at least [s]; shorter runs are repeated back to back."""
+"""Least processor time of a measurement [s]; shorter runs are repeated."""
 
 LONG = 0.5
-"""Processor time from which the run that gives the error is timed too, not another one [s]."""
+"""Processor time above which the run for the error also counts as a measurement [s]."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is spent on a case.
+    """Limits on the effort for a case.
 
-    Processor time of a scene [s] after which no finer step is tried with the same options, and of
-    all repeated runs together; most and fewest runs of a setting that may decide a level.
+    `patience` is the processor time of a scene [s] above which no finer step is tried with the same
+    options, `repeats` the processor time of all repeated runs together [s], and `most` and `fewest`
+    are the numbers of runs of a setting that may decide a level.
     """
 
     patience: float
@@ -50,7 +51,7 @@ QUICK = Effort(patience=1.0, repeats=1.0, most=5, fewest=3)
 
 @dataclass
 class Setting:
-    """An engine with its options and a step; what it erred and took so far."""
+    """An engine with options and a step, and its measured error and times."""
 
     engine: ModuleType
     dt: float
@@ -64,11 +65,11 @@ class Setting:
         return float(np.median(self.cpu))
 
     def load(self, scene: Scene, sleeping: bool) -> Any:
-        """Return the engine with a scene in it."""
+        """Return the engine with a scene loaded."""
         return self.engine.Engine(scene, self.dt, sleeping, **self.options)
 
     def row(self, case: Case) -> Row:
-        """Return what was measured; times per simulated second, of one scene."""
+        """Return the measurements as a row, with times per simulated second of one scene."""
         simulated = 1e-6 * case.duration * len(case.scenes)
         return Row(
             case.name,
@@ -84,7 +85,7 @@ class Setting:
 
 
 def first_run(setting: Setting, case: Case) -> None:
-    """Set the error of a setting, infinite where a scene diverges, and its first time."""
+    """Set the error of a setting, infinite if a scene diverges, and its first time."""
     stride = 1 if case.every is None else round(case.every / setting.dt)
     frames = round(case.duration / setting.dt) // stride
     errors, cpu = [], 0.0
@@ -109,8 +110,8 @@ def first_run(setting: Setting, case: Case) -> None:
 def stepping(setting: Setting, case: Case) -> float:
     """Return the processor time of the steps of all scenes of a case [s].
 
-    Loading is left out, and nothing is read in between: this core and MuJoCo take all steps in one
-    call; pymunk and Box2D need a call a step, which is part of using them from Python.
+    Loading is excluded and nothing is read in between. This core and MuJoCo take all steps in one
+    call; pymunk and Box2D need one call per step, which is part of using them from Python.
     """
     total, rounds = 0.0, 0
     while total < LEAST:
@@ -127,9 +128,10 @@ def stepping(setting: Setting, case: Case) -> float:
 def sweep(
     case: Case, engines: list[ModuleType], effort: Effort, say: Callable[[str], None]
 ) -> list[Setting]:
-    """Measure a case: errors first, then times in rounds through what may decide a level.
+    """Measure a case: errors first, then times in rounds for settings that may decide a level.
 
-    The machine is shared: interleaved, engines meet the same disturbances, and medians count.
+    The machine is shared: in rounds, all engines are exposed to the same disturbances, and medians
+    are used.
     """
     settings: list[Setting] = []
     for engine in engines:
@@ -151,7 +153,7 @@ def sweep(
 def _refine(
     case: Case, engine: ModuleType, options: dict[str, Any], effort: Effort
 ) -> Iterator[Setting]:
-    """Yield ever finer steps until they take too long, sooner if they are accurate enough."""
+    """Yield ever finer steps until they take too long, or are accurate enough."""
     for part in case.parts:
         setting = Setting(engine, LONGEST / part, options)
         try:

@@ -1,4 +1,4 @@
-"""A catch bench below a mine face: retained share against width."""
+"""A catch bench below a mine face: share of retained blocks against its width."""
 
 from experiments.catch_bench.study import run
 

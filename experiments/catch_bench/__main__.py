@@ -1,4 +1,4 @@
-"""Run it: `python -m experiments.catch_bench [--quick] [--out DIR]`."""
+"""Run the catch bench study: `python -m experiments.catch_bench [--quick] [--out DIR]`."""
 
 from experiments.catch_bench.study import run
 from experiments.script import main

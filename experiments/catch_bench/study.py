@@ -1,13 +1,14 @@
-"""A catch bench below a face of 24.5 m: retained share of six-inch blocks against width.
+"""A catch bench below a face of 24.5 m: share of retained six-inch blocks against its width.
 
-A program that was calibrated on field tests retains 90 % of them within 10.9 m of the toe and about
-80 % within 9.4 m (RocFall2, Restrepo et al. 2025). This compares a model with a calibrated model.
-The face angle is not in what was at hand: 70, 75 and 80 degrees are computed, to show how much it
-matters. For each, one number is fitted so that 90 % stay within 10.9 m; what stays within 9.4 m is
-the prediction, on fresh releases. The block model is fitted twice, by its damping in contact and by
-its restitution, the lumped mass by its tangential restitution.
+A program calibrated with field tests retains 90 % of the blocks within 10.9 m of the toe and about
+80 % within 9.4 m (RocFall2, Restrepo et al. 2025). This study therefore compares a model with a
+calibrated model. The source at hand does not give the face angle; 70, 75 and 80 degrees are
+computed to show its effect. For each angle, one parameter is fitted so that 90 % stop within 10.9
+m. The share within 9.4 m is then predicted with fresh releases. The block model is fitted by its
+contact damping and, alternatively, by its restitution, the lumped-mass model by its tangential
+restitution.
 
-Judged by the share within 9.4 m, damping fitted, of the face farthest from 80 %.
+Judged by the share within 9.4 m, with fitted damping, for the face farthest from 80 %.
 """
 
 from __future__ import annotations
@@ -28,32 +29,32 @@ from rigdda.agents.fit import Floats, Model, Parameter, run_outs, with_values
 HERE = Path(__file__).parent
 
 HEIGHT = 24.5
-"""Of the face [m]."""
+"""Height of the face [m]."""
 
 FACES = (70.0, 75.0, 80.0)
 """Face angles [deg]."""
 
 FLOOR = 100.0
-"""Level ground below it [m]."""
+"""Length of the level ground below it [m]."""
 
 FITTED, PREDICTED = (10.9, 0.9), (9.4, 0.8)
-"""Width [m], and the share that it retains: one to fit to, one to predict."""
+"""Width [m] and share retained within it: one for the fit, one for the prediction."""
 
 BAR, QUICK_BAR = 0.05, 0.09
-"""Greatest distance of the prediction [-]; by 300 releases it scatters by 0.03."""
+"""Tolerance of the prediction [-]; with 300 releases it scatters by 0.03."""
 
 NEAR = 0.05
-"""Part of a width within which the growth of the share is measured [-]."""
+"""Fraction of a width over which the derivative of the share is measured [-]."""
 
 RELEASES, QUICK_RELEASES = 1500, 300
-"""Releases of each fit."""
+"""Number of releases for each fit."""
 
 FRESH, QUICK_FRESH = 4000, 600
-"""Of each prediction."""
+"""Number of releases for each prediction."""
 
 
 class Variant(NamedTuple):
-    """A model, the number that is fitted with its range, and others that are set."""
+    """A model, its fitted parameter with its range, and other parameters that are set."""
 
     model: Model
     fitted: Parameter
@@ -73,7 +74,7 @@ VARIANTS = {
         (
             ("lumped.rock.normal", 0.3),
             ("lumped.rock.friction_deg", 30.0),
-            ("scatter.friction_deg", 10.0),  # else all points come as far
+            ("scatter.friction_deg", 10.0),  # otherwise all points stop at the same place
         ),
     ),
 }
@@ -81,7 +82,7 @@ COLOURS = {"damping": BLUE, "restitution": ORANGE, "lumped": GREEN}
 
 
 def below(face: float) -> Site:
-    """Return the site with another face angle [deg]."""
+    """Return the site with this face angle [deg]."""
     site = Site.load(HERE / "site.toml")
     toe = HEIGHT / math.tan(math.radians(face))
     points = ((-10.0, HEIGHT), (0.0, HEIGHT), (toe, 0.0), (toe + FLOOR, 0.0))
@@ -89,7 +90,7 @@ def below(face: float) -> Site:
 
 
 def widths(site: Site, variant: Variant, value: float, seeds: range) -> Floats:
-    """Return how far from the toe each release stops [m]."""
+    """Return the distances from the toe at which releases stop [m]."""
     others = [Parameter(path, 0.0, 1.0) for path, _ in variant.set_to]
     values = [x for _, x in variant.set_to]
     changed = with_values(site, [*others, variant.fitted], [*values, value])
@@ -98,19 +99,19 @@ def widths(site: Site, variant: Variant, value: float, seeds: range) -> Floats:
 
 
 def within(found: Floats, width: float) -> float:
-    """Return the share that a width retains."""
+    """Return the share retained within a width."""
     return float((found <= width).mean())
 
 
 def steepness(found: Floats, width: float) -> float:
-    """Return how fast the retained share grows with the logarithm of the width [-]."""
+    """Return the derivative of the retained share with the logarithm of the width [-]."""
     return (within(found, (1.0 + NEAR) * width) - within(found, (1.0 - NEAR) * width)) / (
         2.0 * NEAR
     )
 
 
 def fitted(site: Site, variant: Variant, releases: int) -> float | None:
-    """Return the value with which the width to fit to retains its share; None: none does."""
+    """Return the value for which the fitted width retains its share; None if there is none."""
     width, share = FITTED
 
     def off(value: float) -> float:
@@ -125,11 +126,11 @@ def fitted(site: Site, variant: Variant, releases: int) -> float | None:
 def row(
     name: str, face: float, value: float | None, found: Floats, releases: int
 ) -> dict[str, Any]:
-    """Return the row of a face and a variant that was fitted to so many releases."""
+    """Return the row of a face and a variant that was fitted with this number of releases."""
     share = within(found, PREDICTED[0]) if value is not None else math.nan
     half = math.nan
     if len(found):
-        # a number that is fitted wrongly scales all widths: so does what it makes of the share
+        # an error of the fitted value scales all widths, which carries over to the share
         carried = steepness(found, PREDICTED[0]) / steepness(found, FITTED[0])
         fit = carried**2 * FITTED[1] * (1.0 - FITTED[1]) / releases
         half = 1.96 * math.sqrt(share * (1.0 - share) / len(found) + fit)
@@ -149,7 +150,7 @@ def row(
 
 
 def picture(figure: Figure, every: dict[tuple[str, float], Floats]) -> None:
-    """Draw the retained share against the width, a panel a face."""
+    """Draw the retained share against the width, one panel per face."""
     grid = np.linspace(0.0, 25.0, 300)
     for axes, face in zip(
         figure.subplots(1, len(FACES), sharey=True, squeeze=False)[0], FACES, strict=True
@@ -169,7 +170,7 @@ def picture(figure: Figure, every: dict[tuple[str, float], Floats]) -> None:
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Fit and predict for each face and write the table and the picture."""
+    """Fit and predict for each face; write the table and the picture."""
     releases, fresh = (QUICK_RELEASES, QUICK_FRESH) if quick else (RELEASES, FRESH)
     rows, every = [], dict[tuple[str, float], Floats]()
     for face in FACES:
@@ -186,7 +187,7 @@ def run(quick: bool, out: Path) -> Number:
     draw(out / "catch_bench.png", (12.0, 4.0), lambda figure: picture(figure, every))
     shares = [r["within_9.4_m"] for r in rows if r["fitted"] == "surfaces.rock.damping"]
     off = np.abs(np.array(shares) - PREDICTED[1])
-    worst = shares[int(off.argmax())]  # the first that is not a number, if there is one
+    worst = shares[int(off.argmax())]  # NaN if there is any
     bar = QUICK_BAR if quick else BAR
     low, high = PREDICTED[1] - bar, PREDICTED[1] + bar
     note = ", ".join(f"{face:g} deg {s:.3f}" for face, s in zip(FACES, shares, strict=True))

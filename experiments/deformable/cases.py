@@ -1,4 +1,4 @@
-"""Columns of elastic blocks whose stress has a closed form."""
+"""Columns of elastic blocks with closed-form stresses."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from rigdda import PointLoad, Scene, Settings, Surface, Terrain
 from rigdda.validation.scenes import FLAT, GRAVITY, box
 
 WIDTH, HEIGHT, BLOCKS = 1.0, 1.0, 8
-"""Size of a block [m], and blocks of a column."""
+"""Size of a block [m], and number of blocks in a column."""
 
 DENSITY = 2600.0
 """Density of the rock [kg/m3]."""
 
 STEPS, DT, PENETRATION = 600, 0.02, 1e-4
-"""Static steps after which a column is at rest, their time [s], wanted penetration [m]."""
+"""Number of static steps to equilibrium, their length [s] and the target penetration [m]."""
 
 
 def column(load: float, gravity: float) -> Deformable:
-    """Return a column on smooth ground at rest, pressed by `load` [N] on the middle of its top."""
+    """Return a column at rest on smooth ground, loaded by `load` [N] on the middle of its top."""
     blocks = [box(0.0, HEIGHT * (i + 0.5), WIDTH, HEIGHT, density=DENSITY) for i in range(BLOCKS)]
     loads = (PointLoad(BLOCKS - 1, (0.0, HEIGHT * BLOCKS), (0.0, -load)),) if load else ()
     smooth = {"rock": Surface(0.0, restitution=None)}
@@ -31,16 +31,16 @@ def column(load: float, gravity: float) -> Deformable:
 
 
 def bar_under_its_weight() -> tuple[Floats, Floats]:
-    """Return the vertical stress of each block, computed and - rho g (H - y) in its middle [Pa]."""
+    """Return the computed vertical stress of each block, and - rho g (H - y) at its middle [Pa]."""
     y = HEIGHT * (np.arange(BLOCKS) + 0.5)
     return column(0.0, GRAVITY).stress[:, 1], -DENSITY * GRAVITY * (HEIGHT * BLOCKS - y)
 
 
 def column_in_compression(load: float = 1e6) -> tuple[Floats, Floats]:
-    """Return stress and strains of a pressed column without weight, computed and exact.
+    """Return stress and strains of a loaded column without weight, computed and exact.
 
-    Vertical stress - P / w [Pa], vertical strain - P / (w E) and lateral strain nu P / (w E) [-] of
-    all blocks, (3, N).
+    They are the vertical stress - P / w [Pa], vertical strain - P / (w E) and lateral strain nu P /
+    (w E) [-] of all blocks, (3, N).
     """
     model, rock = column(load, 0.0), Rock()
     corners = np.array([model.vertices(i) for i in range(BLOCKS)])

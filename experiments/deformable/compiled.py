@@ -1,4 +1,4 @@
-"""Compilation of an entry kernel whose parts lie here and in the core, and its cache."""
+"""Compilation and caching of an entry kernel with parts here and in the core."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rigdda.kernel import cache_directory
 
 
 def entry(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that Python calls; kept on disk under the hash of both sets of sources."""
+    """Compile a kernel for calls from Python, cached under the hash of both sets of sources."""
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())

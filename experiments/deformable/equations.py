@@ -1,4 +1,4 @@
-"""The 6N x 6N simultaneous equations: blocks, contacts, and conjugate gradients."""
+"""The 6N x 6N simultaneous equations: blocks, contacts and conjugate gradients."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rigdda.kernel import kernel
 
 
 class Solid(NamedTuple):
-    """State and equations of N deformable blocks; P pairs of them touch."""
+    """State and equations of N deformable blocks with P pairs in contact."""
 
     velocity: Floats  # (N, 6) rates of the unknowns [m/s, rad/s, 1/s]
     stress: Floats  # (N, 3) sx, sy, txy, tension positive [Pa]
@@ -59,7 +59,7 @@ def assemble_blocks(bodies: Bodies, outlines: Outlines, s: Solid, n: int, p: Par
 
 @kernel
 def rows(c: Contact, of_a: bool) -> tuple[Row, Row]:
-    """Return the rows of a contact along its normal and its shear direction for a, or b."""
+    """Return the rows of a contact along its normal and shear directions for body a, or else b."""
     nx, ny = c.nx, c.ny
     if of_a:
         x, y = c.ra_x, c.ra_y
@@ -105,7 +105,7 @@ def assemble(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, s: Solid, n: int,
     pairs: int, p: Parameters,
 ) -> None:  # fmt: skip
-    """Set the equations with all contacts in their current states."""
+    """Assemble the equations for the current states of all contacts."""
     assemble_blocks(bodies, outlines, s, n, p)
     for q in range(pairs):
         s.off[q] = 0.0
@@ -119,7 +119,7 @@ def assemble(
 
 @kernel
 def forces(c: Contact, s: Solid) -> tuple[float, float]:
-    """Return the normal force of a contact and the shear force if it stuck [N]."""
+    """Return the normal force of a contact and the shear force if it sticks [N]."""
     en, es = rows(c, True)
     fn, fs = rows(c, False)
     dn = ds = 0.0
@@ -151,7 +151,7 @@ def multiply(s: Solid, m: Matrix, n: int, pairs: int, x: Floats, y: Floats) -> N
 
 @kernel
 def solve_pcg(s: Solid, m: Matrix, n: int, pairs: int, tolerance: float) -> int:
-    """Solve K d = F from the start value in s.d; the iterations, see `dynamics.linear.pcg`."""
+    """Solve K d = F, starting from s.d; return the iterations, see `solvers.solve_pcg`."""
     multiply(s, m, n, pairs, s.d, s.product)
     scale = rho = 0.0
     for i in range(n):

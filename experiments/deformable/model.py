@@ -1,4 +1,4 @@
-"""The facade: a scene of deformable blocks in motion."""
+"""Simulation of a scene with deformable blocks."""
 
 from __future__ import annotations
 
@@ -33,16 +33,17 @@ class Rock(NamedTuple):
 
 
 class Deformable:
-    """A scene of convex free blocks in the plain penalty contact (`restitution=None`).
+    """A scene of convex free blocks with plain penalty contacts (`restitution=None`).
 
     Parameters
     ----------
     scene : Scene
-        Without barriers and supports.
+        A scene without barriers and supports.
     settings : Settings
-        `dt`, `penetration`, `tolerance`, `open_close_iterations` and `mode` are heeded.
+        Settings, of which `dt`, `penetration`, `tolerance`, `open_close_iterations` and `mode` are
+        used.
     rock : Rock
-        Elasticity.
+        Elasticity of the blocks.
     """
 
     def __init__(self, scene: Scene, settings: Settings, rock: Rock | None = None):
@@ -52,7 +53,7 @@ class Deformable:
             raise ValueError("give a scene of free blocks")
         if not all(is_convex(b.vertices) for b in scene.blocks):
             raise ValueError("give convex blocks")
-        self._sim = Simulation(scene, settings)  # its arrays serve the detection of contacts
+        self._sim = Simulation(scene, settings)  # used for contact detection
         self._counters = np.zeros(COUNTERS, dtype=np.int64)
         self._solid = empty_solid(scene, (rock or Rock()).elasticity, len(self._sim.loop.now))
 
@@ -87,12 +88,12 @@ class Deformable:
         return self._sim.contacts()
 
     def vertices(self, block: int) -> Floats:
-        """Return the corners of a block now, (n, 2) [m]."""
+        """Return the current corners of a block, (n, 2) [m]."""
         return self._sim.vertices(block)
 
     @property
     def work(self) -> dict[str, float]:
-        """Open-close iterations and solver iterations a step, on average."""
+        """Mean number of open-close iterations and solver iterations per step."""
         steps = max(self._counters[STEPS], 1)
         return {
             "open_close": float(self._counters[ITERATIONS] / steps),
@@ -101,7 +102,7 @@ class Deformable:
 
 
 def empty_solid(scene: Scene, elasticity: Floats, pairs: int) -> Solid:
-    """Return blocks at the start of a scene, without stress."""
+    """Return the blocks of a scene in their initial state, without stress."""
     n = len(scene.blocks)
     velocity, load = np.zeros((n, UNKNOWNS)), np.zeros((n, UNKNOWNS))
     velocity[:, :3] = [b.velocity for b in scene.blocks]

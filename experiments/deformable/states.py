@@ -14,10 +14,10 @@ from rigdda.kernel import kernel
 
 @kernel
 def next_state(c: Contact, normal: float, shear: float, weight: float) -> bool:
-    """Move a contact to the state that its forces [N] ask for; returns whether it changed.
+    """Update the state of a contact from its forces [N]; return whether it changed.
 
-    Tension opens it, and overlap closes it; it slips where |S| > N tan phi, with the friction of
-    the last iteration.
+    Tension opens it and overlap closes it. It slips if |S| > N tan phi, with the friction of the
+    last iteration.
     """
     state = c.state
     if state == OPEN:

@@ -1,4 +1,4 @@
-"""One step of deformable blocks: detect contacts, settle them, move."""
+"""One step of deformable blocks: detect contacts, compute their forces, move."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def settle(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, s: Solid, m: Matrix, n: int,
     pairs: int, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
-    """Iterate until no contact opens, closes, slips or sticks any more."""
+    """Iterate until no contact changes its state."""
     for i in range(n):
         for a in range(UNKNOWNS):
             s.d[i, a] = p.dt * s.velocity[i, a]
@@ -80,7 +80,7 @@ def move_block(bodies: Bodies, outlines: Outlines, s: Solid, i: int, dt: float) 
 
 @kernel
 def rest_all(bodies: Bodies, velocity: Floats) -> None:
-    """Take the velocity from every block: static mode."""
+    """Set all velocities to zero, for static mode."""
     velocity[:] = 0.0
     for i in range(len(velocity)):
         bodies[i].vx = bodies[i].vy = bodies[i].omega = 0.0
@@ -96,7 +96,7 @@ def advance(
     Returns
     -------
     fits, swapped : bool
-        Whether all contacts fitted; whether `now` and `before` have changed roles.
+        Whether all contacts fitted; whether `now` and `before` have exchanged roles.
     """
     n, swapped, p = len(s.d), False, levels[0]
     bodies, outlines, m, counters = world.bodies, world.outlines, work.matrix, totals.counters

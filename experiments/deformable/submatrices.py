@@ -19,7 +19,7 @@ Row = tuple[float, float, float, float, float, float]
 
 @kernel
 def row_along(x: float, y: float, lx: float, ly: float) -> Row:
-    """Return (lx, ly) T at arm (x, y) [m]: the displacement along a direction of each unknown."""
+    """Return (lx, ly) T at arm (x, y) [m]: displacement along a direction per unknown."""
     return (
         lx,
         ly,
@@ -34,7 +34,8 @@ def row_along(x: float, y: float, lx: float, ly: float) -> Row:
 def area_moments(outlines: Outlines, i: int, n: int, x0: float, y0: float) -> Row:
     """Return area [m2], then integrals of X^2, Y^2 and XY over block i [m4], and two zeros.
 
-    Simplex integration: triangles from the centroid to each of the n edges.
+    They are found by simplex integration over the triangles from the centroid to each of the n
+    edges.
     """
     area = xx = yy = xy = 0.0
     for k in range(n):
@@ -68,9 +69,9 @@ def set_inertia(matrix: Floats, mass: float, moments: Row) -> None:
 def add_elasticity(
     matrix: Floats, rhs: Floats, area: float, elasticity: Floats, stress: Floats
 ) -> None:
-    """Add S E to the strains of a block, and - S sigma_0 of the stress it has already [N m].
+    """Add S E for the strains of a block, and - S sigma_0 for its present stress [N m].
 
-    `elasticity` is the (3, 3) matrix E [Pa] and `stress` (sx, sy, txy) [Pa].
+    `elasticity` is the (3, 3) matrix E [Pa] and `stress` is (sx, sy, txy) [Pa].
     """
     for a in range(3):
         rhs[3 + a] -= area * stress[a]

@@ -1,1 +1,1 @@
-"""Grounds of the library against three field cases."""
+"""Grounds of the library compared with three field cases."""

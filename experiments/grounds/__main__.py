@@ -1,4 +1,4 @@
-"""Run it all: `python -m experiments.grounds [--quick] [--out DIR]`."""
+"""Run the study: `python -m experiments.grounds [--quick] [--out DIR]`."""
 
 from experiments.grounds.study import run
 from experiments.script import main

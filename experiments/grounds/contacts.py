@@ -1,13 +1,13 @@
-"""Chant Sura: what a contact with alpine soil leaves of the translational energy of a block.
+"""Chant Sura: share of the translational energy that a block keeps in a contact with alpine soil.
 
-EOTA concrete blocks, a wheel of 210 and of 780 kg and an equant one of 250 kg, fell onto a slope of
+EOTA concrete blocks, wheels of 210 and 780 kg and an equant block of 250 kg, fell onto a slope of
 about 45 degrees of alpine meadow and scree (Caviezel et al. 2020, Induced Rockfall Dataset #2,
 EnviDat, doi 10.16904/envidat.174; derived contacts in `chant_sura_contacts.csv`). Six contacts of a
-block of 780 kg in mid-slope were measured as well (Caviezel et al. 2019, Earth Surface Dynamics 7,
+block of 780 kg in mid-slope were also measured (Caviezel et al. 2019, Earth Surface Dynamics 7,
 199-210, doi 10.5194/esurf-7-199-2019).
 
-The share that a contact keeps is that of the kinetic energy of translation just after it over that
-just before it, each from the parabola of the flight, as the data have it.
+The share kept in a contact is the translational kinetic energy just after it over that just before
+it, each from the parabola of the flight, as in the data.
 """
 
 from __future__ import annotations
@@ -29,43 +29,43 @@ from rigdda.model.terrain import Roughness
 SEEN = Path(__file__).parent / "chant_sura_contacts.csv"
 
 SLOPE = math.radians(45.0)
-"""Mean slope where the contacts happened."""
+"""Mean slope at the contacts [rad]."""
 
 DENSITY = 2670.0
-"""Of the concrete [kg/m3]."""
+"""Density of the concrete [kg/m3]."""
 
 MASSES = {"W200": (210.0, 0.5), "W800": (780.0, 0.5), "e200": (250.0, 1.0)}
 """Mass [kg] and thickness over diameter [-] of each block."""
 
 FILL = 17.0 / 27.0
-"""Volume over that of its box of a block whose edges are cut off at a third (EOTA)."""
+"""Volume over bounding box volume of an EOTA block, whose edges are cut off at a third."""
 
 SPEEDS = (4.0, 10.0)
-"""Speeds of the contacts that are counted [m/s]."""
+"""Range of speeds of the counted contacts [m/s]."""
 
 MID_SPEEDS = (16.0, 29.0)
-"""The same in mid-slope [m/s]."""
+"""Range of speeds of the contacts in mid-slope [m/s]."""
 
 MID_SLOPE = np.array([0.22, 1.11, 0.55, 0.42, 0.50, 0.47])
 """Shares kept in the six contacts in mid-slope [-]."""
 
 SPIN = 2.0
-"""Greatest rate of rotation of a block that tips off its platform, either way [rad/s]; assumed."""
+"""Assumed greatest rate of rotation of a block that tips off its platform, either way [rad/s]."""
 
 DT = 5e-3
 """Step [s]."""
 
 LONGEST = 2.0
-"""Time after which a block that does not fly again has rolled or stopped [s]."""
+"""Time without another flight after which a block is rolling or at rest [s]."""
 
 
 class Contact(NamedTuple):
     """A contact between two flights."""
 
     speed: float
-    """Just before [m/s]."""
+    """Speed just before [m/s]."""
     kept: float
-    """Share of the translational energy that is left just after [-]."""
+    """Share of the translational energy just after [-]."""
 
 
 def observed() -> Floats:
@@ -78,9 +78,10 @@ def observed() -> Floats:
 
 
 def section(name: str, rng: np.random.Generator) -> tuple[Floats, float]:
-    """Return the corners of one of the three faces of a block at random [m], and its size [m].
+    """Return the corners of a random face of a block [m], and the size of the block [m].
 
-    Of a wheel one face is round and two are flat. Corners are cut off at a third of the edges.
+    One of the three faces of a wheel is round and two are flat. Corners are cut off at a third of
+    the edges.
     """
     mass, flatness = MASSES[name]
     size = (mass / DENSITY / (FILL * flatness)) ** (1.0 / 3.0)
@@ -90,7 +91,7 @@ def section(name: str, rng: np.random.Generator) -> tuple[Floats, float]:
 
 
 def drawn(surface: Surface, rng: np.random.Generator) -> Surface:
-    """Return a surface with friction, restitution and damping as a release may find them."""
+    """Return a surface with random friction, restitution and damping as in a release."""
     normal = np.clip(rng.standard_normal(3), -FARTHEST, FARTHEST)
     spread = (surface.friction_sd_deg, surface.restitution_sd, surface.damping_sd)
     friction, restitution, damping = normal * spread
@@ -105,7 +106,7 @@ def drawn(surface: Surface, rng: np.random.Generator) -> Surface:
 def scene(
     surface: Surface, name: str, velocity: Floats, slope: float, rng: np.random.Generator
 ) -> Scene:
-    """Return a block that is about to touch a slope [rad] at this velocity [m/s, m/s, rad/s]."""
+    """Return a block about to touch a slope [rad] with this velocity [m/s, m/s, rad/s]."""
     corners, size = section(name, rng)
     angle = rng.uniform(0.0, 2.0 * math.pi)
     cos, sin = math.cos(angle), math.sin(angle)
@@ -127,9 +128,9 @@ def scene(
 def contacts(
     scene: Scene, duration: float, most: int = 10**6, lowest: float = -math.inf
 ) -> list[Contact]:
-    """Return up to so many contacts of a block, each between two flights of at least `APART`.
+    """Return up to `most` contacts of a block, separated by flights of at least `APART`.
 
-    A contact without a flight within `LONGEST` after it is one, too: the block rolls or stops.
+    If no flight follows a contact within `LONGEST`, it counts as well: the block rolls or stops.
     """
     sim = Simulation(scene, Settings(dt=DT))
     body, gravity = sim.loop.arrays.bodies, scene.gravity_vector[1]
@@ -144,7 +145,7 @@ def contacts(
                 began, before = step, last
             touched = step
         elif began >= 0 and (step - touched) * DT > APART + DT:
-            after = velocity - (0.0, gravity * DT * (step - touched))  # as it left the ground
+            after = velocity - (0.0, gravity * DT * (step - touched))  # when it left the ground
             found.append(_contact(before, after))
             began = -1
         if began >= 0 and (step - began) * DT > LONGEST:
@@ -162,9 +163,9 @@ def _contact(before: Floats, after: Floats) -> Contact:
 def early_contacts(
     surface: Surface, name: str, count: int, seed: int, number: int = 1
 ) -> list[Contact]:
-    """Return the contacts at `SPEEDS` that are the first, or a later one, of releases of a block.
+    """Return the first contacts at `SPEEDS` in releases of a block, or later ones.
 
-    Speeds at the first one are uniform within these, directions those that were observed.
+    Speeds at the first contact are uniform in this range, directions are those observed.
 
     Parameters
     ----------
@@ -173,9 +174,9 @@ def early_contacts(
     name : str
         The block.
     count, seed : int
-        How many releases, and the seed of their random numbers.
+        Number of releases, and seed of their random numbers.
     number : int
-        Which contact of each release counts, from 1.
+        Number of the contact that counts in each release, from 1.
     """
     seen, found = observed(), []
     for k in range(count):
@@ -191,9 +192,9 @@ def early_contacts(
 
 
 def mid_slope(surface: Surface, count: int, seed: int) -> list[Contact]:
-    """Return the contacts at `MID_SPEEDS` of so many releases of the block of 780 kg.
+    """Return the contacts at `MID_SPEEDS` in `count` releases of the block of 780 kg.
 
-    Of each the last one at which the block is as fast: they go down 200 m of the slope.
+    The blocks travel down 200 m of the slope.
     """
     found = []
     for k in range(count):
@@ -211,8 +212,8 @@ def lumped_share(normal: float, tangential: float) -> Floats:
     Parameters
     ----------
     normal, tangential : float
-        Its coefficients of restitution [-].
+        Coefficients of restitution [-].
     """
     speed, vertical, _ = observed().T
-    steep = np.arcsin(-vertical / speed) - SLOPE  # off the slope downhill; 90 degrees is square
+    steep = np.arcsin(-vertical / speed) - SLOPE  # angle from the slope; 90 degrees is normal
     return (tangential * np.cos(steep)) ** 2 + (normal * np.sin(steep)) ** 2

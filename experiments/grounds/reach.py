@@ -1,4 +1,4 @@
-"""Which number of the ground decides whether rock reaches the road below a face and its talus."""
+"""Effect of ground parameters on whether rock reaches the road below a face and its talus."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from rigdda.model.grounds import GROUNDS
 SLOPE = Path(__file__).parent / "slope.toml"
 
 FALLBACK = (0.0, 0.5, 1.0, 1.7)
-"""Damping that the site gives to surfaces without one of their own [1/s]."""
+"""Site-wide damping for surfaces without damping of their own [1/s]."""
 
 replace = msgspec.structs.replace
 
 
 def variants() -> dict[str, Site]:
-    """Return the slope with other grounds of the talus, and with other damping elsewhere."""
+    """Return the slope with other grounds of the talus, and with other site-wide damping."""
     site, found = Site.load(SLOPE), dict[str, Site]()
 
     def talus(surface: Surface) -> Site:
@@ -39,7 +39,7 @@ def variants() -> dict[str, Site]:
     for value in FALLBACK:
         motion = replace(site.motion, damping=value)
         found[f"site: damping {value:g}"] = replace(site, motion=motion)
-    for value in FALLBACK:  # as it was before surfaces had damping of their own
+    for value in FALLBACK:  # surfaces without damping of their own
         motion = replace(site.motion, damping=value)
         plain = Surface(ground.friction_deg.typical, restitution=ground.restitution.typical)
         found[f"no ground named: damping {value:g}"] = replace(talus(plain), motion=motion)
@@ -47,7 +47,10 @@ def variants() -> dict[str, Site]:
 
 
 def rows(releases: int) -> list[dict[str, Any]]:
-    """Return P(a boulder reaches the road) of each variant, with its 95 % interval."""
+    """Return the probability that a boulder reaches the road for each variant.
+
+    The 95 % intervals are included.
+    """
     out = []
     for what, site in variants().items():
         outcomes = release_many([(site, (), seed, "boulder") for seed in range(releases)])
@@ -58,6 +61,6 @@ def rows(releases: int) -> list[dict[str, Any]]:
 
 
 def moved(table: list[dict[str, Any]], head: str) -> float:
-    """Return by how much the variants with such a name move the probability [-]."""
+    """Return the range of the probability over variants whose names start with `head` [-]."""
     values = [row["reach"] for row in table if row["variant"].startswith(head)]
     return max(values) - min(values)

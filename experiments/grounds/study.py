@@ -1,13 +1,13 @@
-"""One set of grounds against three field cases: fitted on one, predicting the others.
+"""One set of ground parameters compared with three field cases: fitted to one, predicting others.
 
 The cases are the run-outs of 33 tests at Tschamut (`experiments.tschamut`), eleven contacts with
 the ground at Chant Sura (`experiments.grounds.contacts`) and the catch bench of a mine
-(`experiments.catch_bench`). Four numbers of the ground are fitted to each case in turn, by the
-block model and by the lumped mass, and to the two cases on alpine soil together; the others are
-predicted. `chant_sura/predicted_contacts.csv` is what the ground `meadow` of the library predicts
-of contacts that nobody fitted to.
+(`experiments.catch_bench`). Four parameters of the ground are fitted to each case in turn, with the
+block model and the lumped-mass model, and to the two cases on alpine soil together; the other cases
+are predicted. `chant_sura/predicted_contacts.csv` contains predictions with the ground `meadow` of
+the library for contacts that were not used in any fit.
 
-Judged by the mean share of energy that contacts keep, predicted by the fit to Tschamut alone.
+Judged by the mean share of energy kept in contacts, predicted by the fit to Tschamut alone.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from rigdda.model.site_tables import Rebound, Scatter
 TSCHAMUT = Path(tschamut.__file__).parent
 
 FACE = 75.0
-"""Angle of the face above the catch bench, which is not known [deg]."""
+"""Assumed angle of the face above the catch bench [deg]."""
 
 RANGES = {
     "blocks": {
@@ -50,42 +50,42 @@ RANGES = {
         "friction_sd_deg": (0.0, 8.0),
     },
 }
-"""What is fitted of each model, and within which limits."""
+"""Fitted parameters of each model and their ranges."""
 
 BUDGET, QUICK_BUDGET = 192, 16
-"""Sets of values that are computed of each fit."""
+"""Number of parameter sets that are computed for each fit."""
 
 RELEASES, QUICK_RELEASES = 120, 30
 """Releases of each block with each set."""
 
 PREDICTED_RELEASES, QUICK_PREDICTED = 1000, 60
-"""Releases of each block of a prediction, on fresh seeds."""
+"""Releases of each block for a prediction, with fresh seeds."""
 
 FRESH = 1_000_000
-"""Seed of the first of these."""
+"""First of the fresh seeds."""
 
 BAR = 0.15
-"""Greatest distance of the mean share that contacts keep [-]."""
+"""Tolerance of the mean share kept in contacts [-]."""
 
 
 class Found(NamedTuple):
-    """What a ground gives in each case."""
+    """Results of a ground in each case."""
 
     run_outs: dict[str, Floats]
     """Run-outs at Tschamut by block [m]."""
     shares: Floats
-    """Of energy kept in the first contacts [-]."""
+    """Shares of energy kept in the first contacts [-]."""
     widths: Floats
-    """How far from the toe of the mine bench blocks stop [m]."""
+    """Distances from the toe at which blocks stop on the mine bench [m]."""
 
 
 class Field:
-    """The three cases, and how well a ground explains each.
+    """The three cases, and the misfit of a ground in each.
 
     Parameters
     ----------
     model : {"blocks", "lumped"}
-        What computes.
+        The model.
     """
 
     def __init__(self, model: fit.Model):
@@ -98,7 +98,7 @@ class Field:
         self.low, self.high = np.array(list(RANGES[model].values())).T
 
     def site(self, site: Site, surface: str, values: Floats) -> Site:
-        """Return a site whose ground has these values."""
+        """Return a site with a ground of these values."""
         named = dict(zip(self.names, values.tolist(), strict=True))
         quiet = msgspec.structs.replace(site.motion, damping=0.0)
         if self.model == "blocks":
@@ -114,22 +114,22 @@ class Field:
         return runs(site, self.model, list(self.seen), seeds)
 
     def contacts(self, values: Floats, seeds: range) -> Floats:
-        """Return the shares of energy that contacts at Chant Sura keep [-]."""
+        """Return the shares of energy kept in contacts at Chant Sura [-]."""
         if self.model == "lumped":
             return lumped_share(values[0], values[1])
         surface = Surface(**dict(zip(self.names, values.tolist(), strict=True)))
         return shares(surface, len(seeds), seeds.start)
 
     def widths(self, values: Floats, seeds: range) -> Floats:
-        """Return how far from the toe of the mine bench blocks stop [m]."""
+        """Return the distances from the toe at which blocks stop on the mine bench [m]."""
         site = self.site(self.bench, "rock", values)
         (found,) = fit.run_outs(site, self.model, ["block"], seeds).values()
         return found - site.slope.toe
 
     def misfit(self, case: str, values: Floats, seeds: range) -> float:
-        """Return how badly a ground explains a case, over what the observed ones do themselves [-].
+        """Return the misfit of a ground in a case, over that of the observations themselves [-].
 
-        Of run-outs and shares that is the ratio of continuous ranked probability scores.
+        For run-outs and shares, this is the ratio of continuous ranked probability scores.
         """
         if case == "catch bench":
             found = self.widths(values, range(seeds.start, seeds.start + 3 * len(seeds)))
@@ -144,7 +144,7 @@ class Field:
         return float(np.concatenate(each).mean() / np.concatenate(own).mean())
 
     def fit(self, cases: tuple[str, ...], budget: int, releases: int) -> Floats:
-        """Return the values that explain some cases best, each weighed by its observations."""
+        """Return the values with the best fit to some cases, each weighted by its observations."""
         weights = {"tschamut": sum(map(len, self.seen.values())), "chant sura": len(self.kept)}
         tried: list[tuple[float, Floats]] = []
 
@@ -166,7 +166,7 @@ class Field:
 
 
 def shares(surface: Surface, count: int, seed: int, number: int = 1) -> Floats:
-    """Return the shares of energy that the first contacts of all blocks keep, or later ones [-]."""
+    """Return the shares of energy kept in the first contacts of all blocks, or in later ones."""
     each = (early_contacts(surface, name, count, seed, number) for name in MASSES)
     return np.array([contact.kept for found in each for contact in found])
 
@@ -177,11 +177,11 @@ FITS: tuple[tuple[str, ...], ...] = (
     ("catch bench",),
     ("tschamut", "chant sura"),
 )
-"""Cases that are fitted to, one fit after the other."""
+"""Cases of each fit."""
 
 
 def row(field: Field, fitted: str, values: Floats, count: int) -> tuple[dict[str, Any], Found]:
-    """Return the row of a fit, and what it gives on fresh seeds."""
+    """Return the row of a fit, and its results with fresh seeds."""
     seeds = range(FRESH, FRESH + count)
     found = Found(
         field.tschamut(values, seeds), field.contacts(values, seeds), field.widths(values, seeds)
@@ -211,7 +211,7 @@ def row(field: Field, fitted: str, values: Floats, count: int) -> tuple[dict[str
 def tschamut_figures(
     found: dict[str, Floats], weights: dict[str, float], toe: float
 ) -> dict[str, float]:
-    """Return mean, quantiles, means of the blocks and share on the slope, of weighed releases."""
+    """Return mean, quantiles, block means and share on the slope of weighted releases."""
     values = np.concatenate([found[e] for e in found])
     weight = np.concatenate([np.full(len(found[e]), weights[e]) for e in found])
     weight /= weight.sum()
@@ -226,7 +226,7 @@ def tschamut_figures(
 
 
 def seen_row(field: Field) -> dict[str, Any]:
-    """Return the row of what was observed."""
+    """Return the row of the observations."""
     ones = dict.fromkeys(field.seen, 1.0)
     empty = {name: "" for names in RANGES.values() for name in names}
     return (
@@ -248,7 +248,7 @@ COLOURS = (BLUE, GREEN, ORANGE, GREY)
 
 
 def picture(figure: Figure, field: Field, every: dict[str, Found]) -> None:
-    """Draw what each fit of the block model gives in each case, beside what was observed."""
+    """Draw the results of each fit of the block model in each case, with the observations."""
     axes = figure.subplots(1, 3)
     seen = (np.concatenate(list(field.seen.values())), field.kept, None)
     for panel, (axis, real) in enumerate(zip(axes, seen, strict=True)):
@@ -274,7 +274,7 @@ def picture(figure: Figure, field: Field, every: dict[str, Found]) -> None:
 
 
 def predict(path: Path, count: int) -> None:
-    """Write the contacts that the library's meadow predicts, so many releases of each block."""
+    """Write the contacts predicted with the library's meadow, `count` releases of each block."""
     surface = Surface(ground="meadow")
     rows = [
         {"block": name, "speed_m_s": c.speed, "share_kept": c.kept}
@@ -285,7 +285,7 @@ def predict(path: Path, count: int) -> None:
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Fit, predict, and write tables and the picture."""
+    """Fit, predict, and write the tables and the picture."""
     budget = QUICK_BUDGET if quick else BUDGET
     releases = QUICK_RELEASES if quick else RELEASES
     count = QUICK_PREDICTED if quick else PREDICTED_RELEASES
@@ -309,7 +309,7 @@ def run(quick: bool, out: Path) -> Number:
     rows.append(seen_row(field))
     write(out / "grounds.csv", rows)
     predict(out / "chant_sura" / "predicted_contacts.csv", count)
-    say("grounds: what decides on a slope with talus")
+    say("grounds: effect of parameters on a slope with talus")
     write(out / "grounds_reach.csv", reach.rows(count))
     draw(out / "grounds.png", (13.0, 5.0), lambda figure: picture(figure, field, every))
     by_tschamut, real = rows[0]["contacts_mean"], rows[-1]["contacts_mean"]
@@ -317,7 +317,7 @@ def run(quick: bool, out: Path) -> Number:
         f"{r['model']} fitted on {r['fitted_on']} {r['contacts_mean']:.2f}" for r in rows[1:-1]
     )
     return Number(
-        "mean share that contacts keep, by the fit to Tschamut [-]",
+        "mean share of energy kept in contacts, by the fit to Tschamut [-]",
         by_tschamut,
         real - BAR,
         real + BAR,

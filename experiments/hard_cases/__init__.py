@@ -1,4 +1,4 @@
-"""Scenes that break contact mechanics, swept over the step: which hold, which refuse."""
+"""Hard cases of contact mechanics for a range of steps: which are solved, which are refused."""
 
 from experiments.hard_cases.study import run
 

@@ -1,4 +1,4 @@
-"""Run it all: `python -m experiments.hard_cases [--quick] [--out DIR]`."""
+"""Run the hard cases: `python -m experiments.hard_cases [--quick] [--out DIR]`."""
 
 from experiments.hard_cases.study import run
 from experiments.script import main

@@ -1,4 +1,4 @@
-"""A keystone arch under a load: the limit by linear programming, then both sides of it."""
+"""A keystone arch with loads on both sides of its limit, found by linear programming."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from rigdda.geometry import polygon_properties
 from rigdda.validation.scenes import FLAT, GRAVITY, rock
 
 RADIUS, THICKNESS, VOUSSOIRS = 5.0, 1.0, 15
-"""Mean radius and thickness [m], and number of blocks, odd: one is the keystone."""
+"""Mean radius and thickness [m], and number of blocks, which is odd so that one is the keystone."""
 
 FRICTION_DEG = 40.0
 
 
 def joints() -> Floats:
-    """Return the inner and the outer end of each radial joint, (K, 2, 2) [m]."""
+    """Return the inner and outer ends of all radial joints, (K, 2, 2) [m]."""
     angle = np.linspace(0.0, math.pi, VOUSSOIRS + 1)
     out = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    out[-1, 1] = 0.0  # both feet exactly on the ground
+    out[-1, 1] = 0.0  # both springings exactly on the ground
     radii = np.array([RADIUS - 0.5 * THICKNESS, RADIUS + 0.5 * THICKNESS])
     return radii[None, :, None] * out[:, None, :]
 
@@ -40,8 +40,9 @@ def voussoirs() -> tuple[Block, ...]:
 def limit_load() -> float:
     """Return the greatest downward force on the keystone for which equilibrium exists [N].
 
-    The static theorem of limit analysis (Livesley 1978): at each joint pressures at both its ends
-    and a shear force of at most tan phi times their sum; three equations of equilibrium a block.
+    By the static theorem of limit analysis (Livesley 1978), with normal forces at both ends of each
+    joint, a shear force of at most tan phi times their sum, and three equations of equilibrium per
+    block.
     """
     ends, blocks = joints(), voussoirs()
     unknowns = 3 * len(ends) + 1
@@ -51,7 +52,7 @@ def limit_load() -> float:
         area, centre, _ = polygon_properties(block.vertices)
         load[3 * i + 1] = block.density * area * GRAVITY
         for joint, sign in ((i, 1.0), (i + 1, -1.0)):
-            along = np.subtract(*ends[joint, ::-1]) / THICKNESS  # outwards
+            along = np.subtract(*ends[joint, ::-1]) / THICKNESS  # pointing outwards
             normal = np.array([-along[1], along[0]])  # from joint k into block k
             for column, direction, point in (
                 (0, normal, ends[joint, 0]),
@@ -75,7 +76,7 @@ def limit_load() -> float:
 
 
 def loaded(share: float) -> Callable[[], Scene]:
-    """Return what builds the arch with a share of its limit load on the keystone."""
+    """Return a builder of the arch with a fraction of its limit load on the keystone."""
 
     def build() -> Scene:
         top = (0.0, RADIUS + 0.5 * THICKNESS)
@@ -86,7 +87,7 @@ def loaded(share: float) -> Callable[[], Scene]:
 
 
 def still_up(history: History) -> float:
-    """Return the height of the keystone at the end over that at the start, above one half [-]."""
+    """Return the final height of the keystone over the initial one, in excess of one half [-]."""
     height = history.poses[:, VOUSSOIRS // 2, 1]
     return max(0.0, float(height[-1] / height[0]) - 0.5)
 

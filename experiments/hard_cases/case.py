@@ -1,4 +1,4 @@
-"""A hard case, what is kept of a run of it, and the verdict."""
+"""A hard case, the record of its run, and the verdict."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ from rigdda import Scene, Simulation
 Floats = NDArray[np.float64]
 
 HOLDS, DEGRADES, REFUSES, FAILS = "holds", "degrades", "refuses", "fails"
-"""Verdicts. holds: all criteria are met. degrades: it runs to its end, nothing is lost, but a
-figure misses its bar. refuses: it stops with an error that says what to change. fails: not a
-number, a block lost, no end within the time limit, or another error."""
+"""Verdicts. holds: all criteria are met. degrades: the run ends and no block is lost, but a
+criterion is missed. refuses: the run stops with an error that says what to change. fails: NaN, a
+lost block, no end within the time limit, or another error."""
 
 
 @dataclass(frozen=True)
 class History:
     """Frames of a run.
 
-    `times` (T,) [s], `poses` and `velocities` (T, N, 3) [m, rad; m/s, rad/s]; `energy` (T,):
-    kinetic, potential and elastic energy less the work of loads and shaking [J]; `sim` at its end.
+    `times` (T,) [s], `poses` and `velocities` (T, N, 3) [m, rad; m/s, rad/s]; `energy` (T,) is the
+    kinetic, potential and elastic energy less the work of loads and shaking [J]; `sim` is the
+    simulation at the end.
     """
 
     scene: Scene
@@ -56,28 +57,28 @@ class Case:
     name : str
         Its name.
     criterion : str
-        What the error is taken from: a closed form or an invariant, with its unit.
+        Basis of the error, a closed form or an invariant, with its unit.
     scene : callable
-        Builds the scene.
+        Returns the scene.
     duration : float
         Simulated time, a multiple of the longest step, 0.1 [s].
     error : callable
-        The error of a run, nothing if it is exact.
+        Returns the error of a run, 0 if it is exact.
     bar : float
-        Greatest error that holds.
+        Tolerance of the error.
     depth : float
-        Greatest penetration in any frame that holds, over the mean block size [-].
+        Tolerance of the penetration in any frame, over the mean block size [-].
     gain : float
-        Greatest growth of energy that holds, over the weight of all blocks times their mean size
-        and all energy given off [-]. What overlaps at the start is lifted as it is pushed out.
+        Tolerance of the energy growth, over the weight of all blocks times their mean size plus
+        all dissipated energy [-]. Initial overlaps are pushed out, which lifts blocks.
     frame : float
         Interval of the frames, if it is longer than the step [s].
     settled : float
         Time from which penetration counts [s].
     settings : mapping
-        Settings beside the step.
+        Settings in addition to the step.
     refused : bool
-        Whether it has no answer and must be refused, at any step.
+        Whether the case has no answer and must be refused at any step.
     """
 
     name: str
@@ -96,10 +97,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a case at a step.
+    """Result of a case at a step.
 
-    Error and its bar in the unit of the criterion; penetration over mean block size, and growth of
-    energy as in `Case` [-]; processor time per simulated second [ms/s].
+    Error and tolerance are in the unit of the criterion; penetration is over the mean block size,
+    and energy growth is defined as in `Case` [-]; processor time is per simulated second [ms/s].
     """
 
     case: str
@@ -114,7 +115,7 @@ class Result:
 
 
 def judge(case: Case, error: float, penetration: float, gain: float, lost: int) -> tuple[str, str]:
-    """Return the verdict on a run that came to its end, and why it is not better."""
+    """Return the verdict on a completed run, and the criteria that it missed."""
     if lost:
         return FAILS, f"{lost} blocks lost"
     misses = [

@@ -1,4 +1,4 @@
-"""Awkward ground: a slot, concave corners, an overhang, short, collinear and empty segments."""
+"""Hard cases of ground: a slot, concave corners, an overhang, degenerate segments."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ SLOT, DEPTH = 1.002, 6.0
 """Width and depth of the slot for a block 1 m wide [m]."""
 
 FALL = 3.0
-"""Way from the start to the floor of the slot [m]."""
+"""Distance from the start to the floor of the slot [m]."""
 
 
 def slot() -> Scene:
-    """Return a block without friction, slightly turned, in a slot 2 mm wider than itself."""
+    """Return a frictionless block, slightly rotated, in a slot 2 mm wider than the block."""
     half = 0.5 * SLOT
     edge = [(-9.0, 0.0), (-half, 0.0), (-half, -DEPTH), (half, -DEPTH), (half, 0.0), (9.0, 0.0)]
     return Scene(Terrain(edge), (box(0.0, -2.5, angle=1e-3),), rock(0.0))
 
 
 def slot_error(history: History) -> float:
-    """Return the way at 0.7 s against a free fall, then that to the floor [-]."""
+    """Return the greater error of the fall at 0.7 s and of the final distance to the floor [-]."""
     way = history.poses[0, 0, 1] - history.poses[:, 0, 1]
     k = int(np.argmin(np.abs(history.times - 0.7)))
     falling = abs(way[k] / (0.5 * GRAVITY * history.times[k] ** 2) - 1.0)
@@ -36,13 +36,13 @@ def slot_error(history: History) -> float:
 
 
 def notch() -> Scene:
-    """Return a square on its corner that fits a concave right angle of the ground exactly."""
+    """Return a square on its corner that exactly fits a concave right angle of the ground."""
     ground = Terrain([(-20.0, 10.0), (-10.0, 10.0), (0.0, 0.0), (10.0, 10.0), (20.0, 10.0)])
     return Scene(ground, (box(0.0, math.sqrt(0.5), angle=math.pi / 4.0),), rock(10.0))
 
 
 def stairs() -> Scene:
-    """Return rough blocks that tumble down stairs into a pit."""
+    """Return irregular blocks that tumble down stairs into a pit."""
     rng = np.random.default_rng(3)
     steps = [(2.0 * i, 20.0 - 2.0 * k) for i in range(10) for k in (i, i + 1)]
     chain = [(-20.0, 40.0), (-20.0, 20.0), *steps, (20.0, 0.0), (40.0, 0.0), (40.0, 40.0)]
@@ -59,7 +59,7 @@ def stairs() -> Scene:
 
 
 def overhang() -> Scene:
-    """Return blocks thrown up against the roof of an overhang above a floor."""
+    """Return blocks thrown up against the roof of an overhang."""
     chain = [(30.0, 0.0), (30.0, 20.0), (40.0, 20.0)]
     cave = [(-20.0, 20.0), (10.0, 20.0), (10.0, 6.0), (-10.0, 4.0), (-10.0, 0.0)]
     rng = np.random.default_rng(4)
@@ -71,7 +71,7 @@ def overhang() -> Scene:
 
 
 def collinear() -> Scene:
-    """Return a block on a plane cut into 200 segments at random, the shortest of microns."""
+    """Return a block on a plane divided into 200 random segments, some of them a micron long."""
     plain, down = incline(30.0, 20.0)
     at = np.sort(np.random.default_rng(5).uniform(-4.0, 20.0, 200))
     at[::20] = at[1::20] - 1e-6
@@ -80,7 +80,7 @@ def collinear() -> Scene:
 
 
 def empty_segment() -> Scene:
-    """Return a ground with a segment of no length."""
+    """Return a ground with a segment of zero length."""
     return Scene(Terrain([(-9.0, 0.0), (0.0, 0.0), (0.0, 0.0), (9.0, 0.0)]), (box(0.0, 0.5),))
 
 
@@ -96,7 +96,7 @@ def hopper() -> Scene:
 
 
 def carried_error(history: History) -> float:
-    """Return the upward force of the ground on blocks at the end against their weight [-]."""
+    """Return the relative error of the upward ground force compared with the weight [-]."""
     c = history.sim.contacts()
     c = c[c["block_b"] < 0]
     up = (c["normal_force"] * c["ny"] + c["shear_force"] * c["nx"]).sum()

@@ -1,4 +1,4 @@
-"""Fast things: spin, blows at 100 m/s, a chain of blows."""
+"""Hard cases of fast motion: spin, impacts at 100 m/s, a chain of impacts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigdda import Block, Scene, Terrain
 from rigdda.validation.scenes import box, polygon, rock, rough
 
 SPEED = 100.0
-"""Speed of the blows [m/s]."""
+"""Speed of the impacts [m/s]."""
 
 RESTITUTION = 0.5
 
@@ -27,30 +27,30 @@ def spinning() -> Scene:
 
 
 def flat_blow() -> Scene:
-    """Return a square that flies flat onto a fixed one at 100 m/s, without gravity."""
+    """Return a square that flies flat against a fixed one at 100 m/s, without gravity."""
     blocks = (box(0.0, 0.0, velocity=(SPEED, 0.0, 0.0)), box(10.0, 0.0, fixed=True))
     return Scene(None, blocks, rock(30.0, RESTITUTION), gravity=0.0)
 
 
 def restitution_error(history: History) -> float:
-    """Return by how much the coefficient of restitution is off [-]."""
+    """Return the error of the coefficient of restitution [-]."""
     return float(abs(-history.velocities[-1, 0, 0] / SPEED - RESTITUTION))
 
 
 def row_blow() -> Scene:
-    """Return a square that flies at 100 m/s into a row of five that touch, without gravity."""
+    """Return a square that flies at 100 m/s into a row of five in contact, without gravity."""
     flyer = box(-10.0, 0.0, velocity=(SPEED, 0.0, 0.0))
     return Scene(None, (flyer, *(box(float(i), 0.0) for i in range(5))), rock(0.0), gravity=0.0)
 
 
 def momentum_error(history: History) -> float:
-    """Return the change of momentum over the first, and plastic blocks end at one speed [-]."""
+    """Return the relative change of momentum or the final spread of velocities, if greater [-]."""
     speed = history.velocities[-1, :, 0]
     return float(max(abs(speed.sum() / SPEED - 1.0), np.ptp(speed) / SPEED))
 
 
 def volley() -> Scene:
-    """Return rough blocks that fly at 100 m/s, spinning, at a fixed wall 0.2 m thick."""
+    """Return spinning irregular blocks that fly at 100 m/s at a fixed wall 0.2 m thick."""
     rng = np.random.default_rng(2)
     blocks = [box(0.0, 25.0, 0.2, 60.0, fixed=True)]
     for i in range(12):
@@ -60,22 +60,22 @@ def volley() -> Scene:
 
 
 def behind_wall(history: History) -> float:
-    """Return how many blocks were behind the wall in any frame; it is in the way of all."""
+    """Return the number of blocks that were behind the wall in any frame."""
     return float((history.poses[:, 1:, 0] > 0.0).any(axis=0).sum())
 
 
 def bullet() -> Scene:
-    """Return a small block that hits a pile of large ones at 100 m/s."""
+    """Return a small block that hits a pile of large blocks at 100 m/s."""
     bullet = box(-10.0, 0.55, 0.1, 0.1, velocity=(SPEED, 0.0, 0.0))
     pile = [box(1.1 * i + 0.55 * j, 0.5 + j) for j in range(3) for i in range(3 - j)]
     return on_level(bullet, *pile)
 
 
 def spin_error(history: History) -> float:
-    """Return by how much speed and spin exceed what energy at the start allows [-].
+    """Return the relative excess of the speed over the limit set by the initial energy [-].
 
-    All energy in translation: v^2 = k^2 w^2 + 2 g h of the first rise; sliding friction turns at
-    most that much.
+    The limit has all energy in translation: v^2 = k^2 w^2 + 2 g h, with the height h of the first
+    fall.
     """
     start = 200.0**2 / 6.0 + 2.0 * 9.81 * 0.75
     now = (history.velocities[:, 0, :2] ** 2).sum(axis=1)

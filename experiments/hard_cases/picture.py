@@ -1,4 +1,4 @@
-"""Verdicts, errors and penetrations of all cases over the step in one picture."""
+"""Picture of the verdicts, errors and penetrations of all cases against the step."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from experiments.hard_cases.case import FAILS, HOLDS, REFUSES, Result
 
 COLOURS = "RdYlGn_r"
 LEAST, MOST = 1e-3, 1e3
-"""Ends of the colours: errors over their bar [-]."""
+"""Limits of the colour scale of errors over their tolerances [-]."""
 
 SMALLEST, LARGEST = 1e-6, 1.0
-"""Ends of the colours: penetrations over the mean block size [-]."""
+"""Limits of the colour scale of penetrations over the mean block size [-]."""
 
 
 def verdicts(figure: Figure, results: list[Result]) -> None:
-    """Draw a row a case and a column a step: errors over their bars beside penetrations."""
+    """Draw a row per case and a column per step: errors over tolerances, and penetrations."""
     left, right = figure.subplots(1, 2, sharey=True)
     names = list(dict.fromkeys(r.case for r in results))
     steps = sorted({r.dt for r in results})
@@ -37,7 +37,7 @@ def verdicts(figure: Figure, results: list[Result]) -> None:
 
 
 def over_bar(result: Result) -> float:
-    """Return the error over its bar [-]; one that must be nothing counts as 1000 bars."""
+    """Return the error over its tolerance [-]; an error that must be zero counts as 1000."""
     if result.bar > 0.0:
         return result.error / result.bar
     return math.nan if math.isnan(result.error) else (MOST if result.error > 0.0 else 0.0)
@@ -51,7 +51,7 @@ def field(
     value: Callable[[Result], float],
     norm: LogNorm,
 ) -> None:
-    """Draw a value of each trial as a colour, and its verdict."""
+    """Draw a value of each trial as a colour, with its verdict."""
     cells = np.full((len(names), len(steps)), np.nan)
     for r in results:
         row, column = names.index(r.case), steps.index(r.dt)

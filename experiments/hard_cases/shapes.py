@@ -1,4 +1,4 @@
-"""Awkward shapes: slivers, pebbles below boulders, wedges, a keystone, exact coincidences."""
+"""Hard cases of shape: slivers, pebbles below boulders, wedges, exact coincidences."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rigdda.validation.scenes import GRAVITY, box, incline, masses, ngon, rock
 from rigdda.validation.slides import slide
 
 HALF = math.radians(5.0)
-"""Half the angle of a sharp wedge [rad]."""
+"""Half of the angle of a sharp wedge [rad]."""
 
 BOULDER, PEBBLE = 5.0, 0.05
-"""Sides [m]: a mass ratio of 1e4."""
+"""Sides of boulders and pebbles [m], for a mass ratio of 1e4."""
 
 
 def way_error(slope_deg: float, friction_deg: float) -> Callable[[History], float]:
-    """Return the relative error of the way of the first block down a slope, from rest [-]."""
+    """Return the relative error of the distance of the first block down a slope, from rest [-]."""
 
     def error(history: History) -> float:
         exact = slide(slope_deg, friction_deg, history.times[-1])
@@ -31,12 +31,12 @@ def way_error(slope_deg: float, friction_deg: float) -> Callable[[History], floa
 
 
 def pile_of_slivers() -> Scene:
-    """Return ten plates 10 m long and 5 cm thick on one another."""
+    """Return a pile of ten plates 10 m long and 5 cm thick."""
     return on_level(*(box(0.0, 0.025 + 0.05 * i, 10.0, 0.05) for i in range(10)))
 
 
 def pebbles() -> Scene:
-    """Return a boulder on three pebbles, and a boulder on that."""
+    """Return a boulder on three pebbles, with another boulder on top."""
     small = [box(x, 0.5 * PEBBLE, PEBBLE, PEBBLE) for x in (-2.0, 0.3, 2.0)]
     large = [box(0.0, PEBBLE + BOULDER * (0.5 + i), BOULDER, BOULDER) for i in range(2)]
     return on_level(*small, *large)
@@ -49,21 +49,21 @@ def wedge_shape(low: float, high: float) -> np.ndarray:
 
 
 def wedge_in_notch() -> Scene:
-    """Return a sharp wedge without friction in a notch of the ground that fits it exactly."""
+    """Return a frictionless sharp wedge in a notch of the ground that fits it exactly."""
     t = math.tan(HALF)
     edge = [(-8.0, 8.0), (-8.0 * t, 8.0), (-0.5 * t, 0.5), (0.5 * t, 0.5), (8.0 * t, 8.0)]
     return Scene(Terrain([*edge, (8.0, 8.0)]), (Block(wedge_shape(1.0, 6.0)),), rock(0.0))
 
 
 def wall_pressure_error(history: History) -> float:
-    """Return the relative error of the sum of the wall forces: 2 N = W/sin(half angle) [-]."""
+    """Return the relative error of the sum of the wall forces, 2 N = W/sin(half angle) [-]."""
     weight = GRAVITY * float(masses(history.scene)[0][0])
     force = float(history.sim.contacts()["normal_force"].sum())
     return abs(force * math.sin(HALF) / weight - 1.0)
 
 
 def wedge_between_blocks() -> Scene:
-    """Return a heavy wedge without friction that drives two blocks apart on level ground."""
+    """Return a heavy frictionless wedge that drives two blocks apart on level ground."""
     t = math.tan(HALF)
     jaw = np.array([(1.0 * t, 0.0), (3.0, 0.0), (3.0, 6.0), (7.0 * t, 6.0)])
     wedge = wedge_shape(3.0, 9.0) - np.array([0.0, 1.0])
@@ -73,7 +73,7 @@ def wedge_between_blocks() -> Scene:
 
 
 def drive_error(history: History) -> float:
-    """Return the relative error of the wedge's way [-]: a = m g/(m + 2 M tan^2 b)."""
+    """Return the relative error of the wedge's distance [-]: a = m g/(m + 2 M tan^2 b)."""
     wedge, jaw, _ = masses(history.scene)[0]
     pull = wedge * GRAVITY / (wedge + 2.0 * jaw * math.tan(HALF) ** 2)
     way = history.poses[0, 0, 1] - history.poses[-1, 0, 1]
@@ -81,19 +81,19 @@ def drive_error(history: History) -> float:
 
 
 def corner_on_corner() -> Scene:
-    """Return a square on its corner that falls exactly onto the corner of another one."""
+    """Return a square on its corner that falls exactly onto the corner of another square."""
     radius = 0.5 * math.sqrt(2.0)
     fixed = Block(ngon(4, radius, (0.0, radius)), fixed=True)
     return on_level(fixed, Block(ngon(4, radius, (0.0, 3.0 * radius + 0.5))))
 
 
 def coincident() -> Scene:
-    """Return two blocks in exactly the same place."""
+    """Return two identical blocks in the same position."""
     return on_level(box(0.0, 0.5), box(0.0, 0.5))
 
 
 def overlapping(depth: float) -> Callable[[], Scene]:
-    """Return what builds three cubes, each `depth` [m] in the next: pressed in from all sides."""
+    """Return a builder of three cubes that overlap by `depth` [m]."""
 
     def build() -> Scene:
         step = 1.0 - depth

@@ -1,4 +1,4 @@
-"""What stands on one another: towers, unequal masses, cards, dominoes, brickwork."""
+"""Hard cases of stacks: towers, unequal masses, cards, dominoes, brickwork."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from rigdda.validation.scenes import FLAT, box, polygon, rock
 from rigdda.validation.stacks import OFFSET, tower
 
 STANDS = 0.02
-"""Displacement up to which a block stands, over its size [-]."""
+"""Displacement over block size up to which a block is stable [-]."""
 
 CARD, THIN, LEAN = 1.0, 0.02, math.radians(20.0)
-"""Length and thickness of a card [m], and its angle to the vertical [rad]."""
+"""Length and thickness of a card [m], and its angle from the vertical [rad]."""
 
 SPACING, TILES, TILE = 0.4, 20, 0.1
-"""Spacing of the dominoes [m], 1 m high, their number and thickness [m]."""
+"""Spacing of the dominoes [m], which are 1 m high, their number and their thickness [m]."""
 
 FAR = 2.6e6
-"""An easting in a national grid [m]."""
+"""A typical easting in a national grid [m]."""
 
 
 def moved(history: History) -> float:
@@ -41,7 +41,7 @@ def on_level(*blocks: Block, friction_deg: float = 30.0) -> Scene:
 
 
 def cubes(densities: list[float], x: float = 0.0) -> tuple[Block, ...]:
-    """Return one-metre cubes on one another, slightly out of line, with these densities."""
+    """Return a tower of one-metre cubes, slightly out of line, with these densities."""
     offsets = np.random.default_rng(1).uniform(-OFFSET, OFFSET, len(densities))
     return tuple(
         box(x + dx, 0.5 + i, density=d)
@@ -50,19 +50,19 @@ def cubes(densities: list[float], x: float = 0.0) -> tuple[Block, ...]:
 
 
 def far_tower() -> Scene:
-    """Return a tower of ten at coordinates of a national grid."""
+    """Return a tower of ten cubes at coordinates of a national grid."""
     ground = Terrain([(FAR - 50.0, 0.0), (FAR + 50.0, 0.0)])
     return Scene(ground, cubes([2600.0] * 10, FAR), rock())
 
 
 def brickwork() -> Scene:
-    """Return a wall of bricks in running bond: all joints closed exactly, edge on edge."""
+    """Return a wall of bricks in running bond, with all joints exactly closed."""
     bricks = [box(2.0 * i + 0.5 * (j % 2), 0.5 + j, 2.0, 1.0) for j in range(6) for i in range(5)]
     return on_level(*bricks)
 
 
 def card(side: float, x: float, y: float) -> Block:
-    """Return a card that leans to `side`, its upper corner at x, its foot at y [m]."""
+    """Return a card leaning to `side`, with its upper corner at x and its foot at y [m]."""
     along = np.array([math.sin(LEAN), math.cos(LEAN)])
     across = np.array([math.cos(LEAN), -math.sin(LEAN)])
     centre = -0.5 * CARD * along - 0.5 * THIN * across
@@ -75,7 +75,7 @@ def card(side: float, x: float, y: float) -> Block:
 
 
 def cards() -> Scene:
-    """Return a house of cards: two tents, a card across their tops, a tent on it."""
+    """Return a house of cards: two tents, a card across their tops, and a tent on it."""
     storey = CARD * math.cos(LEAN) + THIN * math.sin(LEAN)
     apart = 0.5 * CARD
     tents = [(-apart, 0.0), (apart, 0.0), (0.0, storey + THIN)]
@@ -84,7 +84,7 @@ def cards() -> Scene:
 
 
 def dominoes() -> Scene:
-    """Return a row of dominoes; the first is tilted beyond its balance."""
+    """Return a row of dominoes, of which the first is tilted beyond its balance."""
     corners = np.array([(-TILE, 0.0), (0.0, 0.0), (0.0, 1.0), (-TILE, 1.0)])
     first = Block(polygon(corners, (0.5 * TILE, 0.0), -1.2 * math.atan(TILE)))
     rest = [box(i * SPACING, 0.5, TILE, 1.0) for i in range(1, TILES)]
@@ -92,14 +92,14 @@ def dominoes() -> Scene:
 
 
 def left_standing(history: History) -> float:
-    """Return how many dominoes never passed their balance, or not after the one before them."""
+    """Return the number of dominoes that stand or fall before their predecessor."""
     past = -history.poses[:, 1:, 2] > math.atan(TILE)
     when = np.where(past.any(axis=0), past.argmax(axis=0), len(past))
     return float((~past[-1]).sum() + (np.diff(when) < 0).sum())
 
 
 def stands(name: str, blocks: Callable[[], Scene], size: float = 1.0, time: float = 20.0) -> Case:
-    """Return the case of blocks of `size` [m] that must stand for `time` [s], awake."""
+    """Return the case of blocks of `size` [m] that must stand for `time` [s], without sleeping."""
     return Case(
         name,
         "displacement [m]: none, it stands",
@@ -112,7 +112,7 @@ def stands(name: str, blocks: Callable[[], Scene], size: float = 1.0, time: floa
 
 
 def straight(count: int) -> Callable[[], Scene]:
-    """Return what builds a tower of cubes."""
+    """Return a builder of a tower of cubes."""
     return lambda: on_level(*tower(np.random.default_rng(0), count))
 
 

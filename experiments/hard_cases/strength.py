@@ -1,4 +1,4 @@
-"""Friction and cohesion at their limits, penalties of any stiffness."""
+"""Hard cases of strength: friction and cohesion at their limits, penalties of any stiffness."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from rigdda import Scene, Surface, Terrain
 from rigdda.validation.scenes import FLAT, GRAVITY, box, incline, masses
 
 CREEP = 1e-4
-"""Displacement up to which a block on a slope holds [m]."""
+"""Displacement up to which a block on a slope counts as held [m]."""
 
 STEEP, ROUGH = 60.0, 20.0
-"""Slope of the joint that cohesion holds, and its friction angle [deg]."""
+"""Slope of the joint held by cohesion, and its friction angle [deg]."""
 
 
 def slope(
     name: str, slope_deg: float, friction_deg: float, height: float, time: float, bar: float
 ) -> Case:
-    """Return the case of a block 1 m long on a slope: it holds, or slides by the closed form."""
+    """Return the case of a block 1 m long that holds on a slope or slides by the closed form."""
     holds = friction_deg > slope_deg
     return Case(
         name,
@@ -37,10 +37,10 @@ def slope(
 
 
 def bonded(share: float) -> Callable[[], Scene]:
-    """Return what builds a block on a steep joint with `share` of the cohesion that it needs.
+    """Return a builder of a block on a steep joint with `share` of the required cohesion.
 
-    c L = W (sin th - cos th tan phi), for a joint of 1 m. The block is thin: joints break where
-    pressure is least, and that of a thin one is even.
+    c L = W (sin th - cos th tan phi), for a joint of 1 m. The block is thin so that the pressure on
+    its joint is uniform, because joints break where the pressure is least.
     """
 
     def build() -> Scene:
@@ -55,7 +55,7 @@ def bonded(share: float) -> Callable[[], Scene]:
 
 
 def hung(share: float) -> Callable[[], Scene]:
-    """Return what builds a cube glued below a fixed one with `share` of the tension it needs."""
+    """Return a builder of a cube bonded below a fixed one with `share` of the required tension."""
 
     def build() -> Scene:
         blocks = (box(0.0, 6.0, fixed=True), box(0.0, 5.0))
@@ -67,19 +67,19 @@ def hung(share: float) -> Callable[[], Scene]:
 
 
 def fall_error(history: History) -> float:
-    """Return the relative error of the way of a free fall of the last block [-]."""
+    """Return the relative error of the free fall distance of the last block [-]."""
     way = history.poses[0, -1, 1] - history.poses[-1, -1, 1]
     return float(abs(way / (0.5 * GRAVITY * history.times[-1] ** 2) - 1.0))
 
 
 SOFTNESS = 0.02
-"""Wanted penetration of the soft tower [m]."""
+"""Target penetration of the soft tower [m]."""
 
 
 def uneven_sinking(history: History) -> float:
-    """Return how far the worst block of a soft tower sinks beyond what its joints may give [-].
+    """Return the greatest settlement of a block of a soft tower over the permitted one [-].
 
-    Joint k from the ground gives way by at most the wanted penetration, for the load it carries.
+    Joint k from the ground may compress by at most the target penetration under its load.
     """
     sunk = history.poses[0, :, 1] - history.poses[-1, :, 1]
     allowed = SOFTNESS * np.arange(1, len(sunk) + 1)

@@ -1,7 +1,7 @@
-"""Hard cases over the step: each holds, degrades, refuses with a clear error, or fails.
+"""Hard cases for a range of steps: each holds, degrades, is refused with a clear error, or fails.
 
-Judged by the share of trials that neither hold nor are refused. Up to the default step only what
-must be refused may be, and everything else is to hold; nowhere may a trial fail.
+Judged by the share of trials that neither hold nor are refused. Up to the default step, only the
+cases that must be refused may be, and all others must hold. No trial may fail at any step.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from rigdda import Settings
 from rigdda.files import atomic
 
 LIMIT, QUICK_LIMIT = 600.0, 60.0
-"""Processor time after which a trial counts as hung [s]: twice what the longest takes."""
+"""Processor time after which a trial counts as hung [s], twice that of the longest one."""
 
 DEFAULT = Settings().dt
 
 MOST = 0.02
-"""Greatest share of trials that may degrade, beyond the default step [-]. What flies by a good part
-of its size in a step sinks by chance: of 12 steps from 12.5 to 21 ms a volley at 100 m/s does in
-five, a hopper that 1,000 blocks fall into at 15 m/s in one."""
+"""Greatest share of trials that may degrade beyond the default step [-]. Bodies that travel a large
+part of their size per step may penetrate by chance: among 12 steps from 12.5 to 21 ms, a volley at
+100 m/s does in five, and a hopper into which 1,000 blocks fall at 15 m/s in one."""
 
 
 def table(results: list[Result]) -> str:
-    """Return the verdicts as a table in Markdown: a row a case, a column a step."""
+    """Return the verdicts as a Markdown table with a row per case and a column per step."""
     steps = sorted({r.dt for r in results})
     lines = ["| case | criterion | " + " | ".join(f"{1e3 * dt:g} ms" for dt in steps) + " |"]
     lines.append("|---" * (len(steps) + 2) + "|")
@@ -43,7 +43,7 @@ def table(results: list[Result]) -> str:
 
 
 def report(results: list[Result]) -> str:
-    """Return the counts at each step and what is not as it should be."""
+    """Return the counts of verdicts at each step and the wrong ones."""
     lines = []
     for dt in sorted({r.dt for r in results}):
         here = [r.verdict for r in results if r.dt == dt]
@@ -55,28 +55,28 @@ def report(results: list[Result]) -> str:
 
 
 def wrong(results: list[Result]) -> list[Result]:
-    """Return what is not as it should be: each case holds, or is refused if it has no answer.
+    """Return the wrong results: a case must hold, or be refused if it has no answer.
 
-    Beyond the default step any case may be refused.
+    Beyond the default step, any case may be refused.
     """
     refused = {case.name for case in CASES if case.refused}
     return [r for r in results if r.verdict not in allowed(r.case in refused, r.dt)]
 
 
 def allowed(refused: bool, dt: float) -> tuple[str, ...]:
-    """Return the verdicts that are right for a case, which must be refused or not, at a step."""
+    """Return the correct verdicts at a step for a case that must or must not be refused."""
     if refused:
         return (REFUSES,)
     return (HOLDS,) if dt <= DEFAULT else (HOLDS, REFUSES)
 
 
 def told(row: Row) -> str:
-    """Return what the terminal says of a trial."""
+    """Return a progress message for a trial."""
     return f"{row['case']} {1e3 * row['dt']:g} ms {row['verdict']} {row['note']}"
 
 
 def share_wrong(results: list[Result]) -> float:
-    """Return the share of what is not as it should be [-], infinite where no chance excuses it."""
+    """Return the share of wrong trials [-], infinite if any of them cannot be due to chance."""
     found = wrong(results)
     grave = any(r.dt <= DEFAULT or r.verdict != DEGRADES for r in found)
     return math.inf if grave else len(found) / len(results)
@@ -93,7 +93,7 @@ def run(quick: bool, out: Path) -> Number:
         part.write_text(table(results), encoding="utf-8")
     draw(out / "hard_cases.png", (9.0, 11.0), lambda figure: verdicts(figure, results))
     return Number(
-        f"share of {len(results)} trials that are not as they should be",
+        f"share of {len(results)} trials with a wrong verdict",
         share_wrong(results),
         high=MOST,
         note=report(results),

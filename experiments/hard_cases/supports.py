@@ -1,4 +1,4 @@
-"""Bolts at yield and a shaken slope."""
+"""Hard cases of bolts at yield and of a shaken slope."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from rigdda.model.block import Block
 from rigdda.validation.scenes import GRAVITY, box, polygon, rock
 
 WEIGHT = 2600.0 * GRAVITY
-"""Of a cube of one metre [N]."""
+"""Weight of a cube of one metre [N]."""
 
 SLOPE, FRICTION = 20.0, 30.0
-"""Of the shaken slope and its joints [deg]."""
+"""Angle of the shaken slope, and friction angle of its joints [deg]."""
 
 YIELD = GRAVITY * math.tan(math.radians(FRICTION - SLOPE))
-"""Acceleration of the ground away from the slope's face at which blocks begin to slide [m/s2]."""
+"""Ground acceleration into the slope at which blocks begin to slide [m/s2]."""
 
 PULSE = 0.4
-"""Duration of the pulse [s]."""
+"""Duration of a pulse [s]."""
 
 
 def hung(share: float) -> Callable[[], Scene]:
-    """Return what builds a block that hangs on a bolt which yields at `share` of its weight."""
+    """Return a builder of a block on a bolt that yields at `share` of the block's weight."""
 
     def build() -> Scene:
         force = share * WEIGHT
@@ -39,7 +39,7 @@ def hung(share: float) -> Callable[[], Scene]:
 
 
 def drop_error(share: float) -> Callable[[History], float]:
-    """Return the relative error of the way [-]: g (1 - F/W) t^2/2."""
+    """Return the relative error of the distance [-]: g (1 - F/W) t^2/2."""
 
     def error(history: History) -> float:
         exact = 0.5 * GRAVITY * (1.0 - share) * history.times[-1] ** 2
@@ -49,7 +49,7 @@ def drop_error(share: float) -> Callable[[History], float]:
 
 
 def jointed(rows: int, columns: int) -> tuple[tuple[Block, ...], Terrain]:
-    """Return bricks in running bond on a slope that falls towards +x, and the slope."""
+    """Return bricks in running bond on a slope down towards +x, and the slope."""
     th = math.radians(SLOPE)
     corners = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 0.5), (0.0, 0.5)])
     blocks = [
@@ -62,9 +62,9 @@ def jointed(rows: int, columns: int) -> tuple[tuple[Block, ...], Terrain]:
 
 
 def shaken(push: float, rows: int) -> Callable[[], Scene]:
-    """Return what builds a jointed slope under a pulse of the ground into the slope [m/s2].
+    """Return a builder of a jointed slope under ground acceleration into the slope [m/s2].
 
-    Pulses in alternate directions where it must hold, one where it slides.
+    Alternating pulses are applied where it must hold, a single one where it slides.
     """
 
     def build() -> Scene:
@@ -72,7 +72,7 @@ def shaken(push: float, rows: int) -> Callable[[], Scene]:
         signs = (-1.0, 1.0) * 5 if push < YIELD else (-1.0,)
         edges = 1.0 + PULSE * np.arange(len(signs) + 1)
         pushes = push * np.array(signs)
-        history = np.zeros((2 * len(edges), 3))  # each edge twice: pulses are rectangular
+        history = np.zeros((2 * len(edges), 3))  # two points per edge for rectangular pulses
         history[:, 0] = np.repeat(edges, 2)
         history[1:-1, 1] = np.repeat(pushes, 2)
         return Scene(ground, blocks, rock(FRICTION), base_motion=history)
@@ -81,11 +81,11 @@ def shaken(push: float, rows: int) -> Callable[[], Scene]:
 
 
 def newmark_error(push: float) -> Callable[[History], float]:
-    """Return the relative error of the way of blocks on the slope (Newmark 1965) [-].
+    """Return the relative error of the displacement of blocks on the slope (Newmark 1965) [-].
 
-    The ground is driven uphill, -x, with `push`: blocks slide down relative to it with
-    a = (push - k) cos(phi - th)/cos phi while it lasts and slow down with k cos(phi - th)/cos phi,
-    k = g tan(phi - th).
+    The ground accelerates uphill, -x, by `push`. Relative to it, blocks accelerate downhill by a =
+    (push - k) cos(phi - th)/cos phi during the pulse and decelerate by k cos(phi - th)/cos phi
+    afterwards, with k = g tan(phi - th).
     """
 
     def error(history: History) -> float:

@@ -1,4 +1,4 @@
-"""One trial: a case at a step."""
+"""A trial: one case at one step."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from rigdda.geometry import polygon_properties
 from rigdda.validation.scenes import block_size, masses
 
 BELOW = 1e3
-"""How far down the ground is drawn to tell what is in it [m]."""
+"""Depth to which the ground is closed for the check of lost blocks [m]."""
 
 
 def trial(case: Case, dt: float) -> Result:
-    """Run a case at a step [s]; bad input is a refusal, any other error a failure."""
+    """Run a case at a step [s]; `BadInput` is a refusal, any other error a failure."""
     try:
         history, cpu = play(case, dt)
     except BadInput as error:
         return Result(case.name, dt, REFUSES, note=f"{type(error).__name__}: {error}")
-    except Exception as error:  # whatever else it is, it is a fault to report
+    except Exception as error:  # any other error is a failure
         return Result(case.name, dt, FAILS, note=f"{type(error).__name__}: {error}")
     if not (np.isfinite(history.poses).all() and np.isfinite(history.velocities).all()):
         return Result(case.name, dt, FAILS, note="not a number")
@@ -37,7 +37,7 @@ def trial(case: Case, dt: float) -> Result:
 
 
 def play(case: Case, dt: float) -> tuple[History, float]:
-    """Return the frames of a case at a step [s], and the processor time of its steps [s]."""
+    """Return the history of a case at a step [s], and the processor time of its steps [s]."""
     scene = case.scene()
     sim = Simulation(scene, Settings(dt=dt, **case.settings))
     stride = max(1, round(case.frame / dt))
@@ -59,9 +59,9 @@ def _frame(sim: Simulation) -> tuple[float, Floats, Floats, float]:
 
 
 def growth(history: History) -> float:
-    """Return the greatest growth of energy over its least so far [-].
+    """Return the greatest growth of energy above its lowest value so far [-].
 
-    Over the weight of the free blocks times their size and all energy that was given off.
+    It is relative to the weight of the free blocks times their size plus all dissipated energy.
     """
     energy, scene = history.energy, history.scene
     free = ~np.array([b.fixed for b in scene.blocks])
@@ -71,7 +71,7 @@ def growth(history: History) -> float:
 
 
 def lost(history: History) -> int:
-    """Return how many blocks end in the ground, beyond its ends or with another area."""
+    """Return the number of blocks in the ground, beyond its ends or with a changed area."""
     scene = history.scene
     change = [
         abs(

@@ -1,4 +1,4 @@
-"""Trials in a process of their own: one that hangs or crashes is a result, not the end."""
+"""Trials in a separate process, so that one that hangs or crashes is only recorded."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from rigdda import Scene, Simulation, Terrain
 from rigdda.validation.scenes import FLAT, box
 
 START = 1800.0
-"""Time within which a process must have loaded or compiled the kernels [s]."""
+"""Time limit for loading or compiling the kernels in a process [s]."""
 
 IDLE = 20.0
-"""Time over processor time after which a trial counts as hung although it does not compute [-]:
-more than a busy machine makes of it."""
+"""Time over the processor time limit after which an idle trial counts as hung [-], with allowance
+for a busy machine."""
 
 
 def limit_processor_time(seconds: float) -> None:
-    """End this process, even within a kernel, when it has computed for so long; 0 lifts the limit.
+    """End this process, even within a kernel, after this processor time; 0 removes the limit.
 
-    Other load on the machine does not change processor time. Windows has no timer of it: there
-    only the time that `Worker.run` waits ends a trial that hangs.
+    Processor time does not depend on other load. Windows has no such timer: there, only the waiting
+    time of `Worker.run` ends a trial that hangs.
     """
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_PROF, seconds)
 
 
 def serve(pipe: Connection, limit: float) -> None:
-    """Run trials as they are asked for, by name and step; scenes cannot be sent.
+    """Run trials on request by name and step, because scenes cannot be pickled.
 
-    A trial that computes for longer than `limit` [s of processor time] ends the process.
+    A trial that takes more than `limit` [s of processor time] ends the process.
     """
     cases = {case.name: case for case in CASES}
-    Simulation(Scene(Terrain(FLAT), (box(0.0, 0.5),))).step()  # compiled, or loaded, before times
+    Simulation(Scene(Terrain(FLAT), (box(0.0, 0.5),))).step()  # compile or load first
     pipe.send(None)
     while True:
         name, dt = pipe.recv()
@@ -49,14 +49,14 @@ def serve(pipe: Connection, limit: float) -> None:
 
 
 class Worker:
-    """A process that runs trials; it is replaced when it hangs or dies.
+    """A process that runs trials and is replaced if it hangs or dies.
 
     Parameters
     ----------
     limit : float
-        Processor time in which a trial must end [s].
+        Processor time limit of a trial [s].
     target : callable
-        What the process runs, with its end of the pipe and the limit.
+        Function that the process runs, with its end of the pipe and the limit.
     """
 
     def __init__(self, limit: float, target: Any = serve):
@@ -65,7 +65,7 @@ class Worker:
         self._pipe: Any = None
 
     def run(self, name: str, dt: float) -> Result:
-        """Return what came of a case at a step [s]."""
+        """Return the result of a case at a step [s]."""
         if self._process is None:
             self._start()
         try:
@@ -82,7 +82,7 @@ class Worker:
         return Result(name, dt, FAILS, note=note)
 
     def measure(self, case: str, dt: float) -> dict[str, Any]:
-        """Return what came of a case at a step [s], but for these two, as columns of a table."""
+        """Return the result of a case at a step [s] as columns of a table, without these two."""
         found = asdict(self.run(case, dt))
         return {name: found[name] for name in found if name not in ("case", "dt")}
 

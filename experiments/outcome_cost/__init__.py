@@ -1,1 +1,1 @@
-"""Processor time of a right outcome: this core, other engines and the lumped mass."""
+"""Processor time for a correct outcome: this core, other engines and the lumped-mass model."""

@@ -1,4 +1,4 @@
-"""Run it: `python -m experiments.outcome_cost [--quick] [--out DIR]`."""
+"""Run the study: `python -m experiments.outcome_cost [--quick] [--out DIR]`."""
 
 from experiments.outcome_cost.study import run
 from experiments.script import main

@@ -1,4 +1,4 @@
-"""What is computed: releases of three sites, as every engine can compute them."""
+"""Cases: releases of three sites in a form that every engine can compute."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from rigdda.model.surface import Surface
 TSCHAMUT = Path(__file__).parent.parent / "tschamut" / "site.toml"
 
 GROUND = {"friction_deg": 38.0, "restitution": 0.4}
-"""Of `tschamut` here: with `DAMPING` its blocks come 80 m far in the mean; 96 were observed."""
+"""Ground of `tschamut` here. With `DAMPING`, its blocks travel 80 m on average; 96 m were
+observed."""
 
 DAMPING = 0.15
-"""Damping of `tschamut` here [1/s]: in flight, too, which is what the other engines know. The fit
-of `experiments.tschamut` damps in contact only."""
+"""Damping of `tschamut` here [1/s], also in flight as in the other engines. The fit in
+`experiments.tschamut` damps in contact only."""
 
 OF_ALL = 0.3
-"""Damping of sites that leave it to their grounds [1/s], in flight, too."""
+"""Damping of sites whose grounds define it [1/s], also in flight."""
 
 ROAD = 80.0
-"""Chainage beyond which blocks of `tschamut` count as debris [m]: two in three do."""
+"""Chainage beyond which blocks of `tschamut` count as debris [m], which two thirds reach."""
 
 CORNERS = (8, 8)
-"""Of the blocks of `tschamut` here: Box2D takes eight at most."""
+"""Numbers of corners of the blocks of `tschamut` here; Box2D permits at most eight."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,11 @@ class Case:
     name : str
         Its name.
     site : Site
-        The slope; what passes its `road.start` counts as debris.
+        The slope; rock that passes its `road.start` counts as debris.
     barrier : float
-        Chainage at which the energy is taken [m].
+        Chainage at which the energy is measured [m].
     events : tuple of str or None
-        Releases take turns with them; None is the only one.
+        Events of successive releases, in turn; None is the only event.
     """
 
     name: str
@@ -58,30 +59,30 @@ class Case:
         return self.events[seed % len(self.events)]
 
     def draw(self, seed: int) -> Drawn:
-        """Return what a seed draws."""
+        """Return the draw of a seed."""
         return self.site.draw(seed, self.event(seed))
 
 
 def everywhere(site: Site) -> Site:
-    """Return a site that damps in flight, too, as all engines do, on a valley floor without end.
+    """Return a site with damping also in flight, as in all engines, and a long level valley floor.
 
-    The road goes on to that end, so that a release ends when all of its blocks sleep.
+    The road extends to its end, so that a release ends only when all of its blocks sleep.
     """
     toe, level = site.slope.toe, site.slope.points[-1][1]
     plain = {
         name: Surface(s.friction_deg, s.cohesion, s.tension, s.restitution)
         for name, s in site.surfaces.items()
-    }  # the peers know neither damping of a surface nor scatter
+    }  # the peers model neither surface damping nor scatter
     damping = OF_ALL if site.motion.damping is None else site.motion.damping
     floor = (*site.slope.points, (RUN_OUT, level))
     return replace(
         site,
-        family="paper",  # others may damp in contact only
+        family="paper",  # other families permit contact damping only
         surfaces=plain,
         motion=replace(site.motion, damping=damping, damping_when="always"),
         slope=replace(site.slope, points=floor),
         road=replace(site.road, end=RUN_OUT - 50.0),
-        barrier_zone=replace(site.barrier_zone, start=toe - 2.0, end=toe - 1.0),  # nothing stands
+        barrier_zone=replace(site.barrier_zone, start=toe - 2.0, end=toe - 1.0),  # no barriers
     )
 
 

@@ -1,4 +1,4 @@
-"""The processor time of an answer within a level, from a sample of releases and the reference."""
+"""Processor time of an answer within a level, from a sample of releases and the reference."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from experiments.outcome_cost.sample import Floats, Release, outcomes
 
 CERTAIN = 1.645
-"""Standard errors of its 90 % interval, within which a bias counts as known."""
+"""Half width of a 90 % interval in standard errors, within which a bias must be known."""
 
 RESAMPLES = 300
 
 
 class Sample(NamedTuple):
-    """What a setting gives: means (3,), their resamples (RESAMPLES, 3), time of a release [s]."""
+    """Results of a setting: means (3,), resampled means (RESAMPLES, 3), time per release [s]."""
 
     means: Floats
     resampled: Floats
@@ -30,24 +30,24 @@ class Sample(NamedTuple):
 
 
 class Cost(NamedTuple):
-    """Processor time of an answer within a level [s], and as often as resampled."""
+    """Processor time of an answer within a level [s], and its resampled values."""
 
     value: float
     resampled: Floats
 
     @property
     def known(self) -> bool:
-        """Whether the bias is known to the level."""
+        """Whether the bias is known with the accuracy of the level."""
         return not math.isnan(self.value)
 
     def ends(self) -> tuple[float, float]:
-        """Return its 95 % interval [s]."""
+        """Return the 95 % interval [s]."""
         low, high = np.quantile(self.resampled, (0.025, 0.975), method="nearest")
         return float(low), float(high)
 
 
 class Verdict(NamedTuple):
-    """Bias over the reference and its standard error, scatter of one release over it; (3,) each."""
+    """Relative bias from the reference, its standard error, and scatter of a release; (3,) each."""
 
     bias: Floats
     error: Floats
@@ -55,7 +55,7 @@ class Verdict(NamedTuple):
 
 
 def sampled(releases: list[Release], seed: int = 0) -> Sample:
-    """Return what releases give; `seed` draws the resamples."""
+    """Return the sample of some releases; `seed` is that of the resampling."""
     rng = np.random.default_rng([seed, len(releases)])
     picks = rng.integers(len(releases), size=(RESAMPLES, len(releases)))
     resampled = np.array([outcomes([releases[i] for i in pick]) for pick in picks])
@@ -71,12 +71,12 @@ def judge(sample: Sample, reference: Sample) -> Verdict:
 
 
 def needed(bias: Floats, noise: Floats, scatter: Floats, level: float) -> Floats:
-    """Return the releases that each outcome needs to be within a level; inf if it never is.
+    """Return the releases that each outcome needs to be within a level, inf if impossible.
 
     Parameters
     ----------
     bias, noise, scatter : (..., 3) arrays
-        Bias as it was found, its standard error, scatter of one release.
+        Estimated bias, its standard error, and scatter of one release.
     """
     left = level**2 - np.maximum(bias**2 - noise**2, 0.0)
     releases = np.divide(scatter**2, left, out=np.full(left.shape, math.inf), where=left > 0.0)
@@ -86,8 +86,9 @@ def needed(bias: Floats, noise: Floats, scatter: Floats, level: float) -> Floats
 def cost(sample: Sample, reference: Sample, level: float) -> Cost:
     """Return the processor time of an answer within a level.
 
-    It is infinite where the bias is surely greater. It is NaN where the bias is not known to the
-    level; its resamples are then those of a setting without bias, the least that it may cost.
+    It is infinite if the bias is certainly greater. It is NaN if the bias is not known with the
+    accuracy of the level; the resampled values are then those of an unbiased setting, a lower
+    bound.
     """
     bias, error, scatter = judge(sample, reference)
     half = CERTAIN * error

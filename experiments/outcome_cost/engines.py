@@ -1,4 +1,4 @@
-"""Every engine with the settings that are tried."""
+"""Engines and their settings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Setting(NamedTuple):
         return f"{self.engine} {1e3 * self.dt:g} ms{words}" if self.dt else self.engine
 
     def load(self, case: Case) -> Core | Peer | Points:
-        """Return what computes releases of a case."""
+        """Return an object that computes releases of a case."""
         if self.engine == LUMPED:
             return Points(case)
         if self.engine == CORE:
@@ -33,7 +33,7 @@ class Setting(NamedTuple):
 
 
 ADAPTERS = {"Box2D": "box2d", "pymunk": "chipmunk", "MuJoCo": "mjc"}
-"""Module of each block engine beside this core."""
+"""Adapter module of each other block engine."""
 
 
 def box2d(dt: float, substeps: int, hertz: float) -> Setting:
@@ -47,14 +47,14 @@ def pymunk(dt: float, iterations: int, slop: float) -> Setting:
 
 
 REFERENCE = Setting(CORE, 1e-3, (("sweep_tolerance", 1e-3), ("open_close_iterations", 50)))
-"""What bias is measured from."""
+"""Setting that is the reference for bias."""
 
 OURS = {
     "highway": (5e-3, 10e-3, 20e-3, 25e-3),
     "quick": (5e-3, 10e-3, 20e-3, 25e-3),
     "tschamut": (2.5e-3, 5e-3, 10e-3),
 }
-"""Steps of this core [s]; longer ones it takes in parts."""
+"""Steps of this core [s]; it divides longer ones."""
 
 PEERS = (
     box2d(20e-3, 1, 120.0),
@@ -71,10 +71,10 @@ PEERS = (
 )
 
 FINE = {"tschamut": (box2d(1e-3, 4, 960.0), pymunk(1e-3, 10, 1e-3))}
-"""Shorter steps for blocks of a tenth of a square metre."""
+"""Settings with shorter steps for blocks of a tenth of a square metre."""
 
 
 def settings(case: str) -> tuple[Setting, ...]:
-    """Return the settings that are tried on a case, the reference first."""
+    """Return all settings for a case, the reference first."""
     ours = tuple(Setting(CORE, dt) for dt in OURS[case])
     return (REFERENCE, *ours, *PEERS, *FINE.get(case, ()), Setting(LUMPED, 0.0))

@@ -1,4 +1,4 @@
-"""Releases of each setting of a case, computed in turns and kept, while the setting may count."""
+"""Samples of all settings of a case, computed in turns and stored on disk."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import atomic
 
 JUDGED = 0.03
-"""Level that is judged: of a setting that is surely biased by more nothing further is computed."""
+"""Level that is judged; settings that are certainly biased by more are dropped."""
 
 CHUNK = {"highway": 20, "quick": 100, "tschamut": 300}
-"""Releases of a setting at a time."""
+"""Releases per setting and turn."""
 
 FEWEST = 3
-"""Chunks after which a setting may be given up."""
+"""Number of turns before a setting may be dropped."""
 
 SURE = 3.5
-"""Standard errors by which its bias must then exceed 3 %, at every look."""
+"""Standard errors by which a bias must exceed 3 % for its setting to be dropped."""
 
 DEAR = 2.0
-"""Processor time of a release, over that of this core's cheapest setting, from which a setting of a
-peer is not computed further; it then counts with the least that it may cost."""
+"""Processor time per release over that of this core's cheapest setting above which a peer's setting
+is dropped; it then counts with its lower bound."""
 
 WORKERS = 2
 
 
 @lru_cache(maxsize=64)
 def loaded(name: str, setting: Setting) -> tuple[Case, Core | Peer | Points]:
-    """Return a case and what computes its releases, once a process."""
+    """Return a case and the object that computes its releases, once per process."""
     case = CASES[name]()
     computer = setting.load(case)
-    computer.release(0)  # compiles, packs
+    computer.release(0)  # compile and pack
     return case, computer
 
 
@@ -52,14 +52,14 @@ def compute(name: str, setting: Setting, seeds: range) -> list[Release]:
     Raises
     ------
     Diverged
-        If this core does: a setting that diverges has no place in the comparison.
+        If this core diverges, since such a setting must not be compared.
     """
     _, computer = loaded(name, setting)
     return [computer.release(seed) for seed in seeds]
 
 
 def made() -> str:
-    """Return a hash of all that releases depend on: mechanics, engines, how they are judged."""
+    """Return a hash of everything that releases depend on: mechanics, engines, measurement."""
     here = Path(__file__).parent
     sources = [here / "sample.py", *sorted((here.parent / "bench" / "engines").glob("*.py"))]
     digest = hashlib.sha256(mechanics().encode())
@@ -75,7 +75,7 @@ def stored(folder: Path, name: str, setting: Setting, seeds: range) -> Path:
 
 
 def save(path: Path, releases: list[Release]) -> None:
-    """Write releases."""
+    """Write releases to a file."""
     count = [len(r.blocks) for r in releases]
     with atomic(path) as part, part.open("wb") as file:
         blocks = np.concatenate([r.blocks for r in releases])
@@ -83,20 +83,20 @@ def save(path: Path, releases: list[Release]) -> None:
 
 
 def read(path: Path) -> list[Release]:
-    """Return releases that were written."""
+    """Read releases from a file."""
     with np.load(path) as found:
         blocks = np.split(found["blocks"], np.cumsum(found["count"])[:-1])
         return [Release(b, float(c)) for b, c in zip(blocks, found["cpu"], strict=True)]
 
 
 def surely_biased(sample: Sample, reference: Sample) -> bool:
-    """Return whether a setting is biased by more than the level that is judged."""
+    """Return whether a setting is certainly biased by more than the judged level."""
     verdict = judge(sample, reference)
     return bool((np.abs(verdict.bias) - SURE * verdict.error > JUDGED).any())
 
 
 def followed(samples: dict[Setting, Sample]) -> list[Setting]:
-    """Return the settings that are computed further: this core's, peers that may be cheapest."""
+    """Return the settings to be continued: this core's, and peers' that may be the cheapest."""
     reference = samples[REFERENCE]
     cheap = DEAR * min(s.cpu for setting, s in samples.items() if setting.engine == CORE)
     return [

@@ -1,4 +1,4 @@
-"""Outcomes of many releases with one engine, and the processor time that they took."""
+"""Outcomes of many releases with one engine, and their processor time."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from rigdda.validation.scenes import masses
 Floats = NDArray[np.float64]
 
 FRAME = 0.1
-"""Interval of the frames [s]; every step is a whole part of it."""
+"""Interval of the frames [s], a multiple of every step."""
 
 LOOK = 5
-"""Frames from one look at whether all is at rest to the next."""
+"""Number of frames between checks for rest."""
 
 STILL = 0.01
-"""Way that no block has made since the last look where it is [m]."""
+"""Displacement since the last check below which all blocks are at rest [m]."""
 
 MASS, PAST, RUN_OUT, ENERGY = range(4)
-"""Columns of what became of a block: mass [kg/m], whether it came past the edge of the road,
-where it stops [m], kinetic energy at the barrier [kJ/m], NaN if it does not come there."""
+"""Columns of the results of a block: mass [kg/m], whether it passed the road's edge, chainage at
+which it stops [m], kinetic energy at the barrier [kJ/m], NaN if it does not reach it."""
 
 OUTCOMES = ("debris share [-]", "95 % run-out [m]", "95 % energy at the barrier [kJ/m]")
 
 
 class Release(NamedTuple):
-    """Blocks of a release, (n, 4), and the processor time that it took [s]."""
+    """Results of the blocks of a release, (n, 4), and its processor time [s]."""
 
     blocks: Floats
     cpu: float
 
 
 def clock() -> float:
-    """Return the processor time of reading it twice [s]."""
+    """Return the processor time of two clock readings [s]."""
     start = time.thread_time()
     for _ in range(1000):
         time.thread_time()
@@ -52,7 +52,7 @@ def clock() -> float:
 
 
 def judge(case: Case, scene: Scene, poses: Floats, velocities: Floats) -> Floats:
-    """Return what became of each block from the frames of a release.
+    """Return the results of each block from the frames of a release.
 
     The energy is that in the first frame beyond the barrier.
 
@@ -74,9 +74,9 @@ def judge(case: Case, scene: Scene, poses: Floats, velocities: Floats) -> Floats
 
 
 class Core:
-    """The core of `rigdda`: releases one after the other, as `rigdda.release_many` computes them.
+    """The core of `rigdda`, with successive releases as in `rigdda.release_many`.
 
-    Settings are those of a simulation; without any, they are what the site gives to the blocks.
+    Empty settings stand for those that the site derives for the blocks.
     """
 
     NAME = "rigdda"
@@ -89,8 +89,8 @@ class Core:
     def release(self, seed: int) -> Release:
         """Compute a release until all its blocks sleep.
 
-        Processor time is that of setting it up, of its steps and of keeping its frames, not of
-        cutting the rock into blocks, which is the same for all engines.
+        The processor time includes the set-up, the steps and the recording of frames, but not the
+        cutting of the rock into blocks, which is the same for all engines.
         """
         scene = self._batch.scene(self._case.draw(seed))
         start = time.thread_time()
@@ -104,16 +104,17 @@ class Core:
 
 
 class Peer:
-    """Another engine, of `experiments.bench.engines`: step by step."""
+    """Another engine from `experiments.bench.engines`, advanced step by step."""
 
     def __init__(self, module: ModuleType, case: Case, dt: float, options: dict[str, Any]):
         self._case, self._engine, self._dt, self._options = case, module.Engine, dt, options
         self._frames, self._clock = round(case.site.motion.duration / FRAME), clock()
 
     def release(self, seed: int) -> Release:
-        """Compute a release until no block has moved since the last look.
+        """Compute a release until no block has moved since the last check.
 
-        Processor time is that of setting up the engine and of its steps, not of reading it.
+        The processor time includes the set-up of the engine and its steps, but not the reading of
+        poses.
         """
         scene = self._case.site.scene(self._case.draw(seed))
         stride = round(FRAME / self._dt)
@@ -134,14 +135,17 @@ class Peer:
 
 
 class Points:
-    """The lumped mass, computed a second time with the road at the barrier for the energy there."""
+    """The lumped-mass model.
+
+    It is run a second time with the road at the barrier, for the energy there.
+    """
 
     def __init__(self, case: Case):
         self._case = case
         self._at = replace(case.site, road=replace(case.site.road, start=case.barrier))
 
     def release(self, seed: int) -> Release:
-        """Compute a release; its processor time includes what is drawn."""
+        """Compute a release; its processor time includes the draw."""
         event, start = self._case.event(seed), time.thread_time()
         road = lumped(self._case.site, (), (seed,), event)
         cpu = time.thread_time() - start
@@ -150,9 +154,10 @@ class Points:
 
 
 def outcomes(releases: list[Release]) -> Floats:
-    """Return debris share, 95 % run-out and 95 % energy of releases taken together, (3,).
+    """Return debris share, 95 % run-out and 95 % energy of all releases together, (3,).
 
-    Run-out by mass; energy by the number of blocks that come to the barrier.
+    The run-out is weighted by mass; the energy is a quantile over the blocks that reach the
+    barrier.
     """
     blocks = np.concatenate([r.blocks for r in releases])
     mass = blocks[:, MASS]

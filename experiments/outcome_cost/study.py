@@ -1,22 +1,22 @@
-"""Processor time to know an outcome: how long each engine takes until its answer is right.
+"""Processor time that each engine needs for an outcome of given accuracy.
 
-Of three cases (`cases`) each engine (`engines`) computes releases with several settings. What a
-designer asks of them: the share of the debris that passes the edge of the road, the run-out that
-95 % of the rock stays within, and the energy that 95 % of the blocks at a barrier stay below.
-With n releases an outcome is wrong by its bias, against the reference, and by its scatter; an
-answer within `e` of the reference needs the n for which bias^2 + scatter^2 / n is e^2 for the worst
-of the three outcomes. Its cost is n times the processor time of a release. A setting whose bias
-exceeds e never gets there.
+For three cases (`cases`), each engine (`engines`) computes releases with several settings. The
+outcomes are those that a designer needs: the share of the debris that passes the edge of the road,
+the run-out of 95 % of the rock, and the energy that 95 % of the blocks at a barrier do not exceed.
+With n releases, the error of an outcome consists of its bias from the reference and its scatter. An
+answer within `e` of the reference needs the n for which bias^2 + scatter^2 / n = e^2 for the worst
+of the three outcomes. Its cost is n times the processor time of a release, and infinite if the bias
+exceeds e.
 
-The reference is this core at 1 ms, and its scatter is common to all ratios of a case. Part of
-what counts as bias of a peer is another law of impact: on `quick` the finest settings of Box2D
-and pymunk settle at more debris than it. All engines compute the same scenes, MuJoCo without
-restitution, which it does not know, for the duration of the site or until all blocks are at rest.
-The run-out is where the rock is then. Settings take turns, some releases each, so that all meet
-the same noise of the machine. A peer's setting is not computed any further when it is surely
-biased by more than 3 %, or too dear to be the cheapest.
+The reference is this core at 1 ms; its scatter is common to all ratios of a case. Part of the bias
+of a peer is due to a different impact law: on `quick`, the finest settings of Box2D and pymunk
+converge to more debris than the reference. All engines compute the same scenes (MuJoCo without
+restitution, which it does not model) for the duration of the site or until all blocks are at rest,
+which also defines the run-out. The settings are computed in turns of some releases each, so that
+all are exposed to the same noise of the machine. A peer's setting is dropped once it is certainly
+biased by more than 3 %, or too expensive to be the cheapest.
 
-Judged by the cost of this core over that of the cheapest other block engine at 3 %, of the worst
+Judged by the cost of this core over that of the cheapest other block engine at 3 %, for the worst
 case.
 """
 
@@ -38,7 +38,7 @@ from experiments.outcome_cost.sample import OUTCOMES
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, write
 
 LEVELS = (0.1, 0.03, 0.01)
-"""How far the answer may be off, over the reference [-]."""
+"""Permitted errors over the reference [-]."""
 
 RELEASES = {"highway": 300, "quick": 1500, "tschamut": 4500}
 QUICK_RELEASES = {"highway": 4, "quick": 20, "tschamut": 60}
@@ -46,7 +46,7 @@ COLOURS = {CORE: BLUE, "Box2D": RED, "pymunk": GREEN, "MuJoCo": ORANGE, LUMPED: 
 
 
 def rows(name: str, samples: dict[Setting, Sample]) -> Iterator[dict[str, Any]]:
-    """Yield a row for each setting: outcomes, bias, and the cost of each level."""
+    """Yield a row per setting: outcomes, bias, and the cost at each level."""
     reference = samples[REFERENCE]
     for setting, sample in samples.items():
         verdict = judge(sample, reference)
@@ -75,11 +75,10 @@ def rows(name: str, samples: dict[Setting, Sample]) -> Iterator[dict[str, Any]]:
 
 
 def compared(samples: dict[Setting, Sample], level: float) -> dict[str, Any]:
-    """Return the cheapest setting of this core and of the peers, and the ratio of their costs.
+    """Return the cheapest settings of this core and of the peers, and the ratio of their costs.
 
-    A peer whose bias is not known counts as if it had none: the ratio is then the greatest that it
-    may be, and `told` says so. The ratio is NaN where this core does not get there; it is 0 where
-    no peer does.
+    A peer with unknown bias counts as unbiased, so that the ratio is an upper bound, which is noted
+    in `told`. The ratio is NaN if this core does not reach the level, and 0 if no peer does.
     """
     every = {s: cost(x, samples[REFERENCE], level) for s, x in samples.items() if s != REFERENCE}
     mine = {s: c for s, c in every.items() if s.engine == CORE}
@@ -114,7 +113,7 @@ def ratios(every: dict[str, dict[Setting, Sample]]) -> list[dict[str, Any]]:
 
 
 def picture(figure: Figure, every: dict[str, dict[Setting, Sample]]) -> None:
-    """Draw the worst bias of each setting against the processor time of a release."""
+    """Draw the greatest bias of each setting against the processor time of a release."""
     for axes, (name, samples) in zip(
         figure.subplots(1, len(every), squeeze=False)[0], every.items(), strict=True
     ):
@@ -144,7 +143,7 @@ def picture(figure: Figure, every: dict[str, dict[Setting, Sample]]) -> None:
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Compute all cases and write the tables and the picture."""
+    """Compute all cases; write the tables and the picture."""
     folder = out / "outcome_cost"
     counts = QUICK_RELEASES if quick else RELEASES
     every = {name: gather(name, counts[name], folder / "samples") for name in CASES}

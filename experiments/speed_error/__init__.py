@@ -1,4 +1,4 @@
-"""What a setting costs and errs: closed forms and the outcome of the highway case."""
+"""Cost and error of each setting: closed forms and the outcome of the highway case."""
 
 from experiments.speed_error.study import run
 

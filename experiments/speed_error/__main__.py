@@ -1,4 +1,4 @@
-"""Run it all: `python -m experiments.speed_error [--quick] [--out DIR]`."""
+"""Run the study: `python -m experiments.speed_error [--quick] [--out DIR]`."""
 
 from experiments.script import main
 from experiments.speed_error.study import run

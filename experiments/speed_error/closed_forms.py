@@ -1,4 +1,4 @@
-"""Closed forms: error against processor time of every choice, and of the peers where they can."""
+"""Closed forms: error against processor time of every setting, and of the peers where possible."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from rigdda.validation.case import Case, Lab, Metered
 from rigdda.validation.scenes import block_size
 
 MORE_STEPS = (*STEPS, 1e-3)
-"""With a shorter step, which closed forms stand [s]."""
+"""Steps of the closed forms, including a shorter one [s]."""
 
 PEER_PARTS = (5, 10, 20, 50, 100, 200)
-"""Steps of the peers, as parts of the longest."""
+"""Steps of the peers, as divisors of the longest step."""
 
 ALONE = ("newmark", "16-gon", "arch-stands")
-"""Cases of the accuracy suite that no peer computes, since they have no adapter for it."""
+"""Cases of the validation suite without an adapter for the peers."""
 
 QUICK_ALONE = ("newmark",)
 
 
 @dataclass(frozen=True)
 class Point:
-    """What a choice erred, in the unit of `quantity`, and took: CPU per simulated second [us/s].
+    """Error of a setting, in the unit of `quantity`, and CPU time per simulated second [us/s].
 
-    `default`: it is the default choice. Of peers, `choice` are their options.
+    `default` marks the default settings. For peers, `options` are their options.
     """
 
     case: str
@@ -52,14 +52,14 @@ class Point:
 
 
 class TunedLab(Lab):
-    """A lab whose simulations all have the settings of a choice."""
+    """A lab whose simulations all use the settings of a choice."""
 
     def __init__(self, choice: Choice):
         self._settings = {k: v for k, v in choice.settings.items() if k != "dt"}
         super().__init__(choice.settings.get("dt", DEFAULT.dt))
 
     def simulate(self, scene: Scene, dt: float | None = None, **settings: Any) -> Metered:
-        """Return the scene in motion with the settings of the choice.
+        """Return a simulation with the settings of the choice.
 
         Its penetration is in units of the mean block size.
         """
@@ -70,7 +70,7 @@ class TunedLab(Lab):
 
 
 def with_peers(quick: bool) -> list[bench.Case]:
-    """Return the closed forms that the bench compares engines on."""
+    """Return the closed-form cases on which the bench compares engines."""
     found = [c for c in bench.all_cases() if not c.name.startswith("rockfall")]
     return [replace(c, scenes=c.scenes[:1]) for c in found] if quick else found
 
@@ -83,7 +83,7 @@ def sweep(case: bench.Case) -> Iterator[Point]:
         done = timing.Setting(engine, dt, settings)
         try:
             timing.first_run(done, case)
-        except BadInput:  # a step that is too long for the blocks
+        except BadInput:  # the step is too long for the blocks
             continue
         row = done.row(case)
         yield Point(
@@ -106,7 +106,7 @@ def sweep_peers(
 
 
 def sweep_alone(case: Case) -> Iterator[Point]:
-    """Yield a point for each choice on the first figure of a case of the accuracy suite."""
+    """Yield a point for each choice on the first check of a case of the validation suite."""
     check = case.checks[0]
     what = f"{check.quantity} [{'-' if check.error == 'relative' else check.unit}]"
     for choice in choices(1.0, MORE_STEPS):
@@ -129,6 +129,6 @@ def sweep_alone(case: Case) -> Iterator[Point]:
 
 
 def alone(quick: bool) -> list[Case]:
-    """Return the cases of the accuracy suite that are swept without peers."""
+    """Return the cases of the validation suite that are computed without peers."""
     modules = (slides, rolling, arches)
     return [c for m in modules for c in m.CASES if c.name in (QUICK_ALONE if quick else ALONE)]

@@ -1,4 +1,4 @@
-"""The outcome of the highway case: bias against a converged reference, over many releases."""
+"""Outcome of the highway case: bias from a converged reference, over many releases."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 SITE = Site.load("shu-hwa-paper")
 (ROCK,) = SITE.sources
 BARRIER = SITE.slope.toe
-"""Chainage of the barrier: at the toe [m]."""
+"""Chainage of the barrier, at the toe [m]."""
 
 OUTCOMES = ("debris fraction [-]", "95 % run-out [m]", "energy at the barrier [kJ]")
 
@@ -40,10 +40,10 @@ BLOCKS = "block area"
 
 
 class Budget(NamedTuple):
-    """Releases of the reference and of the default; of every other choice; of each peer.
+    """Number of releases of reference and default, of every other choice, and of each peer.
 
-    `area` is the mean area of a block [m2], `factors` what it is multiplied with to have fewer
-    blocks or more, `duration` the simulated time [s].
+    `area` is the mean area of a block [m2], `factors` multiply it for fewer or more blocks, and
+    `duration` is the simulated time [s].
     """
 
     reference: int
@@ -60,7 +60,7 @@ QUICK = Budget(12, 6, 4, 8.0, (2.0,), 20.0)
 
 @dataclass(frozen=True)
 class Sample:
-    """Outcomes of the releases of one choice, (R, 3), and processor time a release [s]."""
+    """Outcomes of the releases of one choice, (R, 3), and processor time per release [s]."""
 
     engine: str
     knob: str
@@ -75,13 +75,16 @@ class Sample:
         return self.outcomes.mean(axis=0)
 
     def half(self, releases: int | None = None) -> Floats:
-        """Return half the 95 % interval of the means of so many releases, of these, (3,)."""
+        """Return half the 95 % interval of the means, (3,).
+
+        It is that of this sample, or of `releases` such releases.
+        """
         return 1.96 * self.outcomes.std(axis=0, ddof=1) / math.sqrt(releases or len(self.outcomes))
 
 
 @lru_cache(maxsize=512)
 def scene(area: float, seed: int) -> Scene:
-    """Return a release with blocks of a mean area [m2]; the valley floor is drawn out level."""
+    """Return a release with this mean block area [m2] and an extended level valley floor."""
     change = msgspec.structs.replace
     valley = (RUN_OUT, SITE.slope.points[-1][1])
     return change(
@@ -94,13 +97,13 @@ def scene(area: float, seed: int) -> Scene:
 def outcome(scene: Scene, poses: Floats) -> tuple[float, float, float]:
     """Return debris fraction, 95 % run-out [m] and energy at the barrier [kJ] from the frames.
 
-    The energy is the 95 % quantile over the blocks that cross the barrier's chainage of their
-    kinetic energy in the frame in which they do.
+    The energy is the 95 % quantile over the blocks that cross the barrier's chainage, of their
+    kinetic energy in the frame of the crossing.
 
     Parameters
     ----------
     poses : (T, N, 3) array
-        x, y of the centroids [m] and rotation [rad], a frame every `FRAME` seconds.
+        x, y of the centroids [m] and rotation [rad], one frame every `FRAME` seconds.
     """
     mass, inertia = masses(scene)
     x = poses[:, :, 0]
@@ -108,7 +111,7 @@ def outcome(scene: Scene, poses: Floats) -> tuple[float, float, float]:
     order = np.argsort(x[-1])
     reached = np.cumsum(mass[order]) / mass.sum()
     poses = poses.copy()
-    poses[:, :, 2] = np.unwrap(poses[:, :, 2], axis=0)  # Box2D tells angles within half a turn
+    poses[:, :, 2] = np.unwrap(poses[:, :, 2], axis=0)  # Box2D wraps angles to half a turn
     speed = np.diff(poses, axis=0) / FRAME
     energy = 0.5 * (mass * (speed[..., 0] ** 2 + speed[..., 1] ** 2) + inertia * speed[..., 2] ** 2)
     crossed = np.flatnonzero((x >= BARRIER).any(axis=0))
@@ -124,7 +127,7 @@ def outcome(scene: Scene, poses: Floats) -> tuple[float, float, float]:
 def release(
     module: Any, area: float, duration: float, seed: int, dt: float, options: dict[str, Any]
 ) -> tuple[tuple[float, float, float], float]:
-    """Return the outcome of one release, nan if it diverges, and its processor time [s]."""
+    """Return the outcome of one release, NaN if it diverges, and its processor time [s]."""
     one = scene(area, seed)
     run = module.Engine(one, dt, True, **options)
     stride = round(FRAME / dt)
@@ -148,7 +151,10 @@ def sample(
     folder: Path,
     module: Any = engine,
 ) -> Sample:
-    """Return the releases of a choice, seeds 0 onwards, over all cores; kept in `folder`."""
+    """Return the releases of a choice, computed on all cores and stored in `folder`.
+
+    Their seeds start at 0.
+    """
     options = dict(choice.settings)
     dt = options.pop("dt", DEFAULT.dt)
 
@@ -176,7 +182,7 @@ def reference(budget: Budget, folder: Path) -> Sample:
 
 
 def samples(budget: Budget, folder: Path, say: Callable[[str], None]) -> Iterator[Sample]:
-    """Yield the releases of all choices, then of other block sizes."""
+    """Yield the releases of all choices, then those of other block sizes."""
     for choice in choices(math.sqrt(budget.area)):
         say(f"highway: {choice.knob} {choice.value:g}")
         releases = budget.reference if choice.default else budget.others

@@ -1,4 +1,4 @@
-"""The settings that are varied, one at a time from the defaults, and what was measured."""
+"""Settings that are varied, one at a time from the defaults."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from rigdda.dynamics.constants import PENETRATION_RATIO
 DEFAULT = Settings()
 
 STEPS = (2e-2, 1e-2, 5e-3, 2.5e-3)
-"""Steps [s]; the longest is the interval of a rockfall's frames."""
+"""Steps [s]; the longest one is the frame interval of a rockfall."""
 
 COMPRESSIONS = (1e-2, 1e-3, 1e-4, 1e-5)
-"""Compressions of contacts under their load over the mean block size [-]: `Settings.penetration`.
-Stiffness is the load over it."""
+"""Compressions of contacts under their load over the mean block size [-], `Settings.penetration`.
+The stiffness is the load over the compression."""
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-10)
-"""Of conjugate gradients, `Settings.tolerance` [-]."""
+"""Tolerances of conjugate gradients, `Settings.tolerance` [-]."""
 
 SWEEP_TOLERANCES = (1.0, 0.02, 0.005, 1e-3, 1e-4)
-"""Of the relaxation of blocks in motion, `Settings.sweep_tolerance` [m/s], per block."""
+"""Tolerances of relaxation, `Settings.sweep_tolerance`, per block [m/s]."""
 
 OPEN_CLOSE = (1, 3, 12, 50)
-"""Most open-close iterations a step."""
+"""Maximum numbers of open-close iterations per step."""
 
 STEP, STIFFNESS, TOLERANCE, ITERATIONS = "step", "compression", "tolerance", "open-close"
 SWEEPS = "sweep tolerance"
@@ -33,7 +33,7 @@ SWEEPS = "sweep tolerance"
 
 @dataclass(frozen=True)
 class Choice:
-    """Settings that differ from the defaults in one: its name, its value, and what to set."""
+    """Settings that differ from the defaults in one knob: its name, value and settings."""
 
     knob: str
     value: float
@@ -42,7 +42,7 @@ class Choice:
 
 
 def choices(size: float, steps: Sequence[float] = STEPS) -> Iterator[Choice]:
-    """Yield all choices for a scene of a mean block size [m], the default one once."""
+    """Yield all choices for a scene with a mean block size [m], the default once."""
     yield Choice(STEP, DEFAULT.dt, {"dt": DEFAULT.dt}, default=True)
     for dt in steps:
         if dt != DEFAULT.dt:

@@ -1,4 +1,4 @@
-"""Error against processor time: closed forms, then the highway case."""
+"""Pictures of error against processor time: closed forms and the highway case."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ COLUMNS = 4
 
 
 def closed_forms(figure: Figure, points: Sequence[Point]) -> None:
-    """Draw a panel a case: every choice, the front of each engine, and the default."""
+    """Draw a panel per case: every choice, the front of each engine, and the default."""
     cases = list(dict.fromkeys(p.case for p in points))
     panels = figure.subplots(math.ceil(len(cases) / COLUMNS), COLUMNS, squeeze=False).ravel()
     for ax, case in zip(panels, cases, strict=False):

@@ -1,4 +1,4 @@
-"""Outcomes on disk, a file for each sample: a study that was stopped goes on where it was."""
+"""Outcomes on disk, one file per sample, from which an interrupted study is resumed."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import atomic
 
 Outcomes = tuple[NDArray[np.float64], float]
-"""Outcomes of the releases of a sample, (R, 3), and processor time a release [s]."""
+"""Outcomes of the releases of a sample, (R, 3), and processor time per release [s]."""
 
 
 def kept(folder: Path, name: str, what: object, compute: Callable[[], Outcomes]) -> Outcomes:
-    """Return what is in `folder` under this name, else what `compute` returns, which is put there.
+    """Return the stored result with this name, or else compute and store it.
 
-    Found again only by the same sources of the mechanics and by the same `what`, told by its repr.
+    A stored result is valid only for the same sources of the mechanics and the same `repr` of
+    `what`.
     """
     digest = hashlib.sha256(repr((mechanics(), what)).encode()).hexdigest()[:12]
     path = folder / f"{name}-{digest}.npz"

@@ -1,6 +1,6 @@
-"""Speed against error: what each setting costs and errs, and where the default lies.
+"""Speed against error: cost and error of each setting, and the position of the default.
 
-Judged by the greatest bias of an outcome of the highway case at the default settings, against a
+Judged by the greatest bias of an outcome of the highway case with the default settings from a
 converged reference, over half the 95 % interval of its mean over 100 releases.
 """
 
@@ -20,20 +20,20 @@ from experiments.speed_error.tables import bias, closed_table, highway_rows, hig
 from rigdda.files import atomic
 
 SAMPLES = "highway-samples"
-"""Folder in that of the results that keeps the outcomes of every release."""
+"""Subfolder of the results for the outcomes of every release."""
 
 JUDGED = 100
-"""Releases of whose mean the 95 % interval is the measure."""
+"""Number of releases for the 95 % interval that is the measure of bias."""
 
 
 def peers() -> list[ModuleType]:
-    """Return the adapters of the peers that are installed."""
+    """Return the adapters of the installed peers."""
     found = []
     for name in PEERS:
         try:
             found.append(adapter(name))
         except PeerMissing as missing:
-            say(f"speed against error: without a peer: {missing}")
+            say(f"speed against error: peer skipped: {missing}")
     return found
 
 
@@ -41,7 +41,7 @@ def closed(quick: bool, others: list[ModuleType]) -> list[Point]:
     """Return all points of the closed forms."""
     points: list[Point] = []
     cases = closed_forms.with_peers(quick)
-    list(closed_forms.sweep(cases[0]))  # compiles
+    list(closed_forms.sweep(cases[0]))  # compile the kernels
     for case in cases:
         say(f"closed form: {case.name}")
         points += closed_forms.sweep(case)
@@ -53,10 +53,13 @@ def closed(quick: bool, others: list[ModuleType]) -> list[Point]:
 
 
 def worst_bias(default: highway.Sample, reference: highway.Sample) -> tuple[float, float]:
-    """Return the greatest bias of an outcome and how far it is known, over its interval [-]."""
+    """Return the greatest relative bias of an outcome, and its uncertainty [-].
+
+    Both are over the 95 % interval of the outcome.
+    """
     off, sure = bias(default, reference)
     measure = default.half(JUDGED)
-    scattered = measure > 0.0  # what is alike in all releases has no interval
+    scattered = measure > 0.0  # constant outcomes have no interval
     off, sure = np.abs(off[scattered]) / measure[scattered], sure[scattered] / measure[scattered]
     worst = int(np.argmax(off))
     return float(off[worst]), float(sure[worst])
@@ -83,8 +86,8 @@ def run(quick: bool, out: Path) -> Number:
     default = next(s for s in samples if s.default)
     value, known = worst_bias(default, reference)
     return Number(
-        f"bias of the highway outcome at the default over its 95 % interval at {JUDGED} releases",
+        f"bias of the highway outcome by default over its 95 % interval at {JUDGED} releases",
         value,
-        high=1.0 + known if quick else 1.0,  # a quick run tells biases beyond its noise only
-        note=f"known to ± {known:.2g}\n{highway_table(samples, reference)}",
+        high=1.0 + known if quick else 1.0,  # quick runs only detect bias beyond their noise
+        note=f"uncertainty ± {known:.2g}\n{highway_table(samples, reference)}",
     )

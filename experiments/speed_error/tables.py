@@ -1,4 +1,4 @@
-"""Tables: what was measured as rows of CSV, and how choices compare with the default."""
+"""Tables of the measurements as CSV rows, and comparisons with the default."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from experiments.speed_error.closed_forms import Point
 from experiments.speed_error.highway import OUTCOMES, Sample
 
 FIELDS = ("debris", "run_out", "energy")
-"""Names of the outcomes in columns."""
+"""Column names of the outcomes."""
 
 RELEASES = (10, 30, 100, 300)
-"""Numbers of releases of which the error of a mean is told."""
+"""Numbers of releases for which the error of a mean is given."""
 
 
 def bias(sample: Sample, reference: Sample) -> tuple[np.ndarray, np.ndarray]:
-    """Return the bias of the three means, and half its 95 % interval."""
+    """Return the bias of the three means, and half of its 95 % interval."""
     return sample.mean - reference.mean, np.hypot(sample.half(), reference.half())
 
 
 def highway_rows(samples: Iterable[Sample], reference: Sample) -> list[dict[str, Any]]:
-    """Return a row a choice: means, halves of 95 % intervals, biases and halves of theirs."""
+    """Return a row per choice: means, half 95 % intervals, biases and half intervals of these."""
     rows = []
     for s in samples:
         row: dict[str, Any] = {
@@ -39,9 +39,9 @@ def highway_rows(samples: Iterable[Sample], reference: Sample) -> list[dict[str,
 
 
 def total_error(sample: Sample, reference: Sample, releases: int) -> np.ndarray:
-    """Return the root mean square error of the means of so many releases, (3,): bias and noise.
+    """Return the root mean square error of means of this number of releases, (3,): bias and noise.
 
-    The noise with which the bias is known counts, too: what few releases tell is not better.
+    The uncertainty of the bias is included, so that few releases do not appear more accurate.
     """
     off, sure = bias(sample, reference)
     square = off**2 + (sure / 1.96) ** 2
@@ -49,7 +49,7 @@ def total_error(sample: Sample, reference: Sample, releases: int) -> np.ndarray:
 
 
 def highway_table(samples: Sequence[Sample], reference: Sample) -> str:
-    """Return the choices against the default and the reference as a table in Markdown."""
+    """Return a Markdown table comparing the choices with the default and the reference."""
     default = next(s for s in samples if s.default)
     lines = ["| engine | choice | CPU a release / default | " + " | ".join(OUTCOMES) + " |"]
     lines.append("|---" * (len(OUTCOMES) + 3) + "|")
@@ -68,9 +68,9 @@ def highway_table(samples: Sequence[Sample], reference: Sample) -> str:
 
 
 def closed_table(points: Sequence[Point]) -> str:
-    """Return error and cost of each choice over the default's, in the middle of all closed forms.
+    """Return error and cost of each choice relative to the default, as medians of all closed forms.
 
-    Cases whose error is rounding at both count as unchanged.
+    Cases with only rounding errors in both count as unchanged.
     """
     own = [p for p in points if p.engine == "rigdda"]
     default = {p.case: p for p in own if p.default}

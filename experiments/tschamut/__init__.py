@@ -1,1 +1,1 @@
-"""Repeated rockfall tests at Tschamut: a fit on some runs, and what it predicts of others."""
+"""Repeated rockfall tests at Tschamut: fit to some runs and prediction of the others."""

@@ -1,4 +1,4 @@
-"""Run it all: `python -m experiments.tschamut [--quick] [--out DIR]`."""
+"""Run the Tschamut study: `python -m experiments.tschamut [--quick] [--out DIR]`."""
 
 from experiments.script import main
 from experiments.tschamut.study import run

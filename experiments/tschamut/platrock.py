@@ -1,4 +1,4 @@
-"""PlatRock beside the models of `rigdda`, in a process of its own: see `platrock_server`."""
+"""PlatRock for comparison, in a separate process: see `platrock_server`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from rigdda import Site
 from rigdda.agents.fit import Floats, Parameter
 
 PYTHON = "PLATROCK_PYTHON"
-"""Environment variable that names the Python which has PlatRock; without it, it is left out."""
+"""Environment variable with the Python that has PlatRock installed; without it, PlatRock is
+skipped."""
 
 PARAMETERS = (
     Parameter("R_n", 0.0, 0.8),
@@ -23,10 +24,10 @@ PARAMETERS = (
     Parameter("roughness", 0.0, 0.5),
     Parameter("mu_r", 0.1, 1.2),
 )
-"""What is fitted of it: restitutions, roughness [m] and coefficient of rolling."""
+"""Fitted parameters of PlatRock: restitutions, roughness [m] and rolling coefficient."""
 
 MASSES = {"block 1": 69.0, "block 2": 79.0, "block 4": 40.0}
-"""Of the blocks [kg]."""
+"""Masses of the blocks [kg]."""
 
 DENSITY = 2650.0
 
@@ -37,9 +38,9 @@ class PlatRock:
     Parameters
     ----------
     python : str
-        The Python that has it, 3.11 or newer.
+        Python with PlatRock installed, 3.11 or newer.
     site : Site
-        Its ground, and where blocks start.
+        The site, for its ground and the starting positions of blocks.
     """
 
     def __init__(self, python: str, site: Site):
@@ -47,7 +48,7 @@ class PlatRock:
         self._errors = tempfile.TemporaryFile("w+")
         server = Path(__file__).with_name("platrock_server.py").resolve()
         self._process = subprocess.Popen(
-            [python, "-P", str(server)],  # else it finds this module for its own
+            [python, "-P", str(server)],  # keep this folder off its path
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -65,12 +66,12 @@ class PlatRock:
         self._errors.close()
 
     def run_outs(self, values: Floats, seeds: range) -> Mapping[str, Floats]:
-        """Return the run-outs of each block [m], as many as seeds.
+        """Return the run-outs of each block [m], one per seed.
 
         Raises
         ------
         RuntimeError
-            If it stops, with what it said.
+            If PlatRock stops, with its error output.
         """
         source = self._site.sources[0]
         asked = {p.path: float(v) for p, v in zip(PARAMETERS, values, strict=True)} | {

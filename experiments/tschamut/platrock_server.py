@@ -1,13 +1,13 @@
-"""Run-outs by PlatRock 2D: a request a line on stdin, an answer a line on stdout, both JSON.
+"""Run-outs by PlatRock 2D: one JSON request per line on stdin, one JSON answer per line on stdout.
 
-For the Python of an environment of its own, as PlatRock 0.4.6 needs older numpy and numba than
-`rigdda` (GPL-3, so that nothing of it is imported by this project either):
+It needs a Python environment of its own, because PlatRock 0.4.6 requires older numpy and numba than
+`rigdda` (and is licensed under GPL-3, so that this project does not import any of it):
 
     python -m venv VENV && VENV/bin/pip install "numpy<2.1" cython setuptools poetry-core
     VENV/bin/pip install --no-build-isolation platrock==0.4.6
 
-It will not start without the system library GDAL, and each simulation downloads data of trees. The
-2D model without forest uses neither; what stands in for them is set up here.
+PlatRock requires the system library GDAL to start, and downloads data on trees for each simulation.
+The 2D model without forest uses neither; substitutes are set up here.
 """
 
 import json
@@ -20,17 +20,17 @@ from pathlib import Path
 
 
 def main() -> None:
-    """Answer requests until there are none."""
+    """Answer requests until stdin is closed."""
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # it prints
-    os.chdir(tempfile.mkdtemp())  # and writes logs
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # PlatRock prints to stdout
+    os.chdir(tempfile.mkdtemp())  # and writes logs to the current folder
     stand_in_for_gdal()
     import platrock
     from platrock.Common import BounceModels, Debug
     from platrock.TwoD import Objects, Simulations
 
     Debug.init(Debug.ERROR)
-    platrock.SICONOS_FOUND = False  # for blocks with corners; only its own main program looks
+    platrock.SICONOS_FOUND = False  # only needed for polygonal blocks; set by its main program
     BounceModels.Toe_Tree_2022.__init__ = lambda self: None  # downloads
     for line in sys.stdin:
         asked = json.loads(line)
@@ -41,7 +41,7 @@ def main() -> None:
 
 
 def stand_in_for_gdal() -> None:
-    """Set up what its import of GDAL finds."""
+    """Provide a substitute for GDAL that PlatRock can import."""
     command = Path("gdal-config")
     command.write_text("#!/bin/sh\necho 0\n", encoding="utf-8")
     command.chmod(0o755)
@@ -59,7 +59,7 @@ def stand_in_for_gdal() -> None:
 def run(objects, simulations, asked: dict, volume: float) -> list[float]:
     """Return the run-outs of blocks of a volume [m3], as chainages of the profile [m]."""
     points = asked["points"]
-    shift = points[0][0]  # its chainages begin at 0
+    shift = points[0][0]  # PlatRock's chainages begin at 0
     lines = [f"{x - shift}\t{z}\n" for x, z in points]
     Path("terrain.csv").write_text("X\tZ\n" + "".join(lines), encoding="utf-8")
     low, high = (x - shift for x in asked["band"])

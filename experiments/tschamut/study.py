@@ -1,16 +1,16 @@
-"""Tschamut 2014: run-outs of repeated tests, predicted after a fit on some of them.
+"""Tschamut 2014: run-outs of repeated tests, predicted after a fit to some of them.
 
-Three blocks were released again and again on a slope of grass and soil (Volkwein and Gerber 2018,
-doi 10.16904/envidat.34, ODbL). `site.toml` is the slope with the blocks by their measured edges,
-`observed.csv` 33 of the runs. The block model and the lumped mass are fitted to them, four numbers
-each with the same budget, by what `rigdda fit` does. Each observed run is predicted by what fits
-the others best. The prediction of runs that nobody saw is that of the ground `meadow` of the
-library, which was fitted to these runs and to the contacts at Chant Sura (`experiments.grounds`),
-with 1,000 runs of each block.
-PlatRock is fitted with the same budget if `PLATROCK_PYTHON` names a Python that has it: see
-`platrock`. Its spheres of the blocks' volumes drop 0.1 to 0.3 m at their mean speed.
+Three blocks were released repeatedly on a slope of grass and soil (Volkwein and Gerber 2018, doi
+10.16904/envidat.34, ODbL). `site.toml` describes the slope with the blocks by their measured edges,
+and `observed.csv` contains 33 of the runs. The block model and the lumped-mass model are fitted to
+them in the same way as by `rigdda fit`, with four parameters and the same budget each. Each
+observed run is predicted by the best fit to the others. The prediction of unpublished runs, 1,000
+per block, uses the ground `meadow` of the library, which was fitted to these runs and to the
+contacts at Chant Sura (`experiments.grounds`). PlatRock is fitted with the same budget if
+`PLATROCK_PYTHON` names a Python with PlatRock, see `platrock`. Its spheres have the volumes of the
+blocks, drop by 0.1 to 0.3 m and start at the mean speed of the blocks.
 
-Judged by how far the mean run-out that is predicted of left-out runs is from theirs.
+Judged by the error of the mean predicted run-out of left-out runs.
 """
 
 from __future__ import annotations
@@ -47,40 +47,40 @@ MODELS: dict[fit.Model, tuple[str, ...]] = {
         "scatter.friction_deg=0:10",
     ),
 }
-"""What is fitted of each model."""
+"""Fitted parameters of each model."""
 
 COLOURS = {"blocks": BLUE, "lumped": GREEN, "PlatRock": ORANGE}
 
 BUDGET, QUICK_BUDGET = 192, 16
-"""Sets of values that are computed of each model."""
+"""Number of parameter sets that are computed for each model."""
 
 RELEASES, QUICK_RELEASES = 250, 40
 """Releases of each block with each set."""
 
 PREDICTED, QUICK_PREDICTED = 1000, 100
-"""Releases of each block with the fitted values, on fresh seeds."""
+"""Releases of each block with the fitted values, with fresh seeds."""
 
 FRESH = 1_000_000
-"""Seed of the first of these."""
+"""First of the fresh seeds."""
 
 DRAWN = 25
 """Trajectories of each block in the picture."""
 
 STARTED = 5.0
-"""Run-out of a release that started, at least [m]."""
+"""Least run-out of a release that counts as started [m]."""
 
 SPARE = 1.4
-"""Releases that are computed for each one that is wanted, since some do not start."""
+"""Releases computed per release needed, since some do not start."""
 
 BAR = 5.0
-"""Greatest distance of the means [m]."""
+"""Tolerance of the mean run-out [m]."""
 
 
 def runs(site: Site, model: fit.Model, events: Sequence[str], seeds: range) -> dict[str, Floats]:
     """Return the computed run-outs of the releases that start [m], by block.
 
-    A block that stays where it was put down is no run of the tests. Of a plate that is flat on a
-    slope less steep than its friction up to one release in ten is none.
+    A block that stays where it was placed is not a run of the tests. Up to one in ten releases of a
+    plate lying flat on a slope below its friction angle does not start.
     """
     found = fit.run_outs(site, model, events, seeds)
     started = {event: values[values > STARTED] for event, values in found.items()}
@@ -93,7 +93,7 @@ def table(model: str, fitted: Fit, observed: dict[str, Floats], seconds: float) 
 
 
 def behind(model: str, left_out: Floats, blocks: Floats, seconds: float) -> dict[str, Any]:
-    """Return the row of how far a model's scores of runs left out are above those of the blocks."""
+    """Return the row with the difference of a model's left-out scores from those of the blocks."""
     mean, half = interval(left_out - blocks)
     return {
         "model": model, "cpu_s": seconds, "what": "score of a run over that of blocks",
@@ -102,7 +102,7 @@ def behind(model: str, left_out: Floats, blocks: Floats, seconds: float) -> dict
 
 
 def cumulative(axes: Axes, values: Floats, colour: str, words: str, band: int = 0) -> None:
-    """Draw the share of runs that stop up to a chainage; 95 % band of samples of `band` runs."""
+    """Draw the share of runs that stop before a chainage, with a 95 % band for `band` runs."""
     grid = np.linspace(0.0, 160.0, 400)
     share = (values[:, None] <= grid).mean(axis=0)
     axes.plot(grid, share, color=colour, label=words)
@@ -118,7 +118,7 @@ def picture(
     predicted: dict[str, dict[str, Floats]],
     site: Site,
 ) -> None:
-    """Draw cumulative run-outs of all runs and of each block, and trajectories in section."""
+    """Draw cumulative run-outs of all runs and of each block, and a section with trajectories."""
     above, below = figure.subfigures(2, 1)
     names = ("all", *observed)
     for axes, name in zip(above.subplots(1, len(names), sharey=True), names, strict=True):
@@ -146,7 +146,7 @@ def picture(
 
 
 def predict(path: Path, site: Site, events: Sequence[str], count: int) -> None:
-    """Write what the ground `meadow` of the library predicts, so many runs of each block."""
+    """Write the predictions with the ground `meadow` of the library, `count` runs of each block."""
     drawn = runs(site, "blocks", events, range(FRESH, FRESH + round(SPARE * count)))
     rows = [
         {"block": event.removeprefix("block "), "run_out_m": float(x)}
@@ -157,7 +157,7 @@ def predict(path: Path, site: Site, events: Sequence[str], count: int) -> None:
 
 
 def run(quick: bool, out: Path) -> Number:
-    """Fit the models, predict, and write tables and the picture."""
+    """Fit the models, predict, and write the tables and the picture."""
     site = Site.load(HERE / "site.toml")
     observed = fit.read(HERE / "observed.csv", site)
     budget, releases, count = (
@@ -208,7 +208,7 @@ def run(quick: bool, out: Path) -> Number:
                 rows.append(behind("PlatRock", fitted.left_out, lost, peer.cpu))
                 predicted["PlatRock"] = dict(peer.run_outs(fitted.best.values, seeds))
                 found["PlatRock"] = fitted
-        except RuntimeError as error:  # what was computed of the others is kept
+        except RuntimeError as error:  # keep the results of the other models
             say(f"tschamut: {error}")
     write(out / "tschamut" / "tschamut.csv", rows)
     predict(out / "tschamut" / "prediction.csv", site, list(observed), count)

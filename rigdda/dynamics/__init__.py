@@ -1,6 +1,6 @@
-"""What computes: the step of the analysis as kernels on arrays, and the simulation around it.
+"""Kernels of the DDA time step and the simulation built on them.
 
-Read `step.advance` first, then `detection.detect`, `step.solve_and_move` and, for each island,
-`island_step.step_island`. docs/theory.md leads from each equation to its function. `lumped` is no
-part of the analysis: points in place of blocks, for comparison.
+Start reading at `step.advance`, then `detection.detect`, `step.solve_and_move` and, for each
+island, `island_step.step_island`. docs/theory.md maps each equation of the paper to its function.
+`point_mass` is not part of the analysis: it treats blocks as points and is used for comparison.
 """

@@ -1,4 +1,4 @@
-"""Arrays that kernels are handed together, as named tuples of arrays of records: see `records`."""
+"""Named tuples of arrays passed to the kernels together; see `records` for their fields."""
 
 from __future__ import annotations
 
@@ -20,20 +20,22 @@ from rigdda.dynamics.records import (
 
 
 class Outlines(NamedTuple):
-    """Polygons, anticlockwise and padded to P: bodies, then convex parts of non-convex bodies.
+    """Polygons with corners in anticlockwise order, padded to P corners.
 
-    Parts have corners of their body only; an edge inside the body is never a face of contact.
+    The outlines of all bodies come first, then the convex parts of non-convex bodies. The parts use
+    only corners of their body. Edges between two parts lie inside the body and are never a contact
+    face.
     """
 
     polygon: Polygons
     corner: Corners
-    local: NDArray[np.void]  # (R, P) of LOCAL: the corners in body coordinates
+    local: NDArray[np.void]  # (R, P) of LOCAL: corners in body coordinates
 
 
 class GroundArrays(NamedTuple):
-    """Terrain segments with bins along x that list those above them."""
+    """Terrain segments, and bins along x that list the segments above them."""
 
-    segment: NDArray[np.void]  # (S + 1,) of SEGMENT; the last is only where the one before ends
+    segment: NDArray[np.void]  # (S + 1,) of SEGMENT; the last entry only marks the terrain's end
     bin_start: Ints  # (bins + 1,)
     bin_item: Ints
     bin_origin: float
@@ -41,7 +43,7 @@ class GroundArrays(NamedTuple):
 
 
 class World(NamedTuple):
-    """What there is in a scene."""
+    """The physical contents of a scene."""
 
     bodies: Bodies
     outlines: Outlines
@@ -52,55 +54,55 @@ class World(NamedTuple):
 
 
 class Totals(NamedTuple):
-    """What is counted and added up over a run."""
+    """Counters and sums accumulated over a run."""
 
     counters: NDArray[np.int64]  # see records.COUNTERS
-    ledger: Floats  # work by what does it [J], see records.LEDGER
+    ledger: Floats  # work by source [J], see records.LEDGER
     deepest: Floats  # (1,) greatest penetration [m]
 
 
 class Matrix(NamedTuple):
-    """The simultaneous equations K d = F of one island: n blocks, block-sparse, symmetric."""
+    """The simultaneous equations K d = F of one island of n blocks: block-sparse and symmetric."""
 
     diagonal: Floats  # (G, 3, 3)
-    off: Floats  # (pairs, 3, 3) row block pair_i, column block pair_j
+    off: Floats  # (pairs, 3, 3), in block row pair_i and block column pair_j
     pair_i: Ints
     pair_j: Ints
     rhs: Floats  # (G, 3)
-    d: Floats  # (G, 3) displacements u0, v0 [m], r0 [rad]
+    d: Floats  # (G, 3) displacements u0, v0 [m] and r0 [rad]
 
 
 class Scratch(NamedTuple):
-    """What the solvers of the equations work on."""
+    """Working arrays of the equation solvers."""
 
-    residual: Floats  # (G, 3) vectors of the iterations
+    residual: Floats  # (G, 3) vectors of the iterative solvers
     direction: Floats
     product: Floats
     scaled: Floats
-    first: Ints  # (G,) leftmost block of a row, or head of its chain of neighbours
-    row: Ints  # (3 G,) place in `factor` of column 0 of a scalar row
-    factor: Floats  # Cholesky factor within the profile
-    next: Ints  # (2 pairs,) next entry in a chain of neighbours, -1 at its end
+    first: Ints  # (G,) leftmost block of a row, or head of its linked list of neighbours
+    row: Ints  # (3 G,) index in `factor` of column 0 of a scalar row
+    factor: Floats  # Cholesky factor within the skyline
+    next: Ints  # (2 pairs,) next entry in a linked list of neighbours, -1 at its end
 
 
 class Boxes(NamedTuple):
-    """Swept boxes of the bodies, and the pairs of bodies whose boxes overlap."""
+    """Swept bounding boxes of the bodies, and the pairs of bodies whose boxes overlap."""
 
     swept: NDArray[np.void]  # (M,) of BOX
-    row: NDArray[np.void]  # (M,) the same in order of low_x, kept over steps
+    row: NDArray[np.void]  # (M,) the same boxes sorted by low_x; the order is kept between steps
     pairs: Ints  # (2 C,) candidate pairs of bodies
-    partner_start: Ints  # (M + 1,) second bodies of the pairs by their first one
-    partner: Ints  # (C,)
+    partner_start: Ints  # (M + 1,) start of each body's entries in `partner`
+    partner: Ints  # (C,) second bodies of the pairs, grouped by first body
 
 
 class Islands(NamedTuple):
-    """Blocks and contacts island by island."""
+    """Blocks and contacts grouped by island."""
 
-    parent: Ints  # (M,) union-find
-    slot: Ints  # (M,) place of a body in its island's matrix
-    block_start: Ints  # (M + 1,) blocks of each island
+    parent: Ints  # (M,) union-find forest
+    slot: Ints  # (M,) position of a body within its island
+    block_start: Ints  # (M + 1,) start of each island's entries in `block_item`
     block_item: Ints
-    contact_start: Ints  # (M + 1,) contacts of each island
+    contact_start: Ints  # (M + 1,) start of each island's entries in `contact_item`
     contact_item: Ints
 
 
@@ -110,20 +112,20 @@ class Rows(NamedTuple):
     row: Floats  # (C, COLUMNS)
     fact: Floats  # (C, FACTS)
     form: Ints  # (C,) OF_A, OF_B, BETWEEN
-    row_i: Ints  # (C,) slots of their bodies
+    row_i: Ints  # (C,) slots of bodies a and b
     row_j: Ints
-    idle: Ints  # (C,) substep until which a contact cannot close
-    visit: Ints  # (C,) contacts that a sweep visits
+    idle: Ints  # (C,) substep before which a contact cannot close
+    visit: Ints  # (C,) contacts visited by a sweep
     place: Ints  # (C,) row of each contact
-    height: Floats  # (C,) of each contact [m]; in `recovery` the excess gap of each row
-    layer: Ints  # (contacts + 1,) contacts below a height
+    height: Floats  # (C,) of each contact [m]; in `position_correction` the excess gap of each row
+    layer: Ints  # (contacts + 1,) number of contacts below a height
     moved_in: Ints  # (G + 1,) last sweep in which a slot moved
-    scale: Floats  # (G + 1, 3) inverse roots of the inertia of each slot
-    slot: Floats  # (G + 1, SLOT_COLUMNS); the last of what does not move
+    scale: Floats  # (G + 1, 3) inverse square roots of the inertia of each slot
+    slot: Floats  # (G + 1, SLOT_COLUMNS); the last one stands for everything that does not move
 
 
 class Work(NamedTuple):
-    """Scratch arrays of a step, by what they are for: kernels are handed no more than they use."""
+    """Working arrays of a step, grouped so that each kernel receives only those that it uses."""
 
     boxes: Boxes
     islands: Islands
@@ -131,21 +133,21 @@ class Work(NamedTuple):
     matrix: Matrix
     scratch: Scratch
     first: Ints  # (M + 1,) first contact of each body a in the last step
-    begin: Ints  # (M + 1,) the same in this step
+    begin: Ints  # (M + 1,) the same for the current step
 
 
 class Monitors(NamedTuple):
-    """What is watched during a run."""
+    """Quantities that are recorded during a run."""
 
-    station: NDArray[np.void]  # (K,) of STATION, ascending
+    station: NDArray[np.void]  # (K,) of STATION, in ascending order
     rock: NDArray[np.void]  # (N,) of WATCHED
     target: NDArray[np.void]  # (B,) of TARGET
-    barrier: Ints  # (M,) barrier that a body is, -1: rock
-    push: Floats  # (B, 2) impulse downhill, in this step, of what leans and what strikes [N s]
-    impulse: Floats  # (B, K, 2) that in the last K steps, which are a second [N s]
-    mean: Floats  # (B, 2) thrust, mean over these [N]
-    last_touch: Floats  # (G, B) time of the last touch [s]
-    watch_low: float  # interval of x [m]
+    barrier: Ints  # (M,) index of the barrier that a body is; -1 for rock
+    push: Floats  # (B, 2) downhill impulse in this step, LEANING and STRIKING [N s]
+    impulse: Floats  # (B, K, 2) the same in each of the last K steps, which span a second [N s]
+    mean: Floats  # (B, 2) thrust averaged over these steps [N]
+    last_touch: Floats  # (G, B) time of the last contact with each barrier [s]
+    watch_low: float  # interval of x in which energies are recorded [m]
     watch_high: float
-    leave: float  # x beyond which what moves on is left alone [m]; -inf: the run is not ended early
+    leave: float  # x beyond which moving blocks may be ignored [m]; -inf: do not end the run early
     event: NDArray[np.void]

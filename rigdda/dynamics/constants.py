@@ -1,86 +1,96 @@
-"""Tolerances and limits of the mechanics: unit, reason and consequence of each."""
+"""Tolerances and limits of the mechanics, each with its unit, its reason and its effect."""
 
 PENETRATION_RATIO = 1e-4
-"""Wanted penetration over block size [-]. Smaller: stiffer contacts, taller stacks stand, more
-solver iterations."""
+"""Target penetration of a contact at rest over the block size [-]. Smaller values give stiffer
+contacts, which keep taller stacks stable but take more solver iterations."""
 
 RIGID = 1e7
-"""Stiffness of a pin, and of a new contact where an island is solved as a whole, times effective
-mass / dt^2 [-]. The velocity after a step misses its target by half the inverse of this, 5e-8 of
-the change. The blocks of a tall stack, which give way one after the other, start without a jolt."""
+"""Stiffness of a pin, and of a new contact in an island that is solved as a whole, over effective
+mass / dt^2 [-]. The velocity at the end of a step misses its target by half the inverse of this
+ratio, 5e-8 of the change. The blocks of a tall stack, whose contacts compress one after another,
+therefore start without a jolt."""
 
 NEW_SHARE = 1e-3
-"""Stiffness of a contact that is new after the first step of a simulation, over that [-]."""
+"""Stiffness of a contact that forms after the first step of a simulation, as a fraction of the
+stiffness set by `RIGID` [-]."""
 
 IMPACT_STEPS = 3.0
-"""Least closing speed of an impact in units of g dt [-], of a lone body in units of g dt over
-`SUBSTEPS`: what gravity alone gives a resting body in a few steps is no impact."""
+"""Lowest closing speed of an impact in units of g dt; for a lone body, in units of g dt /
+`SUBSTEPS` [-]. Slower closing is what gravity alone causes within a few steps in a body at rest."""
 
 AT_ONCE = 1e-4
-"""Least substep of a lone body over the step [-]: corners that strike within it do so at once. With
-2e-2 a square that lands on a corner, the next one 1 mm above the ground, misses its velocity by
-5 %, at most by 43 %, in steps of 10 ms with a restitution of 0.5."""
+"""Shortest substep of a lone body over the step [-]. Corners that strike within this time strike
+simultaneously. With 2e-2, a square that lands on one corner while the next corner is 1 mm above the
+ground has a velocity error of 5 %, and of 43 % at most, in steps of 10 ms with a restitution of
+0.5."""
 
 RECOVERY_SWEEPS = 6
-"""Sweeps over the contacts of an island that push out what they are too deep."""
+"""Number of sweeps over the contacts of an island in position correction."""
 
 RETARDATION_TIME = 5e-3
-"""Retardation time of contacts at rest: viscosity over stiffness [s]. Longer steps damp more, as
-the force follows the velocity at their end. Without it an arch near its limit vibrates in steps of
-0.1 ms until it falls."""
+"""Retardation time of contacts at rest: viscosity over stiffness [s]. Longer steps damp more,
+because the contact force depends on the velocity at the end of the step. Without retardation, an
+arch near its limit of stability vibrates in steps of 0.1 ms until it collapses."""
 
 SETTLED = 0.02
-"""Greatest change in an iteration at which it may end [-]: in open-close iteration of a friction
-force, over its limit; in relaxation of a normal velocity, over the speed of the island, so that
-slow islands come to rest. Without the first a block on the paper's contacts, at 35 deg with 34 deg
-of friction, slides six times as far as it should in steps of 10 ms."""
+"""Relative change per iteration at which an iteration may stop [-]. In open-close iteration this is
+the change of a friction force over its limit; in relaxation, the change of a normal velocity over
+the speed of the island, so that slow islands come to rest. Without the first criterion, a block
+with the paper's contacts on a 35 deg slope with 34 deg of friction slides six times too far in
+steps of 10 ms."""
 
 SUBSTEPS = 8
-"""Substeps in the relaxation of an island of several bodies [-]: a blow goes on from contact to
-contact in each, and what the sweeps leave of it is as much smaller as they are shorter. With 5 a
-silo that fills in steps of 10 ms gains up to 1.5 % of the energy that was released."""
+"""Number of substeps in the relaxation of an island of several bodies [-]. An impact propagates
+from contact to contact in each of them, and the error that the sweeps leave decreases with their
+length. With 5 substeps, a silo filled in steps of 10 ms gains up to 1.5 % of the released
+energy."""
 
 MOST_SWEEPS = 100
-"""Most sweeps over the contacts of an island in a substep. They end once none changes a normal
-velocity by more than the tolerance."""
+"""Maximum number of sweeps over the contacts of an island in a substep. Sweeps stop earlier when
+none changes a normal velocity by more than the tolerance."""
 
 SAME_NORMAL = 0.7
-"""Least cosine between the normals of one vertex's contact in two steps, for it to be one [-]."""
+"""Least cosine of the angle between the normals of a vertex's contacts in two successive steps for
+them to count as the same contact [-]."""
 
 SAME_FACE = 0.999
-"""Cosine above which two edges, or two contacts of one vertex, count as in one line [-]."""
+"""Cosine of the angle above which two edges, or the faces of two contacts of a vertex, count as
+collinear [-]."""
 
 LATELY = 0.7
-"""Share of a body's greatest speed of late that counts on in the next step [-]. In a pile blocks
-are stopped and driven on step by step: the path of one that stands for a moment is not nothing.
-Without it the thrust of a row on an embankment is 53 kN in steps of 10 ms, 38 in shorter ones."""
+"""Factor by which the recent peak speed of a body decays per step; the decayed peak bounds its path
+in the next step [-]. In a pile, blocks stop and are pushed on from step to step, so that a block
+that is momentarily at rest may still move. Without this bound, the thrust of a row of blocks on an
+embankment is 53 kN in steps of 10 ms and 38 kN in shorter steps."""
 
 MARGIN_RATIO = 5e-3
-"""Distance over block size within which contacts are candidates even at rest [-]."""
+"""Distance over block size within which even bodies at rest are contact candidates [-]."""
 
 SLEEP_SPEED = 0.02
-"""Speed of any point of a block below which it counts as quiet [m/s]. An island of such blocks that
-does not settle in relaxation is solved as a whole."""
+"""Speed of the fastest point of a block below which the block is quiet [m/s]. An island of quiet
+blocks for which relaxation does not converge is solved as a whole."""
 
 SLEEP_TIME = 0.5
-"""Time for which a whole island must be quiet before it sleeps [s]."""
+"""Time for which all blocks of an island must be quiet before the island sleeps [s]."""
 
 GROWN = 0.1
-"""Growth of its speed, over the speed below which it counts as quiet, from which on a block is not
-[-]. Without it what is 0.2 deg too steep to stand fell asleep before it slid."""
+"""Increase in speed, over `SLEEP_SPEED`, above which a block is not quiet [-]. Without it, blocks
+on a slope 0.2 deg too steep for them fell asleep before they slid."""
 
 APART = 0.1
-"""Time since the last touch after which a block is apart [s]: from a barrier, so that it may hit it
-anew; from everything, so that damping in contact ends. Were that to end with the touch, a block
-that rattles down would be damped in proportion to the step: of a mass .50 / .53 / .54 / .57 reached
-the road of `quick` at 10 / 5 / 2.5 / 1.25 ms, +- .02; like this .44 / .45 / .44 at 10 / 5 / 1 ms,
-+- .006."""
+"""Time since the last contact after which a block counts as separated [s]. Separated from a
+barrier, it can hit that barrier again; separated from everything, it is no longer damped by
+surfaces. If damping ended with the contact itself, the damping of a block that rattles downhill
+would depend on the step: fractions of .50 / .53 / .54 / .57 of a mass (+- .02) reached the road of
+`quick` at 10 / 5 / 2.5 / 1.25 ms; with this delay they are .44 / .45 / .44 (+- .006) at 10 / 5 / 1
+ms."""
 
 LONGEST_FLIGHT = 64
-"""Steps for which a flight is looked ahead: the more, the wider the search for what may be met."""
+"""Maximum number of steps of a free flight. Longer flights require a wider search for obstacles."""
 
 SPEED_LIMIT = 1e4
-"""Speed at which a simulation is stopped as diverged [m/s], thirty times any rockfall."""
+"""Speed above which a simulation is stopped as diverged [m/s], thirty times the speed of any
+rockfall."""
 
 # status of a body
 AWAKE, ASLEEP, FIXED, RETIRED = 0, 1, 2, 3

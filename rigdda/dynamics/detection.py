@@ -1,4 +1,4 @@
-"""Detection: the contacts of a step, body by body."""
+"""Contact detection: lists the contacts of a step, body by body."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from rigdda.kernel import kernel, stage, variable
 
 @kernel
 def candidate_pairs(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> bool:
-    """List the bodies that each awake one may touch in this step; returns whether they fit."""
+    """List the bodies that each awake body may touch in this step; return whether they fit."""
     pairs = sweep_and_prune(bodies, polygon, boxes, p)
     if pairs > 0 and p.sleeping and wake_neighbours(bodies, boxes.pairs, pairs, p.blocks) > 0:
         pairs = sweep_and_prune(bodies, polygon, boxes, p)
@@ -45,7 +45,7 @@ def keep_asleep(
     bodies: Bodies, contacts: Contacts, count: int, old: Contacts, first: Ints, a: int,
     monitors: Monitors, time: float,
 ) -> int:  # fmt: skip
-    """Keep the contacts of sleeping block a with what is still; returns the new number, or -1."""
+    """Keep the contacts of sleeping block a with bodies at rest; return the new count, or -1."""
     if count + first[a + 1] - first[a] > len(contacts):
         return -1
     for m in range(first[a], first[a + 1]):
@@ -61,10 +61,10 @@ def keep_asleep(
 
 @kernel
 def keep_sideways(contacts: Contacts, low: int, high: int, most: float) -> int:
-    """Keep those of the contacts low:high that push sideways; returns the new number.
+    """Keep only the contacts low:high that push sideways; return the new number of contacts.
 
-    A net holds what comes against it, not what comes down on its top; and what is in it already, by
-    more than `most` [m], goes over it.
+    A net stops blocks that come against it, but not blocks that fall on its top. Blocks that are
+    already in it by more than `most` [m] pass over it.
     """
     kept = low
     for k in range(low, high):
@@ -82,12 +82,12 @@ def collide_block(
     world: World, contacts: Contacts, count: int, old: Contacts, work: Work, a: int, start: bool,
     p: Parameters, totals: Totals,
 ) -> int:  # fmt: skip
-    """Write the contacts of awake block a with the terrain and with its partners.
+    """Write the contacts of awake block a with the terrain and with its candidate partners.
 
     Returns
     -------
     int
-        The new number of contacts; -1 if they do not fit.
+        The new number of contacts, or -1 if they do not fit.
     """
     bodies, outlines = world.bodies, world.outlines
     first, room, boxes = count, len(contacts) - outlines.corner.shape[1] - 4, work.boxes
@@ -125,7 +125,13 @@ def detect(
     world: World, contacts: Contacts, old: Contacts, work: Work, monitors: Monitors, time: float,
     p: Parameters, totals: Totals,
 ) -> int:  # fmt: skip
-    """Write all contacts of the step in order of their first body; -1 if they do not fit."""
+    """Write all contacts of the step, ordered by first body.
+
+    Returns
+    -------
+    int
+        The number of contacts, or -1 if they do not fit.
+    """
     bodies, links = world.bodies, world.links
     if not candidate_pairs(bodies, world.outlines.polygon, work.boxes, p):
         return -1

@@ -1,10 +1,10 @@
-"""The simultaneous equations of an island: inertia, damping, weight, loads and closed contacts.
+"""Assembly of the equations of an island: inertia, damping, weight, loads and closed contacts.
 
-A spring of stiffness k along direction e of a contact contributes k e_i^t e_j to the stiffness,
-with e_i = (l, m, r x (l, m)) the rows of T_i along (l, m) = the normal or the shear direction.
-`assemble_contact` adds the springs of a contact, the friction submatrix among them.
-Mass-proportional damping enters with the inertia (`inertia_stiffness`, with the coefficient of
-`damping_of`); in relaxation it is in `relaxation.pull`.
+A spring of stiffness k along a direction (l, m), the normal or the shear direction, adds k e_i^t
+e_j to the stiffness matrix, where e_i = (l, m, r x (l, m)) is the row of T_i along that direction.
+`assemble_contact` adds the springs of a contact, including the friction submatrix.
+Mass-proportional damping is added with the inertia (`inertia_stiffness`, with the coefficient from
+`damping_of`); relaxation applies it in `relaxation.pull`.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from rigdda.kernel import inlined, kernel
 def inertia_stiffness(mass: float, damping: float, dt: float) -> float:
     """Return 2 M / dt^2 + alpha M / dt: inertia and damping on the diagonal [N/m].
 
-    With the second moment instead of the mass it is the entry of the rotation. The submatrices
-    integrate T^t T over the block, diagonal about the centroid.
+    With the second moment instead of the mass, it is the entry of the rotation. The submatrices are
+    integrals of T^t T over the block and are diagonal about the centroid.
     """
     return 2.0 * mass / (dt * dt) + damping * mass / dt
 
 
 @kernel
 def inertia_force(mass: float, velocity: float, dt: float) -> float:
-    """Return 2 M V0 / dt, the force of inertia in dynamic mode [N]."""
+    """Return 2 M V0 / dt, the inertia force in dynamic mode [N]."""
     return 2.0 * mass * velocity / dt
 
 
 @kernel
 def normal_row(c: Contact, of_a: bool) -> tuple[float, float, float]:
-    """Return e along the normal of a contact for its body a, or b."""
+    """Return e along the normal of a contact for body a, or else for body b."""
     if of_a:
         return c.nx, c.ny, c.ra_x * c.ny - c.ra_y * c.nx
     return -c.nx, -c.ny, -(c.rb_x * c.ny - c.rb_y * c.nx)
@@ -45,7 +45,7 @@ def normal_row(c: Contact, of_a: bool) -> tuple[float, float, float]:
 
 @kernel
 def shear_row(c: Contact, of_a: bool) -> tuple[float, float, float]:
-    """Return e along the normal turned by +90 degrees for body a, or b."""
+    """Return e along the normal turned by +90 degrees for body a, or else for body b."""
     if of_a:
         return -c.ny, c.nx, c.ra_x * c.nx + c.ra_y * c.ny
     return c.ny, -c.nx, -(c.rb_x * c.nx + c.rb_y * c.ny)
@@ -63,7 +63,7 @@ def add_block(
 
 @kernel
 def add_force(rhs: NDArray, force: float, e: tuple[float, float, float]) -> None:
-    """Add the generalised force of `force` along e to a right-hand side."""
+    """Add the generalised force of a force along e to a right-hand side."""
     rhs[0] += force * e[0]
     rhs[1] += force * e[1]
     rhs[2] += force * e[2]
@@ -71,13 +71,13 @@ def add_force(rhs: NDArray, force: float, e: tuple[float, float, float]) -> None
 
 @kernel
 def along(e: tuple[float, float, float], d: NDArray) -> float:
-    """Return the displacement along e of a block that moves by d."""
+    """Return the displacement along e of a block with displacements d."""
     return e[0] * d[0] + e[1] * d[1] + e[2] * d[2]
 
 
 @kernel
 def relative_displacement(c: Contact, d: NDArray, i: int, j: int) -> tuple[float, float]:
-    """Return the normal and shear displacement of a contact of slots i and j (-1: at rest) [m]."""
+    """Return the normal and shear displacement at a contact of slots i and j (-1: at rest) [m]."""
     dn, ds = along(normal_row(c, True), d[i]), along(shear_row(c, True), d[i])
     if j >= 0:
         dn += along(normal_row(c, False), d[j])
@@ -89,8 +89,8 @@ def relative_displacement(c: Contact, d: NDArray, i: int, j: int) -> tuple[float
 def damping_of(body: Body, p: Parameters) -> float:
     """Return the damping coefficient of a block in this step [1/s].
 
-    That of the surface that it touched last, for `APART` after the touch, however long the steps
-    are: middles count.
+    It is that of the surface that the block touched last, until `APART` after that contact. The
+    comparison uses the middle of the step so that the duration does not depend on the step length.
     """
     return p.damping_in_flight if body.apart + 0.5 * p.dt > APART else body.damping
 
@@ -108,7 +108,7 @@ def load_moment(body: Body) -> float:
 def assemble_blocks(
     bodies: Bodies, m: Matrix, islands: Islands, low: int, high: int, p: Parameters
 ) -> None:
-    """Set the diagonal blocks and forces of inertia, damping, weight and loads."""
+    """Set the diagonal blocks and the forces from inertia, damping, weight and loads."""
     for place in range(low, high):
         body, s = bodies[islands.block_item[place]], place - low
         alpha = damping_of(body, p)
@@ -131,16 +131,16 @@ def assemble_blocks(
 def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float) -> None:
     """Add the springs of a closed contact between slots i and j (-1: no unknowns).
 
-    On the displacement d of the step the spring N = kappa (b - dt w_1) has stiffness 2 kappa and
-    force kappa (b + dt w_0). The friction of a slipping contact is a force, that of the last
-    iteration. A bolt has no shear; one that yields is a force.
+    In terms of the displacement d of the step, the spring N = kappa (b - dt w_1) has stiffness 2
+    kappa and force kappa (b + dt w_0). The friction of a slipping contact is a given force, that of
+    the last iteration. A bolt has no shear force; a yielding bolt is a given force.
     """
     stiffness = 2.0 * c.kappa
     normal = c.kappa * (c.bias + dt * c.un)
     shear = c.accumulated_shear + c.kappa * dt * c.us
     en, es = normal_row(c, True), shear_row(c, True)
     bolt = c.kind == BOLT
-    if bolt and c.state == SLIP:  # it yields
+    if bolt and c.state == SLIP:  # the bolt yields
         stiffness, normal = 0.0, -c.tension
     add_block(m.diagonal[i], stiffness, en, en)
     add_force(m.rhs[i], normal, en)
@@ -178,7 +178,7 @@ def assemble_island(
     pairs: int,
     p: Parameters,
 ) -> None:
-    """Set the system of an island with its contacts in their current states."""
+    """Assemble the system of an island for the current states of its contacts."""
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     assemble_blocks(bodies, m, islands, b0, b1, p)
     for a in range(3):

@@ -1,9 +1,9 @@
-"""Fences: yielding supports that give way against a constant force until their elongation is spent.
+"""Fences: barriers that yield at a constant force until their elongation is used up.
 
-A fence is a body that moves along x alone, and downhill only. Its brake holds it with any force up
-to F = capacity / elongation (`relaxation.release_fences`). What pushes harder, be it a blow or a
-pile, moves it against F, so that it takes the energy F times its path. When its
-elongation is spent, it has taken its capacity and is gone.
+A fence is a body that moves only along x, and only downhill. Its brake resists any force up to F =
+capacity / elongation (`relaxation.release_fences`). A larger force, whether from an impact or from
+a pile, moves the fence against F, so that the fence absorbs F times its displacement. When its
+elongation is used up, the fence has absorbed its capacity and is removed.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from rigdda.kernel import kernel, stage
 def last_block(
     contacts: Contacts, count: int, fence: int, barrier: int, monitors: Monitors
 ) -> tuple[int, float, float]:
-    """Return the block that presses hardest on a fence in this step, and where it does [m].
+    """Return the block that presses hardest on a fence in this step, and the contact point [m].
 
-    Where none does, the one that touched it last, at infinity.
+    If no block presses on it, return the block that touched it last, with infinite coordinates.
     """
     block, most, x, y = -1, 0.0, math.inf, math.inf
     for k in range(count):
@@ -48,10 +48,11 @@ def update_fences(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, count: int, monitors: Monitors,
     counters: NDArray, ledger: NDArray, time: float, p: Parameters,
 ) -> None:  # fmt: skip
-    """Spend the elongation of the fences that have moved in this step, and lower their tops.
+    """Reduce the elongation left in fences that moved in this step, and lower their tops.
 
-    A fence whose elongation is spent fails, by the block that presses hardest on it or did last.
-    What a fence absorbs is added up in `island_step.account_contacts`.
+    A fence whose elongation is used up fails. Its failure is attributed to the block that presses
+    hardest on it, or that touched it last. The energy that fences absorb is summed in
+    `island_step.account_contacts`.
     """
     for fence in range(len(monitors.rock), p.blocks):
         body = bodies[fence]
@@ -69,7 +70,7 @@ def update_fences(
         set_body_coordinates(bodies, outlines, fence)
         if body.elongation > 0.0:
             continue
-        body.x += body.elongation  # not what the last substep went beyond its end
+        body.x += body.elongation  # the last substep may overshoot the elongation
         ledger[1] -= retire(body)
         block, x, y = last_block(contacts, count, fence, barrier, monitors)
         if x == math.inf:

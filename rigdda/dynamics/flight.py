@@ -1,9 +1,9 @@
-"""Free flight of the only body that moves: steps in which it can touch nothing are only flown.
+"""Free flight of a single moving body: steps without contact detection.
 
-Most steps of a falling block find nothing that it may touch. How many of them are to come follows
-from its distance to the ground and to other bodies, and they need no detection, no corners and no
-islands. What a step computes of the motion is computed here by the same operations, so that the
-numbers are the same to the last bit, wherever a flight is interrupted.
+In most steps of its fall, a block is too far from the ground and from other bodies to touch
+anything. These distances give the number of steps for which detection, corner positions and islands
+can be skipped. The motion is computed by the same operations as in a full step, so that results are
+bit-identical wherever a flight is interrupted.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rigdda.kernel import kernel
 
 @kernel
 def lone_flyer(bodies: Bodies, begin: Ints, p: Parameters) -> int:
-    """Return the only body that is awake, if it touches nothing and bears no load, else -1."""
+    """Return the only awake body if it has no contacts and no loads, else -1."""
     alone = -1
     for i in range(p.blocks):
         if bodies[i].status != AWAKE:
@@ -42,7 +42,7 @@ def lone_flyer(bodies: Bodies, begin: Ints, p: Parameters) -> int:
 
 @kernel
 def time_to_fall(gap: float, speed: float, gravity: float) -> float:
-    """Return in what time a gap can close, first at `speed`, then as fast as gravity makes it."""
+    """Return the least time in which a gap closes from a closing speed under gravity [s]."""
     if gap <= 0.0:
         return 0.0
     root = math.sqrt(speed * speed + 2.0 * gravity * gap)
@@ -54,10 +54,11 @@ def time_to_ground(
     body: Body, i: int, outlines: Outlines, ground: GroundArrays, speed: float, reach: float,
     most: float, gravity: float,
 ) -> float:  # fmt: skip
-    """Return in what time, at most `most`, the body can come as near to the ground as `reach`.
+    """Return a lower bound on the time until the body is within `reach` of the ground [s].
 
-    For each segment the latest that one of three bounds gives: its corners over the line of the
-    segment, its circle over that line, its circle about the segment.
+    The bound is at most `most`. For each segment it is the largest of three bounds: from the
+    corners above the line of the segment, from the circumscribed circle above that line, and from
+    the distance of the circle to the segment.
     """
     x, y, r = body.x, body.y, body.radius
     for s in range(len(ground.segment) - 1):
@@ -89,7 +90,10 @@ def time_to_ground(
 def time_to_bodies(
     bodies: Bodies, i: int, polygon: Polygons, speed: float, reach: float, most: float
 ) -> float:
-    """Return in what time, at most `most`, body i can come as near to another one as `reach`."""
+    """Return a lower bound on the time until body i is within `reach` of another body [s].
+
+    The bound is at most `most`.
+    """
     x, y = bodies[i].x, bodies[i].y
     for j in range(len(bodies)):
         if j == i or bodies[j].status == RETIRED:
@@ -106,9 +110,10 @@ def time_to_bodies(
 def steps_of_flight(
     bodies: Bodies, i: int, outlines: Outlines, ground: GroundArrays, p: Parameters
 ) -> int:
-    """Return for how many steps body i can surely touch nothing.
+    """Return the number of steps for which body i cannot touch anything.
 
-    Contacts are looked for within what a corner can go in a step; twice of it here.
+    Detection searches within the distance that a corner can travel in a step; twice that distance
+    is used here.
     """
     body, most = bodies[i], LONGEST_FLIGHT * p.dt
     speed = max(top_speed(body) + p.gravity * most, body.lately)
@@ -124,7 +129,7 @@ def take_off(
     bodies: Bodies, outlines: Outlines, ground: GroundArrays, islands: Islands, begin: Ints,
     p: Parameters,
 ) -> tuple[int, int]:  # fmt: skip
-    """Return the body that flies and for how many steps, 0 if none does; it is island 0 then."""
+    """Return the flying body and its number of steps, 0 if none flies; set it up as island 0."""
     i = lone_flyer(bodies, begin, p)
     steps = steps_of_flight(bodies, i, outlines, ground, p) if i >= 0 else 0
     if steps > 0:
@@ -138,7 +143,7 @@ def take_off(
 def keep_touch(
     bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, time: float
 ) -> None:
-    """Note that what sleeps against barriers still touches them."""
+    """Record that blocks asleep against barriers still touch them."""
     for k in range(count):
         if bodies[contacts[k].a].status == ASLEEP:
             block, barrier = barrier_contact(monitors, contacts[k].a, contacts[k].b)
@@ -148,7 +153,10 @@ def keep_touch(
 
 @kernel
 def fly(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
-    """Take a step of body i, which touches nothing; its corners stay. Returns i if it went bad."""
+    """Advance body i, which touches nothing, by one step; return i if it diverged, else -1.
+
+    Its corners are not updated until `land`.
+    """
     bodies[i].apart += p.dt
     fall(bodies[i], p, ledger)
     bodies[i].quiet = 0.0
@@ -157,6 +165,6 @@ def fly(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
 
 @kernel
 def land(bodies: Bodies, outlines: Outlines, i: int, flown: int) -> None:
-    """Set the corners of body i where it has flown for some steps."""
+    """Update the corners of body i after `flown` steps of flight."""
     if flown > 0:
         place_corners(bodies, outlines, i)

@@ -1,4 +1,4 @@
-"""Frames of a run: where the bodies are and how fast they move."""
+"""Frames of a run: positions and velocities of all bodies at one time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rigdda.dynamics.records import Bodies
 from rigdda.kernel import kernel
 
 PIECE = 64
-"""Frames that are kept between two calls of the kernels; what a progress bar waits for."""
+"""Maximum number of frames per call of the kernels; a progress bar is updated after each call."""
 
 
 @kernel
@@ -23,20 +23,20 @@ def keep_frame(bodies: Bodies, frame: NDArray) -> None:
 
 
 def frame_of(bodies: Bodies) -> NDArray[np.float64]:
-    """Return the frame of the present state, (M, 6), see `keep_frame`."""
+    """Return the frame of the current state, (M, 6), see `keep_frame`."""
     plain = bodies.view(np.ndarray)
     return np.stack([plain[name] for name in ("x", "y", "theta", "vx", "vy", "omega")], axis=1)
 
 
 def no_frames(bodies: Bodies) -> NDArray[np.float64]:
-    """Return room for no frame."""
+    """Return an empty array of frames."""
     return np.empty((0, len(bodies), 6))
 
 
 def pieces(steps: int, stride: int) -> list[tuple[int, int]]:
-    """Return how to take so many steps with a frame after each `stride` of them and in the end.
+    """Divide `steps` into calls with a frame after every `stride` steps and one at the end.
 
-    Pairs of a number of frames, at most `PIECE`, and of steps from one to the next.
+    Each call is a pair: its number of frames, at most `PIECE`, and the number of steps per frame.
     """
     whole, rest = divmod(steps, stride)
     parts = [(min(PIECE, whole - done), stride) for done in range(0, whole, PIECE)]
@@ -44,7 +44,7 @@ def pieces(steps: int, stride: int) -> list[tuple[int, int]]:
 
 
 def tracked(parts: list[tuple[int, int]], progress: bool) -> Iterable[tuple[int, int]]:
-    """Return the pieces, with a progress bar over them if it is asked for."""
+    """Return the pieces, wrapped in a progress bar if requested."""
     if not progress:
         return parts
     from rich.progress import track

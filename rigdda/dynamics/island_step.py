@@ -1,4 +1,4 @@
-"""The step of one island: solve or relax it, note its hits, push out, move its bodies."""
+"""The step of one island: compute contact forces, record hits, correct positions, move bodies."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ from rigdda.kernel import inlined, kernel, stage
 
 @inlined
 def fall(body: Body, p: Parameters, ledger: NDArray) -> None:
-    """Move a body that touches nothing: weight, loads and damping are constant over the step."""
+    """Move a body without contacts; weight, loads and damping are constant over the step."""
     alpha, dt = damping_of(body, p), p.dt
     mass, inertia = (
         inertia_stiffness(body.mass, alpha, dt),
@@ -88,7 +88,7 @@ def fall(body: Body, p: Parameters, ledger: NDArray) -> None:
 
 @inlined
 def stop_fence(body: Body, p: Parameters, ledger: NDArray) -> None:
-    """Let a fence that nothing touches come to a stop against its brake."""
+    """Decelerate a fence without contacts by its brake."""
     deceleration = body.brake / body.mass
     time = min(p.dt, max(body.vx, 0.0) / deceleration)
     speed = body.vx - deceleration * time
@@ -100,10 +100,10 @@ def stop_fence(body: Body, p: Parameters, ledger: NDArray) -> None:
 
 @inlined
 def take_slot(body: Body, slot: Floats, scale: Floats, p: Parameters, ledger: NDArray) -> None:
-    """Move a body to where its slot is, and account for weight and loads.
+    """Move a body to the position in its slot, and account for the work of weight and loads.
 
-    What contacts that act at one time in the step, and position correction, lift or lower against
-    them counts as impact.
+    Contacts that act at one instant of the step, and position correction, also move bodies against
+    weight and loads. This work counts as impact.
     """
     body.lately = LATELY * max(top_speed(body), body.lately)
     if body.brake > 0.0:
@@ -136,10 +136,10 @@ def is_tried_whole(
 ) -> bool:
     """Return whether an island is solved as a whole before relaxation is tried.
 
-    That is so in static mode, for islands with the paper's contacts, for a lone block with
-    supports, and for `quiet` islands with supports, with joints that hold, or that were solved as a
-    whole in the last step. It is not so for an island with a fence, which has no entries in the
-    system of equations.
+    That is the case in static mode, for islands with the paper's contacts, for a lone block with
+    supports, and for `quiet` islands with supports, with unbroken joints, or that were solved as a
+    whole in the last step. It is never the case for an island with a fence, because a fence has no
+    entries in the system of equations.
     """
     required, bonds, rested = p.static, False, True
     low, high = islands.block_start[island], islands.block_start[island + 1]
@@ -159,10 +159,10 @@ def is_tried_whole(
 def settle_island(
     bodies: Bodies, contacts: Contacts, work: Work, island: int, p: Parameters, totals: Totals
 ) -> bool:
-    """Move the slots of an island through the step, and set the forces of its contacts.
+    """Compute the contact forces of an island and move its slots through the step.
 
-    What moves is relaxed. Where that does not settle, an island at rest is solved as a whole.
-    Returns whether a contact was struck.
+    Islands are relaxed. If relaxation does not converge, an island at rest is solved as a whole.
+    Returns whether any contact had an impact.
     """
     counters, ledger = totals.counters, totals.ledger
     islands, rows, m = work.islands, work.rows, work.matrix
@@ -200,7 +200,7 @@ def settle_island(
     for s in range(b1 - b0):
         slot = rows.slot[s]
         slot[COS], slot[SIN] = math.cos(slot[TURN]), math.sin(slot[TURN])
-        if slot[BRAKE] > 0.0:  # position correction leaves fences where they are
+        if slot[BRAKE] > 0.0:  # position correction does not move fences
             rows.scale[s, 0] = 0.0
     return struck and not whole
 
@@ -220,7 +220,8 @@ def take_impulses(
 ) -> None:
     """Set force and state of each contact of a relaxed island from the impulses of its row.
 
-    Normal and shear force are means over the step; the accumulated ones are those at its end.
+    The normal and shear forces are means over the step; the accumulated forces are those at its
+    end.
     """
     for item in range(low, high):
         c, k = contacts[islands.contact_item[item]], rows.place[item]
@@ -243,7 +244,7 @@ def take_impulses(
 
 @kernel
 def accumulate_force(c: Contact) -> None:
-    """Carry the force of a contact that was solved for to the next step."""
+    """Carry the force of a contact of an island that was solved as a whole to the next step."""
     c.struck = 0
     if c.state == OPEN:
         c.accumulated_normal = c.accumulated_shear = 0.0
@@ -255,7 +256,7 @@ def accumulate_force(c: Contact) -> None:
 
 @inlined
 def note_touch(body: Body, damping: float) -> None:
-    """Set the damping of a block to that of what it touches in this step; the greatest counts."""
+    """Set the damping of a block to the greatest of the surfaces that it touches in this step."""
     body.damping = max(body.damping, damping) if body.apart == 0.0 else damping
     body.apart = 0.0
 
@@ -265,7 +266,7 @@ def account_contacts(
     bodies: Bodies, interfaces: Interfaces, contacts: Contacts, islands: Islands, rows: Rows,
     low: int, high: int, monitors: Monitors, p: Parameters, ledger: NDArray,
 ) -> None:  # fmt: skip
-    """Add the work of contacts to the ledger, what barriers take, and whom they damp."""
+    """Add the work of contacts to the ledger and the barriers, and set the damping of blocks."""
     for item in range(low, high):
         c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
         if c.state == OPEN:
@@ -291,7 +292,7 @@ def account_contacts(
 
 @inlined
 def check_body(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
-    """Retire a body that has left the site; returns it if it went bad, else -1."""
+    """Retire a body that has left the site; return i if the body diverged, else -1."""
     body = bodies[i]
     bad = -1
     if not top_speed(body) < SPEED_LIMIT:
@@ -306,9 +307,9 @@ def end_body(
     bodies: Bodies, outlines: Outlines, i: int, before: tuple[float, float, float], p: Parameters,
     ledger: NDArray,
 ) -> int:  # fmt: skip
-    """Place the corners of a body that has moved, and retire one that has left the site.
+    """Update the corners of a body that has moved, and retire a body that has left the site.
 
-    `before` is where it was: angle, x and y. Returns the body if it went bad, else -1.
+    `before` holds its previous angle, x and y. Returns i if the body diverged, else -1.
     """
     if p.post_correction:
         place_corners(bodies, outlines, i)
@@ -322,9 +323,9 @@ def step_island(
     world: World, contacts: Contacts, work: Work, monitors: Monitors, time: float, island: int,
     p: Parameters, totals: Totals,
 ) -> int:  # fmt: skip
-    """Take the step of an island: settle it, note its hits, push out, move its bodies.
+    """Advance an island by one step.
 
-    Returns a body that went bad, or -1.
+    Returns a body that diverged, or -1.
     """
     bodies, outlines, interfaces = world.bodies, world.outlines, world.interfaces
     counters, ledger = totals.counters, totals.ledger

@@ -1,6 +1,6 @@
-"""Islands: clusters of free blocks joined by contacts, open ones too, or by bolts; one by one.
+"""Islands: clusters of free blocks connected by contacts, including open ones, or by bolts.
 
-Fixed and sleeping bodies and the terrain have no unknowns and join nothing.
+Fixed and sleeping bodies and the terrain have no unknowns and do not connect blocks.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from rigdda.kernel import kernel, variable
 
 @kernel
 def root(parent: NDArray, i: int) -> int:
-    """Return the representative of i, halving the path."""
+    """Return the representative of i, with path halving."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -32,7 +32,10 @@ def joins(bodies: Bodies, c: Contact) -> bool:
 def join_blocks(
     bodies: Bodies, contacts: Contacts, count: int, parent: NDArray, blocks: int, apart: bool
 ) -> None:
-    """Join the blocks that contacts couple, or all, in a union-find; a root is the least index."""
+    """Build the union-find forest of blocks coupled by contacts; a root is the smallest index.
+
+    With `apart` False, all awake blocks form one island.
+    """
     for i in range(blocks):
         parent[i] = i
     if not apart:
@@ -52,10 +55,10 @@ def join_blocks(
 def find_islands(
     bodies: Bodies, contacts: Contacts, begin: Ints, islands: Islands, blocks: int, apart: bool
 ) -> int:
-    """List blocks and contacts island by island; the root is the smallest index.
+    """List blocks and contacts island by island.
 
-    Contacts come in order of their first body, those of body a from begin[a], so they are read
-    once.
+    The contacts are ordered by first body, those of body a starting at begin[a], so that one pass
+    suffices.
 
     Returns
     -------
@@ -68,7 +71,7 @@ def find_islands(
     count = variable(0)
     for s in range(len(block_start)):
         block_start[s] = contact_start[s] = 0
-    # slot serves first as the number of the root's island
+    # until `_fill`, slot holds the island number of each root
     for i in range(blocks):
         if bodies[i].status == AWAKE and root(parent, i) == i:
             slot[i] = count
@@ -116,9 +119,9 @@ def _fill(bodies: Bodies, begin: Ints, islands: Islands, blocks: int, count: int
 def pair_blocks(
     bodies: Bodies, contacts: Contacts, m: Matrix, islands: Islands, low: int, high: int
 ) -> int:
-    """Assign the off-diagonal blocks of an island; returns the number of pairs of bodies.
+    """Assign the off-diagonal blocks of an island; return the number of pairs of bodies.
 
-    Contacts of a pair follow one another.
+    The contacts of a pair must be consecutive.
     """
     pairs, last_a, last_b = 0, -1, -1
     for item in range(low, high):

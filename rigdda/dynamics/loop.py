@@ -1,4 +1,4 @@
-"""The arrays of a scene and the compiled step loop over them: steps, room for contacts, events."""
+"""The compiled step loop over the arrays of a scene, with growing room for contacts and events."""
 
 from __future__ import annotations
 
@@ -30,35 +30,35 @@ from rigdda.kernel import Direct
 from rigdda.model.scene import Scene, Terrain
 
 advance_directly = Direct(advance)
-"""The step loop; the types of its arrays are the same for every scene."""
+"""The step loop without type dispatch: the types of its arrays are the same for every scene."""
 
 
 @lru_cache(maxsize=16)
 def _packed_ground(ground: Terrain | None, names: tuple[str, ...]) -> GroundArrays:
-    """Return a ground in arrays: releases of a site have the same one left, and only read it."""
+    """Return the packed ground; cached because the releases of a site share it unchanged."""
     return pack_ground(ground, list(names))
 
 
 class Loop:
-    """A packed scene, and what is counted and kept while it moves.
+    """A packed scene with its step loop, its counters and its recorded events.
 
     Parameters
     ----------
     scene : Scene
-        What was packed.
+        The scene that was packed.
     arrays : Arrays
-        The scene in arrays, before the first step.
+        Arrays of the scene before the first step.
     dt : float
         Step [s].
 
     Attributes
     ----------
     arrays : Arrays
-        The scene now.
+        Arrays of the scene in its current state.
     now, before : (C,) array of CONTACT
-        Contacts of this step and of the last one, with room for more.
+        Contacts of the current and the last step, with spare room.
     counters : (COUNTERS,) array of int
-        What `records` numbers.
+        Counters, numbered in `records`.
     ledger : (5,) array
         Work done on the blocks so far, see `records.LEDGER` [J].
     deepest : (1,) array
@@ -75,7 +75,7 @@ class Loop:
         self.start(arrays)
 
     def start(self, arrays: Arrays) -> None:
-        """Begin with arrays before the first step, whatever was done before."""
+        """Restart with arrays in their state before the first step."""
         self.arrays = arrays
         self.now, self.before = arrays.now, arrays.before
         self.counters[:], self.ledger[:], self.deepest[:] = 0, 0.0, 0.0
@@ -84,7 +84,7 @@ class Loop:
 
     @property
     def steps(self) -> int:
-        """Steps so far."""
+        """Number of steps so far."""
         return int(self.counters[STEPS])
 
     @property
@@ -98,24 +98,24 @@ class Loop:
         return self.now.view(np.ndarray)[: self.counters[CONTACTS]]
 
     def advance(self, steps: int, frames: NDArray[np.float64]) -> bool:
-        """Take steps, as many from each of the frames to be kept to the next.
+        """Take a number of steps and record frames at equal intervals.
 
         Parameters
         ----------
         steps : int
-            How many.
+            Number of steps.
         frames : (F, M, 6) array
-            What is kept, see `frames.keep_frame`; F divides the steps, or is 0.
+            Filled with the frames, see `frames.keep_frame`; F divides the number of steps, or is 0.
 
         Returns
         -------
         bool
-            Whether the run is over before that, see `leave` of `Simulation`.
+            Whether the run ended before that, see `leave` of `Simulation`.
 
         Raises
         ------
         Diverged
-            If a block's velocity is no longer finite or beyond any rockfall.
+            If the velocity of a block is not finite or exceeds that of any rockfall.
         """
         target = self.counters[STEPS] + steps
         stride = steps // max(len(frames), 1)
@@ -152,18 +152,18 @@ class Loop:
         return False
 
     def events(self) -> NDArray[np.void]:
-        """Return what happened so far, an array of EVENT."""
+        """Return the events so far, an array of EVENT."""
         self._drain_events()
         return self._events[0] if len(self._events) == 1 else np.concatenate(self._events)
 
     def _drain_events(self) -> None:
-        """Keep the events that the kernels noted, and make room for others."""
+        """Store the events that the kernels wrote, and empty their buffer."""
         n = self.counters[EVENTS]
         self._events.append(self.arrays.monitors.event.view(np.ndarray)[:n].copy())
         self.counters[EVENTS] = 0
 
     def _move_ground(self) -> None:
-        """Take the embankments that were pushed away off the ground, and wake what sleeps."""
+        """Remove embankments that were pushed away from the ground, and wake all bodies."""
         failed = self.events()
         gone = failed["target"][failed["kind"] == FAILED]
         left, names = self._scene.ground_without(gone), tuple(self._scene.surfaces)
@@ -172,11 +172,11 @@ class Loop:
         bodies, contacts = self.arrays.bodies, self.now
         bodies["quiet"][bodies["status"] == ASLEEP] = 0.0
         bodies["status"][bodies["status"] == ASLEEP] = AWAKE
-        # its corners have other numbers now
+        # the corners of the new ground are numbered differently
         contacts["state"][(contacts["b"] == TERRAIN) & (contacts["owner"] == 0)] = OPEN
 
     def _grow(self) -> None:
-        """Make room for twice as many contacts."""
+        """Double the room for contacts."""
         room, bodies = 2 * len(self.now), self.arrays.bodies
         blocks = self.arrays.parameters[0].blocks
         grown = empty_contacts(room)

@@ -1,13 +1,15 @@
-"""What a run watches: hits of barriers, crossings of stations, energies, thrust on barriers.
+"""Monitors of a run: hits of barriers, crossings of stations, energies and thrust on barriers.
 
-The thrust on a barrier is a mean over a second, which may push an embankment away.
-What lies against a barrier and what strikes it both press on it, in the ratio of chance in any one
-step. Over a second it is the momentum that the barrier takes, which does not depend on the step.
-A contact with the ground presses on the embankment on which it is.
+The thrust on a barrier is averaged over a second; if it exceeds the resistance of an embankment,
+the embankment is pushed away. Leaning contacts and impacts share the load in a proportion that
+varies randomly from step to step. Over a second their sum is the momentum that the barrier absorbs,
+which does not depend on the step. A contact with the ground counts for the embankment on which it
+lies.
 
-Rock that is jammed between two rigid faces presses on both with any force, of which nothing is left
-once one of them gives way. So contacts at rest count for no more than the weight of what leans on
-the barrier: that is what drives rock on a slope 45 degrees steeper than its friction.
+Rock that is jammed between two rigid faces may press on both with any force, which vanishes as soon
+as one of them yields. Contacts at rest therefore count for no more than the weight of the blocks
+that lean on the barrier: this is the driving force of rock on a slope 45 degrees steeper than its
+friction angle.
 """
 
 from __future__ import annotations
@@ -46,8 +48,8 @@ def chainages(stations: Sequence[float]) -> NDArray[np.float64]:
 
 
 HIT, CROSSING, FAILED = 0, 1, 2
-"""Kinds of event: a block touches a barrier; a block's centroid first passes a station; a block
-breaks a barrier."""
+"""Kinds of event: a block touches a barrier; the centroid of a block first passes a station; a
+block breaks a barrier."""
 
 
 @kernel
@@ -55,7 +57,7 @@ def write_event(
     monitors: Monitors, n: int, time: float, kind: int, body: Body, i: int, target: int,
     x: float, y: float, height: float,
 ) -> int:  # fmt: skip
-    """Write event n of body i; returns the new number of events."""
+    """Write event n of body i; return the new number of events."""
     event = monitors.event[n]
     rocks = len(monitors.rock)
     event.time, event.kind, event.target = time, kind, target
@@ -68,9 +70,9 @@ def write_event(
 
 @kernel
 def barrier_contact(monitors: Monitors, a: int, b: int) -> tuple[int, int]:
-    """Return what strikes and what barrier it strikes in a contact of a and b, -1 for no barrier.
+    """Return the striking body and the struck barrier of a contact of a and b, -1 if no barrier.
 
-    A gravity wall that is carried along strikes other barriers.
+    A gravity wall that is carried along can strike other barriers.
     """
     rocks = len(monitors.rock)
     if b >= rocks:
@@ -85,7 +87,7 @@ def note_hits(
     bodies: Bodies, contacts: Contacts, islands: Islands, low: int, high: int, monitors: Monitors,
     events: int, time: float,
 ) -> int:  # fmt: skip
-    """Write a hit for each barrier that a block touches anew; velocities still those before."""
+    """Write a hit for each barrier that a block newly touches, before velocities are updated."""
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         i, barrier = barrier_contact(monitors, c.a, c.b)
@@ -102,7 +104,7 @@ def note_hits(
 
 @inlined
 def note_passage(bodies: Bodies, monitors: Monitors, events: int, time: float) -> int:
-    """Write a crossing for each station that a centroid first passes; watch energies, extents."""
+    """Record the first crossing of each station by a centroid, and update energies and extents."""
     stations = len(monitors.station)
     for i in range(len(monitors.rock)):
         body, rock = bodies[i], monitors.rock[i]
@@ -120,10 +122,10 @@ def note_passage(bodies: Bodies, monitors: Monitors, events: int, time: float) -
 
 @kernel
 def is_over(bodies: Bodies, monitors: Monitors, counters: Ints, p: Parameters) -> bool:
-    """Return whether nothing moves any more but what has left `monitors.leave` behind, downhill.
+    """Return whether all blocks are at rest or have passed `monitors.leave` and move downhill.
 
-    Where there are barriers it must have been so for a second: what lies on them presses on, and
-    thrust is a mean over a second.
+    With barriers, this must have held for a second, because blocks that lie on a barrier still
+    press on it and thrust is averaged over a second.
     """
     if monitors.leave == -math.inf:
         return False
@@ -141,12 +143,12 @@ def is_over(bodies: Bodies, monitors: Monitors, counters: Ints, p: Parameters) -
 
 
 LEANING, STRIKING = 0, 1
-"""Contacts of a barrier by which thrust is summed up."""
+"""Kinds of contact with a barrier, whose thrust is summed separately."""
 
 
 @kernel
 def pressed(monitors: Monitors, c: Contact) -> int:
-    """Return the barrier that a contact presses on, -1 for none."""
+    """Return the barrier that a contact presses on, or -1."""
     if c.state == OPEN or c.kind == BOLT or c.kind == PIN:
         return -1
     if c.b != TERRAIN:
@@ -159,7 +161,7 @@ def pressed(monitors: Monitors, c: Contact) -> int:
 
 @kernel
 def press(c: Contact, monitors: Monitors, dt: float) -> None:
-    """Add the impulse of a contact in a time [s] to what presses on a barrier."""
+    """Add the impulse of a contact over a time [s] to the thrust on its barrier."""
     barrier = pressed(monitors, c)
     if barrier < 0:
         return
@@ -176,7 +178,7 @@ def press(c: Contact, monitors: Monitors, dt: float) -> None:
 def press_asleep(
     bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, dt: float
 ) -> None:
-    """Add the impulses in a step [s] of what sleeps on barriers."""
+    """Add the impulses over a step [s] of blocks that sleep on barriers."""
     for k in range(count if len(monitors.target) > 0 else 0):
         if bodies[contacts[k].a].status == ASLEEP:
             press(contacts[k], monitors, dt)
@@ -187,7 +189,7 @@ def weight_on(
     bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, islands: Islands,
     barrier: int, p: Parameters,
 ) -> float:  # fmt: skip
-    """Return the weight of the blocks that lean on a barrier, through others or not [N]."""
+    """Return the weight of the blocks that lean on a barrier, directly or through others [N]."""
     parent, leans = islands.parent, islands.slot
     for i in range(p.blocks):
         parent[i], leans[i] = i, 0
@@ -210,14 +212,14 @@ def watch_thrust(
     bodies: Bodies, contacts: Contacts, count: int, monitors: Monitors, islands: Islands,
     events: int, step: int, time: float, p: Parameters,
 ) -> tuple[int, bool]:  # fmt: skip
-    """End a step: set the means over a second, and let what they exceed fail.
+    """Update the thrust averaged over a second, and let barriers fail whose resistance it exceeds.
 
     Returns
     -------
     events : int
         The new number of events.
     ground : bool
-        Whether an embankment was pushed away, so that the ground is to change.
+        Whether an embankment was pushed away, so that the ground must change.
     """
     ground = False
     for barrier in range(len(monitors.target)):

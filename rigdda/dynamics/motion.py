@@ -1,4 +1,4 @@
-"""Speed and energy of one body."""
+"""Speed and kinetic energy of a body."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from rigdda.kernel import kernel
 
 @kernel
 def top_speed(body: Body) -> float:
-    """Return a bound on the speed of any point of a body [m/s]."""
+    """Return an upper bound on the speed of any point of a body [m/s]."""
     spin = abs(body.omega) * body.radius
     return math.sqrt(body.vx**2 + body.vy**2) + spin
 
 
 @kernel
 def kinetic_energy(body: Body) -> float:
-    """Return the energy of translation and rotation of a body [J]."""
+    """Return the translational and rotational energy of a body [J]."""
     speed = body.vx**2 + body.vy**2
     return 0.5 * body.mass * speed + 0.5 * body.inertia * body.omega**2
 
 
 @kernel
 def retire(body: Body) -> float:
-    """Take a block that has left the site out of the simulation; returns its kinetic energy [J]."""
+    """Remove a body that has left the site from the simulation; return its kinetic energy [J]."""
     energy = kinetic_energy(body)
     body.status = RETIRED
     body.vx = body.vy = body.omega = 0.0

@@ -1,9 +1,10 @@
-"""Open-close iteration: solve an island as a whole for states with which all its forces agree.
+"""Open-close iteration: solve an island as a whole until contact states and forces agree.
 
-`next_state` decides the state of each contact: a closed contact must press, an open one must not
-overlap, a sticking one must stay within its friction limit, a slipping one must slip against its
-friction. All islands are solved like this in static mode, and islands at rest where relaxation
-does not settle; all others are relaxed, see `rigdda.dynamics.relaxation`.
+`next_state` decides the state of each contact: a closed contact must press, an open contact must
+not overlap, a sticking contact must stay within its friction limit, and a slipping contact must
+slip against its friction. In static mode all islands are solved this way, otherwise islands at rest
+for which relaxation does not converge. All other islands are relaxed, see
+`rigdda.dynamics.relaxation`.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from rigdda.kernel import inlined, kernel
 
 @inlined
 def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[float, float]:
-    """Return the normal force of a contact, and its shear force if it stuck [N]."""
+    """Return the normal force of a contact, and its shear force if it sticks [N]."""
     dn, ds = relative_displacement(c, d, i, j)
     normal = c.kappa * (c.bias - (2.0 * dn - dt * c.un))
     shear = c.accumulated_shear - c.kappa * (2.0 * ds - dt * c.us)
@@ -51,7 +52,10 @@ def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[fl
 
 @kernel
 def next_state_of_link(c: Contact, normal: float, shear: float) -> bool:
-    """Let a bolt yield, or no more: SLIP stands for yielding; a pin holds whatever its force."""
+    """Update the state of a support; return whether it changed.
+
+    A bolt is in state SLIP while it yields. A pin holds any force.
+    """
     c.normal, c.shear = max(normal, -c.tension), 0.0 if c.kind == BOLT else shear
     before = c.state
     c.state = SLIP if normal < -c.tension else STICK
@@ -60,7 +64,7 @@ def next_state_of_link(c: Contact, normal: float, shear: float) -> bool:
 
 @kernel
 def next_friction(c: Contact, shear: float) -> bool:
-    """Let a closed contact whose normal force is set stick or slip: a return mapping."""
+    """Apply Coulomb friction to a closed contact by a return mapping; return whether it changed."""
     state, limit = c.state, c.friction * c.normal
     c.shear = min(max(shear, -limit), limit)
     if abs(shear) <= limit:
@@ -74,9 +78,9 @@ def next_friction(c: Contact, shear: float) -> bool:
 
 @inlined
 def next_state(c: Contact, normal: float, shear: float, breaks: bool) -> bool:
-    """Move a contact to the state that its forces ask for; returns whether it changed.
+    """Update the state of a contact from its forces; return whether it changed.
 
-    `breaks` tells whether these forces have broken the joint that it is on.
+    `breaks` is whether these forces have broken the joint of the contact.
     """
     if c.kind == BOLT or c.kind == PIN:
         return next_state_of_link(c, normal, shear)
@@ -100,7 +104,7 @@ def next_state(c: Contact, normal: float, shear: float, breaks: bool) -> bool:
 def update_states(
     contacts: Contacts, d: NDArray, islands: Islands, low: int, high: int, p: Parameters
 ) -> bool:
-    """Move every contact of an island to its next state; returns whether one changed."""
+    """Update the state of every contact of an island; return whether any changed."""
     changed = False
     for item in range(low, high if p.bonded else low):
         c = contacts[islands.contact_item[item]]
@@ -119,7 +123,7 @@ def update_states(
 
 @kernel
 def solve_system(m: Matrix, scratch: Scratch, n: int, pairs: int, p: Parameters) -> int:
-    """Solve for the displacements of an island; returns the iterations, 0 of a direct solution."""
+    """Solve for the displacements of an island; return the iterations, 0 for a direct solution."""
     if n == 1:
         solve_block(m.diagonal[0], m.rhs[0], m.d[0])
         return 0
@@ -138,9 +142,9 @@ def solve_states(
     bodies: Bodies, contacts: Contacts, work: Work, island: int, pairs: int, p: Parameters,
     counters: NDArray,
 ) -> bool:  # fmt: skip
-    """Iterate until no contact of the island changes; returns whether that was reached.
+    """Iterate until no contact of the island changes its state; return whether that was reached.
 
-    Afterwards normal and shear of each contact hold its force, zero where it is open.
+    Afterwards `normal` and `shear` of each contact hold its forces, zero if it is open.
     """
     islands, m = work.islands, work.matrix
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
@@ -166,8 +170,8 @@ def take_solution(
 ) -> None:  # fmt: skip
     """Move the slots of an island by its forces; set the work of contacts and of damping.
 
-    Forces are applied equal and opposite here, once more and exactly, so that momentum is kept to
-    rounding whatever the residual of the solver.
+    The forces are applied here once more, exactly and in equal and opposite pairs, so that momentum
+    is conserved to rounding whatever the residual of the solver.
     """
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     assemble_blocks(bodies, m, islands, b0, b1, p)

@@ -1,4 +1,4 @@
-"""From a scene to the arrays that the kernels work on, with room for contacts and equations."""
+"""Packing of a scene into the arrays of the kernels, with room for contacts and equations."""
 
 from __future__ import annotations
 
@@ -67,16 +67,16 @@ from rigdda.model.scene import Block, Scene, Terrain
 from rigdda.model.settings import EARTH, SOLVERS, Settings, longest_step
 
 MOST_BANDWIDTH = 64
-"""Blocks to the left of the diagonal, on average, up to which a skyline is kept room for."""
+"""Mean number of blocks to the left of the diagonal for which a skyline has room."""
 
 
 def empty_contacts(room: int) -> Contacts:
-    """Return space for `room` contacts."""
+    """Return room for `room` contacts."""
     return np.zeros(room, dtype=CONTACT).view(np.recarray)
 
 
 def empty_matrix(blocks: int, room: int) -> Matrix:
-    """Return space for the equations of an island of all blocks."""
+    """Return room for the equations of an island of all blocks."""
     return Matrix(
         np.zeros((blocks, 3, 3)),
         np.zeros((room, 3, 3)),
@@ -88,7 +88,7 @@ def empty_matrix(blocks: int, room: int) -> Matrix:
 
 
 def empty_scratch(blocks: int, room: int) -> Scratch:
-    """Return space for the solvers of these equations."""
+    """Return working arrays for the solvers of these equations."""
     return Scratch(
         np.zeros((blocks, 3)),
         np.zeros((blocks, 3)),
@@ -102,12 +102,12 @@ def empty_scratch(blocks: int, room: int) -> Scratch:
 
 
 def profile_room(blocks: int) -> int:
-    """Return the entries of a skyline that are kept room for; longer ones are not factorised."""
+    """Return the room for skyline entries; a longer skyline is not factorised."""
     return 9 * blocks * min(blocks, MOST_BANDWIDTH)
 
 
 def empty_work(bodies: int, blocks: int, room: int) -> Work:
-    """Return the scratch arrays of a step."""
+    """Return the working arrays of a step."""
 
     def whole(n: int) -> NDArray[np.int64]:
         return np.zeros(n, dtype=np.int64)
@@ -153,7 +153,7 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
 
 
 def pack_ground(ground: Terrain | None, names: list[str]) -> GroundArrays:
-    """Return the terrain segments and the bins that find them by x."""
+    """Return the terrain segments and the bins that locate them by x."""
     if ground is None:
         none, start = np.zeros(1, dtype=SEGMENT), np.zeros(1, dtype=np.int64)
         return GroundArrays(none.view(np.recarray), start, start[:0], 0.0, 1.0)
@@ -201,7 +201,7 @@ def pack_ground(ground: Terrain | None, names: list[str]) -> GroundArrays:
 
 
 def pack_shaking(scene: Scene) -> Shaking:
-    """Return the motion of the ground with its integrals over time."""
+    """Return the ground motion with its integrals over time."""
     history = np.zeros((0, 3)) if scene.base_motion is None else scene.base_motion
     shaking = np.zeros(len(history), dtype=SHAKING)
     shaking["time"], shaking["x"], shaking["y"] = t, x, y = history.T
@@ -211,7 +211,7 @@ def pack_shaking(scene: Scene) -> Shaking:
 
 
 def cumulative(t: Floats, a: Floats) -> Floats:
-    """Return the integral of a polygon up to each of its corners but the first."""
+    """Return the integral of a piecewise linear function up to each corner after the first."""
     return np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))
 
 
@@ -223,7 +223,7 @@ def pack_monitors(
     leave: float,
     dt: float,
 ) -> Monitors:
-    """Return the monitors, with no station passed that a block starts beyond; `dt` in s."""
+    """Return the monitors; stations uphill of where a block starts count as passed; `dt` in s."""
     blocks, barriers, ground = len(scene.blocks), len(scene.barriers), scene.smooth_ground
     station = np.zeros(len(stations), dtype=STATION)
     station["x"], station["ground"] = stations, [_ground(ground, x) for x in stations]
@@ -250,7 +250,7 @@ def pack_monitors(
 
 
 def start_targets(target: NDArray[np.void], scene: Scene) -> None:
-    """Write what embankments resist, where they press on the ground, and how fences sag."""
+    """Write the resistance and extent of embankments and the sag of fences."""
     target["low"] = target["limit"] = np.inf
     target["high"] = -np.inf
     for i, barrier in enumerate(scene.barriers):
@@ -263,7 +263,7 @@ def start_targets(target: NDArray[np.void], scene: Scene) -> None:
 
 
 def start_rock(rock: NDArray[np.void], bodies: Bodies, stations: NDArray[np.float64]) -> None:
-    """Write where blocks start: between which stations, and their extent."""
+    """Write the next station and the extent of each block at the start."""
     x, radius = bodies["x"][: len(rock)], bodies["radius"][: len(rock)]
     rock["next"] = stations.searchsorted(x, side="right")
     rock["low"], rock["high"] = x - radius, x + radius
@@ -276,16 +276,16 @@ def _ground(terrain: Terrain | None, x: float) -> float:
 
 
 def event_room(blocks: int, stations: int, barriers: int) -> int:
-    """Return the size of an event buffer that holds any two steps."""
+    """Return the size of an event buffer that holds the events of any two steps."""
     return 2 * (blocks + 1) * (stations + barriers) + 1
 
 
 FALL_BELOW = 20.0
-"""Depth below the lowest terrain at which a block that left the site is retired [m]."""
+"""Depth below the lowest terrain at which a block has left the site and is retired [m]."""
 
 
 def check_step(settings: Settings, areas: NDArray[np.float64], gravity: float) -> None:
-    """Refuse a step that is too long for free blocks of these areas [m2]."""
+    """Raise `BadInput` if a step is too long for free blocks of these areas [m2]."""
     most = longest_step(areas, gravity)
     if settings.dt > most and settings.mode == "dynamic":
         sizes = np.sqrt(areas)
@@ -297,11 +297,11 @@ def check_step(settings: Settings, areas: NDArray[np.float64], gravity: float) -
 
 
 def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
-    """Return how each two surfaces meet.
+    """Return the interface properties of each pair of surfaces.
 
-    Fences, which come last, are of the surface of barriers, but plastic, without strength and
-    without friction: a net moves along with what it holds.
-    Damping that a surface leaves open is that of the scene.
+    The surface of fences comes last. It is the surface of barriers without restitution, strength
+    and friction, because a net moves along with what it holds. A surface without a damping
+    coefficient has that of the scene.
     """
     fences = any(isinstance(b, Fence) for b in scene.barriers)
     every = [*names, scene.barrier_surface] if fences else names
@@ -319,14 +319,14 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
 
 
 def frictions(scene: Scene, size: int) -> list[list[float]]:
-    """Return the coefficient of friction of each two of `size` surfaces, see `pack_interfaces`."""
+    """Return the coefficient of friction of each pair of `size` surfaces, see `pack_interfaces`."""
     every = list(scene.surfaces)
     every += [scene.barrier_surface] * (size - len(every))
     return [[math.tan(math.radians(scene.friction_deg(a, b))) for b in every] for a in every]
 
 
 def dampings(scene: Scene, size: int) -> list[list[float]]:
-    """Return the damping of each two of `size` surfaces [1/s], see `pack_interfaces`."""
+    """Return the damping of each pair of `size` surfaces [1/s], see `pack_interfaces`."""
     every = list(scene.surfaces)
     every += [scene.barrier_surface] * (size - len(every))
     pairs = [[scene.interface(a, b).damping for b in every] for a in every]
@@ -334,7 +334,7 @@ def dampings(scene: Scene, size: int) -> list[list[float]]:
 
 
 def rock_numbers(scene: Scene, settings: Settings, bodies: Bodies) -> dict[str, float]:
-    """Return the numbers that depend on the blocks."""
+    """Return the parameters that depend on the blocks."""
     free = [i for i, b in enumerate(scene.blocks) if not b.fixed]
     mass = bodies["mass"][free]
     area = mass / [scene.blocks[i].density for i in free]
@@ -351,7 +351,7 @@ def rock_numbers(scene: Scene, settings: Settings, bodies: Bodies) -> dict[str, 
 def pack_parameters(
     scene: Scene, settings: Settings, bodies: Bodies, interfaces: Interfaces
 ) -> NDArray[np.void]:
-    """Return the numbers of the scene and the settings: of a step, and of parts of one."""
+    """Return the parameters of the scene and the settings."""
     gx, gy = scene.gravity_vector
     static = settings.mode == "static"
     shaken = scene.base_motion is not None
@@ -387,17 +387,17 @@ def pack_parameters(
 
 
 def free_bodies(scene: Scene) -> int:
-    """Return how many bodies are not barriers that are fixed: these come first."""
+    """Return the number of bodies that are not fixed barriers; these bodies come first."""
     return len(scene.blocks) + sum(isinstance(b, GravityWall | Fence) for b in scene.barriers)
 
 
 def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
-    """Return the blocks, then the barriers, as bodies at the start, and their outlines.
+    """Return blocks, then barriers, as bodies in their initial state, and their outlines.
 
-    The surface of fences comes after the named ones.
+    The surface of fences follows the named surfaces.
     """
     polygons = [b.vertices for b in scene.blocks] + [scene.outline(i) for i in scene.bodies]
-    bodies = np.zeros(len(polygons), dtype=BODY)  # its columns are quicker to set than a recarray's
+    bodies = np.zeros(len(polygons), dtype=BODY)  # columns are faster to set than in a recarray
     outlines = pack_outlines(polygons, bodies)
     traits = block_traits(scene.blocks, names)
     traits += [barrier_trait(scene, i, names) for i in scene.bodies]
@@ -428,7 +428,7 @@ def block_traits(blocks: Sequence[Block], names: list[str]) -> list[Trait]:
 
 
 def barrier_trait(scene: Scene, number: int, names: list[str]) -> Trait:
-    """Return the same of a barrier that is a body."""
+    """Return density, velocity, surface and status of a barrier that is a body."""
     barrier = scene.barriers[number]
     if isinstance(barrier, Fence):
         area = polygon_properties(scene.outline(number))[0]
@@ -441,9 +441,9 @@ def barrier_trait(scene: Scene, number: int, names: list[str]) -> Trait:
 
 
 def start_fences(scene: Scene, bodies: Bodies, parameters: NDArray[np.void]) -> None:
-    """Write how fences give way; they sleep until something comes near.
+    """Write brakes and status of fences; a fence sleeps until a moving body comes near.
 
-    Where nothing sleeps they are awake, and in static mode and without post-correction fixed.
+    Fences are awake if sleeping is disabled, and fixed in static mode or without post-correction.
     """
     p = parameters[0]
     moves = p["post_correction"] and not p["static"]
@@ -455,13 +455,13 @@ def start_fences(scene: Scene, bodies: Bodies, parameters: NDArray[np.void]) -> 
 
 
 def fences(scene: Scene) -> dict[int, Fence]:
-    """Return the fences of a scene by their places among the bodies."""
+    """Return the fences of a scene, keyed by body index."""
     found = ((place, scene.barriers[i]) for place, i in enumerate(scene.bodies, len(scene.blocks)))
     return {place: barrier for place, barrier in found if isinstance(barrier, Fence)}
 
 
 def set_brakes(scene: Scene, bodies: Bodies) -> None:
-    """Write the forces against which fences give way, by the width of an event, and how far."""
+    """Write the braking force of each fence, by the width of an event, and its elongation."""
     for place, fence in fences(scene).items():
         bodies["brake"][place], bodies["elongation"][place] = fence.braking_force, fence.elongation
 
@@ -469,17 +469,17 @@ def set_brakes(scene: Scene, bodies: Bodies) -> None:
 def write_polygons(
     polygons: Sequence[Floats], traits: Sequence[Trait], bodies: Bodies, outlines: Outlines
 ) -> None:
-    """Write the first bodies of an array and their outlines, from the corners of each."""
+    """Write the first bodies of an array and their outlines from the corners of each."""
     corners = np.concatenate(polygons)
     _write.call(corners, np.array(traits, dtype=np.float64), bodies, outlines)
 
 
 @short_kernel
 def write_bodies(corners: NDArray, traits: NDArray, bodies: Bodies, outlines: Outlines) -> None:
-    """Set bodies at their start from the corners of one after the other, and place their corners.
+    """Set bodies to their initial state from their corners, listed one body after the other.
 
-    The number of corners and the parts of each body are set. Density, velocity, surface and status
-    are columns of `traits`.
+    The number of corners and the parts of each body must be set. Density, velocity, surface and
+    status are the columns of `traits`.
     """
     low = 0
     for i in range(len(traits)):
@@ -510,7 +510,7 @@ _write = Direct(write_bodies)
 
 
 def _add_load(bodies: Bodies, i: int, force: Floats, point: Floats) -> None:
-    """Add a dead load on body i at the start; its arm turns with the body."""
+    """Add a dead load to body i in its initial state; its lever arm rotates with the body."""
     (fx, fy), (x, y) = force, point - (bodies["x"][i], bodies["y"][i])
     bodies["force_x"][i] += fx
     bodies["force_y"][i] += fy
@@ -519,9 +519,9 @@ def _add_load(bodies: Bodies, i: int, force: Floats, point: Floats) -> None:
 
 
 def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
-    """Return the outlines and convex parts of bodies, and set where each body's parts are.
+    """Return the outlines and convex parts of bodies, and set where each body's parts start.
 
-    Where their corners are `write_polygons` sets.
+    The positions of the corners are set by `write_polygons`.
     """
     rows = [(i, list(range(len(p)))) for i, p in enumerate(polygons)]
     for i, polygon in enumerate(polygons):
@@ -548,9 +548,10 @@ def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
 
 
 def pack_links(scene: Scene, bodies: Bodies) -> Links:
-    """Return the supports in order of their block a.
+    """Return the supports, ordered by block a.
 
-    Block a is free unless both are not, and the first of two that are free, as of contacts.
+    Block a is free unless neither block is. Of two free blocks it is the one with the lower index,
+    as for contacts.
     """
 
     def anchor(block: int, point: tuple[float, float]) -> tuple[float, float]:
@@ -585,7 +586,7 @@ def pack_links(scene: Scene, bodies: Bodies) -> Links:
 
 
 class Arrays(NamedTuple):
-    """Everything the step loop needs, for one scene."""
+    """All arrays of one scene that the step loop needs."""
 
     bodies: Bodies
     outlines: Outlines
@@ -607,16 +608,16 @@ def pack(
     watch: tuple[float, float],
     leave: float = -math.inf,
 ) -> Arrays:
-    """Return the kernels' arrays for a scene at rest at its start.
+    """Return the arrays of the kernels for a scene in its initial state.
 
     Parameters
     ----------
     stations : (K,) array
         Ascending chainages whose first crossings are recorded [m].
     watch : (float, float)
-        Interval of x in which energies are watched [m].
+        Interval of x in which energies are recorded [m].
     leave : float
-        x beyond which what moves on is left alone [m], -inf: the run is not ended early.
+        x beyond which blocks that move downhill may be ignored [m]; -inf: do not end the run early.
     """
     names = list(scene.surfaces)
     bodies, outlines = pack_bodies(scene, names)

@@ -1,8 +1,8 @@
-"""The lumped-mass model: a block is a point that bounces, slides and stops on the ground.
+"""Lumped-mass model: a block is a point that bounces, slides and stops on the ground.
 
-What rockfall programs began with (the paper's introduction; Ritchie 1963; Stevens 1998): parabolas,
-at an impact a normal and a tangential coefficient of restitution, friction where the point no
-longer bounces. It has neither shape nor rotation, and blocks do not meet.
+This is the model of the first rockfall programs (the paper's introduction; Ritchie 1963; Stevens
+1998): parabolic flight, normal and tangential coefficients of restitution at impacts, and friction
+where the point no longer bounces. Blocks have neither shape nor rotation and do not interact.
 """
 
 from __future__ import annotations
@@ -14,21 +14,22 @@ from numpy.typing import NDArray
 from rigdda.kernel import entry_kernel, kernel
 
 STILL = 0.05
-"""Normal speed after an impact below which a point slides on [m/s]: a bounce of 0.1 mm."""
+"""Normal speed after an impact below which a point slides instead of bouncing [m/s]. It corresponds
+to a bounce of 0.1 mm."""
 
 MOST_MOVES = 100_000
-"""Most flights and slides of a trajectory."""
+"""Maximum number of flights and slides of a trajectory."""
 
 NEAR = 1e-9
-"""Length that is rounding [m]."""
+"""Length below which distances are rounding errors [m]."""
 
 X, Y, VX, VY = 0, 1, 2, 3
 """Columns of a start [m, m/s]."""
 NORMAL, TANGENTIAL, FRICTION = 0, 1, 2
-"""Columns of a segment's coefficients [-]; friction is a tangent."""
+"""Columns of a segment's coefficients [-]; friction is the tangent of the angle."""
 RUN_OUT, SPEED, HEIGHT = 0, 1, 2
-"""Columns of what is found: where it stops [m], speed [m/s] and height above the ground [m] where
-it first passes a line, NaN if it does not."""
+"""Columns of the results: stopping place [m], and speed [m/s] and height above the ground [m] at
+the first passage of a line, NaN without a passage."""
 
 Floats = NDArray
 
@@ -43,7 +44,7 @@ def axes(ground: Floats, s: int) -> tuple[float, float, float]:
 
 @kernel
 def segment_at(ground: Floats, x: float, uphill: bool) -> int:
-    """Return the segment at a chainage, at a corner the one uphill or downhill of it."""
+    """Return the segment at a chainage; at a corner, the one uphill or downhill of it."""
     s = 0
     while s < len(ground) - 2 and (ground[s + 1, 0] < x or (not uphill and ground[s + 1, 0] <= x)):
         s += 1
@@ -54,8 +55,9 @@ def segment_at(ground: Floats, x: float, uphill: bool) -> int:
 def time_to_line(height: float, rise: float, pull: float) -> float:
     """Return when height + rise t - pull t^2 / 2 falls to 0, inf if it does not; pull > 0.
 
-    The later root: a point may be below the line of a segment that it has yet to come to. On the
-    line, with height 0 to rounding, one that rises comes back, one that falls is there.
+    This is the later root, because a point may be below the line of a segment that it has not
+    reached yet. On the line, with height 0 to rounding, a rising point returns to it and a falling
+    point is already there.
     """
     if abs(height) <= NEAR:
         return max(2.0 * rise / pull, 0.0)
@@ -66,7 +68,7 @@ def time_to_line(height: float, rise: float, pull: float) -> float:
 
 @kernel
 def fly(ground: Floats, p: Floats, s: int, g: float) -> tuple[float, int]:
-    """Return how long a point flies and the segment that it meets, -1 beyond the ends."""
+    """Return the flight time of a point and the segment that it meets, -1 beyond the ends."""
     step = 1 if p[VX] >= 0.0 else -1
     while 0 <= s < len(ground) - 1:
         tx, ty, _ = axes(ground, s)
@@ -84,7 +86,7 @@ def fly(ground: Floats, p: Floats, s: int, g: float) -> tuple[float, int]:
 def watch(
     ground: Floats, p: Floats, time: float, ax: float, ay: float, line: float, found: Floats
 ) -> None:
-    """Note speed and height where a point first passes a chainage within a time."""
+    """Record speed and height where a point first passes a chainage within a time."""
     if not math.isnan(found[SPEED]) or p[X] >= line:
         return
     x = p[X] + p[VX] * time + 0.5 * ax * time * time if time < math.inf else math.inf
@@ -112,7 +114,7 @@ def advance(p: Floats, time: float, ax: float, ay: float) -> None:
 
 @kernel
 def rebound(ground: Floats, laws: Floats, p: Floats, s: int) -> bool:
-    """Let a point rebound from a segment; returns whether it slides on from there."""
+    """Apply restitution at a segment; return whether the point slides from there."""
     tx, ty, _ = axes(ground, s)
     normal = -laws[s, NORMAL] * (-ty * p[VX] + tx * p[VY])
     along = laws[s, TANGENTIAL] * (tx * p[VX] + ty * p[VY])
@@ -126,7 +128,7 @@ def rebound(ground: Floats, laws: Floats, p: Floats, s: int) -> bool:
 def slide(
     ground: Floats, laws: Floats, p: Floats, s: int, g: float, line: float, found: Floats
 ) -> tuple[bool, int]:
-    """Let a point slide to the end of its segment; returns whether it stopped, and where it is."""
+    """Slide a point to the end of its segment; return whether it stopped, and its segment."""
     tx, ty, length = axes(ground, s)
     here = tx * (p[X] - ground[s, 0]) + ty * (p[Y] - ground[s, 1])
     speed, pull, drag = tx * p[VX] + ty * p[VY], -g * ty, laws[s, FRICTION] * g * tx
@@ -136,7 +138,7 @@ def slide(
     gain = way * pull - drag  # acceleration along the way
     rest, v = (length - here if way > 0.0 else here), abs(speed)
     if v * v + 2.0 * gain * rest <= 0.0:
-        time = -v / gain  # it comes to rest, perhaps to slide back
+        time = -v / gain  # it comes to rest and may slide back
         watch(ground, p, time, way * gain * tx, way * gain * ty, line, found)
         advance(p, time, way * gain * tx, way * gain * ty)
         p[VX] = p[VY] = 0.0
@@ -159,7 +161,7 @@ def follow(ground: Floats, laws: Floats, p: Floats, g: float, line: float, found
             stopped, after = slide(ground, laws, p, s, g, line, found)
             if stopped or not 0 <= after < len(ground) - 1:
                 break
-            if after != s:  # over a corner it flies off, into one it hits the ground
+            if after != s:  # it flies off a convex corner and hits the ground at a concave one
                 tx, ty, _ = axes(ground, after)
                 away = -ty * p[VX] + tx * p[VY]
                 slides = away <= NEAR and (away > -NEAR or rebound(ground, laws, p, after))
@@ -179,7 +181,7 @@ def follow(ground: Floats, laws: Floats, p: Floats, g: float, line: float, found
 def trajectories(
     ground: Floats, laws: Floats, starts: Floats, g: float, line: float, found: Floats
 ) -> None:
-    """Follow points from their starts, (n, 4), which are moved to their ends.
+    """Follow points from their starts; `starts` is overwritten with the final states.
 
     Parameters
     ----------
@@ -188,13 +190,13 @@ def trajectories(
     laws : (n, m - 1, 3) array
         Coefficients of each segment, for each point.
     starts : (n, 4) array
-        Place [m] and velocity [m/s].
+        Position [m] and velocity [m/s].
     g : float
         Gravity [m/s2].
     line : float
-        Chainage at which points are watched [m].
+        Chainage at which speed and height are recorded [m].
     found : (n, 3) array
-        Filled in.
+        Filled with the results.
     """
     for i in range(len(starts)):
         found[i, SPEED] = found[i, HEIGHT] = math.nan

@@ -1,9 +1,10 @@
-"""Position correction: penetration beyond what the load explains is pushed out, without force.
+"""Position correction: removes penetration beyond what the load explains, without forces.
 
-What contacts have sunk too far, while a pile came to rest or as they turned within a step, is no
-elastic compression. To push it out by forces would lift the pile against the friction of its
-walls, and drive what cannot give way. So bodies are displaced by lambda M^-1 e^t along the normals
-alone at the end of a step, and get no velocity from it: projected Gauss-Seidel sweeps, lambda >= 0.
+Contacts may sink too far while a pile comes to rest or while bodies rotate within a step. This
+penetration is not elastic compression. Removing it by forces would lift a pile against the friction
+of its walls and push against bodies that cannot yield. Instead, bodies are displaced by lambda M^-1
+e^t along the contact normals at the end of a step, which gives them no velocity. Projected
+Gauss-Seidel sweeps with lambda >= 0 find the displacements.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ from rigdda.kernel import inlined, kernel
 def find_deepest(
     contacts: Contacts, islands: Islands, rows: Rows, island: int, most: float
 ) -> float:
-    """Set rows.height to the gaps after the step that the load does not explain.
+    """Set rows.height to the part of the gaps after the step that the load does not explain.
 
-    The compression that the load explains counts up to `most` [m]. Springs whose stiffness is given
-    are as deep as they are to be. A cluster in flight is left as it is: to displace its bodies
-    would change its angular momentum. Returns the deepest [m].
+    The load explains a compression of up to `most` [m]. Springs of given stiffness are not
+    corrected. Neither is a cluster in flight, because displacing its bodies would change its
+    angular momentum. Returns the greatest excess penetration [m].
     """
     deepest, grounded = 0.0, False
     for q in range(islands.contact_start[island], islands.contact_start[island + 1]):
@@ -61,7 +62,7 @@ def find_deepest(
 
 @kernel
 def list_rows(rows: Rows, count: int, reach: float) -> int:
-    """List the rows that are closed, or may be once others are pushed out; returns how many."""
+    """List the rows that are closed or may close when others are corrected; return how many."""
     listed = 0
     for k in range(count):
         if rows.height[k] <= reach:
@@ -76,7 +77,7 @@ def list_rows(rows: Rows, count: int, reach: float) -> int:
 
 @kernel
 def part_bodies(rows: Rows, listed: int) -> None:
-    """Sweep once over the listed rows: part their bodies as far as they are to."""
+    """Sweep once over the listed rows and separate their bodies as far as is still necessary."""
     for place in range(listed):
         k = rows.visit[place]
         row, a, b = rows.row[k], rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
@@ -90,10 +91,10 @@ def part_bodies(rows: Rows, listed: int) -> None:
 def push_out(
     contacts: Contacts, islands: Islands, rows: Rows, island: int, struck: bool, p: Parameters
 ) -> None:
-    """Displace the slots of an island, at the end of its step, by what pushes out penetration.
+    """Displace the slots of an island at the end of its step to remove excess penetration.
 
-    In an island that was struck a force may be an impulse, which explains no lasting penetration
-    beyond the wanted one.
+    After an impact, a force may be an impulse, which explains no lasting penetration beyond the
+    target penetration.
     """
     count = islands.contact_start[island + 1] - islands.contact_start[island]
     n = islands.block_start[island + 1] - islands.block_start[island]

@@ -1,4 +1,7 @@
-"""Post-correction of rotation: where the corners and edges of a body are (equation 1)."""
+"""Post-correction of rotation: positions of corners and edges from the exact displacement.
+
+This is equation 1 of the paper.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,9 @@ from rigdda.kernel import inlined, kernel
 def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
     """Set the corners and edge normals of body i and of its parts from its centroid and angle.
 
-    The exact displacement function (equation 1), which replaces the linear one of the solve: the
-    post-correction. Corners come from the angle and body coordinates, so area is kept exactly.
+    This is the exact displacement function (equation 1), the post-correction of the linear one in
+    the solve. The corners follow from the angle and the body coordinates, so the area is conserved
+    exactly.
     """
     body = bodies[i]
     cos, sin = math.cos(body.theta), math.sin(body.theta)
@@ -32,9 +36,9 @@ def place_corners(bodies: Bodies, outlines: Outlines, i: int) -> None:
 
 @kernel
 def set_body_coordinates(bodies: Bodies, outlines: Outlines, i: int) -> None:
-    """Set the normals of body i in body coordinates from its corners there, then all that is now.
+    """Set the edge normals of body i in body coordinates from its corners, then its current state.
 
-    And the circle in each of its polygons, which goes with it.
+    The radius of the inscribed circle of each polygon is set as well.
     """
     body = bodies[i]
     for place in range(polygons(body)):
@@ -50,7 +54,7 @@ def set_body_coordinates(bodies: Bodies, outlines: Outlines, i: int) -> None:
 
 @kernel
 def polygons(body: Body) -> int:
-    """Return how many polygons a body has: its outline, then its parts if it has several."""
+    """Return the number of polygons of a body: its outline, and its parts if it has several."""
     return 1 + body.parts if body.parts > 1 else 1
 
 
@@ -62,14 +66,14 @@ def polygon_row(body: Body, i: int, place: int) -> int:
 
 @kernel
 def normal_of(ex: float, ey: float) -> tuple[float, float]:
-    """Return the outward unit normal of an edge, of outlines that run anticlockwise."""
+    """Return the outward unit normal of an edge of an anticlockwise outline."""
     length = math.sqrt(ex * ex + ey * ey)
     return ey / length, -ex / length
 
 
 @inlined
 def set_extent(outlines: Outlines, row: int) -> None:
-    """Set the middle and the extent of a polygon from its corners."""
+    """Set the mean corner and the extent of a polygon from its corners."""
     polygon, n, sum_x, sum_y = outlines.polygon[row], outlines.polygon[row].count, 0.0, 0.0
     low_x = low_y = math.inf
     high_x = high_y = -math.inf
@@ -85,16 +89,16 @@ def set_extent(outlines: Outlines, row: int) -> None:
 
 @kernel
 def set_inside(outlines: Outlines, row: int) -> None:
-    """Set the radius of the circle in a polygon."""
+    """Set the radius of the circle about the mean corner that touches the nearest edge."""
     inside = math.inf
     for k in range(outlines.polygon[row].count):
         inside = min(inside, -over_edge(outlines, row, k, row))
-    outlines.polygon[row].inside = (1.0 - 1e-9) * inside  # rounding leaves out no face of contact
+    outlines.polygon[row].inside = (1.0 - 1e-9) * inside  # rounding must not exclude a face
 
 
 @kernel
 def place_edges(outlines: Outlines, row: int) -> None:
-    """Set all that depends on the corners of a polygon that has changed its shape."""
+    """Set all properties that depend on the corners of a polygon whose shape has changed."""
     n = outlines.polygon[row].count
     for k in range(n):
         own, end = outlines.corner[row, k], outlines.corner[row, following(k, n)]
@@ -109,8 +113,8 @@ def move_corners(
 ) -> None:
     """Move the corners of body i by the linear displacement function (equation 2) alone.
 
-    What the post-correction replaces: body i expands as it turns. `before` is where the body was:
-    angle, x and y.
+    This is the alternative to post-correction: body i expands as it rotates. `before` holds the
+    previous angle, x and y of the body.
     """
     body = bodies[i]
     u, v, r = body.x - before[1], body.y - before[2], body.theta - before[0]

@@ -1,4 +1,4 @@
-"""What can be read of a simulation: contacts, forces of supports, energies, what it took."""
+"""Readings of a simulation: contacts, support forces, energies and diagnostics."""
 
 from __future__ import annotations
 
@@ -48,21 +48,21 @@ CONTACT_TABLE = np.dtype(
         ("penetration", "f8"),
     ]
 )
-"""One contact. block_b: -1 terrain, N + i barrier i; block_a may be one, a gravity wall. The
-normal points from b to a; shear is positive along the normal turned by +90 degrees. Forces act on a
-[N]; penetration [m]."""
+"""Fields of a contact. block_b is -1 for the terrain and N + i for barrier i; block_a may be N + i
+for a gravity wall. The normal points from b to a; shear is positive along the normal turned by +90
+degrees. Forces act on a [N]; penetration is in m."""
 
 STATES = np.array(["open", "stick", "slip"])
 
 
 class Energy(NamedTuple):
-    """Energies of all blocks and gravity walls now, and work done on them so far [J].
+    """Current energies of all blocks and gravity walls, and the work done on them so far [J].
 
-    `elastic` is stored in bolts and plain contacts. `friction`, `damping` and `impact` are what
-    shear forces, damping and the normal forces of contacts did, less what springs store: negative
-    where they took energy. The kinetic energy of a block that leaves the site counts as taken by
-    impact. `external` is the work of loads and of the motion of the ground.
-    kinetic + potential + elastic grows by the sum of the four.
+    `elastic` is the energy stored in bolts and plain contacts. `friction`, `damping` and `impact`
+    are the work of shear forces, of damping, and of the normal forces of contacts less the stored
+    energy; they are negative where they dissipate energy. The kinetic energy of a block that leaves
+    the site counts as lost in `impact`. `external` is the work of loads and of the ground motion.
+    The change of kinetic + potential + elastic equals the sum of these four.
     """
 
     kinetic: float
@@ -75,13 +75,13 @@ class Energy(NamedTuple):
 
 
 class Diagnostics(NamedTuple):
-    """What the computation took so far.
+    """Cost and accuracy of the computation so far.
 
-    `penetration` is the greatest depth of a vertex inside another polygon or the terrain [m];
-    `relaxed` counts islands whose contact forces were relaxed, since they move or their open-close
-    iteration did not settle. `compression` is how far contacts at rest give way now: their median,
-    of plain ones the greatest, over the mean block size [-].
-    `seconds` is the processor time of all steps so far [s].
+    `penetration` is the greatest depth of a vertex inside another polygon or the terrain [m].
+    `relaxed` counts islands whose contact forces were found by relaxation, because they move or
+    because open-close iteration did not converge. `compression` is the current compression of
+    contacts at rest over the mean block size: the median, or if larger the greatest of plain
+    contacts [-]. `seconds` is the processor time of all steps so far [s].
     """
 
     steps: int
@@ -97,7 +97,7 @@ class Diagnostics(NamedTuple):
 
 
 def contact_table(scene: Scene, c: Contacts) -> NDArray[np.void]:
-    """Return contacts of a step as a structured array, see `CONTACT_TABLE`."""
+    """Return the contacts of a step as a structured array, see `CONTACT_TABLE`."""
     c = c[(c["kind"] != BOLT) & (c["kind"] != PIN)]
     out = np.zeros(len(c), dtype=CONTACT_TABLE)
     blocks = len(scene.blocks)
@@ -126,7 +126,7 @@ def support_forces(arrays: Arrays, c: Contacts) -> Floats:
 def bolt_forces(arrays: Arrays) -> Floats:
     """Return the force of each bolt on its first block, (S, 2) [N], in the order of the links.
 
-    0 for pins.
+    The force is 0 for pins.
     """
     out = np.zeros((len(arrays.links), 2))
     pull_of_bolts(arrays.bodies, arrays.links, out)
@@ -134,7 +134,7 @@ def bolt_forces(arrays: Arrays) -> Floats:
 
 
 def elastic_energy(arrays: Arrays, c: Contacts) -> float:
-    """Return the energy stored in bolts and plain contacts now [J]."""
+    """Return the energy currently stored in bolts and plain contacts [J]."""
     links = arrays.links
     if len(links) + len(c) == 0:
         return 0.0
@@ -146,7 +146,7 @@ def elastic_energy(arrays: Arrays, c: Contacts) -> float:
 
 
 def energies(scene: Scene, arrays: Arrays, c: Contacts, ledger: Floats, before: float) -> Energy:
-    """Return the energies of what is free to move now and the work done on it so far.
+    """Return the current energies of all free bodies and the work done on them so far.
 
     `before` is the elastic energy at the start [J].
     """
@@ -172,7 +172,7 @@ def energies(scene: Scene, arrays: Arrays, c: Contacts, ledger: Floats, before: 
 def diagnosed(
     arrays: Arrays, c: Contacts, count: Ints, deepest: float, seconds: float
 ) -> Diagnostics:
-    """Return what a computation took so far: its counters, and the time of its steps [s]."""
+    """Return the diagnostics of a computation from its counters and its processor time [s]."""
     return Diagnostics(
         int(count[STEPS]),
         int(count[ITERATIONS]),
@@ -188,10 +188,10 @@ def diagnosed(
 
 
 def compression(arrays: Arrays, c: Contacts) -> float:
-    """Return how far contacts at rest give way now, over the mean block size [-].
+    """Return the current compression of contacts at rest over the mean block size [-].
 
-    The median, since a blow loads one or another for a step; the greatest of plain contacts,
-    all of one stiffness.
+    The median is used, because an impact may load single contacts for one step; of plain contacts,
+    which all have the same stiffness, the greatest is used.
     """
     b = arrays.bodies
     quiet = np.hypot(b["vx"], b["vy"]) + np.abs(b["omega"]) * b["radius"] < SLEEP_SPEED
@@ -204,7 +204,7 @@ def compression(arrays: Arrays, c: Contacts) -> float:
 
 
 def divergence(arrays: Arrays, contacts: NDArray[np.void], block: int, when: str) -> str:
-    """Return what is known of a block that moves too fast, and of the contact that did it."""
+    """Return a message about a block that moves too fast, and about its most loaded contact."""
     body = arrays.bodies[block]
     speed = ", ".join(f"{body[name]:g}" for name in ("vx", "vy", "omega"))
     told = f"{when}: block {block} moves at ({speed})"

@@ -1,32 +1,35 @@
-r"""Relaxation: the motion of an island whose contacts open, close, stick, slip and are struck.
+r"""Relaxation: motion of an island whose contacts open, close, stick, slip and undergo impacts.
 
-The step is taken in `SUBSTEPS` substeps of length h. In each, weight, loads and contacts act as
-impulses, with the geometry of its start, and the bodies then move with their new velocities,
+The step is divided into `SUBSTEPS` substeps of length h. In each, weight, loads and contacts act as
+impulses, with the geometry of the start of the substep; then the bodies move with their new
+velocities,
 
 .. math:: v \leftarrow v + \frac{1}{M} \Bigl(h F + \sum_c p_c e_c^t\Bigr), \qquad
     x \leftarrow x + h v,
 
-with F weight and loads, p_c the impulse of a contact and e_c its row (a body that no contact acts
-on moves with the mean of its velocities, as it would under a constant force). Momentum and angular
-momentum are kept whatever the impulses are.
+where F is weight and loads, p_c the impulse of a contact and e_c its row. (A body without contact
+impulses moves with the mean of its old and new velocity, as under a constant force.) Linear and
+angular momentum are conserved for any impulses.
 
-A lone body takes its step in one, or in parts that end where it is struck. As nothing is struck
-within a part, its contacts act with the geometry of the middle, which is of second order. A wheel
-of sixteen sides rolls 1e-4 too far; in ten substeps with the geometry of their start, 8e-4.
+A lone body takes a single substep, or several that end at its impacts. Because no impact occurs
+within a substep, its contacts act with the geometry of the middle of the substep, which is accurate
+to second order. A wheel of sixteen sides rolls 1e-4 too far; with ten substeps and the geometry of
+their start, 8e-4.
 
-Impulses are found by projected Gauss-Seidel sweeps, which decide the state of each contact as they
-visit it. The normal impulse does not pull. After it an open contact closes no faster than would
-just close its gap within the substep, and a closed one does not approach. The shear impulse stops
-the bodies from slipping, within the friction limit. Many short substeps of few sweeps find where a
-blow goes better than one step of many (Macklin et al. 2019, Small steps in physics simulation).
+The impulses are found by projected Gauss-Seidel sweeps, which decide the state of each contact as
+they visit it. The normal impulse cannot pull. It limits the closing velocity of an open contact to
+that which just closes its gap within the substep, and stops the approach of a closed contact. The
+shear impulse stops slip within the friction limit. Many short substeps with few sweeps resolve the
+path of an impact better than one step with many sweeps (Macklin et al. 2019, Small steps in physics
+simulation).
 
-A contact that closes faster than gravity would make it in `IMPACT_STEPS` steps is struck. Its
-substep is plastic. At the end of it, all contacts that were struck open with the velocities that
-their restitution asks for; together the two impulses of each obey the law of friction. If the blow
-would give energy, restitution is lessened.
+A contact that closes faster than gravity would accelerate it in `IMPACT_STEPS` steps undergoes an
+impact. The impact is plastic during its substep. At the end of the substep, all contacts with an
+impact open with the velocities given by their restitution; the sum of both impulses of a contact
+obeys Coulomb friction. If the impact would gain energy, restitution is reduced.
 
-Contacts close a little more than they should: sweeps end at a tolerance, and bodies turn in a
-substep. What is too deep is pushed out at the end of the step, see `recovery`.
+Contacts penetrate slightly, because sweeps end at a tolerance and bodies rotate within a substep.
+Excess penetration is removed at the end of the step, see `position_correction`.
 """
 
 from __future__ import annotations
@@ -99,7 +102,7 @@ from rigdda.kernel import arithmetic_kernel, inlined, kernel, variable
 
 @kernel
 def start_slot(body: Body, slot: Floats, scale: Floats, p: Parameters) -> None:
-    """Set a slot from its body: where it is, how it moves, and what pulls it."""
+    """Set a slot from its body: position, velocity, weight and loads."""
     root, spin = math.sqrt(body.mass), math.sqrt(body.inertia)
     scale[0], scale[1], scale[2] = 1.0 / root, 1.0 / root, 1.0 / spin
     slot[NOW], slot[NOW + 1], slot[NOW + 2] = root * body.vx, root * body.vy, spin * body.omega
@@ -116,7 +119,7 @@ def start_slot(body: Body, slot: Floats, scale: Floats, p: Parameters) -> None:
 
 @inlined
 def start_slots(bodies: Bodies, islands: Islands, rows: Rows, island: int, p: Parameters) -> None:
-    """Set the slots of an island from its bodies, and the one for what does not move."""
+    """Set the slots of an island from its bodies, and one slot for all that does not move."""
     first = islands.block_start[island]
     n = islands.block_start[island + 1] - first
     for s in range(n):
@@ -130,7 +133,7 @@ def start_slots(bodies: Bodies, islands: Islands, rows: Rows, island: int, p: Pa
 
 @kernel
 def pull(slots: Floats, n: int, h: float) -> None:
-    """Let weight, loads and damping act for a substep."""
+    """Apply weight, loads and damping for a substep."""
     for s in range(n):
         slot = slots[s]
         half = 0.5 * h * slot[DAMPING]
@@ -143,7 +146,7 @@ def pull(slots: Floats, n: int, h: float) -> None:
 
 @kernel
 def greatest_pull(rows: Rows, n: int) -> float:
-    """Return the greatest acceleration that weight and loads give a centroid [m/s2]."""
+    """Return the greatest acceleration of a centroid by weight and loads [m/s2]."""
     most = 0.0
     for s in range(n):
         x, y = rows.slot[s, PULL] * rows.scale[s, 0], rows.slot[s, PULL + 1] * rows.scale[s, 1]
@@ -153,7 +156,7 @@ def greatest_pull(rows: Rows, n: int) -> float:
 
 @kernel
 def drift_half(slots: Floats, scale: Floats, n: int, h: float) -> None:
-    """Move the bodies for half a substep h, with the velocities that they have."""
+    """Move the bodies for half a substep h with their current velocities."""
     for s in range(n):
         slot = slots[s]
         for q in range(3):
@@ -163,11 +166,11 @@ def drift_half(slots: Floats, scale: Floats, n: int, h: float) -> None:
 
 @kernel
 def drift(slots: Floats, scale: Floats, n: int, h: float, gone: float) -> float:
-    """Move the bodies for a substep, and add up the work of weight and loads.
+    """Move the bodies for a substep, and sum up the work of weight and loads.
 
-    Every impulse, of contacts too, works along the mean of the velocities before and after all of
-    them. `gone` is the share of the substep for which the bodies have moved already. Returns the
-    work of damping [J].
+    Every impulse, including those of contacts, does work along the mean of the velocities before
+    and after the substep. `gone` is the fraction of the substep for which the bodies have already
+    moved. Returns the work of damping [J].
     """
     lost = 0.0
     for s in range(n):
@@ -185,11 +188,11 @@ def drift(slots: Floats, scale: Floats, n: int, h: float, gone: float) -> float:
 
 @arithmetic_kernel
 def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float, left: float) -> None:
-    """Set what a visit needs of a row in a substep h.
+    """Set the quantities that a visit of a row needs in a substep h.
 
-    An open contact may close by its gap in the time that is `left` [s], less what it opens by
-    itself as the bodies turn. A spring acts with its force in the middle of the substep, so that it
-    keeps energy at any step.
+    An open contact may close by its gap in the time `left` [s], corrected for the opening that
+    rotation of the bodies causes. A spring acts with its force in the middle of the substep, so
+    that it conserves energy at any step length.
     """
     flexible = rolling = cross = 0.0
     for q in range(6):
@@ -200,13 +203,14 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float, left: flo
     row[COHESION], row[TENSION] = h * fact[STRENGTH], h * fact[STRENGTH + 1]
     if row[STIFFNESS] == 0.0:
         row[KEEP] = row[KEEP_SHEAR] = 1.0
-        # nothing gives way along x between two fences, nor along y beside one
+        # a contact along which neither body can move has no flexibility: between two fences
+        # along x, or with a fence along y
         row[GAIN] = 1.0 / flexible if flexible > 0.0 else 0.0
         row[GAIN_SHEAR] = 1.0 / rolling if rolling > 0.0 else 0.0
         row[AIM], row[AIM_SHEAR] = -0.5 * h * row[BEND], 0.0
-        if fact[STRENGTH] == math.inf:  # a pin, which `mend_links` puts in its place
+        if fact[STRENGTH] == math.inf:  # a pin; `mend_links` removes its drift
             row[AIM_SHEAR] = -0.5 * h * row[BEND + 1]
-        elif row[GAP] > 0.0 and fact[STRENGTH + 1] == 0.0:  # a joint does not draw it shut
+        elif row[GAP] > 0.0 and fact[STRENGTH + 1] == 0.0:  # an open contact without a joint
             row[AIM] -= row[GAP] / left
     else:
         give = 0.25 * row[STIFFNESS] * h * h
@@ -222,10 +226,10 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float, left: flo
 
 @kernel
 def start_rows(rows: Rows, count: int, number: int, h: float, left: float, ratio: float) -> None:
-    """Start a substep for all contacts that may close in it: they act as in the one before.
+    """Start a substep for all contacts that may close in it, with the impulses of the last one.
 
-    `left` is the time for which the bodies are still to move in it [s], and `ratio` its length over
-    that of the last one.
+    `left` is the time for which the bodies still have to move in the substep [s], and `ratio` its
+    length over that of the last one, which scales the warm start.
     """
     for place in range(count):
         k = np.uintp(place)
@@ -244,12 +248,12 @@ def start_rows(rows: Rows, count: int, number: int, h: float, left: float, ratio
 
 @kernel
 def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
-    """Write the contacts that the next sweep is to visit into rows.visit; returns how many.
+    """Write the contacts that the next sweep visits into rows.visit; return their number.
 
-    Not those that cannot close before substep idle[k]; nor, after the first sweep of a substep,
-    where neither body has moved in the last one: moved_in[s] is the number of the last sweep of the
-    substep in which slot s did. Every contact is written, and the next one over it if it is not to
-    be visited: branches that go either way would cost more than the visits.
+    Contacts that cannot close before substep idle[k] are skipped. After the first sweep of a
+    substep, so are contacts of which neither body moved in the last sweep; moved_in[s] is the last
+    sweep of the substep in which slot s moved. Every contact is written, and overwritten by the
+    next one if it is to be skipped, because unpredictable branches would cost more than the visits.
     """
     visits = 0
     for place in range(count):
@@ -265,15 +269,15 @@ def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
 def sweep(
     rows: Rows, still: int, visits: int, tries: int, number: int, reach: float, quiet: float
 ) -> float:
-    """Visit the contacts listed once, from the lowest up, or down.
+    """Visit the listed contacts once, alternately from the lowest up and from the highest down.
 
-    Returns the greatest change of a normal velocity [m/s]; shear does not count. One that is open
-    is not visited for as long as it cannot close, at the speed at which it moves now and `reach`
-    [m/s] besides. A slot has moved if its velocity changed by more than `quiet` [m/s]; slot `still`
-    never does.
+    Returns the greatest change of a normal velocity [m/s]; changes of shear velocities do not
+    count. An open contact is not visited again until it could close at its current speed plus
+    `reach` [m/s]. A slot has moved if its velocity changed by more than `quiet` [m/s]; slot `still`
+    never moves.
 
-    A visit reads the bodies once: what the normal impulse changes along the shear direction is
-    added to what was read. Unsigned indices spare numba's test for negative ones.
+    A visit reads the bodies once and corrects the slip velocity for the change of the normal
+    impulse. Unsigned indices avoid numba's handling of negative ones.
     """
     worst = 0.0
     for q in range(visits):
@@ -311,7 +315,7 @@ def sweep(
 
 @arithmetic_kernel
 def count_row(row: Floats, fact: Floats, a: Floats, b: Floats, normal: float, shear: float) -> None:
-    """Add impulses of a contact to its sums, and their work."""
+    """Add impulses of a contact to its sums, together with their work."""
     fact[SUM] += normal
     fact[SUM + 1] += shear
     own = along = other = across = 0.0
@@ -328,14 +332,14 @@ def count_row(row: Floats, fact: Floats, a: Floats, b: Floats, normal: float, sh
 
 @kernel
 def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple[bool, bool]:
-    """End a substep for its contacts: count their impulses, and note which were struck.
+    """End a substep for its contacts: sum up their impulses and detect impacts.
 
-    A contact was if it closed faster than `least` [m/s] when the substep began.
+    An impact is a contact that closed faster than `least` [m/s] at the start of the substep.
 
     Returns
     -------
     struck, bouncing : bool
-        Whether a contact was struck, and whether one is to open again.
+        Whether there was an impact, and whether any contact has to open again.
     """
     struck, bouncing = False, False
     for place in range(count):
@@ -348,7 +352,7 @@ def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple
         count_row(row, fact, a, b, normal, shear)
         if row[STIFFNESS] > 0.0:
             continue
-        # between two bodies, or at a blow, impulses act at the start of the substep
+        # at an impact or between two bodies, impulses act at the start of the substep
         sudden = normal > 0.0 and -along_six(row[NORMAL : NORMAL + 6], a, b, BEFORE) > least
         if sudden or rows.row_j[k] < n:
             a[HELD] = b[HELD] = 1.0
@@ -362,10 +366,10 @@ def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple
 
 @kernel
 def work_from(rows: Rows, count: int, number: int, first: int) -> float:
-    """Return the work of contacts that are no springs, on velocities that change at once [J].
+    """Return the work of contacts other than springs on instantaneous velocity changes [J].
 
-    `first` is the column of the slots with the velocities before. What is to open again counts with
-    its impulse since LOAD.
+    `first` is the column of the slots with the velocities before. A contact that has to open again
+    counts with its impulse since LOAD.
     """
     work = 0.0
     for k in range(count):
@@ -386,9 +390,10 @@ def work_from(rows: Rows, count: int, number: int, first: int) -> float:
 
 @kernel
 def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> None:
-    """Set an island to the end of a substep, before contacts open with a share of restitution.
+    """Prepare an island for the rebound at the end of a substep with a fraction of restitution.
 
-    What was struck goes on with its impulses, so that friction is limited by the whole blow.
+    Contacts with an impact keep their impulses, so that friction is limited by the total impulse of
+    the impact.
     """
     for s in range(n):
         for q in range(3):
@@ -399,7 +404,7 @@ def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> No
             continue
         if fact[BOUNCE] > 0.0:
             row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
-            row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # it does not pull
+            row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # in sum no tension
         else:
             row[IMPULSE] = row[IMPULSE + 1] = 0.0
 
@@ -408,14 +413,14 @@ def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> No
 def rebound(
     rows: Rows, n: int, count: int, number: int, h: float, reach: float, tolerance: float
 ) -> int:
-    """Let all contacts that were struck in a substep open again, at its end; returns the sweeps.
+    """Open all contacts with an impact at the end of the substep; return the number of sweeps.
 
     `h` is the least length of the next substep [s], within which open contacts may close.
 
-    Restitution with friction can raise the kinetic energy of an eccentric impact. A plastic impact,
-    which has worked `lost` < 0 [J], cannot. Energy is quadratic in the velocities, so the gain is
-    convex in the share of restitution. Where the chord from plastic to full restitution is zero,
-    the gain is zero at most.
+    Restitution with friction can increase the kinetic energy in an eccentric impact. A plastic
+    impact, which did the work `lost` < 0 [J], cannot. Energy is quadratic in the velocities, so the
+    gain is a convex function of the fraction of restitution. At the fraction where the chord from
+    plastic to full restitution is zero, the gain is therefore not positive.
     """
     lost = work_from(rows, count, number, FREE)
     for s in range(n):
@@ -428,7 +433,7 @@ def rebound(
             place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
             aim_row(row, fact, a, b, h, h)
             fact[LOAD], fact[LOAD + 1] = row[IMPULSE], row[IMPULSE + 1]
-            if row[STIFFNESS] > 0.0:  # a spring keeps its impulse meanwhile
+            if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
                 row[KEEP] = row[KEEP_SHEAR] = 1.0
                 row[GAIN] = row[GAIN_SHEAR] = row[CROSS] = 0.0
     sweeps, share = 0, 1.0
@@ -456,7 +461,7 @@ def rebound(
 
 @kernel
 def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float) -> int:
-    """Sweep until no normal velocity changes by more than a tolerance; returns how often."""
+    """Sweep until no normal velocity changes by more than a tolerance; return the sweeps."""
     for s in range(n + 1):
         rows.moved_in[s] = -1
     for tries in range(MOST_SWEEPS):
@@ -469,7 +474,7 @@ def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance:
 
 @kernel
 def hold_fences(slots: Floats, scale: Floats, n: int) -> float:
-    """Hold the fences of an island for a substep; returns the energy that they had [J]."""
+    """Hold the fences of an island for a substep; return the kinetic energy that they had [J]."""
     energy = 0.0
     for s in range(n):
         slot = slots[s]
@@ -481,7 +486,7 @@ def hold_fences(slots: Floats, scale: Floats, n: int) -> float:
 
 @kernel
 def push_downhill(rows: Rows, k: int, s: int) -> float:
-    """Return the impulse downhill of row k on slot s, a fence that is held [N s]."""
+    """Return the downhill impulse of row k on slot s, a held fence [N s]."""
     i, j = rows.row_i[k], rows.row_j[k]
     other, first = (j, 3) if i == s else (i, 0)
     scale = rows.scale[other, 0]
@@ -490,10 +495,11 @@ def push_downhill(rows: Rows, k: int, s: int) -> float:
 
 @kernel
 def rest_on(rows: Rows, count: int, number: int, s: int, share: float) -> None:
-    """Let what pushes a held fence downhill do so with a share of its impulse, all else not at all.
+    """Reduce the impulses on a held fence before it is released.
 
-    What pushes a body at rest is far more than what a light one that moves can pass on, and sweeps
-    that start from it may end with a gain of energy.
+    Downhill normal impulses keep the fraction `share`, all others are set to zero. The impulses on
+    a fence at rest are much greater than those that a light moving fence can transmit, and sweeps
+    that start from them may gain energy.
     """
     for k in range(count):
         i, j = rows.row_i[k], rows.row_j[k]
@@ -511,11 +517,11 @@ def rest_on(rows: Rows, count: int, number: int, s: int, share: float) -> None:
 def release_fences(
     rows: Rows, n: int, count: int, number: int, h: float, ledger: NDArray
 ) -> bool:  # fmt: skip
-    """Let the fences give way on which contacts push harder than their brakes; whether one does.
+    """Release fences that contacts push harder than their brakes; return whether any was released.
 
-    Held, a fence has stopped with what it brought from the substep before. Released, its brake acts
-    with its force, and its contacts are to be settled anew. A brake whose elongation is spent does
-    not act.
+    While it is held, a fence has lost its velocity of the last substep. When it is released, its
+    brake acts with its braking force, and the contacts must be solved again. The brake of a fence
+    whose elongation is used up does not act.
     """
     released = False
     for s in range(n):
@@ -549,7 +555,7 @@ def release_fences(
 
 @kernel
 def end_fences(slots: Floats, scale: Floats, n: int, ledger: NDArray) -> None:
-    """Account for the work of the brakes of fences that have given way; none goes uphill."""
+    """Account for the work of the brakes of yielding fences; stop those that would move uphill."""
     for s in range(n):
         slot = slots[s]
         if slot[BRAKE] > 0.0 and scale[s, 0] == 0.0:
@@ -563,7 +569,7 @@ def end_fences(slots: Floats, scale: Floats, n: int, ledger: NDArray) -> None:
 
 @kernel
 def stop_uphill(slots: Floats, n: int) -> float:
-    """Stop the fences that a rebound has sent uphill; returns the energy that they had [J]."""
+    """Stop the fences that a rebound moves uphill; return the kinetic energy that they had [J]."""
     energy = 0.0
     for s in range(n):
         slot = slots[s]
@@ -575,7 +581,7 @@ def stop_uphill(slots: Floats, n: int) -> float:
 
 @kernel
 def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
-    """Return in what time, at most `most`, a contact closes faster than `least` [m/s]."""
+    """Return the time, at most `most`, until a contact closes faster than `least` [m/s]."""
     for k in range(count):
         i, j = rows.row_i[k], rows.row_j[k]
         row, a, b = rows.row[k], rows.slot[i], rows.slot[j]
@@ -591,10 +597,11 @@ def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
 
 @kernel
 def part_of_step(rows: Rows, count: int, left: float, least: float, shortest: float) -> float:
-    """Return how long the next substep of a lone body is, with a time `left` of the step [s].
+    """Return the length of the next substep of a lone body, with a time `left` in the step [s].
 
-    It ends just before a contact closes faster than `least` [m/s]; one that begins there is as
-    short as substeps may be, so that all contacts that close at about that time are struck at once.
+    The substep ends just before a contact closes faster than `least` [m/s]. A substep that begins
+    there has the shortest permitted length, so that contacts that close at nearly the same time
+    undergo the impact together.
     """
     time = time_to_blow(rows, count, left + 0.5 * shortest, least) - 0.5 * shortest
     return min(left, max(time, shortest))
@@ -604,10 +611,11 @@ def part_of_step(rows: Rows, count: int, left: float, least: float, shortest: fl
 def relax(
     rows: Rows, n: int, count: int, speed: float, p: Parameters, ledger: NDArray
 ) -> tuple[int, bool, bool]:
-    """Move the slots of an island through the step, with the impulses of its contacts.
+    """Move the slots of an island through the step by the impulses of its contacts.
 
-    A lone body takes no substeps but those that end where it is struck, and its contacts act where
-    it is in the middle of each: of second order, as nothing is struck on the way.
+    A lone body takes only the substeps that end at its impacts. Its contacts act at the position in
+    the middle of each substep, which is accurate to second order because no impact occurs within
+    it.
 
     Parameters
     ----------
@@ -621,9 +629,9 @@ def relax(
     sweeps : int
         Number of sweeps.
     struck : bool
-        Whether a contact was struck.
+        Whether any contact had an impact.
     settled : bool
-        Whether the sweeps of the last substep came to their tolerance.
+        Whether the sweeps of the last substep converged to the tolerance.
     """
     alone, fenced, shortest = n == 1, False, AT_ONCE * p.dt
     usual, reach = p.dt / SUBSTEPS, speed + greatest_pull(rows, n) * p.dt
@@ -660,7 +668,7 @@ def relax(
             ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1
-    for place in range(count):  # a force again, but for that of a blow in a short substep
+    for place in range(count):  # to forces; none after an impact in a short substep
         lasts = 0.0 if rows.fact[place, STRUCK] > 0.0 and last < 0.5 * usual else 1.0 / last
         rows.row[place, IMPULSE] *= lasts
         rows.row[place, IMPULSE + 1] *= lasts

@@ -1,10 +1,11 @@
-"""Contacts of one island as rows of numbers, as relaxation and position correction read them.
+"""Contacts of one island as rows of numbers, for relaxation and position correction.
 
-A row holds a contact in two ways. Its place is kept in body coordinates: the vertex from the
-centroid of the body that owns it, a point of the face and the normal from the body of the face. Its
-directions are written anew for every substep, from where the bodies are then: e_n and e_s, the rows
-of the contact along normal and shear for its bodies a and b, each divided by the root of the
-inertia, so that an impulse p changes the scaled velocities V = sqrt(M) v by p e.
+A row describes a contact in two ways. The geometry is fixed in body coordinates: the vertex
+relative to the centroid of its owner, and a point and the normal of the face relative to the body
+of the face. The directions are recomputed in every substep from the positions of the bodies: e_n
+and e_s, the rows of the contact along the normal and shear directions for its bodies a and b, each
+divided by the square root of the inertia, so that an impulse p changes the scaled velocities V =
+sqrt(M) v by p e.
 """
 
 from __future__ import annotations
@@ -16,57 +17,55 @@ from rigdda.dynamics.constants import BOLT, PIN, PLAIN
 from rigdda.dynamics.records import Contact, Contacts, Floats
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
-# columns of rows.row, what a sweep reads. NORMAL to + 5: e_n of a and b [kg^-1/2]. IMPULSE and + 1:
-# normal and shear impulse in this substep [N s]. AIM: normal velocity to reach at least [m/s].
+# Columns of rows.row, read by a sweep. NORMAL to + 5: e_n of a and b [kg^-1/2]. IMPULSE and + 1:
+# normal and shear impulse in this substep [N s]. AIM: least normal velocity to be reached [m/s].
 NORMAL, IMPULSE, AIM = 0, 6, 8
 
-# p = KEEP p + GAIN (AIM - v), see relaxation.sweep [-], [kg]. COHESION, TENSION: shear impulse
-# and tension that the contact bears besides friction and pressure [N s].
+# p = KEEP p + GAIN (AIM - v), see relaxation.sweep [-], [kg]. COHESION, TENSION: impulses of the
+# shear strength at zero pressure and of the tensile strength [N s].
 KEEP, GAIN, COHESION, TENSION = 9, 10, 11, 12
 
-# SHEAR to + 5, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR: the same for shear. CROSS: shear impulse that a
-# change of the normal impulse takes [-]. FLEXIBLE: normal velocity per impulse [1/kg]. FRICTION:
-# tan phi. STIFFNESS of a spring [N/m], 0: it is rigid.
+# SHEAR to + 5, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR: the same for shear. CROSS: decrease of the shear
+# impulse per increase of the normal impulse [-]. FLEXIBLE: normal velocity per impulse [1/kg].
+# FRICTION: tan phi. STIFFNESS of a spring [N/m], 0 for a rigid contact.
 SHEAR, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR, CROSS, FLEXIBLE = 14, 20, 21, 22, 23, 24
 FRICTION, STIFFNESS = 25, 26
 
-# GAP now [m]; BEND: its second time derivative as the bodies turn [m/s2], and + 1 along shear.
+# GAP [m]. BEND: second time derivative of the gap due to rotation [m/s2]; + 1: along shear.
 GAP, BEND = 27, 28
 
 COLUMNS = 32
 
-# columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: place of the vertex and of the point
-# of the face, and normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR at which a spring is free
-# [m]. STRENGTH, + 1: the forces of which COHESION and TENSION are impulses [N].
+# Columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: position of the vertex and of the
+# point of the face, and the normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR: displacements at
+# which a spring is force-free [m]. STRENGTH and + 1: cohesion and tension of a contact [N].
 VERTEX, FACE, DIRECTION, FREE_GAP, FREE_SHEAR, STRENGTH = 0, 2, 4, 6, 7, 8
 
-# RESTITUTION [-]. BOUNCE: velocity with which a contact that was struck in this substep is to open
-# [m/s], 0: it was not. STRUCK: 1 if it was in this step, else 0. LOAD and + 1: impulses before a
-# rebound [N s].
+# RESTITUTION [-]. BOUNCE: opening velocity after an impact in this substep [m/s], 0 without one.
+# STRUCK: 1 after an impact in this step, else 0. LOAD and + 1: impulses before a rebound [N s].
 RESTITUTION, BOUNCE, STRUCK, LOAD = 11, 12, 13, 14
 
-# SUM and + 1: impulses since the start of the step [N s]. WORK and + 1: work of normal and shear
-# force [J]; WORK_ON_A: of both on body a.
+# SUM and + 1: sum of impulses since the start of the step [N s]. WORK and + 1: work of the normal
+# and the shear force [J]. WORK_ON_A: work of both on body a [J].
 SUM, WORK, WORK_ON_A = 16, 18, 20
 
 FACTS = 21
 
-# columns of rows.slot, one slot a body. NOW, FREE, BEFORE: scaled velocities now, those that the
-# body would have in this substep without contacts, and in the substep before [kg^1/2 m/s]. X, Y:
-# centroid [m]; TURN since the start of the step [rad], with its COS and SIN. PULL: scaled
-# acceleration of weight and loads. DAMPING [1/s]. FIELD: work of weight and loads since the start
-# of the step [J]. HELD: 1 if it was struck or touches another body in this substep, else 0.
+# Columns of rows.slot, one slot per body. NOW, FREE, BEFORE: scaled velocities at the end of this
+# substep, the same without contacts, and in the substep before [kg^1/2 m/s]. X, Y: centroid [m].
+# TURN: rotation since the start of the step [rad], with its COS and SIN. PULL: scaled acceleration
+# by weight and loads. DAMPING [1/s]. FIELD: work of weight and loads since the start of the step
+# [J]. HELD: 1 if it has an impact or touches another body in this substep, else 0.
 NOW, FREE, BEFORE, X, Y, TURN, COS, SIN = 0, 3, 6, 9, 10, 11, 12, 13
 PULL, DAMPING, FIELD, HELD = 14, 17, 18, 19
 
-# BRAKE: force against which a fence gives way [N], 0: no fence. MOVES: its 1 / sqrt(M) along x,
-# which counts while it does. LEFT: elongation that is left at the start of the step, START: x then
-# [m].
+# BRAKE: force at which a fence yields [N], 0 for other bodies. MOVES: 1 / sqrt(M) of a fence along
+# x, used while it yields. LEFT, START: remaining elongation and x at the start of the step [m].
 BRAKE, MOVES, LEFT, START = 20, 21, 22, 23
 
 SLOT_COLUMNS = 24
 
-# rows.form: which body owns the vertex, or that it is a bolt
+# rows.form: the vertex belongs to a, to b, or the contact is a bolt between two points
 OF_A, OF_B, BETWEEN = 0, 1, 2
 
 
@@ -79,7 +78,7 @@ def along_six(e: Floats, a: Floats, b: Floats, first: int) -> float:
 
 @arithmetic_kernel
 def push(row: Floats, first: int, a: Floats, b: Floats, column: int, impulse: float) -> None:
-    """Change three columns of two slots by what an impulse along a row changes them."""
+    """Add an impulse along a row to three columns of the slots of both bodies."""
     for q in range(3):
         a[column + q] += impulse * row[first + q]
         b[column + q] += impulse * row[first + 3 + q]
@@ -87,7 +86,7 @@ def push(row: Floats, first: int, a: Floats, b: Floats, column: int, impulse: fl
 
 @kernel
 def is_elastic(c: Contact) -> bool:
-    """Return whether a contact is a spring whose stiffness is given, or a support."""
+    """Return whether a contact is a spring of given stiffness or a support."""
     return c.kind == PLAIN or c.kind == BOLT or c.kind == PIN
 
 
@@ -125,9 +124,9 @@ def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, still: int) -
 def place_row(
     row: Floats, fact: Floats, form: int, a: Floats, b: Floats, one: Floats, two: Floats
 ) -> None:
-    """Set the gap and the directions of a row from where its bodies a and b are now.
+    """Set the gap and the directions of a row from the current positions of its bodies a and b.
 
-    `one` and `two` are the columns of `rows.scale`: the inverse roots of their inertia.
+    `one` and `two` are their entries of `rows.scale`: inverse square roots of the inertia.
     """
     co, so, cf, sf = a[COS], a[SIN], b[COS], b[SIN]
     xo, yo, xf, yf, side = a[X], a[Y], b[X], b[Y], 1.0
@@ -152,7 +151,8 @@ def place_row(
     row[SHEAR + 2] = (ax * nx + ay * ny) * one[2]
     row[SHEAR + 3], row[SHEAR + 4] = ny * two[0], -nx * two[1]
     row[SHEAR + 5] = -(bx * nx + by * ny) * two[2]
-    # velocity of the vertex from the centroid of the face, and how the gap bends as bodies turn
+    # velocity of the vertex relative to the centroid of the face, and the second time derivative
+    # of the gap due to rotation
     spin, turn = a[BEFORE + 2] * one[2], b[BEFORE + 2] * two[2]
     rx, ry, fx, fy = ax, ay, bx, by
     if form == OF_B:
@@ -166,10 +166,11 @@ def place_row(
 
 @kernel
 def sort_by_height(contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int) -> None:
-    """Set the rows of the contacts low:high by height, lowest first: a sweep carries loads through.
+    """Assign the rows of the contacts low:high by height, lowest first.
 
-    A counting sort in as many layers as there are contacts; within one the order does not matter.
-    Contacts stay in order: to read them one after the other is what takes long in a large island.
+    In this order a sweep carries loads through a pile. The counting sort has as many layers as
+    there are contacts; the order within a layer does not matter. The contacts themselves stay in
+    order, because reading them consecutively dominates the time in a large island.
     """
     place, height, layer = rows.place, rows.height, rows.layer
     layers = high - low
@@ -193,7 +194,7 @@ def sort_by_height(contacts: Contacts, islands: Islands, rows: Rows, low: int, h
 
 @inlined
 def pack_rows(contacts: Contacts, islands: Islands, rows: Rows, island: int) -> int:
-    """Write the contacts of an island as rows, lowest first; returns how many."""
+    """Write the contacts of an island as rows, lowest first; return their number."""
     low, high = islands.contact_start[island], islands.contact_start[island + 1]
     still = islands.block_start[island + 1] - islands.block_start[island]
     sort_by_height(contacts, islands, rows, low, high)

@@ -38,36 +38,37 @@ EVENT = np.dtype(
         ("energy", "f8"),
     ]
 )
-"""One event. block: N + i for barrier i, a gravity wall that hits or breaks another one. target:
-index of the barrier or station. x, y: contact point of a hit or a failure, centroid at a crossing
-[m]. height: of that point above the highest ground there, above 0 where there is none [m]. speed:
-of the centroid [m/s]. energy: translational and rotational, just before a hit or a failure [J]."""
+"""Fields of an event. block: N + i for barrier i, a gravity wall that hits or breaks another
+barrier. target: index of the barrier or station. x, y: contact point of a hit or failure, centroid
+at a crossing [m]. height: of that point above the highest ground there, or above 0 where there is
+no ground [m]. speed: of the centroid [m/s]. energy: translational and rotational, just before a hit
+or failure [J]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """What a simulation recorded: N blocks, T frames, B barriers.
+    """Record of a simulation with N blocks, T frames and B barriers.
 
     Parameters
     ----------
     scene : Scene
-        What was simulated.
+        The simulated scene.
     times : (T,) array
         Times of the frames [s].
     poses, velocities : (T, N, 3) array
         x, y, theta of the centroids [m, m, rad] and their rates [m/s, m/s, rad/s].
     events : (E,) structured array
-        Hits and crossings in order of time, see `EVENT`.
+        Hits, crossings and failures in order of time, see `EVENT`.
     absorbed : (B,) array
-        Energy that each barrier took from the blocks [J], as `BarrierOutcome` says.
+        Energy that each barrier absorbed from the blocks [J], see `BarrierOutcome`.
     thrust : (B,) array
-        Greatest mean over a second of the thrust on each barrier [N], as `BarrierOutcome` says.
+        Greatest thrust on each barrier, averaged over a second [N], see `BarrierOutcome`.
     watch_energy : (N,) array
         Largest kinetic energy of each block while its centroid was in the watched interval [J].
     extent : (N, 2) array
-        Least and greatest chainage that the circle about each block came to [m].
+        Least and greatest chainage reached by the circumscribed circle of each block [m].
     barrier_poses : (T, B, 3) array
-        x, y, theta of the centroid of each barrier's outline at the start: gravity walls and fences
+        x, y, theta of the centroid of each barrier's initial outline; gravity walls and fences
         move.
     """
 
@@ -83,7 +84,7 @@ class Run:
     barrier_poses: NDArray[np.float64]
 
     def _check(self) -> None:
-        """Check that every array is of its shape and finite, and that times rise."""
+        """Check that every array has its shape and is finite, and that times increase."""
         t, n, b = self.times.size, len(self.scene.blocks), len(self.scene.barriers)
         shapes = {
             "times": (t,),
@@ -111,15 +112,16 @@ class Run:
         return self._of(HIT, barrier)
 
     def failure(self, barrier: int) -> float:
-        """Return the time at which `barrier` failed, inf if it did not [s]."""
+        """Return the time at which `barrier` failed [s], inf if it did not fail."""
         failed = self._of(FAILED, barrier)
         return float(failed["time"][0]) if len(failed) else np.inf
 
     def states(self, barrier: int) -> list[tuple[float, str]]:
-        """Return the states of a barrier, each with the time from which it is in it [s].
+        """Return the successive states of a barrier, each with the time at which it begins [s].
 
-        The first is "stands"; then a fence "failed", an embankment was "pushed", a gravity wall
-        "slid" or is "overturned", by the frames of the run.
+        The first state is "stands". Later ones are "failed" for a fence, "pushed" for an
+        embankment, and "slid" or "overturned" for a gravity wall, determined from the frames of the
+        run.
         """
         changes = self.scene.barriers[barrier].changes
         poses = self.barrier_poses[:, barrier]
@@ -127,10 +129,10 @@ class Run:
         return [start, *changes(self.times, poses, self.failure(barrier))]
 
     def passed(self, x: float) -> NDArray[np.bool_]:
-        """Return whether each block's centroid was ever at or past a chainage [m], (T, N).
+        """Return whether each block's centroid has reached a chainage [m] by each frame, (T, N).
 
-        Crossings count where they happened, so that a block which came back between two frames is
-        not missed.
+        Recorded crossings count as well, so that a block that returned between two frames is not
+        missed.
         """
         seen = self.poses[:, :, 0] >= x
         for event in self.events[(self.events["kind"] == CROSSING) & (self.events["x"] >= x)]:
@@ -160,7 +162,7 @@ class Run:
 
     @property
     def ground(self) -> Terrain | None:
-        """The ground at the end: without the embankments that were pushed away."""
+        """The ground at the end, without the embankments that were pushed away."""
         failed = self.events["target"][self.events["kind"] == FAILED]
         return self.scene.ground_without(failed)
 
@@ -172,7 +174,7 @@ class Run:
         return self.events[(self.events["kind"] == kind) & (self.events["target"] == target)]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the run as .npz; `load` gives back exactly the same numbers."""
+        """Write the run as .npz; `load` restores exactly the same numbers."""
         with atomic(path) as part, part.open("wb") as file:
             np.savez_compressed(
                 file,
@@ -190,7 +192,7 @@ class Run:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Run:
-        """Read a run that `save` wrote.
+        """Read a run written by `save`.
 
         Raises
         ------
@@ -214,14 +216,14 @@ class Run:
         return run
 
     def to_rerun(self, path: str | os.PathLike[str], marks: Marks | None = None) -> None:
-        """Write the run as a rerun recording (.rrd): geometry once, poses and scalars by column.
+        """Write the run as a Rerun recording (.rrd): static geometry, time series of poses.
 
         Parameters
         ----------
         path : path
             The .rrd file.
         marks : Marks, optional
-            What the scene does not know: the road and words about the episode.
+            Information that the scene lacks: the road and a description of the episode.
         """
         from rigdda.replay.recording import write_rerun
 

@@ -1,4 +1,4 @@
-"""The acceleration that gravity and the motion of the ground give free blocks."""
+"""Acceleration of free blocks by gravity and ground motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rigdda.kernel import kernel
 
 @kernel
 def velocity(shaking: Shaking, time: float) -> tuple[float, float]:
-    """Return the velocity of the ground at a time: the integrals of its acceleration [m/s]."""
+    """Return the velocity of the ground at a time, the integral of its acceleration [m/s]."""
     if time <= shaking[0].time:
         return 0.0, 0.0
     low, high = 0, len(shaking)  # the last corner at or before `time`

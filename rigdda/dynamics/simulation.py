@@ -1,4 +1,4 @@
-"""A scene in motion: the simulation of one scene, and of many at once."""
+"""Simulation of one scene, and of many scenes in parallel."""
 
 from __future__ import annotations
 
@@ -33,38 +33,38 @@ from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
 
 MOST_STEPS, PIECE = 1e9, 10_000
-"""Most steps of a run, a day or more of computing for a single block, and most of them between
-which nothing interrupts it."""
+"""Maximum number of steps of a run, which take a day or more for a single block, and maximum number
+of steps between which a run cannot be interrupted."""
 
 SOFT = 5e-3
-"""Compression of a contact at rest over block size, above which a run warns [-]. A stack of 20
-buckles there: at 1.96/n^2 of the size of its blocks."""
+"""Compression of a contact at rest over block size above which a run warns [-]. A stack of n blocks
+buckles at a compression of 1.96/n^2 of the block size: at this value, with 20 blocks."""
 
 
 class Simulation:
-    """A scene in motion.
+    """A scene and its state of motion.
 
     Parameters
     ----------
     scene : Scene
-        What to simulate.
+        The scene to simulate.
     settings : Settings, optional
-        How to compute it.
+        Settings of the computation.
     stations : sequence of float
         Chainages whose first crossing by each block is recorded as an event [m].
     watch : (float, float), optional
-        Interval of x in which the largest energy of each block is kept [m].
+        Interval of x in which the largest energy of each block is recorded [m].
     leave : float, optional
-        End a run as soon as nothing moves any more, or only downhill beyond this chainage [m];
-        None: it lasts as long as is asked for.
+        End a run early, as soon as every block is at rest or moves downhill beyond this chainage
+        [m]. With None, a run lasts its full duration.
     template : Template, optional
-        Arrays packed for the same stations, interval, chainage and settings, and a scene from which
-        this one differs in its rock: it is started in them.
+        Arrays packed for the same stations, interval, chainage and settings, and for a scene that
+        differs from this one only in its rock. The simulation uses these arrays.
 
     Attributes
     ----------
     loop : Loop
-        The scene in arrays, and the step loop over them.
+        The arrays of the scene and the step loop over them.
 
     Raises
     ------
@@ -106,7 +106,7 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """Simulated time [s], counted in whole steps."""
+        """Simulated time [s], a whole number of steps."""
         return self.loop.time
 
     @property
@@ -119,7 +119,7 @@ class Simulation:
     def barrier_poses(self) -> NDArray[np.float64]:
         """Copy of x, y, theta of the centroids of the barriers' outlines, (B, 3) [m, m, rad].
 
-        Gravity walls and fences move.
+        Only gravity walls and fences move.
         """
         out = self._barrier_start.copy()
         b, n = self.loop.arrays.bodies, len(self.scene.blocks)
@@ -133,7 +133,7 @@ class Simulation:
         return np.stack([b["vx"][:n], b["vy"][:n], b["omega"][:n]], axis=1)
 
     def vertices(self, block: int) -> NDArray[np.float64]:
-        """Return the corners of a block now, (n, 2) [m]."""
+        """Return the current corners of a block, (n, 2) [m]."""
         n = self.loop.arrays.bodies["count"][block]
         corner = self.loop.arrays.outlines.corner[block, :n]
         return np.stack([corner["x"], corner["y"]], axis=1)
@@ -145,19 +145,19 @@ class Simulation:
     def supports(self) -> NDArray[np.float64]:
         """Return the force of each support on its (first) block, (S, 2) [N].
 
-        Of bolts the one at the end of the last step, of pins the mean over it; if it was taken in
-        parts, over the last one.
+        For bolts it is the force at the end of the last step. For pins it is the mean over the last
+        step, or over its last substep if the step was divided.
         """
         return support_forces(self.loop.arrays, self.loop.contacts)
 
     def energy(self) -> Energy:
-        """Return the energies of what is free to move now and the work done on it so far."""
+        """Return the current energies of all free bodies and the work done on them so far."""
         before = self._elastic_at_start
         return energies(self.scene, self.loop.arrays, self.loop.contacts, self.loop.ledger, before)
 
     @property
     def diagnostics(self) -> Diagnostics:
-        """What the computation took so far."""
+        """Cost and accuracy of the computation so far."""
         deepest = float(self.loop.deepest[0])
         return diagnosed(
             self.loop.arrays, self.loop.contacts, self.loop.counters, deepest, self.loop.seconds
@@ -169,15 +169,15 @@ class Simulation:
         Raises
         ------
         BadInput
-            If `n` is no whole number from 0 to 1e9.
+            If `n` is not a whole number from 0 to 1e9.
         Diverged
-            If a block's velocity is no longer finite or beyond any rockfall.
+            If the velocity of a block is not finite or exceeds that of any rockfall.
         """
         for done in range(0, check.integer("n", n, 0, int(MOST_STEPS)), PIECE):
             self.loop.advance(min(n - done, PIECE), self._no_frames)
 
     def run(self, duration: float, every: float = 0.05, progress: bool = False) -> Run:
-        """Simulate `duration` seconds and record a frame `every` so often, the start included.
+        """Simulate `duration` seconds and record frames at regular intervals, including the start.
 
         Parameters
         ----------
@@ -189,15 +189,15 @@ class Simulation:
         Raises
         ------
         BadInput
-            If a time is not positive, or the duration of more than 1e9 steps.
+            If a time is not positive, or the duration exceeds 1e9 steps.
         Diverged
-            If the simulation diverges; its `run` keeps the frames up to then.
+            If the simulation diverges; the `run` attribute of the error holds the frames so far.
 
         Warns
         -----
         SoftContacts
-            If contacts at rest in the end are too soft for their load, by `Settings.penetration`
-            or by the one stiffness of plain contacts.
+            If contacts at rest at the end are too soft for their load, because of
+            `Settings.penetration` or of the uniform stiffness of plain contacts.
         """
         most = MOST_STEPS * self.settings.dt
         check.number("duration", duration, 0.0, most, open_low=True)
@@ -221,7 +221,7 @@ class Simulation:
                 at = [mark for mark in at if start + mark < self.loop.steps]
                 error.run = self._record(kept, start + np.array(at))
                 raise
-        # what follows from the load by default is as stiff as it should be
+        # by default the stiffness follows from the load and needs no check
         plain = bool((self.loop.contacts["kind"] == PLAIN).any())
         stated = plain or self.settings.penetration is not None
         give = compression(self.loop.arrays, self.loop.contacts) if stated else 0.0
@@ -235,7 +235,7 @@ class Simulation:
         return self._record(kept, start + np.array(at))
 
     def _record(self, kept: list[NDArray], steps: NDArray) -> Run:
-        """Return a run of the first frames that were kept, which were reached in such steps."""
+        """Return a run of the first recorded frames, which were taken at these steps."""
         frames, n = np.concatenate(kept)[: len(steps)], len(self.scene.blocks)
         barrier_poses = np.repeat(self._barrier_start[None], len(steps), axis=0)
         barrier_poses[:, list(self.scene.bodies)] = frames[:, n:, :3]
@@ -263,7 +263,7 @@ def simulate_many(
     stations: Sequence[float] = (),
     watch: tuple[float, float] | None = None,
 ) -> list[Run]:
-    """Run independent scenes over all cores, in threads; each gives what running it alone gives.
+    """Run independent scenes in threads on all cores, with the same results as one by one.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""A single convex block on a ground that stays the same, run in the same arrays again and again.
+"""Repeated simulation of a single convex block on a fixed ground, in reused arrays.
 
-To describe a block and its surroundings anew in Python takes as long as to compute how it comes
-down. Here kernels write the block, and how surfaces meet, into the arrays of a scene like it, and
-read what came of it. The arrays are to the bit what `rigdda.dynamics.packing.pack` gives for a
-scene of that block, as far as they are read.
+Describing a block and its surroundings in Python takes as long as simulating its descent. Here,
+kernels write the block and the interface properties into the arrays of a similar scene and read the
+results. All entries that are used are bit-identical to those that `rigdda.dynamics.packing.pack`
+gives for a scene of that block.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from rigdda.model.scene import Scene
 from rigdda.model.settings import EARTH, Settings
 
 MOST_CORNERS = 12
-"""Most corners of such a block: blocks of a band have no more."""
+"""Maximum number of corners of such a block; the blocks of a release band have no more."""
 
 
 def with_room(outlines: Outlines) -> Outlines:
-    """Return outlines, the first one of a single block, with room for one of `MOST_CORNERS`."""
+    """Return outlines, the first one of a single block, with room for `MOST_CORNERS` corners."""
     corner, local = outlines.corner, outlines.local
     more = max(0, MOST_CORNERS - corner.shape[1])
     wide = np.pad(corner.view(np.ndarray), ((0, 0), (0, more)))
@@ -51,31 +51,31 @@ def start_single(
     restitution: NDArray, damping: NDArray, stations: NDArray, gravity: float, bodies: Bodies,
     outlines: Outlines, interfaces: Interfaces, rock: NDArray, parameters: NDArray,
 ) -> tuple[bool, float]:  # fmt: skip
-    """Write a block and how surfaces meet into arrays that are otherwise as at the start.
+    """Write a block and the interface properties into arrays that are in their initial state.
 
     Parameters
     ----------
     corners : (n, 2) array
         Corners of the block [m].
     traits : (1, 6) array
-        Its other properties, see `pack.bodies.Trait`.
+        Its other properties, see `packing.Trait`.
     chain : (m, 2) array
         Corners of the ground [m].
     boxes : (K, 4) array
         Least x and y, greatest x and y of each barrier that is a body [m].
     friction_deg, restitution, damping : arrays
-        How each two surfaces meet, see `Meetings` [deg, -, 1/s].
+        Properties of each pair of surfaces, see `Meetings` [deg, -, 1/s].
     stations : (K,) array
-        Chainages that are watched [m].
+        Chainages of the stations [m].
     gravity : float
         Acceleration that gives the block its weight [m/s2].
     bodies, outlines, interfaces, rock, parameters : arrays
-        What is written.
+        Arrays that are written.
 
     Returns
     -------
     clear : bool
-        Whether the block is surely convex and clear of the ground and of barriers.
+        Whether the block is certainly convex and clear of the ground and of barriers.
     start : float
         Chainage of its centroid [m].
     """
@@ -103,7 +103,7 @@ start_single_directly = Direct(start_single)
 
 @kernel
 def _near(corners: NDArray, boxes: NDArray) -> bool:
-    """Return whether the bounding box of a block meets that of a barrier."""
+    """Return whether the bounding box of a block overlaps that of a barrier."""
     left, right, low, high = math.inf, -math.inf, math.inf, -math.inf
     for k in range(len(corners)):
         left, right = min(left, corners[k, 0]), max(right, corners[k, 0])
@@ -119,7 +119,7 @@ def _near(corners: NDArray, boxes: NDArray) -> bool:
 def _set_interfaces(
     friction_deg: NDArray, restitution: NDArray, damping: NDArray, interfaces: Interfaces
 ) -> None:
-    """Write how surfaces meet, but what no release draws; fences come last, without friction."""
+    """Write the interface properties that releases vary; fences come last, without friction."""
     for i in range(len(interfaces)):
         for j in range(len(interfaces)):
             interface = interfaces[i, j]
@@ -133,7 +133,7 @@ def _set_interfaces(
 def read_single(
     bodies: Bodies, rock: NDArray
 ) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float], float]:
-    """Return place [m], velocity [m/s], extent [m] and energy [J] of a block, see `Descent`."""
+    """Return position [m], velocity [m/s], extent [m] and energy [J] of a block, see `Descent`."""
     body, watched = bodies[0], rock[0]
     extent = watched.low, watched.high
     return (body.x, body.y), (body.vx, body.vy), extent, watched.energy
@@ -143,11 +143,11 @@ read_single_directly = Direct(read_single)
 
 
 ABSORBED, THRUST = (list(TARGET.fields or ()).index(name) for name in ("absorbed", "thrust"))
-"""Places of these fields in a record of a barrier."""
+"""Indices of these fields in a record of a barrier."""
 
 
 class Descent(NamedTuple):
-    """What came of a block."""
+    """Results of the descent of a block."""
 
     start: float
     """Chainage of its centroid at the start [m]."""
@@ -156,37 +156,37 @@ class Descent(NamedTuple):
     velocity: tuple[float, float]
     """Velocity of its centroid at the end [m/s]."""
     extent: tuple[float, float]
-    """Least and greatest chainage that the circle about it came to [m]."""
+    """Least and greatest chainage reached by its circumscribed circle [m]."""
     energy: float
     """Its largest kinetic energy in the watched interval [J]."""
     time: float
-    """When it ended [s]."""
+    """Duration of the run [s]."""
     events: list[tuple[Any, ...]]
-    """What happened, in order of time, each with the fields of `rigdda.dynamics.run.EVENT`."""
+    """Events in order of time, each with the fields of `rigdda.dynamics.run.EVENT`."""
     absorbed: list[float]
-    """Energy that each barrier took [J]."""
+    """Energy that each barrier absorbed [J]."""
     thrust: list[float]
-    """Greatest mean over a second of the thrust on each barrier [N/m]."""
+    """Greatest thrust on each barrier, averaged over a second [N/m]."""
     moved: list[float]
-    """How far each barrier that is a body has moved downhill, in the order of the bodies [m]."""
+    """Downhill displacement of each barrier that is a body, in the order of the bodies [m]."""
 
 
 class SingleBlock:
-    """The arrays of a scene of a single block, and what it takes to set them back for another one.
+    """Reusable arrays of a scene with a single block.
 
     Parameters
     ----------
     scene : Scene
-        One such scene: its block is convex and free, no surface has a restitution of None, and no
-        gravity wall can move.
+        A scene of this kind: its block is convex and free, no surface has a restitution of None,
+        and no gravity wall can move.
     settings : Settings
-        How it is computed.
+        Settings of the computation.
     stations : (K,) array
         Ascending chainages whose first crossings are recorded [m].
     watch : (float, float)
-        Interval of x in which energies are watched [m].
+        Interval of x in which energies are recorded [m].
     leave : float
-        x beyond which what moves on is left alone [m].
+        x beyond which a block that moves downhill may be ignored [m].
     """
 
     def __init__(
@@ -208,7 +208,7 @@ class SingleBlock:
         self._loop = Loop(scene, self._arrays, settings.dt)
         self._no_frames = no_frames(packed.bodies)
         self._corners = np.zeros((MOST_CORNERS, 2))
-        self._traits = np.zeros((1, 6))  # see `pack.bodies.Trait`
+        self._traits = np.zeros((1, 6))  # see `packing.Trait`
         self._chain = np.array(scene.smooth_ground.points)
         outlines = [scene.outline(i) for i in scene.bodies]
         self._boxes = np.array(
@@ -227,26 +227,26 @@ class SingleBlock:
         limits: Sequence[float],
         steps: int,
     ) -> Descent | None:
-        """Return what comes of a block.
+        """Simulate the descent of a block.
 
         Parameters
         ----------
         block : Block
-            The block, with `MOST_CORNERS` at most.
+            The block, with at most `MOST_CORNERS` corners.
         meetings : Meetings
-            How surfaces meet.
+            Properties of each pair of surfaces.
         forces : sequence of float
-            Force against which each fence gives way, in the order of the bodies [N/m].
+            Braking force of each fence, in the order of the bodies [N/m].
         limits : sequence of float
-            Thrust that each barrier bears before it is pushed away, inf: any [N/m].
+            Thrust at which each barrier is pushed away, inf: never [N/m].
         steps : int
-            Most steps.
+            Maximum number of steps.
 
         Returns
         -------
         Descent or None
-            None where it takes more than this to tell: the block may start in the ground or in a
-            barrier, is hardly convex, or the simulation diverges.
+            None if this method cannot decide the outcome: the block may start in the ground or in a
+            barrier, is nearly non-convex, or the simulation diverges.
         """
         a, loop = self._arrays, self._loop
         self._memory[:] = self._fresh

@@ -1,4 +1,4 @@
-"""Blocks at rest sleep, a whole island at a time, until something moving comes near."""
+"""Sleeping: islands at rest are not computed until a moving body comes near."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rigdda.kernel import kernel
 
 @kernel
 def wake_island(bodies: Bodies, island: int, blocks: int) -> int:
-    """Wake the bodies that fell asleep in an island; returns how many."""
+    """Wake the bodies that fell asleep in an island; return their number."""
     woken = 0
     for k in range(blocks):
         body = bodies[k]
@@ -24,9 +24,10 @@ def wake_island(bodies: Bodies, island: int, blocks: int) -> int:
 
 @kernel
 def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int:
-    """Wake the islands of sleeping bodies paired with a moving one; returns how many bodies.
+    """Wake the islands of sleeping bodies paired with a moving one; return the number of bodies.
 
-    What lies still and awake against a fence wakes it, too: it may be struck and push it on.
+    A quiet awake body next to a sleeping fence wakes it as well, because the body may be struck and
+    push the fence.
     """
     woken = 0
     for q in range(count):
@@ -41,9 +42,9 @@ def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int
 
 @kernel
 def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> None:
-    """Count how long blocks have been quiet and put wholly quiet islands to sleep.
+    """Update how long blocks have been quiet, and put islands to sleep in which all blocks are.
 
-    A block that is getting faster is not quiet: it has begun to slide or to fall.
+    A block that accelerates is not quiet, because it has begun to slide or fall.
     """
     for s in range(count):
         least = 1e300

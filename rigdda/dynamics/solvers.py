@@ -1,10 +1,10 @@
 """Solvers of the simultaneous equations of an island.
 
-Conjugate gradients preconditioned by the inverse of the diagonal (Koo and Chern 1998) are usual;
-for comparison by the inverses of the 3x3 blocks on it. Successive over-relaxation is the original
-solver of DDA (Fig. 5). The direct solution has Cholesky factors within the profile of the matrix (a
-skyline): best for few blocks and for chains such as stacks, whose profile is short when blocks are
-numbered along the chain.
+The default is the conjugate gradient method, preconditioned by the inverse of the diagonal (Koo and
+Chern 1998), or by the inverses of its 3x3 blocks for comparison. Successive over-relaxation is the
+original solver of DDA (Fig. 5). The direct solver computes Cholesky factors within the skyline of
+the matrix. It is best for few blocks and for chains such as stacks, whose skyline is short if
+blocks are numbered along the chain.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from rigdda.kernel import kernel
 
 @kernel
 def solve_block(k: NDArray, f: NDArray, d: NDArray) -> None:
-    """Solve K d = f for one 3x3 block, symmetric or not: elimination with partial pivoting.
+    """Solve K d = f for one 3x3 block, symmetric or not, by elimination with partial pivoting.
 
-    A contact may be 1e7 times as stiff as inertia. Cramer's rule squares that ratio, which leaves
-    two digits of the force of such a contact.
+    A contact may be 1e7 times as stiff as the inertia term. Cramer's rule would square that ratio,
+    which leaves only two digits of the force of such a contact.
     """
-    i, j, n = 0, 1, 2  # rows in the order of the pivots
+    i, j, n = 0, 1, 2  # row order after pivoting
     if abs(k[1, 0]) > abs(k[i, 0]):
         i, j = 1, 0
     if abs(k[2, 0]) > abs(k[i, 0]):
@@ -44,9 +44,9 @@ def solve_block(k: NDArray, f: NDArray, d: NDArray) -> None:
 
 @kernel
 def profile(m: Matrix, scratch: Scratch, n: int, pairs: int) -> int:
-    """Set first[i], the leftmost block in row i, and return the number of entries of the profile.
+    """Set first[i], the leftmost block in row i, and return the number of skyline entries.
 
-    row[r] is the place in scratch.factor at which scalar row r would have its column 0.
+    row[r] is the index in scratch.factor at which scalar row r would have its column 0.
     """
     for i in range(n):
         scratch.first[i] = i
@@ -63,7 +63,7 @@ def profile(m: Matrix, scratch: Scratch, n: int, pairs: int) -> int:
 
 @kernel
 def fill(m: Matrix, scratch: Scratch, n: int, pairs: int, count: int) -> None:
-    """Copy the lower half of the block-sparse matrix into the profile."""
+    """Copy the lower triangle of the block-sparse matrix into the skyline."""
     for e in range(count):
         scratch.factor[e] = 0.0
     for i in range(n):
@@ -82,7 +82,7 @@ def fill(m: Matrix, scratch: Scratch, n: int, pairs: int, count: int) -> None:
 
 @kernel
 def solve_skyline(m: Matrix, scratch: Scratch, n: int, pairs: int, count: int) -> None:
-    """Solve K d = rhs for n blocks whose `profile` has `count` entries; sets m.d."""
+    """Solve K d = rhs for n blocks whose skyline has `count` entries; the solution is in m.d."""
     fill(m, scratch, n, pairs, count)
     factor, row = scratch.factor, scratch.row
     for r in range(3 * n):
@@ -109,7 +109,8 @@ def solve_skyline(m: Matrix, scratch: Scratch, n: int, pairs: int, count: int) -
 
 
 SMALLEST = float(np.finfo(float).tiny)
-"""Least residual that is told from none: forces that balance leave a right-hand side of zero."""
+"""Least squared residual norm that counts as nonzero; forces in equilibrium give a right-hand side
+of zero."""
 
 
 @kernel
@@ -135,7 +136,7 @@ def multiply(m: Matrix, n: int, pairs: int, x: NDArray, y: NDArray) -> None:
 
 @kernel
 def precondition(m: Matrix, scratch: Scratch, n: int, by_block: bool) -> float:
-    """Set scaled = residual / diagonal, entries or 3x3 blocks, and return their product."""
+    """Set scaled = residual / diagonal, by entries or 3x3 blocks; return residual . scaled."""
     product = 0.0
     for i in range(n):
         if by_block:
@@ -155,15 +156,15 @@ def precondition(m: Matrix, scratch: Scratch, n: int, by_block: bool) -> float:
 def solve_pcg(
     m: Matrix, scratch: Scratch, n: int, pairs: int, tolerance: float, by_block: bool
 ) -> int:
-    """Solve K d = rhs from the start value in m.d, in place.
+    """Solve K d = rhs by preconditioned conjugate gradients, starting from m.d.
 
-    Stops when the residual, in the norm of the preconditioner, is below `tolerance` times the
-    forces, or as small as numbers can be.
+    Stops when the residual, in the norm of the preconditioner, is below `tolerance` times that of
+    the right-hand side, or at the smallest positive number.
 
     Returns
     -------
     int
-        Iterations used.
+        Number of iterations.
     """
     multiply(m, n, pairs, m.d, scratch.product)
     scale = 0.0
@@ -199,7 +200,10 @@ def solve_pcg(
 
 @kernel
 def list_neighbours(m: Matrix, scratch: Scratch, n: int, pairs: int) -> None:
-    """List the off-diagonal blocks of each row: chains first[i], next[2 q], next[2 q + 1], -1."""
+    """Build linked lists of the off-diagonal blocks of each row.
+
+    A list starts at first[i], continues through next[2 q] or next[2 q + 1], and ends at -1.
+    """
     for i in range(n):
         scratch.first[i] = -1
     for q in range(pairs):
@@ -212,10 +216,10 @@ def list_neighbours(m: Matrix, scratch: Scratch, n: int, pairs: int) -> None:
 def solve_sor(
     m: Matrix, scratch: Scratch, n: int, pairs: int, tolerance: float, factor: float
 ) -> int:
-    """Solve K d = rhs from the start value in m.d, row by row of 3x3 blocks; returns the sweeps.
+    """Solve K d = rhs by over-relaxation of 3x3 blocks, starting from m.d; return the sweeps.
 
     Stops when the residual, in the norm of the inverse diagonal as for conjugate gradients, is
-    below `tolerance` times the forces, or as small as numbers can be.
+    below `tolerance` times that of the right-hand side, or at the smallest positive number.
     """
     list_neighbours(m, scratch, n, pairs)
     scale = 0.0

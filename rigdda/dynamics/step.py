@@ -1,4 +1,4 @@
-"""One step: detect contacts, settle them island by island, move, correct."""
+"""One time step: detect contacts, compute forces island by island, move, correct."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def solve_and_move(
     world: World, contacts: Contacts, work: Work, monitors: Monitors, time: float, p: Parameters,
     totals: Totals,
 ) -> int:  # fmt: skip
-    """Take the step of every island; returns a block that went bad, or -1."""
+    """Take the step of every island; return a block that diverged, or -1."""
     found = find_islands(world.bodies, contacts, work.begin, work.islands, p.blocks, p.islands)
     bad = -1
     for s in range(found):
@@ -56,7 +56,7 @@ def solve_and_move(
 
 @kernel
 def rest_all(bodies: Bodies) -> None:
-    """Take the velocity from every block: static mode."""
+    """Set all velocities to zero, for static mode."""
     for i in range(len(bodies)):
         body = bodies[i]
         body.vx = body.vy = body.omega = 0.0
@@ -64,7 +64,7 @@ def rest_all(bodies: Bodies) -> None:
 
 @kernel
 def set_out(bodies: Bodies, shaking: Shaking, since: float, time: float, p: Parameters) -> None:
-    """Begin a step: at rest in static mode, in the field that the motion of the ground makes."""
+    """Begin a step: reset velocities in static mode, and set the field of the ground motion."""
     if p.static:
         rest_all(bodies)
     if len(shaking) > 0:
@@ -76,7 +76,7 @@ def end_step(
     bodies: Bodies, contacts: Contacts, count: int, work: Work, monitors: Monitors,
     counters: NDArray, p: Parameters,
 ) -> int:  # fmt: skip
-    """Watch what a whole step has brought; returns DONE, GROUND_MOVED or ENDED."""
+    """Update the monitors at the end of a step; return DONE, GROUND_MOVED or ENDED."""
     counters[STEPS] += 1
     time = counters[STEPS] * p.dt
     counters[EVENTS] = note_passage(bodies, monitors, counters[EVENTS], time)
@@ -93,24 +93,24 @@ def advance(
     world: World, now: Contacts, before: Contacts, work: Work, monitors: Monitors,
     parameters: NDArray[np.void], totals: Totals, steps: int, frames: NDArray, stride: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Take up to `steps` steps, and keep a frame whenever a multiple of `stride` is left.
+    """Take up to `steps` steps, with a frame whenever a multiple of `stride` steps is left.
 
     Parameters
     ----------
     parameters : (1,) array of PARAMETERS
-        Numbers of the scene and the settings.
+        Parameters of the scene and the settings.
     frames : (F, M, 6) array
-        The last is for the state in the end; see `frames.keep_frame`.
+        Filled in, the last one with the final state; see `frames.keep_frame`.
 
     Returns
     -------
     reason : int
-        DONE, CONTACTS_FULL, EVENTS_FULL, GROUND_MOVED, BAD_STATE or ENDED; anything but DONE stops
-        early.
+        DONE, CONTACTS_FULL, EVENTS_FULL, GROUND_MOVED, BAD_STATE or ENDED; any reason other than
+        DONE stops early.
     block : int
-        The block that went bad, else -1.
+        The block that diverged, else -1.
     swapped : bool
-        Whether `now` and `before` have changed roles.
+        Whether `now` and `before` have exchanged roles.
     """
     swapped, reason, bad, p = False, DONE, -1, parameters[0]
     bodies, outlines, ground, _, links, shaking = world
@@ -120,7 +120,7 @@ def advance(
         variable(-1),
         variable(0),
         0,
-    )  # steps of a flight that are taken, and all of them
+    )  # flying body, steps flown, and steps of the flight
     while steps > 0 and reason == DONE:
         room = len(monitors.event) - counters[EVENTS]
         if room < (p.blocks + 1) * (len(monitors.station) + len(monitors.target)):
@@ -155,7 +155,7 @@ def advance(
         press_asleep(bodies, now, count, monitors, p.dt)
         events = counters[EVENTS]
         reason = end_step(bodies, now, count, work, monitors, counters, p)
-        if counters[EVENTS] > events:  # a barrier may have failed: detection wakes what it held
+        if counters[EVENTS] > events:  # a barrier may have failed; detection wakes its neighbours
             flight = flown
         steps -= 1
         if bad >= 0:

@@ -1,4 +1,4 @@
-"""Arrays of a scene that serve others, which differ in rock, strength and elevations alone."""
+"""Reusable arrays for scenes that differ only in rock, strength and ground elevations."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from rigdda.model.settings import Settings
 
 
 class Template:
-    """The arrays of a scene before its first step, and what it takes to set them back.
+    """The arrays of a scene before its first step, which can be reset and reused.
 
-    Barriers and space are packed once; the ground is packed again only where it has other pits, and
-    surfaces where they have other properties. A scene of `Scene.with_rock` with as many blocks,
-    all convex, is written into the same arrays: they are to the bit what `pack` gives, as far as
-    they are read. One simulation at a time uses them.
+    Barriers and working arrays are packed once. The ground is packed again only if its pits change,
+    and interface properties only if they change. A scene made by `Scene.with_rock`, with the same
+    number of blocks, all convex, is written into the same arrays; all entries that are used are
+    bit-identical to those of `pack`. Only one simulation at a time can use the arrays.
 
     Parameters
     ----------
     scene : Scene
-        The first one, without fixed blocks.
+        The first scene, without fixed blocks.
     settings, stations, watch, leave
-        As `pack` takes them.
+        As for `pack`.
     """
 
     def __init__(
@@ -55,11 +55,11 @@ class Template:
         packed = pack(scene, settings, stations, watch, leave)
         self._corners = packed.outlines.corner.shape[1]
         number = packed.outlines.corner["number"]
-        number[: len(scene.blocks)] = np.arange(self._corners)  # where there is no corner, too
+        number[: len(scene.blocks)] = np.arange(self._corners)  # including padding
         self._memory, self._arrays = together(packed)
         self._fresh = self._memory.copy()
         plain = [
-            array.view(np.ndarray)  # quicker to reach into than a recarray
+            array.view(np.ndarray)  # faster to access than a recarray
             for array in (
                 self._arrays.bodies,
                 self._arrays.outlines.polygon,
@@ -70,7 +70,7 @@ class Template:
         self._bodies, self._polygons, self._rock, self._parameters = plain
 
     def fits(self, scene: Scene) -> bool:
-        """Return whether a scene of `with_rock` can be written into these arrays."""
+        """Return whether a scene made by `with_rock` can be written into these arrays."""
         mine, blocks = self.scene.blocks, scene.blocks
         return (
             _alike(scene.ground, self.scene.ground)
@@ -101,7 +101,7 @@ class Template:
         polygons = [b.vertices for b in scene.blocks]
         traits = block_traits(scene.blocks, self._names)
         for i in scene.bodies:
-            if isinstance(scene.barriers[i], GravityWall):  # they follow the blocks
+            if isinstance(scene.barriers[i], GravityWall):  # they directly follow the blocks
                 polygons.append(scene.outline(i))
                 traits.append(barrier_trait(scene, i, self._names))
         write_polygons(polygons, traits, arrays.bodies, outlines)
@@ -111,7 +111,7 @@ class Template:
                 mine[...] = its
         other_surfaces = scene.surfaces is not self.scene.surfaces
         if other_surfaces or scene.barriers != self.scene.barriers:
-            start_targets(arrays.monitors.target, scene)  # of embankments friction is the strength
+            start_targets(arrays.monitors.target, scene)  # friction is the strength of embankments
             set_brakes(scene, arrays.bodies)
         if other_surfaces:
             arrays.interfaces[...] = pack_interfaces(scene, self._names)
@@ -122,7 +122,7 @@ class Template:
 
 
 def _alike(ground: Terrain | None, other: Terrain | None) -> bool:
-    """Return whether grounds differ by elevations alone, if at all."""
+    """Return whether two grounds differ in elevations only, or not at all."""
     if ground is other or ground is None or other is None:
         return ground is other
     same = ground.surfaces == other.surfaces
@@ -130,9 +130,9 @@ def _alike(ground: Terrain | None, other: Terrain | None) -> bool:
 
 
 def together(arrays: Arrays) -> tuple[NDArray[np.uint8], Arrays]:
-    """Return a block of memory and copies of all arrays in it, which are set back in one go.
+    """Return one block of memory and copies of all arrays in it, so that all are reset at once.
 
-    Arrays that are one and the same stay so.
+    Arrays that are identical objects remain so.
     """
     leaves = {id(array): array for array in _leaves(arrays) if array.size}
     room = [-(-array.nbytes // LINE) * LINE for array in leaves.values()]
@@ -147,7 +147,7 @@ def together(arrays: Arrays) -> tuple[NDArray[np.uint8], Arrays]:
 
 
 LINE = 64
-"""Bytes to a multiple of which arrays are aligned: a line of the cache."""
+"""Alignment of the arrays in bytes: a cache line."""
 
 
 def _leaves(arrays: Any) -> list[NDArray[Any]]:
@@ -159,7 +159,7 @@ def _leaves(arrays: Any) -> list[NDArray[Any]]:
 
 
 def _replaced(arrays: Any, by: dict[int, Any]) -> Any:
-    """Return nested named tuples with other arrays in the place of these, by their identity."""
+    """Return nested named tuples with arrays replaced by others, looked up by identity."""
     if isinstance(arrays, tuple):
         return type(arrays)(*(_replaced(a, by) for a in arrays))
     return by.get(id(arrays), arrays)

@@ -1,1 +1,1 @@
-"""Replays: runs and episodes as files of the rerun viewer."""
+"""Replays: runs and episodes as files for the Rerun viewer."""

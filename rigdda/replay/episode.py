@@ -1,4 +1,4 @@
-"""Replays of episodes in which barriers are placed one by one: the same release after each."""
+"""Replays of episodes that place barriers one by one and show the same release after each."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from rigdda.replay.recording import (
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """What a replay tells of the state after one placement.
+    """State of an episode after one placement.
 
     Parameters
     ----------
     run : Run
-        The release with what stands.
+        The release with the current barriers.
     layout : str
-        What stands, in words.
+        Description of the current barriers.
     reward, objective, debris, cost : float
-        Of the placement; at the start, without barriers, the reward is 0.
+        Values of the placement; at the start, without barriers, the reward is 0.
     """
 
     run: RecordedMotion
@@ -55,31 +55,31 @@ def write_episode(
     title: str,
     record: str = "",
 ) -> None:
-    """Write an episode as a rerun recording.
+    """Write an episode as a Rerun recording.
 
-    Placement k, from 0 without barriers, is below the entity `placement_k`: its frames are on the
-    timelines `sim_time` and `placement`; the layout and the numbers after each are below `episode`
-    on the timeline `placement`.
+    Placement k, where 0 is the start without barriers, is below the entity `placement_k`, with its
+    frames on the timelines `sim_time` and `placement`. The layout and the values after each
+    placement are below `episode` on the timeline `placement`.
 
     Parameters
     ----------
     path : path
-        The .rrd file; an old one is replaced when the new one is complete.
+        The .rrd file; an existing one is replaced when the new one is complete.
     placements : sequence of Placement
-        The start, without barriers, and what followed.
+        The start, without barriers, and the placements.
     road : (float, float)
-        Chainages of the road's uphill and downhill edge [m].
+        Chainages of the road's uphill and downhill edges [m].
     seed : str
-        The seed of the release, in words.
+        Description of the seed of the release.
     title : str
         Name of the recording.
     record : str
-        All that it takes to compute the episode again, as JSON; kept in the file, not shown.
+        All inputs needed to compute the episode again, as JSON; stored in the file but not shown.
 
     Raises
     ------
     BadInput
-        If there is no placement or the name does not end in .rrd.
+        If there are no placements or the file name does not end in .rrd.
     """
     if not placements:
         raise BadInput("placements", placements, "give at least the start")
@@ -107,7 +107,7 @@ def _name(k: int) -> str:
 
 
 def _words(placements: Sequence[Placement], seed: str, title: str) -> str:
-    """Return the whole episode as a page with a table."""
+    """Return a description of the whole episode in Markdown, with a table."""
     lines = [f"## {title}", "", f"**seed**: {seed}", ""]
     lines += ["| | reward | objective | debris | cost | layout |", "|-|-|-|-|-|-|"]
     for k, p in enumerate(placements):
@@ -117,7 +117,7 @@ def _words(placements: Sequence[Placement], seed: str, title: str) -> str:
 
 
 def _blueprint(placements: Sequence[Placement]) -> rrb.Blueprint:
-    """Return the layout: a tab for the slope after each placement, the notes beside them."""
+    """Return the viewer layout: a tab with the slope for each placement, and notes at the side."""
     views = [slope_view(p.run, _name(k), _root(k)) for k, p in enumerate(placements)]
     debris = [
         rrb.TimeSeriesView(

@@ -1,8 +1,9 @@
-"""Replays for the rerun viewer: a run as an .rrd file.
+"""Replays of runs as .rrd files for the Rerun viewer.
 
-Geometry is logged once, poses and numbers by column. The world is in metres, y up, seen by a far
-pinhole camera (a flat view of filled shapes); z only orders the layers. The viewer shows the slope,
-beside it notes and plots, below them the timeline.
+Geometry is logged once, and poses and scalars as columns over time. The world is in metres with y
+up and is seen through a distant pinhole camera, which gives a flat view of filled shapes; z only
+sets the order of layers. The viewer shows the slope, with notes and plots at its side and the
+timeline below.
 """
 
 from __future__ import annotations
@@ -36,11 +37,11 @@ Floats = NDArray[np.float64]
 
 
 class RecordedMotion(Protocol):
-    """What a replay shows: the motion of a scene, as a `rigdda.Run` has recorded it."""
+    """Interface of a run as needed by replays, implemented by `rigdda.Run`."""
 
     @property
     def scene(self) -> Scene:
-        """What was simulated."""
+        """The simulated scene."""
 
     @property
     def times(self) -> Floats:
@@ -63,25 +64,25 @@ class RecordedMotion(Protocol):
         """The ground at the end."""
 
     def passed(self, x: float) -> NDArray[np.bool_]:
-        """Return whether each block was ever at or past a chainage, by frame."""
+        """Return whether each block has been at or past a chainage by each frame."""
 
     def failure(self, barrier: int) -> float:
-        """Return the time at which a barrier failed, inf if it did not [s]."""
+        """Return the time at which a barrier failed, inf if it did not fail [s]."""
 
     def states(self, barrier: int) -> list[tuple[float, str]]:
-        """Return the states of a barrier, each with the time from which it is in it [s]."""
+        """Return the successive states of a barrier, each with the time at which it begins [s]."""
 
 
 CAMERA = 1000.0
-"""Distance of the camera [m]: one pixel is one metre, and a layer shifts a point by 1e-5."""
+"""Distance of the camera [m]. One pixel is one metre, and a layer shifts a point by 1e-5."""
 LAYER = {"terrain": 0.0, "barriers": 0.02, "road": 0.04, "blocks": 0.06}
 LABEL = 0.05
-"""Height of a label above the top of its barrier, as a share of the view; every third is as
-high."""
+"""Height of a label above the top of its barrier, as a fraction of the view. Labels use three
+heights in turn."""
 DOT = -3.0
-"""Radius of the dot of a label: negative numbers are points of the screen."""
+"""Radius of the dot of a label; negative numbers are screen points."""
 EDGE = 0.01
-"""z of a layer, and of an outline above its fill [m]."""
+"""z offset of an outline above its fill [m]."""
 
 SKY: Colour = (233, 240, 246)
 GROUND: Colour = (201, 188, 165)
@@ -94,7 +95,7 @@ INK: Colour = (40, 34, 30)
 
 
 def frame(scene: Scene) -> tuple[float, float, float, float]:
-    """Return left, bottom, right, top of a view on the whole scene at its start [m]."""
+    """Return left, bottom, right and top of a view of the whole scene at its start [m]."""
     parts = [block.vertices for block in scene.blocks]
     if scene.ground is not None:
         parts += [scene.ground.points, *(scene.outline(i) for i in range(len(scene.barriers)))]
@@ -108,21 +109,21 @@ def frame(scene: Scene) -> tuple[float, float, float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """What a replay shows that the scene does not know.
+    """Information for a replay that the scene lacks.
 
     Parameters
     ----------
     road : (float, float), optional
-        Chainages of the road's uphill and downhill edge [m].
+        Chainages of the road's uphill and downhill edges [m].
     notes : mapping of str to str
-        Words about the episode: seed, layout, reward, objective.
+        Notes about the episode: seed, layout, reward, objective.
     title : str
         Name of the recording.
     labels : sequence of str
-        What each barrier of the scene is called, a fence with its class; without any, the words
-        that the scene has for them.
+        Name of each barrier of the scene, a fence with its class; if empty, the descriptions by
+        the scene are used.
     record : str
-        All that it takes to compute the episode again, as JSON; kept in the file, not shown.
+        All inputs needed to compute the episode again, as JSON; stored in the file but not shown.
 
     Raises
     ------
@@ -144,7 +145,7 @@ class Marks:
             raise BadInput("road", self.road, "give its uphill edge, then its downhill edge")
 
     def labels_of(self, scene: Scene) -> Sequence[str]:
-        """Return what each barrier of a scene is called.
+        """Return the name of each barrier of a scene.
 
         Raises
         ------
@@ -159,7 +160,7 @@ class Marks:
 
 
 MOVING = 0.1
-"""Speed above which a block counts as moving [m/s]; slower is a creep of under 1 m in 10 s."""
+"""Speed above which a block counts as moving [m/s]; a slower block creeps less than 1 m in 10 s."""
 
 PLOTS = {
     "kinetic_energy": ("kinetic energy [J]", ROAD),
@@ -172,7 +173,7 @@ PLOTS = {
 
 
 def scalars(run: RecordedMotion, marks: Marks) -> dict[str, Floats]:
-    """Return the (T,) numbers of every plot, of the free blocks; debris where there is a road."""
+    """Return the (T,) values of every plot for the free blocks; debris only if there is a road."""
     free = np.array([not block.fixed for block in run.scene.blocks])
     shapes = [polygon_properties(block.vertices) for block in run.scene.blocks]
     density = np.array([block.density for block in run.scene.blocks])
@@ -199,7 +200,7 @@ PLACEMENT = "placement"
 
 
 def slope_view(run: RecordedMotion, name: str, root: str = "") -> rrb.Spatial2DView:
-    """Return the view on the slope of a run that is logged below the entity `root`."""
+    """Return the view of the slope for a run that is logged below the entity `root`."""
     left, bottom, right, top = frame(run.scene)
     return rrb.Spatial2DView(
         origin=f"{root}/world/camera",
@@ -211,7 +212,7 @@ def slope_view(run: RecordedMotion, name: str, root: str = "") -> rrb.Spatial2DV
 
 
 def run_blueprint(run: RecordedMotion, marks: Marks) -> rrb.Blueprint:
-    """Return the layout: the slope, beside it the notes and the plots."""
+    """Return the viewer layout: the slope, with notes and plots at its side."""
     slope = slope_view(run, marks.title)
     plots = {
         name: rrb.TimeSeriesView(
@@ -239,27 +240,27 @@ def run_blueprint(run: RecordedMotion, marks: Marks) -> rrb.Blueprint:
 
 
 Clock = Callable[[Sequence[float] | Floats], list[rr.TimeColumn]]
-"""Gives the time columns of rows at some times [s]."""
+"""Function that returns the time columns for rows at given times [s]."""
 
 
 def write_rerun(
     run: RecordedMotion, path: str | os.PathLike[str], marks: Marks | None = None
 ) -> None:
-    """Write `run` as a rerun recording with geometry, poses, scalars and a blueprint.
+    """Write `run` as a Rerun recording with geometry, poses, scalars and a viewer layout.
 
     Parameters
     ----------
     run : Run
-        What to show.
+        The run.
     path : path
-        The .rrd file; an old one is replaced when the new one is complete.
+        The .rrd file; an existing one is replaced when the new one is complete.
     marks : Marks, optional
-        The road and words about the episode.
+        The road and notes about the episode.
 
     Raises
     ------
     BadInput
-        If the name does not end in .rrd.
+        If the file name does not end in .rrd.
     """
     marks = marks or Marks()
     with recording(path, run_blueprint(run, marks)) as rec:
@@ -269,22 +270,22 @@ def write_rerun(
 
 
 RECORD = "/record"
-"""Entity of what it takes to compute an episode again."""
+"""Entity of the inputs needed to compute an episode again."""
 
 
 def log_record(rec: rr.RecordingStream, record: str) -> None:
-    """Log what it takes to compute an episode again, if there is anything."""
+    """Log the inputs needed to compute an episode again, if there are any."""
     if record:
         rec.log(RECORD, rr.TextDocument(record, media_type="application/json"), static=True)
 
 
 def read_record(path: str | os.PathLike[str]) -> str:
-    """Return what a replay holds to compute its episode again.
+    """Return the inputs stored in a replay for computing its episode again, as JSON.
 
     Raises
     ------
     BadInput
-        If the file is missing, is not a replay or holds nothing of that kind.
+        If the file is missing, is not a replay or contains no such inputs.
     """
     file = rrd_path(path)
     if not file.is_file():
@@ -305,7 +306,7 @@ def read_record(path: str | os.PathLike[str]) -> str:
 def recording(
     path: str | os.PathLike[str], blueprint: rrb.Blueprint
 ) -> Iterator[rr.RecordingStream]:
-    """Yield a stream of its own that is at `path` when the block ends without error."""
+    """Yield a separate recording stream, saved at `path` when the block ends without an error."""
     with atomic(rrd_path(path)) as part:
         rec = rr.RecordingStream("rigdda", recording_id=uuid4())
         try:
@@ -323,7 +324,7 @@ def log_run(
     root: str = "",
     placement: int | None = None,
 ) -> None:
-    """Log a whole run below the entity `root`; its frames are those of a `placement`, if any.
+    """Log a whole run below the entity `root`, with frames at a `placement` if one is given.
 
     Raises
     ------
@@ -357,7 +358,7 @@ def log_run(
 
 
 def _log_setting(rec: rr.RecordingStream, world: str, run: RecordedMotion, marks: Marks) -> None:
-    """Log what never changes: the camera, the ground as it is at the end and the road."""
+    """Log the static parts: the camera, the ground at the end of the run and the road."""
     left, bottom, right, top = frame(run.scene)
     rec.log(world, rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
     eye = rr.Transform3D(translation=[(left + right) / 2, (bottom + top) / 2, CAMERA])
@@ -386,7 +387,7 @@ def _log_setting(rec: rr.RecordingStream, world: str, run: RecordedMotion, marks
 def _log_barrier(
     rec: rr.RecordingStream, entity: str, clock: Clock, run: RecordedMotion, i: int
 ) -> None:
-    """Log barrier `i`: a gravity wall moves, what fails turns pale, a ditch is a line."""
+    """Log barrier `i`: gravity walls move, failed barriers turn pale, ditches are lines."""
     barrier, z = run.scene.barriers[i], LAYER["barriers"]
     outline = run.scene.outline(i)
     if barrier.drawn == "line":
@@ -410,7 +411,7 @@ def _log_barrier(
 def _log_state(
     rec: rr.RecordingStream, entity: str, clock: Clock, run: RecordedMotion, i: int, label: str
 ) -> None:
-    """Log what barrier `i` is and in which state, over time, above its top."""
+    """Log the name and state of barrier `i` over time as a label above its top."""
     outline, changes = run.scene.outline(i), run.states(i)
     x, top = float(outline[:, 0].mean()), float(outline[:, 1].max())
     left, bottom, right, high = frame(run.scene)
@@ -433,7 +434,7 @@ def _log_state(
 def _log_motion(
     rec: rr.RecordingStream, entity: str, when: list[rr.TimeColumn], poses: Floats, z: float
 ) -> None:
-    """Log where a body is in every frame, from its poses, (T, 3)."""
+    """Log the position of a body in every frame, from its poses, (T, 3)."""
     x, y, theta = poses.T
     still = np.zeros_like(theta)
     columns = rr.Transform3D.columns(
@@ -446,7 +447,7 @@ def _log_motion(
 def _log_block(
     rec: rr.RecordingStream, entity: str, clock: Clock, run: RecordedMotion, i: int
 ) -> None:
-    """Log block `i`: its polygon about its centroid once, and where that is in every frame."""
+    """Log block `i`: its polygon about its centroid, and its pose in every frame."""
     block = run.scene.blocks[i]
     body = block.vertices - polygon_properties(block.vertices)[1]
     colour = GROUND if block.fixed else ROCK[i % len(ROCK)]
@@ -462,11 +463,11 @@ def _log_shape(
     colour: Colour | None,
     outline: shapely.Geometry | None = None,
 ) -> None:
-    """Log `shape` filled with `colour`, and in ink its `outline` (by default, all of it).
+    """Log `shape` filled with `colour`, and its `outline` (by default, all edges) in ink.
 
-    Without a colour it is left to be logged over time.
+    If `colour` is None, the colour must be logged over time.
     """
-    valid = shapely.make_valid(shape)  # parts of an earthwork may be joined without width
+    valid = shapely.make_valid(shape)  # parts of an earthwork may join at a point
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(valid))
     corners = [_lift(triangle, z)[:3] for triangle in triangles]  # the fourth closes the ring
     edge = _lift(outline or shape, z + EDGE)
@@ -481,7 +482,7 @@ def _lift(shape: shapely.Geometry, z: float) -> Floats:
 
 
 def _ground(chain: Floats, bottom: float) -> shapely.Geometry:
-    """Return the ground from a chain with overhangs down to the level `bottom`."""
+    """Return the ground below a chain, which may have overhangs, down to the level `bottom`."""
     left, right = chain[:, 0].min(), chain[:, 0].max()
     closing = [(right, chain[-1, 1]), (right, bottom), (left, bottom), (left, chain[0, 1])]
     return shapely.make_valid(shapely.Polygon([*chain, *closing]))

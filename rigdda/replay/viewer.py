@@ -1,4 +1,4 @@
-"""The rerun viewer on the file of a replay."""
+"""Launcher of the Rerun viewer for replay files."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from rigdda.errors import BadInput, Error
 
 
 def open_viewer(path: str | os.PathLike[str]) -> None:
-    """Show a replay in the rerun viewer; return when it is closed or on Ctrl-C.
+    """Show a replay in the Rerun viewer; return when it is closed or on Ctrl-C.
 
     Raises
     ------
     BadInput
-        If the file is missing or is not a rerun recording.
+        If the file is missing or is not a Rerun recording.
     Error
-        If the viewer fails, for example without a screen.
+        If the viewer fails, for example without a display.
     """
     file = rrd_path(path)
     if not file.is_file():
@@ -31,7 +31,7 @@ def open_viewer(path: str | os.PathLike[str]) -> None:
     viewer = subprocess.Popen(command, start_new_session=True)
     try:
         code = viewer.wait()
-    except KeyboardInterrupt:  # `python -m rerun` only starts the viewer: end the whole group
+    except KeyboardInterrupt:  # `python -m rerun` only starts the viewer: end its process group
         if hasattr(os, "killpg"):
             os.killpg(viewer.pid, signal.SIGTERM)
         else:  # Windows
@@ -43,12 +43,12 @@ def open_viewer(path: str | os.PathLike[str]) -> None:
 
 
 def rrd_path(path: str | os.PathLike[str]) -> Path:
-    """Return `path`, whose name the viewer must recognise.
+    """Return `path` after checking that the viewer will recognise its name.
 
     Raises
     ------
     BadInput
-        If the name does not end in .rrd.
+        If the file name does not end in .rrd.
     """
     if Path(path).suffix != ".rrd":
         raise BadInput("replay file", str(path), "let its name end in .rrd")

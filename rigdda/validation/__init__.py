@@ -1,7 +1,7 @@
-"""The accuracy suite: computed motions against closed forms and invariances.
+"""Validation suite: computed motions compared with closed-form solutions and invariances.
 
-One case is one computed experiment with one or more figures, each with its bar. `suite.CASES` lists
-them; `rigdda validate` prints them and the tests run them.
+A case is one computed experiment with one or more checked quantities, each with an error tolerance.
+`suite.CASES` lists all cases; `rigdda validate` prints their results and the tests run them.
 """
 
 from rigdda.validation.case import Case, Check, Lab, Measured, Result, evaluate

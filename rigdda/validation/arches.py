@@ -1,4 +1,4 @@
-"""A semicircular masonry arch under its weight (Milankovitch 1907; Heyman 1969)."""
+"""A semicircular masonry arch under its own weight (Milankovitch 1907; Heyman 1969)."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ RADIUS, VOUSSOIRS = 10.0, 22
 
 
 def arch(ratio: float) -> tuple[Block, ...]:
-    """Return blocks with radial joints, of thickness `ratio` times the mean radius."""
+    """Return blocks with radial joints and a thickness of `ratio` times the mean radius."""
     thickness = ratio * RADIUS
     inner, outer = RADIUS - 0.5 * thickness, RADIUS + 0.5 * thickness
     angle = np.linspace(0.0, math.pi, VOUSSOIRS + 1)
     joint = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    joint[-1, 1] = 0.0  # both feet exactly on the ground
+    joint[-1, 1] = 0.0  # both springings exactly on the ground
     return tuple(Block([inner * p, outer * p, outer * q, inner * q]) for p, q in pairwise(joint))
 
 
 def drop(lab: Lab, ratio: float, time: float) -> float:
-    """Return by how far the crown has sunk after `time` [m]."""
+    """Return the settlement of the crown after `time` [m]."""
     blocks = arch(ratio)
     sim = lab.simulate(Scene(Terrain(FLAT), blocks, rock(60.0)), sleeping=False)
     crown = VOUSSOIRS // 2
@@ -43,7 +43,7 @@ CASES = (
     ),
     Case(
         "arch-falls",
-        # the crown of a fallen arch lies lower than half its height
+        # the crown of a collapsed arch lies below half its height
         (Check("falls at 0.095", "yes: limit 0.1068", "-", 0.0, "absolute"),),
         lambda lab: (Measured(float(drop(lab, 0.095, 30.0) > 0.5 * RADIUS), 1.0),),
     ),

@@ -1,4 +1,4 @@
-"""A case of the accuracy suite and what came of it."""
+"""Cases of the validation suite and their results."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from rigdda.model.settings import Settings
 
 
 class Lab:
-    """Where a case simulates: its step, its random numbers, and a meter of what it costs.
+    """Environment of a case: its step, its random numbers and a meter of its processor time.
 
     Parameters
     ----------
     dt : float
         Time step [s].
     seed : int
-        Which random shapes, speeds and offsets a case draws.
+        Seed of the random shapes, velocities and offsets of a case.
 
     Attributes
     ----------
     cpu, simulated : float
-        Processor time spent in steps, and the time they simulated [s].
+        Processor time spent in steps, and the simulated time [s].
     """
 
     def __init__(self, dt: float, seed: int = 0):
@@ -38,11 +38,11 @@ class Lab:
         self.cpu, self.simulated = 0.0, 0.0
 
     def simulate(self, scene: Scene, dt: float | None = None, **settings: Any) -> Metered:
-        """Return the scene in motion, at the step of the lab or at `dt` [s]."""
+        """Return a simulation of a scene, with the step of the lab or with `dt` [s]."""
         return Metered(self, scene, Settings(dt=dt or self.dt, **settings))
 
     def random(self, *which: int) -> np.random.Generator:
-        """Return the random numbers of one of the experiments of a case."""
+        """Return the random number generator of one of the experiments of a case."""
         return np.random.default_rng((self.seed, *which))
 
     def steps(self, duration: float) -> int:
@@ -51,14 +51,14 @@ class Lab:
 
 
 class Metered(Simulation):
-    """A simulation whose steps are timed; what a case does between them is not."""
+    """A simulation that measures the processor time of its steps only."""
 
     def __init__(self, lab: Lab, scene: Scene, settings: Settings, **monitors: Any):
         super().__init__(scene, settings, **monitors)
         self._lab = lab
 
     def step(self, n: int = 1) -> None:
-        """Take `n` steps and time them."""
+        """Take `n` steps and measure their processor time."""
         before = time.process_time()
         super().step(n)
         self._lab.cpu += time.process_time() - before
@@ -66,7 +66,7 @@ class Metered(Simulation):
 
 
 class Measured(NamedTuple):
-    """What was computed, one value or several, and what the closed form gives for each."""
+    """One or several computed values, and the exact value of each."""
 
     computed: ArrayLike
     exact: ArrayLike = 0.0
@@ -74,21 +74,21 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One figure of a case.
+    """One checked quantity of a case.
 
     Parameters
     ----------
     quantity : str
-        What is computed.
+        Name of the quantity.
     closed_form : str
-        The equation it is compared with, and its source.
+        The equation for its exact value, and the source.
     unit : str
         Unit of the quantity; a relative error has none.
     bar : float
-        The greatest error that passes.
+        Error tolerance.
     error : {"relative", "absolute", "bound"}
-        How the error is taken: over the closed form, in the unit, or the computed value itself,
-        which is then a quantity that ought to be nothing.
+        Definition of the error: relative to the exact value, absolute in the unit, or the
+        computed value itself if it should be zero.
     """
 
     quantity: str
@@ -98,7 +98,7 @@ class Check:
     error: Literal["relative", "absolute", "bound"]
 
     def errors(self, computed: np.ndarray, exact: np.ndarray) -> np.ndarray:
-        """Return the error of each value; one that is not a number counts as infinite."""
+        """Return the error of each value, infinite for NaN."""
         error = computed if self.error == "bound" else np.abs(computed - exact)
         if self.error == "relative":
             error = error / np.abs(exact)
@@ -114,15 +114,15 @@ class Case:
     name : str
         Its name on the command line.
     checks : sequence of Check
-        Its figures.
+        Its checked quantities.
     measure : callable
-        Simulates in a `Lab` and returns one `Measured` for each check.
+        Function that simulates in a `Lab` and returns one `Measured` for each check.
     dt : float, optional
-        Step instead of the default one [s].
+        Step that replaces the default one [s].
     slow : bool
-        It takes more than a few seconds.
+        Whether it takes more than a few seconds.
     smooth : bool
-        Its error has an order of convergence in the step.
+        Whether its error has an order of convergence in the step.
     """
 
     name: str
@@ -135,7 +135,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """One figure of a case against its bar; of several values, the worst one.
+    """Result of one check of a case; for several values, that with the largest error.
 
     `cpu` is the processor time of the case's steps per simulated time [us/s].
     """
@@ -149,7 +149,7 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """Whether the bar holds."""
+        """Whether the error is within the tolerance."""
         return self.error <= self.check.bar
 
     def __str__(self) -> str:
@@ -162,16 +162,16 @@ class Result:
 
 
 def evaluate(case: Case, dt: float | None = None, seed: int = 0) -> tuple[Result, ...]:
-    """Run a case and return its figures.
+    """Run a case and return the results of its checks.
 
     Parameters
     ----------
     case : Case
-        What to run.
+        The case.
     dt : float, optional
-        Time step [s]; that of the case, or the default one, if it is not given.
+        Time step [s]; by default that of the case or the default step.
     seed : int
-        Which random shapes, speeds and offsets it draws.
+        Seed of the random shapes, velocities and offsets.
     """
     lab = Lab(dt or case.dt or Settings().dt, seed)
     try:

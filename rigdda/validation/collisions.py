@@ -1,4 +1,4 @@
-"""Blocks that spin and collide in free space keep their momentum, two or several at once."""
+"""Blocks that spin and collide in free space conserve momentum, in pairs and in larger groups."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import masses, momentum, polygon, rock, rough
 
 PAIRS = 300
-"""Random pairs; blocks that part in free space do not meet again."""
+"""Number of random pairs; blocks that separate in free space do not collide again."""
 
 RINGS = 60
-"""Random rings of each size."""
+"""Number of random rings of each size."""
 
 
 def pair(rng: np.random.Generator) -> Scene:
@@ -27,7 +27,7 @@ def pair(rng: np.random.Generator) -> Scene:
 
 
 def ring(rng: np.random.Generator, count: int) -> Scene:
-    """Return random blocks on a ring that fly at one another and meet several at once."""
+    """Return random blocks on a ring that fly inwards, so that several collide at once."""
     blocks = []
     for turn in 2.0 * np.pi * np.arange(count) / count:
         outward = np.array([np.cos(turn), np.sin(turn)])
@@ -41,10 +41,11 @@ def ring(rng: np.random.Generator, count: int) -> Scene:
 
 
 def drift(lab: Lab, scene: Scene) -> tuple[float, float, float]:
-    """Return the greatest change of linear and of angular momentum and growth of energy [-].
+    """Return the greatest changes of linear and angular momentum and the growth of energy [-].
 
-    Momenta over the sum of their magnitudes (on an arm of 1 m); growth above the least energy so
-    far, so that small gains add up, over the first energy.
+    Changes of momentum are relative to the sum of the magnitudes of momentum (with a lever arm of 1
+    m). The growth of energy is above the lowest energy so far, so that small gains add up, relative
+    to the initial energy.
     """
     sim = lab.simulate(scene, sleeping=False)
     linear, angular, start = momentum(sim)
@@ -60,13 +61,13 @@ def drift(lab: Lab, scene: Scene) -> tuple[float, float, float]:
 
 
 def measure(lab: Lab) -> list[Measured]:
-    """Let all pairs collide."""
+    """Simulate the collisions of all pairs."""
     columns = zip(*(drift(lab, pair(lab.random(i))) for i in range(PAIRS)), strict=True)
     return [Measured(column) for column in columns]
 
 
 def measure_rings(lab: Lab) -> list[Measured]:
-    """Let rings of three and of six blocks collide."""
+    """Simulate the collisions of rings of three and six blocks."""
     rings = [ring(lab.random(count, i), count) for count in (3, 6) for i in range(RINGS)]
     linear, angular, gain = zip(*(drift(lab, scene) for scene in rings), strict=True)
     return [Measured(linear), Measured(angular), Measured(gain)]

@@ -1,4 +1,4 @@
-"""The observed order of convergence of the smooth cases."""
+"""Observed order of convergence of the smooth cases."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ STEPS = (1e-2, 5e-3, 2.5e-3, 1.25e-3)
 """Time steps [s]."""
 
 FLOOR = 1e-10
-"""Error below which rounding hides the order [-]."""
+"""Error below which rounding dominates [-]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Convergence:
-    """Errors of one figure at the steps `STEPS`, and their order.
+    """Errors of one checked quantity at the steps `STEPS`, and their order.
 
-    `order` is the slope of the line of least squares through the logarithms of error and step,
-    over the errors above rounding; nan if fewer than two are.
+    `order` is the slope of the least-squares line through the logarithms of error and step, over
+    the errors above rounding; NaN if there are fewer than two.
     """
 
     case: str
@@ -39,7 +39,7 @@ class Convergence:
 
 
 def converge(case: Case, seed: int = 0) -> tuple[Convergence, ...]:
-    """Run a case at all steps."""
+    """Run a case with all steps."""
     runs = [evaluate(case, dt, seed) for dt in STEPS]
     return tuple(
         Convergence(case.name, check.quantity, tuple(run[i].error for run in runs))

@@ -1,4 +1,4 @@
-"""A box that slides off the crest of a bench, tips over it and falls: spin and place of landing."""
+"""A box slides off the crest of a bench, tips over it and falls: rotation and landing point."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, box, rock
 
 WIDTH, HEIGHT, DROP = 1.0, 0.6, 14.0
-"""Size of the box and height of the crest above the level on which it lands [m]."""
+"""Sides of the box and height of the crest above the landing level [m]."""
 
 NEAR = 0.2
-"""Height of the lowest corner above that level at which the flight is read [m]."""
+"""Height of the lowest corner above that level at which the flight is evaluated [m]."""
 
 
 class CrestSlide(NamedTuple):
-    """A bench, its friction angle and the speed of the box with its front at the crest."""
+    """Dip of a bench, its friction angle, and the speed of the box with its front at the crest."""
 
     bench_deg: float
     friction_deg: float
@@ -37,17 +37,18 @@ SLIDES = (
 
 
 def over_the_crest(slide: CrestSlide) -> tuple[float, float]:
-    """Return rate of rotation in flight [rad/s] and where the centroid is at the landing [m].
+    """Return the rate of rotation in flight [rad/s] and the centroid's x at landing [m].
 
-    The crest is at (0, 0). The box slides flat until its support, which friction shifts forward by
-    h tan(phi)/2, reaches the crest. Then its base slides over the crest with Coulomb friction: with
-    e and n along and normal to the base, s the place of the crest along it from the centroid, and k
-    the radius of gyration,
+    The crest is at (0, 0). The box slides flat until the resultant of its base pressure, which
+    friction shifts forward by h tan(phi)/2, reaches the crest. Then its base slides over the crest
+    with Coulomb friction. With e and n along and normal to the base, s the position of the crest
+    along the base from the centroid, and k the radius of gyration,
 
         N = (-g n + v_e w - w s') / (1 + s (s - mu h/2) / k^2),   F = -mu N,
         a = g + N n + F e,   w' = (s N + h F/2) / k^2,   s' = -v_e - w h/2,
 
-    until the rear corner is at the crest. It flies from there until a corner is at the level.
+    until the rear corner reaches the crest. From there the box flies until a corner reaches the
+    level.
     """
     w, h, mu = WIDTH, HEIGHT, math.tan(math.radians(slide.friction_deg))
     bench, k2 = math.radians(slide.bench_deg), (WIDTH**2 + HEIGHT**2) / 12.0
@@ -84,13 +85,13 @@ def over_the_crest(slide: CrestSlide) -> tuple[float, float]:
 
 
 def lowest(y: float, angle: float) -> float:
-    """Return the elevation of the lowest corner of the box at a place and an angle [m, rad]."""
+    """Return the elevation of the lowest corner of the box at a position and an angle [m, rad]."""
     reach = 0.5 * (WIDTH * abs(math.sin(angle)) + HEIGHT * abs(math.cos(angle)))
     return y - reach
 
 
 def ground(bench_deg: float, pieces: int) -> tuple[Terrain, list[Block]]:
-    """Return the bench above level ground: of terrain, or of so many fixed blocks if any."""
+    """Return the bench above level ground, made of terrain or of `pieces` fixed blocks if not 0."""
     bench = math.radians(bench_deg)
     down = np.array([math.cos(bench), -math.sin(bench)])
     top = -12.0 * down
@@ -103,7 +104,7 @@ def ground(bench_deg: float, pieces: int) -> tuple[Terrain, list[Block]]:
 
 
 def fall(lab: Lab, slide: CrestSlide, pieces: int) -> tuple[float, float]:
-    """Return what `over_the_crest` does, of a simulation over a bench of so many pieces."""
+    """Return the results of `over_the_crest` from a simulation with a bench of `pieces` blocks."""
     terrain, fixed = ground(slide.bench_deg, pieces)
     bench = math.radians(slide.bench_deg)
     down = np.array([math.cos(bench), -math.sin(bench)])
@@ -122,14 +123,14 @@ def fall(lab: Lab, slide: CrestSlide, pieces: int) -> tuple[float, float]:
 
 
 def measure(lab: Lab, pieces: int) -> tuple[Measured, Measured]:
-    """Let the box slide over each crest."""
+    """Simulate the slides over each crest."""
     computed = np.array([fall(lab, slide, pieces) for slide in SLIDES]).T
     exact = np.array([over_the_crest(slide) for slide in SLIDES]).T
     return Measured(computed[0], exact[0]), Measured(computed[1], exact[1])
 
 
 def case(name: str, pieces: int, bar: float, dt: float | None = None) -> Case:
-    """Return the case of a bench of so many fixed blocks, 0: of terrain, at a step [s]."""
+    """Return the case of a bench of `pieces` fixed blocks, or of terrain if 0, at a step [s]."""
     checks = (
         Check("rate of rotation", "a base that slides over a corner with friction", "rad/s", bar,
               "relative"),
@@ -144,4 +145,4 @@ CASES = (
     case("crest-block", 1, 1.5e-2),
     case("crest-blocks", 5, 1.5e-2),
 )
-"""All cases of the accuracy suite."""
+"""All cases with a crest."""

@@ -1,4 +1,4 @@
-"""The energy ledger of a whole release."""
+"""Energy balance of a whole release."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from rigdda.model.site import Site
 from rigdda.validation.case import Case, Check, Lab, Measured
 
 STATE = ("kinetic", "potential", "elastic")
-"""Energies of a state; all others of a ledger are work done on the blocks so far."""
+"""Energies of the state; all other entries of the ledger are work done on the blocks so far."""
 
 
 def measure(lab: Lab) -> tuple[Measured]:
-    """Release the site shu-hwa-paper for 25 s; the change of state must be the work done."""
+    """Release the site shu-hwa-paper for 25 s; the change of state must equal the work done."""
     sim = lab.simulate(Site.load("shu-hwa-paper").realise(seed=lab.seed))
     start = sim.energy()
     sim.step(lab.steps(25.0))

@@ -1,8 +1,9 @@
-"""A fence brakes what pushes it with a constant force, and goes when its elongation is spent.
+"""A fence decelerates bodies with a constant force and fails at the end of its elongation.
 
-Its plate, of mass m_p, takes part in every blow, which is plastic. A block of mass m and speed v
-that hits it squarely goes on with it at m v / (m + m_p), and both are stopped over the path
-K / F: K is the kinetic energy of both after the blow, F the braking force.
+The plate of the fence, with mass m_p, takes part in every impact, which is plastic. A block of mass
+m and speed v that hits it squarely continues together with it at m v / (m + m_p). Both are stopped
+over the distance K / F, where K is the kinetic energy of both after the impact and F the braking
+force.
 """
 
 from __future__ import annotations
@@ -22,15 +23,15 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, GRAVITY, box, kinetic_energy, masses, polygon, rock
 
 CAPACITY, ELONGATION = 1e5, 2.0
-"""Of the fence that volleys hit: energy [J/m] and path over which it takes it [m]."""
+"""Energy capacity [J/m] and elongation [m] of the fence that volleys hit."""
 
 FENCE = Fence(0.0, 20.0, CAPACITY, elongation=ELONGATION)
 
 STRONG = Fence(0.0, 5.0, 1e6, elongation=8.0)
-"""A fence that stops any train of unit squares of these cases."""
+"""A fence that stops any train of unit squares in these cases."""
 
 RIGID = Fence(0.0, 20.0, 1e9, elongation=1.0)
-"""A fence that hardly gives way to any block of these cases."""
+"""A fence that hardly yields to any block in these cases."""
 
 SIDE = 1.4
 """Side of the squares of a volley [m]."""
@@ -39,7 +40,7 @@ DURATION = 4.0
 """Time in which three squares arrive and fly on [s]."""
 
 PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
-"""Parts of a step by which a volley is late: it hits elsewhere in a step."""
+"""Fractions of a step by which a volley is delayed, which shifts the impacts within a step."""
 
 
 def plate_mass(fence: Fence) -> float:
@@ -48,21 +49,21 @@ def plate_mass(fence: Fence) -> float:
 
 
 def path(run: Run, barrier: int = 0) -> float:
-    """Return how far a barrier has moved downhill in a run [m]."""
+    """Return the downhill displacement of a barrier in a run [m]."""
     return float(run.barrier_poses[-1, barrier, 0] - run.barrier_poses[0, barrier, 0])
 
 
 class Stop(NamedTuple):
-    """What comes of a plastic blow on a fence."""
+    """Energies of a plastic impact on a fence."""
 
     braked: float
-    """Energy of block and plate after the blow, which the brake has to take [J]."""
+    """Energy of block and plate after the impact, which the brake must absorb [J]."""
     lost: float
-    """Energy that the blow itself takes: m m_p / (2 (m + m_p)) v^2 [J]."""
+    """Energy dissipated by the impact itself: m m_p / (2 (m + m_p)) v^2 [J]."""
 
 
 def blow(mass: float, speed: float, fence: Fence) -> Stop:
-    """Return what comes of a block of this mass [kg] and speed [m/s] that hits a fence squarely."""
+    """Return the energies of a square impact of a block of this mass [kg] and speed [m/s]."""
     plate = plate_mass(fence)
     energy = 0.5 * mass * speed**2
     return Stop(energy * mass / (mass + plate), energy * plate / (mass + plate))
@@ -83,11 +84,11 @@ def volley(
     shares : sequence of float
         Their kinetic energies over the capacity of `FENCE` [-].
     late : float
-        Time by which all of them are late [s].
+        Delay of all squares [s].
     fence : Fence
-        What they hit.
+        The fence.
     uphill : bool
-        Whether they come from the downhill side.
+        Whether they come from the downhill side and fly uphill.
     """
     blocks = []
     for i, share in enumerate(shares):
@@ -99,22 +100,22 @@ def volley(
 
 
 class FenceOutcome(NamedTuple):
-    """What comes of a volley by closed forms."""
+    """Closed-form results of a volley."""
 
     breaking: int
-    """Which hit breaks the fence, 0: none."""
+    """Number of the hit that breaks the fence, 0 if none does."""
     kept: float
-    """Energy that the blocks keep [J]."""
+    """Energy that the blocks retain [J]."""
     path: float
-    """How far the fence has given way [m]."""
+    """Displacement of the fence [m]."""
     taken: float
-    """Energy that the fence has taken from the blocks, its plate included [J]."""
+    """Energy that the fence has absorbed from the blocks, including its plate [J]."""
 
 
 def outcome(shares: Sequence[float], fence: Fence = FENCE) -> FenceOutcome:
-    """Return what comes of a volley: braked energies add up until the capacity is spent.
+    """Return the closed-form results of a volley: braked energies add up to the capacity.
 
-    The block that breaks the fence goes on as fast as the plate at that time.
+    The block that breaks the fence continues at the speed of the plate at that time.
     """
     mass, plate = square_mass(), plate_mass(fence)
     capacity = fence.capacity or 0.0
@@ -134,7 +135,7 @@ def outcome(shares: Sequence[float], fence: Fence = FENCE) -> FenceOutcome:
 
 
 def fly(lab: Lab, scene: Scene) -> tuple[int, float, float]:
-    """Return which hit breaks the fence, the energy kept [J], and the path, as computed."""
+    """Return the computed number of the breaking hit, the retained energy [J] and the path [m]."""
     sim = lab.simulate(scene)
     run = sim.run(DURATION)
     broken = run.events[run.events["kind"] == FAILED]
@@ -143,7 +144,7 @@ def fly(lab: Lab, scene: Scene) -> tuple[int, float, float]:
 
 
 def measure(lab: Lab, shares: Sequence[float]) -> tuple[Measured, ...]:
-    """Throw one volley, at all phases."""
+    """Simulate one volley at all phases."""
     found = (fly(lab, volley(shares, phase * lab.dt)) for phase in PHASES)
     breaking, kept, paths = zip(*found, strict=True)
     exact = outcome(shares)
@@ -165,9 +166,9 @@ def case(name: str, *shares: float) -> Case:
 
 
 def together(fence: Fence, blocks: Sequence[Block], momentum: float) -> float:
-    """Return the path of a fence over which blocks and plate are stopped that go on together [m].
+    """Return the stopping distance of a fence, its plate and blocks that move together [m].
 
-    `momentum` is what they have downhill before the blow [N s].
+    `momentum` is their total downhill momentum before the impact [N s].
     """
     mass = float(masses(Scene(None, tuple(blocks)))[0].sum()) + plate_mass(fence)
     return 0.5 * momentum**2 / mass / fence.braking_force
@@ -176,9 +177,10 @@ def together(fence: Fence, blocks: Sequence[Block], momentum: float) -> float:
 def push_together(
     lab: Lab, row: int, shots: Sequence[float], speeds: Sequence[float]
 ) -> tuple[Measured]:
-    """Return the path of a fence on which a row of unit squares leans and which others strike.
+    """Compare the path of a fence loaded by a row of unit squares and hit by others.
 
-    `shots` are the chainages of what comes [m], with `speeds` [m/s]. All go on together.
+    The row leans on the fence. `shots` are the chainages of the other squares [m], and `speeds`
+    their speeds [m/s]. All bodies move on together.
     """
     moving = [box(x, 0.5, velocity=(v, 0.0, 0.0)) for x, v in zip(shots, speeds, strict=True)]
     blocks = [*(box(-0.5 - i, 0.5) for i in range(row)), *moving]
@@ -189,13 +191,13 @@ def push_together(
 
 
 def in_one_step(lab: Lab, ahead: float, fast: float = 20.0) -> tuple[Measured]:
-    """Return the path where a fast block strikes a slower one in the step in which that hits."""
+    """Compare the path if a fast block hits a slower one in the step of the fence impact."""
     shots = (-0.5 - 0.3 * ahead * lab.dt, -1.5 - 0.3 * fast * lab.dt)
     return push_together(lab, 0, shots, (ahead, fast))
 
 
 def joint_push(name: str, row: int, *shots: float) -> Case:
-    """Return the case of unit squares that come with 10 m/s, one behind the other."""
+    """Return the case of unit squares that arrive at 10 m/s, one behind the other."""
     check = Check("path", "momentum of all, then energy / F", "m", 0.01, "relative")
     speeds = (10.0,) * len(shots)
     return Case(name, (check,), lambda lab: push_together(lab, row, shots, speeds))
@@ -211,9 +213,9 @@ class Lean(NamedTuple):
     share : float
         Braking force of the fence over the horizontal thrust W tan(slope) of the row [-].
     blocks : int
-        Squares of the row.
+        Number of squares in the row.
     elongation : float
-        Of the fence [m].
+        Elongation of the fence [m].
     """
 
     slope_deg: float
@@ -223,7 +225,7 @@ class Lean(NamedTuple):
 
     @property
     def thrust(self) -> float:
-        """Horizontal force with which the row leans on what does not give way [N/m]."""
+        """Horizontal force of the row on a rigid barrier [N/m]."""
         return self.blocks * 2600.0 * GRAVITY * math.tan(math.radians(self.slope_deg))
 
     @property
@@ -234,7 +236,7 @@ class Lean(NamedTuple):
 
     @property
     def scene(self) -> Scene:
-        """The row, which touches the fence, on a ramp of ice."""
+        """The row, in contact with the fence, on a ramp of ice."""
         slope = math.radians(self.slope_deg)
         cos, sin = math.cos(slope), math.sin(slope)
         terrain = Terrain([(-60.0 * cos, 60.0 * sin), (60.0 * cos, -60.0 * sin)], ["ice"])
@@ -248,7 +250,7 @@ class Lean(NamedTuple):
         return Scene(terrain, blocks, surfaces, barriers=(self.fence,))
 
     def path(self, time: float) -> float:
-        """Return how far the row has pushed the fence in a time [m]; nothing if it is held.
+        """Return the displacement of the fence in a time [m], 0 if it holds the row.
 
         m a = m g sin(slope) - N cos(slope), N = F + m_p a cos(slope), both from rest.
         """
@@ -260,13 +262,13 @@ class Lean(NamedTuple):
 
 
 def lean(lab: Lab, leans: Sequence[Lean], time: float = 1.0) -> tuple[Measured]:
-    """Return how far rows on slopes have pushed their fences in a time [s]."""
+    """Compare the displacements of fences under rows on slopes in a time [s]."""
     found = [path(lab.simulate(one.scene).run(time)) for one in leans]
     return (Measured(found, [one.path(time) for one in leans]),)
 
 
 class Bar(NamedTuple):
-    """A thin bar, tilted, that flies at a fence and strikes it with a corner, without friction."""
+    """A thin tilted bar that hits a fence with a corner, without friction."""
 
     tilt_deg: float
     speed: float = 10.0
@@ -275,7 +277,7 @@ class Bar(NamedTuple):
 
     @property
     def block(self) -> Block:
-        """The bar, its right-most corner 10 cm before the fence."""
+        """The bar, with its rightmost corner 10 cm in front of the fence."""
         corners = 0.5 * polygon(
             [(-self.thick, -self.long), (self.thick, -self.long)], (0.0, 0.0), 0.0
         )
@@ -285,13 +287,14 @@ class Bar(NamedTuple):
 
     @property
     def scene(self) -> Scene:
-        """The bar before a fence that hardly gives way."""
+        """The bar in front of a fence that hardly yields."""
         return Scene(Terrain(FLAT), (self.block,), rock(40.0, 0.5), barriers=(RIGID,), gravity=0.0)
 
     def after(self) -> tuple[float, float, float, float]:
-        """Return vx, vy, omega after the blow [m/s, m/s, rad/s] and the work on the bar [J].
+        """Return vx, vy, omega after the impact [m/s, m/s, rad/s] and the work on the bar [J].
 
-        The corner stops: v - p / m - omega r = 0, omega = p r / I, for the arm r of the blow.
+        The corner stops: v - p / m - omega r = 0, omega = p r / I, with the lever arm r of the
+        impulse.
         """
         (mass,), (inertia,) = masses(self.scene)
         corners = self.block.vertices
@@ -304,7 +307,7 @@ class Bar(NamedTuple):
 
 
 def strike(lab: Lab, bars: Sequence[Bar]) -> tuple[Measured, Measured, Measured]:
-    """Return work, turn and velocity along the face after tilted bars have struck a fence."""
+    """Compare work, rotation and velocity along the face for tilted bars that hit a fence."""
     works, turns, slips = [], [], []
     for bar in bars:
         sim = lab.simulate(bar.scene)

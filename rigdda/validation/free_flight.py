@@ -1,4 +1,4 @@
-"""Flight without contact: free fall and fall with mass-proportional damping."""
+"""Flight without contacts: free fall, and fall with mass-proportional damping."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, box, rock
 
 DURATION = 3.0
-"""Time of the falls [s]."""
+"""Duration of the falls [s]."""
 
 
 def fall(damping: float, time: float) -> tuple[float, float]:
-    """Return way [m] and speed [m/s] after `time` [s] from rest: v' = g - a v.
+    """Return distance [m] and speed [m/s] after `time` [s] from rest: v' = g - a v.
 
     v = g/a (1 - exp(-a t)), s = g/a (t - (1 - exp(-a t))/a); without damping g t and g t^2/2.
     """
@@ -24,7 +24,7 @@ def fall(damping: float, time: float) -> tuple[float, float]:
 
 
 def measure(lab: Lab, damping: float) -> tuple[Measured, Measured]:
-    """Let a block fall."""
+    """Simulate the fall of a block."""
     sim = lab.simulate(Scene(None, (box(),), rock(), damping=damping))
     sim.step(lab.steps(DURATION))
     way, speed = fall(damping, DURATION)

@@ -1,4 +1,4 @@
-"""A rock leans on a gravity wall, which slides or overturns at the load of statics."""
+"""A rock leans on a gravity wall, which slides or overturns at its static limit load."""
 
 from __future__ import annotations
 
@@ -21,21 +21,22 @@ FACE = 0.5
 """Chainage of the face of the wall, beyond the foot of the ramp [m]."""
 
 DURATION, MOVED, BISECTIONS = 2.0, 1e-3, 14
-"""Time of a push [s], displacement from which on a wall counts as moved [m], halvings.
+"""Duration of a push [s], displacement above which a wall counts as moved [m], and number of
+bisections.
 
-A thousandth more than the limit moves each of the walls by 3 mm or more in that time.
+A load a thousandth above the limit moves each of the walls by at least 3 mm in that time.
 """
 
 
 class Push(NamedTuple):
-    """A wall on level ground, its friction angle [deg], the height of the push on it [m]."""
+    """A wall on level ground, its friction angle [deg] and the height of the push on it [m]."""
 
     wall: GravityWall
     friction_deg: float
     height: float
 
     def limit(self) -> float:
-        """Return the force that moves the wall [N]: W tan phi slides, W b/(2 h) overturns it."""
+        """Return the limit load [N]: the lesser of W tan phi (slides) and W b/(2 h) (overturns)."""
         weight = self.wall.density * GRAVITY * self.wall.thickness * self.wall.height
         sliding = math.tan(math.radians(self.friction_deg))
         return weight * min(sliding, 0.5 * self.wall.thickness / self.height)
@@ -43,8 +44,8 @@ class Push(NamedTuple):
     def scene(self, force: float) -> Scene:
         """Return the wall at the foot of a ramp of ice, pushed by a smooth rock with `force` [N].
 
-        The rock touches the face with its nose. Without friction it rests on the ramp under the
-        horizontal force W tan(slope), from which its density follows.
+        The rock touches the face of the wall with its nose. Without friction, it rests on the ramp
+        under the horizontal force W tan(slope), which determines its density.
         """
         low, high = 0.6, 6.0
         corners = np.array(
@@ -61,7 +62,7 @@ class Push(NamedTuple):
 
 
 def displacement(lab: Lab, scene: Scene) -> Floats:
-    """Return how far and how much the first barrier moves and turns, (3,) [m, m, rad]."""
+    """Return the displacement and rotation of the first barrier, (3,) [m, m, rad]."""
     sim = lab.simulate(scene, sleeping=False)
     start = sim.barrier_poses
     sim.step(lab.steps(DURATION))
@@ -70,7 +71,7 @@ def displacement(lab: Lab, scene: Scene) -> Floats:
 
 
 def limit_load(lab: Lab, push: Push) -> float:
-    """Return the force from which on the wall moves [N], bisected from 0.5 to 1.4 of the limit."""
+    """Return the force above which the wall moves [N], bisected from 0.5 to 1.4 of the limit."""
     low, high = 0.5 * push.limit(), 1.4 * push.limit()
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
@@ -87,7 +88,7 @@ def limit_loads(lab: Lab, pushes: Sequence[Push]) -> Measured:
 
 
 def turns(lab: Lab, pushes: Sequence[Push]) -> Floats:
-    """Return by how much walls turn at 1.02 of their limits [rad], downhill negative."""
+    """Return the rotations of walls at 1.02 of their limit loads [rad], negative downhill."""
     return np.array([displacement(lab, push.scene(1.02 * push.limit()))[2] for push in pushes])
 
 

@@ -1,4 +1,4 @@
-"""Impacts on the ground: restitution as prescribed, energy that never grows."""
+"""Impacts on the ground: prescribed restitution, and energy that never increases."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ HITS = 1_000
 PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
 STEPS = (1e-4, 3e-4, 1e-3, 3e-3, 5e-3, 1e-2)
 DENSITIES = (1.0, 1e2, 1e4, 1e6)
-"""Of blocks of 1 m2: as many kilogrammes."""
+"""Densities of blocks of 1 m2 [kg/m3], equal to their masses [kg/m]."""
 
 
 def rebound(lab: Lab, restitution: float, dt: float, phase: float, density: float) -> float:
-    """Return the restitution that the apex after a flat drop shows: sqrt(apex / drop).
+    """Return the restitution from the apex after a flat drop: sqrt(apex / drop).
 
-    `phase` shifts the drop so that the block touches elsewhere within its step.
+    `phase` changes the height of the drop, which shifts the impact within its step.
     """
     drop = DROP + phase * dt * math.sqrt(2.0 * GRAVITY * DROP)
     block = box(0.0, 0.5 + drop, density=density)
@@ -48,7 +48,7 @@ def rebound(lab: Lab, restitution: float, dt: float, phase: float, density: floa
 
 
 def measure_restitution(lab: Lab, restitution: float) -> tuple[Measured]:
-    """Drop a square flat, at all steps, phases and masses."""
+    """Drop a square flat, with all steps, phases and masses."""
     found = [
         rebound(lab, restitution, dt, phase, density)
         for dt in STEPS
@@ -68,7 +68,7 @@ def oblique_hit(rng: np.random.Generator) -> Scene:
 
 
 def greatest_gain(lab: Lab, scene: Scene, time: float) -> float:
-    """Return the greatest growth of kinetic energy above its least so far, over the first [-]."""
+    """Return the greatest rise of kinetic energy above its lowest so far, over the initial one."""
     sim = lab.simulate(scene, sleeping=False)
     mass, inertia = masses(scene)
     least = start = kinetic_energy(sim.velocities, mass, inertia)
@@ -81,7 +81,7 @@ def greatest_gain(lab: Lab, scene: Scene, time: float) -> float:
 
 
 def measure_hits(lab: Lab) -> tuple[Measured]:
-    """Throw random blocks at the ground."""
+    """Simulate impacts of random blocks on the ground."""
     gains = [greatest_gain(lab, oblique_hit(lab.random(hit)), 0.5) for hit in range(HITS)]
     return (Measured(gains),)
 
@@ -96,7 +96,7 @@ CASES = (
     *(restitution_case(e) for e in RESTITUTIONS),
     Case(
         "eccentric-hits",
-        # a sum of two squares, each to rounding, over 100 steps
+        # rounding errors of a sum of two squares over 100 steps
         (Check("gain of energy", "none: passive contact", "-", 1e-9, "bound"),),
         measure_hits,
     ),

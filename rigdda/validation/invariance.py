@@ -1,4 +1,4 @@
-"""What must not matter: where a scene is, how it is turned, the order of its blocks, its side."""
+"""Invariance under shift, rotation and reflection of a scene and reordering of its blocks."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from rigdda.validation.scenes import GRAVITY, Floats, polygon, rock, rough
 
 SLOPE = np.array([(-40.0, 30.0), (-10.0, 8.0), (0.0, 5.0), (30.0, -10.0), (80.0, -12.0)])
 DURATION = 0.6
-"""Time in which the blocks strike the ground, spin and slide, and have not met yet [s]."""
+"""Time in which the blocks hit the ground, spin and slide, but do not meet yet [s]."""
 
 MOVE, TURN, ORDER = np.array([5000.0, 2000.0]), math.radians(25.0), (2, 0, 3, 1)
 """Rigid motion [m, rad] and new order of the blocks."""
 
 
 def parts(lab: Lab) -> list[tuple[Floats, tuple[float, float, float]]]:
-    """Return corners and velocities of four blocks that are well apart."""
+    """Return corners and velocities of four well-separated blocks."""
     rng = lab.random()
     places = [(-30.0, 24.2), (-12.0, 11.5), (5.0, 4.5), (22.0, -4.0)]
     return [
@@ -36,7 +36,7 @@ def parts(lab: Lab) -> list[tuple[Floats, tuple[float, float, float]]]:
 
 
 def still(points: Floats) -> Floats:
-    """Leave points where they are."""
+    """Return points unchanged."""
     return points
 
 
@@ -48,9 +48,9 @@ def flight(
     order: Sequence[int] = (0, 1, 2, 3),
     **scene: Any,
 ) -> Floats:
-    """Return the poses after the flight of the changed scene, (4, 3), in the order of `parts`.
+    """Return the poses after the flight in the changed scene, (4, 3), in the order of `parts`.
 
-    `place` changes points, `turn` directions.
+    `place` transforms points and `turn` transforms directions.
     """
     blocks = []
     for i in order:
@@ -67,7 +67,7 @@ def flight(
 
 
 def measured(lab: Lab, poses: Floats) -> tuple[Measured]:
-    """Return the distance of poses from those of the unchanged scene, over the way they made."""
+    """Return the distances of poses from those of the unchanged scene, over the distances moved."""
     plain = flight(lab)
     start = np.array([polygon_properties(corners)[1] for corners, _ in parts(lab)])
     way = np.linalg.norm(plain[:, :2] - start, axis=1)
@@ -75,24 +75,24 @@ def measured(lab: Lab, poses: Floats) -> tuple[Measured]:
 
 
 def measure_shift(lab: Lab) -> tuple[Measured]:
-    """Move the scene."""
+    """Shift the scene."""
     return measured(lab, flight(lab, lambda p: p + MOVE) - [*MOVE, 0.0])
 
 
 def measure_order(lab: Lab) -> tuple[Measured]:
-    """Give the blocks in another order."""
+    """Reorder the blocks."""
     return measured(lab, flight(lab, order=ORDER))
 
 
 def measure_mirror(lab: Lab) -> tuple[Measured]:
-    """Exchange left and right."""
+    """Mirror the scene horizontally."""
     left = np.array([-1.0, 1.0])
     poses = flight(lab, lambda p: p * left, lambda v: v * left, mirror=True)
     return measured(lab, poses * [-1.0, 1.0, -1.0])
 
 
 def measure_turn(lab: Lab) -> tuple[Measured]:
-    """Turn the scene together with its gravity."""
+    """Rotate the scene together with gravity."""
     gravity = tuple(polygon([0.0, -GRAVITY], angle=TURN))
     poses = flight(
         lab, lambda p: polygon(p, angle=TURN), lambda v: polygon(v, angle=TURN), gravity=gravity
@@ -102,7 +102,7 @@ def measure_turn(lab: Lab) -> tuple[Measured]:
 
 
 def measure_balance(lab: Lab) -> tuple[Measured, Measured]:
-    """Release the site `quick` with its blocks in two orders: no mass is lost or gained."""
+    """Release the site `quick` with its blocks in two orders; mass must be conserved."""
     site = Site.load("quick")
     drawn = site.draw(lab.seed, "mass")
     scene = site.scene(drawn)

@@ -1,7 +1,7 @@
-"""A joint breaks where a traction that is linear along it exceeds its strength.
+"""A joint breaks where a linear traction along it exceeds its strength.
 
-In tension, pulled at its middle or beside it, by N = sigma_t L / (1 + 6 e / L), and in shear,
-pushed at its level or above it, by S = c L + N tan phi.
+It is loaded in tension, pulled with an eccentricity e, which it resists up to N = sigma_t L / (1 +
+6 e / L); and in shear, pushed at its level or above it, up to S = c L + N tan phi.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from rigdda.validation.scenes import FLAT, GRAVITY, box, masses
 
 STEPS = (1e-3, 5e-3, 1e-2)
 FRICTION = 30.0
-"""Of the joint [deg]."""
+"""Friction angle of the joint [deg]."""
 
 STRENGTH = 1e5
-"""Of the joint, in tension and, a tenth of it, in shear [Pa]."""
+"""Tensile strength of the joint; its cohesion is a tenth of it [Pa]."""
 
 ECCENTRICITIES = (0.0, 0.1, 0.25, 0.5)
-"""Of the pull, over the length of the joint of 1 m."""
+"""Eccentricities of the pull over the joint length of 1 m [-]."""
 
 ARMS = (0.0, 0.5, 1.0)
 """Heights of the push above the joint of a block 2 m high [m]."""
 
 TIME = 0.3
-"""Time after which what is to break has come apart [s]."""
+"""Time after which a broken joint has visibly separated [s]."""
 
 HALVINGS = 6
 
@@ -45,18 +45,18 @@ def breaking(lab: Lab, scene: Scene, dt: float) -> bool:
 
 
 def pulled(eccentricity: float, share: float) -> Scene:
-    """Return a block on a joint that is pulled up with a share of what breaks it."""
+    """Return a block on a joint, pulled upwards with a fraction of the breaking force."""
     block = box(0.0, 0.5)
     weight = GRAVITY * float(masses(Scene(None, (block,)))[0][0])
     pull = share * STRENGTH / (1.0 + 6.0 * eccentricity)
-    # the pull and the weight are one force beside the middle
+    # pull and compensation of the weight, combined into one eccentric force
     load = PointLoad(0, (pull * eccentricity / (pull + weight), 1.0), (0.0, pull + weight))
     surface = Surface(FRICTION, cohesion=100.0 * STRENGTH, tension=STRENGTH)
     return Scene(Terrain(FLAT), (block,), {"rock": surface}, loads=(load,))
 
 
 def pushed(arm: float, share: float) -> Scene:
-    """Return a block of 1 by 2 m on a joint that is pushed aside with a share of what breaks it."""
+    """Return a block of 1 by 2 m on a joint, pushed by a fraction of the breaking force."""
     block = box(0.0, 1.0, 1.0, 2.0)
     weight = GRAVITY * float(masses(Scene(None, (block,)))[0][0])
     push = share * (0.1 * STRENGTH + weight * math.tan(math.radians(FRICTION)))
@@ -66,7 +66,7 @@ def pushed(arm: float, share: float) -> Scene:
 
 
 def strength(lab: Lab, build: Callable[[float], Scene], dt: float) -> float:
-    """Return the share of the closed form at which a joint breaks, by bisection."""
+    """Return the breaking force of a joint over the closed form, by bisection."""
     low, high = 0.25, 4.0
     for _ in range(HALVINGS):
         share = math.sqrt(low * high)
@@ -77,7 +77,7 @@ def strength(lab: Lab, build: Callable[[float], Scene], dt: float) -> float:
 def measure(
     lab: Lab, build: Callable[[float, float], Scene], places: tuple[float, ...]
 ) -> tuple[Measured]:
-    """Break joints at all steps."""
+    """Break joints with all steps."""
     found = [strength(lab, partial(build, x), dt) for x in places for dt in STEPS]
     return (Measured(found, 1.0),)
 

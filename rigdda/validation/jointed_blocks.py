@@ -1,6 +1,6 @@
-"""A block slides over flush joints of others: along a plane, a wall, in a slot.
+"""A block slides over flush joints between other blocks: on a plane, along a wall, in a slot.
 
-The sides of the blocks that it slides over do not catch it, so it goes as on one smooth face.
+The sides of the blocks must not stop it, so that it moves as on one smooth face.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from rigdda.validation.scenes import GRAVITY, Floats, box, rock, shifts
 
 STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
 TIME = 1.6
-"""Time of a slide [s]."""
+"""Duration of a slide [s]."""
 
 COURSE = 30
-"""Blocks of 1 m in a row: more than a slide in that time goes over."""
+"""Number of blocks of 1 m in a row, longer than any slide in that time."""
 
 CLEARANCE = 1e-4
-"""Of a block in a slot [m]."""
+"""Clearance of a block in a slot [m]."""
 
 
 class JointSlide(NamedTuple):
-    """A slide over joints: slope and friction [deg], first speed [m/s], gravity [m/s2]."""
+    """A slide over joints: slope and friction [deg], initial speed [m/s], gravity [m/s2]."""
 
     slope: float
     friction: float
     speed: float = 0.0
     gravity: float = GRAVITY
-    free: bool = False  # whether the blocks it slides over are, on rough ground
+    free: bool = False  # whether the blocks below are free, on rough ground
 
     def way(self) -> float:
-        """Return v t + g t^2/2 (sin th - cos th tan phi), up to where it stops [m]."""
+        """Return v t + g t^2/2 (sin th - cos th tan phi), up to the stopping point [m]."""
         slope = math.radians(self.slope)
         drag = math.cos(slope) * math.tan(math.radians(self.friction))
         pull = self.gravity * (math.sin(slope) - drag)
@@ -43,7 +43,7 @@ class JointSlide(NamedTuple):
         return self.speed * time + 0.5 * pull * time**2
 
     def scene(self) -> tuple[Scene, Floats]:
-        """Return the blocks, the slider first, and the unit fall."""
+        """Return the blocks, the sliding one first, and the downslope direction."""
         slope = math.radians(self.slope)
         down = np.array([math.cos(slope), -math.sin(slope)])
         out = np.array([math.sin(slope), math.cos(slope)])
@@ -53,7 +53,7 @@ class JointSlide(NamedTuple):
         row = [box(x, y, angle=-slope, fixed=not self.free) for x, y in places]
         if not self.free:
             return Scene(None, (slider, *row), rock(self.friction), gravity=self.gravity), down
-        # the last one holds the row
+        # the last block supports the row
         x, y = COURSE * down - 0.5 * out
         row.append(box(x, y, angle=-slope, fixed=True))
         ground = Terrain([-3.0 * down - out, 2.0 * COURSE * down - out])
@@ -61,7 +61,7 @@ class JointSlide(NamedTuple):
 
 
 def fall_along(friction_deg: float, clearance: float | None) -> Scene:
-    """Return a block beside a wall of stacked blocks that are fixed, or in a slot between two."""
+    """Return a block beside a wall of stacked fixed blocks, or in a slot between two walls."""
     slider = box(1.0 + 0.5 * (clearance or 0.0), 15.3)
     sides = (0.0,) if clearance is None else (0.0, 2.0 + clearance)
     stack: list[Block] = [box(x, float(i), fixed=True) for x in sides for i in range(20)]
@@ -69,7 +69,7 @@ def fall_along(friction_deg: float, clearance: float | None) -> Scene:
 
 
 def measure_slide(lab: Lab, slide: JointSlide) -> tuple[Measured]:
-    """Let a block slide over the row at all steps."""
+    """Simulate a slide over the row with all steps."""
     ways = []
     for dt in STEPS:
         scene, down = slide.scene()
@@ -81,7 +81,7 @@ def measure_slide(lab: Lab, slide: JointSlide) -> tuple[Measured]:
 
 
 def measure_fall(lab: Lab, clearance: float | None) -> tuple[Measured]:
-    """Let a block fall along a wall or in a slot at all steps, smooth and rough."""
+    """Simulate falls along a wall or in a slot with all steps, smooth and rough."""
     ways = []
     for dt in STEPS:
         for friction in (0.0, 30.0):
@@ -99,7 +99,7 @@ def slide_case(name: str, slide: JointSlide) -> Case:
 
 
 def fall_case(name: str, clearance: float | None) -> Case:
-    """Return the case of a fall beside joints."""
+    """Return the case of a fall along joints."""
     check = Check("way, 1-20 ms", "g t^2/2: nothing presses", "m", 1e-2, "relative")
     return Case(name, (check,), lambda lab: measure_fall(lab, clearance))
 

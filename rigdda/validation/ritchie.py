@@ -3,11 +3,11 @@
 Ritchie (1963, Evaluation of rockfall and its control, Highway Research Record 17) filmed rocks that
 were pushed off crests: below 45 deg they roll, from 45 to 75 deg they bounce, above 75 deg they
 fall. Here single blocks of random shape are pushed off the crests of the sites `ritchie-35`,
-`ritchie-60` and `ritchie-80`, which differ only in their angle.
+`ritchie-60` and `ritchie-80`, which differ only in their slope angle.
 
-That no contact is closed does not tell the modes apart: rigid blocks touch for no time, and an
-angular one that rolls faster than sqrt(g r cos) leaves the ground between its corners. What does is
-how far it leaves the slope, measured by its size, and how often it hits it.
+Closed contacts do not distinguish the modes: impacts of rigid blocks are instantaneous, and an
+angular block that rolls faster than sqrt(g r cos) leaves the ground between its corners. The modes
+are distinguished by the distance from the slope over block size and by the number of hits.
 """
 
 from __future__ import annotations
@@ -27,33 +27,34 @@ from rigdda.validation.scenes import Floats, polygon, rough
 SOURCE = "Ritchie (1963)"
 
 ROLLING, BOUNCING, FALLING = 35, 60, 80
-"""Angle of a slope of each mode [deg]."""
+"""Slope angles for each mode [deg]."""
 
 RELEASES, DITCHED = 64, 200
-"""Blocks that are pushed off each crest to watch their descent, and above each ditch."""
+"""Number of blocks pushed off each crest to observe their descent, and above each ditch."""
 
 LONGEST = 15.0
-"""Time after which a block that has not reached the foot lies on the slope [s]."""
+"""Time after which a block that has not reached the foot counts as stopped on the slope [s]."""
 
 RUN_OUT = 10.0
-"""Time in which a block has come to rest at the foot [s]."""
+"""Time in which a block comes to rest at the foot [s]."""
 
 DITCHES = {60: (1.8, 4.6), 80: (1.2, 4.6)}
-"""Depth and width [m] of his ditches below slopes of 0.5:1 and near vertical, 10 to 20 m high. His
-table from memory: data to compute with, and nothing to compare with."""
+"""Depth and width [m] of Ritchie's ditches below slopes of 0.5:1 and near vertical, 10 to 20 m
+high. They are quoted from memory and serve as input only, not for comparison."""
 
 
 PUSH = 1e-6
-"""Change of velocity in a step, beside that by gravity, that is a touch [m/s]. What is closed at
-the end of a step would miss impacts that are over by then."""
+"""Change of velocity in a step, other than by gravity, that indicates contact [m/s]. The contacts
+that are closed at the end of a step would miss impacts that are over by then."""
 
 
 class RitchieDescent(NamedTuple):
-    """How a block came down a slope, until it is as near to the foot as it is large.
+    """Descent of a block down a slope, until its height above the foot equals its size.
 
-    `aloft` is the share of the time in which its lowest corner is higher above the slope than its
-    size; `contact` that in which it touches the slope; `touches` are separate ones, after a flight
-    however short; `turns` is the way over the circumference of its circumcircle.
+    `aloft` is the fraction of time in which its lowest corner is higher above the slope than its
+    size, and `contact` the fraction in which it touches the slope. `touches` counts contacts
+    separated by a flight, however short. `turns` is the distance over the circumference of its
+    circumcircle.
     """
 
     aloft: float
@@ -63,7 +64,7 @@ class RitchieDescent(NamedTuple):
 
 
 def pushed(site: Site, rng: np.random.Generator) -> tuple[Block, float]:
-    """Return a block that leaves the crest at 0.5 to 1.5 m/s, and its size: its diameter [m]."""
+    """Return a block that leaves the crest at 0.5 to 1.5 m/s, and its diameter [m]."""
     crest = max(site.slope.points, key=lambda point: (point[1], point[0]))
     radius = rng.uniform(0.3, 0.6)
     corners = polygon(
@@ -75,7 +76,7 @@ def pushed(site: Site, rng: np.random.Generator) -> tuple[Block, float]:
 
 
 def descend(lab: Lab, site: Site, rng: np.random.Generator) -> RitchieDescent:
-    """Push a block off the crest of a site and watch it down to the foot."""
+    """Push a block off the crest of a site and follow it down to the foot."""
     block, size = pushed(site, rng)
     sim = lab.simulate(Scene(site.profile, (block,), site.surfaces))
     foot = site.profile.height(site.slope.toe)
@@ -98,24 +99,24 @@ def descend(lab: Lab, site: Site, rng: np.random.Generator) -> RitchieDescent:
 
 
 def descents(lab: Lab, slope_deg: int) -> Floats:
-    """Return all descents of a slope, a row each with the fields of `RitchieDescent`."""
+    """Return all descents of a slope, one row each with the fields of `RitchieDescent`."""
     site = Site.load(f"ritchie-{slope_deg}")
     return np.array([descend(lab, site, lab.random(slope_deg, i)) for i in range(RELEASES)])
 
 
 def interval(values: Floats) -> Floats:
-    """Return the 95 % interval of the mean, low and high."""
+    """Return the lower and upper limits of the 95 % confidence interval of the mean."""
     half = 1.96 * values.std(ddof=1) / math.sqrt(len(values))
     return values.mean() + np.array([-half, half])
 
 
 def overlaps(*intervals: Floats) -> list[float]:
-    """Return by how much each interval reaches into the next higher one; below 0: apart."""
+    """Return the overlap of each interval with the next higher one, negative if disjoint."""
     return [float(a[1] - b[0]) for a, b in pairwise(intervals)]
 
 
 def measure_modes(lab: Lab) -> tuple[Measured, ...]:
-    """Compare the descents of the three slopes."""
+    """Compare the descents on the three slopes."""
     roll, bounce, fall = (descents(lab, deg) for deg in (ROLLING, BOUNCING, FALLING))
     aloft, _, touches, turns = range(len(RitchieDescent._fields))
     return (
@@ -130,7 +131,7 @@ def measure_modes(lab: Lab) -> tuple[Measured, ...]:
 
 
 def passing(lab: Lab, site: Site, layout: Layout, station: float) -> float:
-    """Return the share of the blocks that come to rest beyond a chainage."""
+    """Return the fraction of blocks that come to rest beyond a chainage."""
     past = 0
     for i in range(DITCHED):
         block, _ = pushed(site, lab.random(i))
@@ -141,7 +142,7 @@ def passing(lab: Lab, site: Site, layout: Layout, station: float) -> float:
 
 
 def measure_ditch(lab: Lab, slope_deg: int) -> tuple[Measured, Measured]:
-    """Push the same blocks off a crest with a ditch at the toe and without."""
+    """Push the same blocks off a crest with and without a ditch at the toe."""
     site = Site.load(f"ritchie-{slope_deg}")
     depth, width = DITCHES[slope_deg]
     ditch = Ditch(site.slope.toe, depth, width)
@@ -152,13 +153,13 @@ def measure_ditch(lab: Lab, slope_deg: int) -> tuple[Measured, Measured]:
 MODES = Case(
     "ritchie-modes",
     (
-        # it touches at least once a turn, and for most of the time it is near
+        # a rolling block touches at least once per turn and is mostly near the slope
         Check("turns a touch at 35 deg", f"at most 1: it rolls, {SOURCE}", "-", 1.0, "bound"),
         Check("time aloft at 35 deg", f"none: it rolls, {SOURCE}", "-", 0.5, "bound"),
-        # more than a turn lies between two touches
+        # a bouncing block makes more than a turn between touches
         Check("touches a turn at 60 deg", f"under 1: it bounces, {SOURCE}", "-", 1.0, "bound"),
-        # pushed off at v it meets the face after a fall of 2 v^2 tan^2/g, 6.6 m at 1 m/s: of that
-        # a face of 20 m has room for three
+        # a block pushed off at v meets the face after a fall of 2 v^2 tan^2/g, 6.6 m at 1 m/s,
+        # three times on a face of 20 m
         Check("touches at 80 deg", f"few: it falls, {SOURCE}", "-", 3.0, "bound"),
         Check("time not aloft at 80 deg", f"none: it falls, {SOURCE}", "-", 0.5, "bound"),
         Check("overlap of time aloft", "none: 35 < 60 < 80 deg", "-", 0.0, "bound"),
@@ -170,7 +171,7 @@ MODES = Case(
 
 
 def ditch_case(slope_deg: int) -> Case:
-    """Return the case of a ditch; how much it keeps is reported, that it helps is demanded."""
+    """Return the case of a ditch; its retention is reported, but it only has to be effective."""
     return Case(
         f"ritchie-ditch-{slope_deg}",
         (

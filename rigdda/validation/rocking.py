@@ -1,4 +1,4 @@
-"""A tall block that falls back from a tilt and rocks over, or tips (Housner 1963)."""
+"""A tall block that rocks on its base after release from a tilt, or tips over (Housner 1963)."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ WIDTH, HEIGHT = 1.0, 4.0
 """Sides of the block [m]."""
 
 HALF = math.atan2(WIDTH, HEIGHT)
-"""Angle of the diagonal to the side [rad]: the tilt at which the block topples."""
+"""Angle between diagonal and side [rad], the tilt beyond which the block topples."""
 
 TILTS = tuple(0.5 * HALF * (1.0 + 1.6e-3 * k) for k in range(5))
-"""First tilts [rad]; the impact comes 1 ms later from each, elsewhere in a step."""
+"""Initial tilts [rad]; each delays the impact by 1 ms, which shifts it within a step."""
 
 BEYOND, FALLEN = 1e-3, 0.5
-"""Angles beyond balance between which it tips [rad]."""
+"""Initial and final angle beyond balance of the tipping block [rad]."""
 
 STEPS = (1e-3, 5e-3, 2e-2)
-"""Steps in which it does [s]."""
+"""Steps for the tipping block [s]."""
 
 PULL = 0.75 * GRAVITY / (0.5 * math.hypot(WIDTH, HEIGHT))
-"""p^2 = 3 g/(4 R): th'' = -p^2 sin(al - th) of a solid rectangle about its corner [1/s2]."""
+"""p^2 = 3 g/(4 R) in th'' = -p^2 sin(al - th), for a solid rectangle about its corner [1/s2]."""
 
 
 def time_to_turn(first: float, last: float) -> float:
-    """Return the time [s] from rest at one angle from the balance [rad] to another.
+    """Return the time [s] from rest at one angle from balance [rad] to another angle.
 
-    The integral of dph/ph', with ph'^2 = 2 p^2 (cos ph0 - cos ph); ph = ph0 + s^2 takes the root
-    out of it.
+    This is the integral of dph/ph', with ph'^2 = 2 p^2 (cos ph0 - cos ph). The substitution ph =
+    ph0 + s^2 removes the singularity.
     """
 
     def slowness(s: float) -> float:
@@ -47,33 +47,33 @@ def time_to_turn(first: float, last: float) -> float:
 
 
 def rate_at_impact(tilt: float) -> float:
-    """Return the rate [rad/s] at tilt 0 of a block whose greatest tilt is `tilt` [rad]."""
+    """Return the rate [rad/s] at zero tilt of a block whose greatest tilt is `tilt` [rad]."""
     return math.sqrt(2.0 * PULL * (math.cos(HALF - tilt) - math.cos(HALF)))
 
 
 def time_to_zero(angle: float, rate: float, before: float, dt: float) -> float:
-    """Return the time [s] in which a tilt [rad] falls to 0, at the acceleration of the last step.
+    """Return the time [s] until a tilt [rad] decreases to 0 at the acceleration of the last step.
 
-    `rate` and `before` are the rates of fall [rad/s] now and a step ago.
+    `rate` and `before` are the rates of decrease [rad/s] now and one step before.
     """
     gain = (rate - before) / dt
     return 2.0 * angle / (rate + math.sqrt(rate * rate + 2.0 * gain * angle))
 
 
 def tilted(tilt: float) -> Scene:
-    """Return the block on a corner."""
+    """Return the block standing on a corner."""
     corners = [(0.0, 0.0), (WIDTH, 0.0), (WIDTH, HEIGHT), (0.0, HEIGHT)]
     return Scene(Terrain(FLAT), (Block(polygon(corners, angle=tilt)),), rock(60.0))
 
 
 def rock_over(lab: Lab, tilt: float) -> tuple[float, float]:
-    """Let the block fall back, strike and rock over to its next greatest tilt.
+    """Release the block, and let it hit the ground and rock over to its next greatest tilt.
 
-    Returns the time to the impact [s] and the rate after it over the rate before [-].
+    Returns the time to the impact [s] and the ratio of the rates after and before it [-].
     """
     sim = lab.simulate(tilted(tilt))
     angle, rate = [tilt], [0.0]
-    while len(rate) < 3 or rate[-1] > rate[-2]:  # the rate of fall grows until the impact
+    while len(rate) < 3 or rate[-1] > rate[-2]:  # the rate grows until the impact
         sim.step()
         angle.append(tilt + sim.poses[0, 2])
         rate.append(-sim.velocities[0, 2])
@@ -85,14 +85,14 @@ def rock_over(lab: Lab, tilt: float) -> tuple[float, float]:
 
 
 def measure(lab: Lab) -> tuple[Measured, Measured]:
-    """Compare times and rates from all first tilts."""
+    """Compare times and rates for all initial tilts."""
     times, kept = zip(*(rock_over(lab, tilt) for tilt in TILTS), strict=True)
     exact = np.array([time_to_turn(HALF - tilt, HALF) for tilt in TILTS])
     return Measured(times, exact), Measured(kept, 1.0 - 1.5 * math.sin(HALF) ** 2)
 
 
 def measure_tip(lab: Lab) -> tuple[Measured]:
-    """Let a block go that is hardly beyond its balance, at several steps."""
+    """Release a block slightly beyond its balance, with several steps."""
     times, exact = [], time_to_turn(BEYOND, FALLEN)
     for dt in STEPS:
         sim, angle, before = lab.simulate(tilted(HALF + BEYOND), dt), BEYOND, BEYOND

@@ -12,15 +12,16 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, ngon, rock, shifts
 
 SIDES, RADIUS, SLOPE, RATE, DURATION = 16, 1.0, math.radians(8.0), 2.2, 3.0
-"""Corners, circumradius [m], slope [rad], first rate of rotation [rad/s], time [s]."""
+"""Number of corners, circumradius [m], slope [rad], initial rate of rotation [rad/s], time [s]."""
 
 
 def wheel(sides: int, radius: float, slope: float, rate: float, time: float) -> float:
-    """Return the way of the centre along the slope [m] (McGeer 1990, with k of a solid polygon).
+    """Return the distance of the centre along the slope [m].
 
-    It turns about one corner at a time, ph'' = g r sin(ph + th)/(k^2 + r^2) with ph from -pi/n to
-    pi/n; then the next corner strikes and w+/w- = (k^2 + r^2 cos(2 pi/n))/(k^2 + r^2), with
-    k^2 = r^2/6 (1 + 2 cos^2(pi/n)). It must not lift off: w^2 r < g cos(ph + th).
+    This is the rimless wheel of McGeer (1990) with the radius of gyration k of a solid polygon. The
+    wheel rotates about one corner at a time, ph'' = g r sin(ph + th)/(k^2 + r^2) with ph from -pi/n
+    to pi/n. Then the next corner hits the ground and w+/w- = (k^2 + r^2 cos(2 pi/n))/(k^2 + r^2),
+    with k^2 = r^2/6 (1 + 2 cos^2(pi/n)). The wheel must not lift off: w^2 r < g cos(ph + th).
     """
     half, r2 = math.pi / sides, radius**2
     k2 = r2 / 6.0 * (1.0 + 2.0 * math.cos(half) ** 2)
@@ -48,7 +49,7 @@ def wheel(sides: int, radius: float, slope: float, rate: float, time: float) -> 
 
 
 def roll(lab: Lab, sides: int, radius: float, slope: float, rate: float, time: float) -> float:
-    """Return the way [m] of a polygon that starts flat on a face, turning about its lower corner.
+    """Return the distance [m] of a polygon that starts flat and rotates about its lower corner.
 
     The arguments are those of `wheel`.
     """
@@ -69,13 +70,13 @@ def roll(lab: Lab, sides: int, radius: float, slope: float, rate: float, time: f
 
 
 def measure(lab: Lab) -> tuple[Measured]:
-    """Roll the polygon."""
+    """Simulate the rolling polygon."""
     wanted = (SIDES, RADIUS, SLOPE, RATE, DURATION)
     return (Measured(roll(lab, *wanted), wheel(*wanted)),)
 
 
 def case(name: str, bar: float, dt: float | None = None) -> Case:
-    """Return the case at a step, the default one or `dt` [s]."""
+    """Return the case with the default step or with `dt` [s]."""
     check = Check("way in 3 s", "rimless wheel (McGeer 1990)", "m", bar, "relative")
     return Case(name, (check,), measure, dt=dt)
 

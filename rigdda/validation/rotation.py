@@ -1,4 +1,4 @@
-"""A spinning block keeps its area; without post-correction it grows as it must."""
+"""A spinning block keeps its area; without post-correction it expands as predicted."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RATE = 2.0 * math.pi * 20.0
 """Rate of rotation [rad/s]."""
 
 ROTATIONS = (1e-3, 1e-2, 5e-2)
-"""Rotations in a step of the linear displacement function [rad]."""
+"""Rotations per step of the linear displacement function [rad]."""
 
 
 def spinning(rate: float) -> Scene:
@@ -25,7 +25,7 @@ def spinning(rate: float) -> Scene:
 
 
 def measure_spin(lab: Lab) -> tuple[Measured, Measured]:
-    """Turn a block many times."""
+    """Rotate a block many times."""
     sim = lab.simulate(spinning(RATE))
     before = polygon_properties(sim.vertices(0))[0]
     steps = lab.steps(TURNS * 2.0 * math.pi / RATE)
@@ -35,16 +35,16 @@ def measure_spin(lab: Lab) -> tuple[Measured, Measured]:
 
 
 def growth(rotation: float) -> float:
-    """Return the growth of area in a turn [-] of the linear displacement function.
+    """Return the growth of area per turn [-] by the linear displacement function.
 
-    Each step of dr [rad] maps x to x + dr k x, which multiplies areas by 1 + dr^2 and turns by
+    Each step of dr [rad] maps x to x + dr k x, which multiplies areas by 1 + dr^2 and rotates by
     atan dr: (1 + dr^2)^(2 pi/atan dr) - 1, about 2 pi dr.
     """
     return math.exp(2.0 * math.pi * math.log1p(rotation**2) / math.atan(rotation)) - 1.0
 
 
 def measure_growth(lab: Lab) -> tuple[Measured]:
-    """Turn a block once without post-correction, at several rotations a step."""
+    """Rotate a block once without post-correction, with several rotations per step."""
     found = []
     for rotation in ROTATIONS:
         sim = lab.simulate(spinning(rotation / lab.dt), post_correction=False)

@@ -1,4 +1,4 @@
-"""Small constructors and measures that the cases and the tests of physics share."""
+"""Constructors and measures shared by the cases and the physics tests."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def polygon(corners: ArrayLike, centre: ArrayLike = (0.0, 0.0), angle: float = 0.0) -> Floats:
-    """Return (n, 2) corners turned by `angle` [rad] about the origin and moved to `centre` [m]."""
+    """Return (n, 2) corners rotated by `angle` [rad] about the origin and moved to `centre` [m]."""
     cos, sin = math.cos(angle), math.sin(angle)
     return np.asarray(corners) @ np.array([[cos, sin], [-sin, cos]]) + np.asarray(centre)
 
@@ -48,7 +48,7 @@ def ngon(n: int, radius: float = 1.0, centre: ArrayLike = (0.0, 0.0), angle: flo
 
 
 def rough(rng: np.random.Generator, n: int, radius: float = 1.0) -> Floats:
-    """Return n corners at random places on an ellipse [m]: a convex block, its centroid at 0."""
+    """Return n random corners on an ellipse [m]: a convex block with its centroid at 0."""
     turn = np.sort(rng.uniform(0.0, 2.0 * math.pi, n))
     while np.diff(turn, append=turn[0] + 2.0 * math.pi).max() > 0.9 * math.pi or (
         np.diff(turn, append=turn[0] + 2.0 * math.pi).min() < 0.15
@@ -60,14 +60,14 @@ def rough(rng: np.random.Generator, n: int, radius: float = 1.0) -> Floats:
 
 
 def rock(friction_deg: float = 30.0, restitution: float = 0.0) -> dict[str, Surface]:
-    """Return the surfaces of a scene that has only one."""
+    """Return the surfaces of a scene with a single surface."""
     return {"rock": Surface(friction_deg=friction_deg, restitution=restitution)}
 
 
 def incline(
     slope_deg: float, friction_deg: float, width: float = 1.0, height: float = 1.0
 ) -> tuple[Scene, Floats]:
-    """Return a scene with a block at rest on a slope that falls towards +x, and the unit fall."""
+    """Return a scene with a block at rest on a slope down to +x, and the downslope direction."""
     slope = math.radians(slope_deg)
     down = np.array([math.cos(slope), -math.sin(slope)])
     out = np.array([math.sin(slope), math.cos(slope)])
@@ -85,7 +85,7 @@ def masses(scene: Scene) -> tuple[Floats, Floats]:
 
 
 def block_size(scene: Scene) -> float:
-    """Return the mean block size: the root of the mean area [m]."""
+    """Return the mean block size, the square root of the mean area [m]."""
     return math.sqrt(float(np.mean([polygon_properties(b.vertices)[0] for b in scene.blocks])))
 
 

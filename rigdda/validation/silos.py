@@ -1,4 +1,4 @@
-"""A deep pile of polygons between walls: it comes to rest, and its base bears what it should."""
+"""A deep pile of polygons between walls: it comes to rest with the correct load on its base."""
 
 from __future__ import annotations
 
@@ -14,39 +14,40 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY
 
 WIDTH, SIZE = 2.0, 0.3
-"""Width of the silo and of its polygons [m]."""
+"""Width of the silo and size of its polygons [m]."""
 
 COLUMNS, SPACING = 6, 1.25
-"""Polygons of a layer, and height of a layer over their size [-]."""
+"""Number of polygons in a layer, and height of a layer over polygon size [-]."""
 
 TIME = 20.0
-"""Time in which a pile is to rest [s]."""
+"""Time in which a pile must come to rest [s]."""
 
 DEPTHS = (20, 40, 60)
-"""Layers that are tried."""
+"""Numbers of layers."""
 
 WALL_DEG, FILLINGS = 20.0, 5
-"""Friction of rough walls [deg], and how many fillings are averaged."""
+"""Friction angle of rough walls [deg], and number of fillings that are averaged."""
 
 PILES = 30
-"""Fillings between smooth walls that are averaged."""
+"""Number of fillings between smooth walls that are averaged."""
 
 STEPS = (1e-3, 2.5e-3, 5e-3, 1e-2)
-"""Steps in which the thrust is compared [s]; the longest that is not refused is 13 ms."""
+"""Steps for which the thrust is compared [s]; the longest permitted one is 13 ms."""
 
 JAKY = 0.5
-"""Horizontal over vertical pressure of rock of 30 deg at rest, 1 - sin phi [-]."""
+"""Ratio of horizontal to vertical pressure of rock of 30 deg at rest, 1 - sin phi [-]."""
 
 LOOK = 0.02
-"""Interval in which energy is looked at [s]."""
+"""Interval at which the energy is sampled [s]."""
 
 RISE = 2e-3
-"""Bar of the rise of energy over what was released [-]: what sank in as layers struck one another
-is pushed out, which lifts those above. Shorter steps rise less, deeper piles more."""
+"""Tolerance of the rise of energy over the released energy [-]. Position correction removes
+penetration from the impacts of layers and thereby lifts the layers above. The rise is smaller for
+shorter steps and greater for deeper piles."""
 
 
 def pebble(rng: np.random.Generator, x: float, y: float) -> Block:
-    """Return a random polygon of four to seven corners, at most 1.15 times the size wide."""
+    """Return a random polygon of four to seven corners, at most 1.15 times as wide as `SIZE`."""
     n = int(rng.integers(4, 8))
     angle = (np.arange(n) + rng.uniform(-0.3, 0.3, n)) * 2.0 * np.pi / n + rng.uniform(0.0, 6.28)
     angle = np.sort(np.mod(angle, 2.0 * np.pi))
@@ -55,7 +56,7 @@ def pebble(rng: np.random.Generator, x: float, y: float) -> Block:
 
 
 def silo(rng: np.random.Generator, layers: int, friction_deg: float = 0.0) -> Scene:
-    """Return loose layers of polygons above the base; walls and base have this friction."""
+    """Return loose layers of polygons above the base; walls and base have this friction angle."""
     height, column = SPACING * SIZE, WIDTH / COLUMNS
     blocks = tuple(
         pebble(rng, (i + 0.5) * column, 0.2 + j * height)
@@ -74,11 +75,11 @@ def silo(rng: np.random.Generator, layers: int, friction_deg: float = 0.0) -> Sc
 
 
 class Filled(NamedTuple):
-    """What a silo comes to.
+    """Results of filling a silo.
 
-    Greatest speed in the end [m/s], load of the base over the weight [-], mean thrust on a wall
-    over that of a fluid of the same weight [-], greatest rise of kinetic and potential energy over
-    what was released [-], depth of the fill [m].
+    Greatest final speed [m/s], load on the base over the weight [-], mean thrust on a wall over
+    that of a fluid of the same weight [-], greatest rise of kinetic and potential energy over the
+    released energy [-], and depth of the fill [m].
     """
 
     speed: float
@@ -89,7 +90,7 @@ class Filled(NamedTuple):
 
 
 def fill(lab: Lab, scene: Scene, dt: float | None = None) -> Filled:
-    """Let a silo fill, looking at it every `LOOK` seconds, at the step of the lab or `dt` [s]."""
+    """Fill a silo and sample its energy every `LOOK` seconds, with the step of the lab or `dt`."""
     sim = lab.simulate(scene, dt)
     stride = round(LOOK / sim.settings.dt)
     energies = []
@@ -113,17 +114,17 @@ def fill(lab: Lab, scene: Scene, dt: float | None = None) -> Filled:
 
 
 def measure(lab: Lab) -> tuple[Measured, ...]:
-    """Fill silos of several depths, between smooth walls."""
+    """Fill silos of several depths between smooth walls."""
     found = [fill(lab, silo(lab.random(layers), layers)) for layers in DEPTHS]
     speeds, loads, _, rises, _ = zip(*found, strict=True)
     return Measured(speeds), Measured(loads, 1.0), Measured(rises)
 
 
 def measure_thrust(lab: Lab) -> tuple[Measured, ...]:
-    """Fill silos with smooth walls: the mean thrust on a wall over several fillings, by step.
+    """Fill silos with smooth walls and compare the mean thrust on a wall for several steps.
 
-    It is that of rock at rest, Jaky's K times that of a fluid. One filling differs from another by
-    0.1: a pile of polygons bears upon few points.
+    The thrust should be that of rock at rest, Jaky's K times that of a fluid. Single fillings
+    scatter by 0.1, because a pile of polygons is supported at few points.
     """
     means = []
     for dt in STEPS:
@@ -133,11 +134,12 @@ def measure_thrust(lab: Lab) -> tuple[Measured, ...]:
 
 
 def measure_rough(lab: Lab) -> tuple[Measured, ...]:
-    """Fill silos with rough walls: the mean load of the base over several fillings.
+    """Fill silos with rough walls and compare the mean load on the base.
 
-    Friction of the walls holds the fill up. Janssen (1895) gives the load of the base over the
-    weight, (1 - exp(-w)) / w with w = 2 K tan(phi) depth / width and Jaky's K = 1 - sin 30 deg, of
-    a fill that slides down the walls everywhere. One that falls all at once does so in part.
+    Wall friction carries part of the fill. Janssen (1895) gives the load on the base over the
+    weight, (1 - exp(-w)) / w with w = 2 K tan(phi) depth / width and Jaky's K = 1 - sin 30 deg, for
+    a fill that slides down the walls everywhere. A fill that falls all at once does so only in
+    part.
     """
     rng = [lab.random(20, k) for k in range(FILLINGS)]
     found = [fill(lab, silo(each, 20, WALL_DEG)) for each in rng]

@@ -1,4 +1,4 @@
-"""A block on a plane under Coulomb friction: it slides, or it holds."""
+"""A block on a plane with Coulomb friction, sliding or at rest."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ LOW = 0.4
 """Height of a block 1 m wide that slides at 45 degrees without toppling [m]."""
 
 DAMPING = 1.0
-"""Of a ground [1/s]."""
+"""Damping of a ground surface [1/s]."""
 
 PULSE, YIELD, PULSE_TIME = 0.5, 0.2, 0.3
 """Newmark's pulse: base acceleration and friction coefficient [g], duration [s]."""
 
 
 def slide(slope_deg: float, friction_deg: float, time: float) -> float:
-    """Return the way [m] from rest: s = g t^2/2 (sin th - cos th tan phi)."""
+    """Return the distance [m] from rest: s = g t^2/2 (sin th - cos th tan phi)."""
     slope, friction = math.radians(slope_deg), math.radians(friction_deg)
     pull = GRAVITY * (math.sin(slope) - math.cos(slope) * math.tan(friction))
     return 0.5 * pull * time**2
 
 
 def damped_slide(slope_deg: float, friction_deg: float, damping: float, time: float) -> float:
-    """Return the way [m] from rest on a ground that damps: s = a/c (t - (1 - exp(-c t))/c).
+    """Return the distance [m] from rest on a damping ground: s = a/c (t - (1 - exp(-c t))/c).
 
-    With a = g (sin th - cos th tan phi) and c the damping of the ground, from v' = a - c v.
+    From v' = a - c v, with a = g (sin th - cos th tan phi) and the damping c of the ground.
     """
     pull = 2.0 * slide(slope_deg, friction_deg, 1.0)
     return pull / damping * (time - (1.0 - math.exp(-damping * time)) / damping)
 
 
 def newmark(pulse: float, limit: float, time: float) -> float:
-    """Return the way [m] of a block on a base under a rectangular pulse (Newmark 1965).
+    """Return the displacement [m] of a block on a base under a rectangular pulse (Newmark 1965).
 
     D = V^2/(2 g N) (1 - N/A), V = A g T, for a pulse A g of T seconds and yield at N g.
     """
@@ -49,7 +49,7 @@ def newmark(pulse: float, limit: float, time: float) -> float:
 def measure_slide(
     lab: Lab, slope_deg: float, friction_deg: float, height: float, time: float
 ) -> tuple[Measured]:
-    """Let a block slide from rest."""
+    """Simulate a block that slides from rest."""
     scene, down = incline(slope_deg, friction_deg, 1.0, height)
     sim = lab.simulate(scene)
     start = sim.poses
@@ -59,7 +59,7 @@ def measure_slide(
 
 
 def measure_damped(lab: Lab) -> tuple[Measured]:
-    """Let a block slide from rest on a ground that damps, in a scene that does not."""
+    """Simulate a slide from rest on a ground with damping, in a scene without damping."""
     plain, down = incline(30.0, 20.0)
     surfaces = rock(20.0) | {"ground": Surface(20.0, damping=DAMPING)}
     assert plain.terrain is not None
@@ -72,7 +72,7 @@ def measure_damped(lab: Lab) -> tuple[Measured]:
 
 
 def measure_creep(lab: Lab, sim: Metered) -> tuple[Measured, Measured]:
-    """Watch a block that holds, from 1 s to 60 s and from 10 s to 60 s."""
+    """Measure the creep of a block at rest, from 1 s to 60 s and from 10 s to 60 s."""
     sim.step(lab.steps(1.0))
     first = sim.poses[:, :2]
     sim.step(lab.steps(9.0))
@@ -86,13 +86,13 @@ def measure_creep(lab: Lab, sim: Metered) -> tuple[Measured, Measured]:
 
 
 def measure_hold(lab: Lab, friction_deg: float) -> tuple[Measured, Measured]:
-    """Watch a block on a slope of 30 degrees that is too rough to slide on."""
+    """Measure the creep of a block on a slope of 30 degrees that is too rough for sliding."""
     scene, _ = incline(30.0, friction_deg)
     return measure_creep(lab, lab.simulate(scene, sleeping=False))
 
 
 def measure_pressed(lab: Lab) -> tuple[Measured, Measured]:
-    """Watch a block that ten times its weight presses into a slope of 30 degrees."""
+    """Measure the creep of a block pressed into a slope of 30 degrees by ten times its weight."""
     plain, down = incline(30.0, 35.0)
     weight = GRAVITY * masses(plain)[0][0]
     force = 10.0 * weight * np.array([down[1], -down[0]])  # into the slope
@@ -107,7 +107,7 @@ def measure_pressed(lab: Lab) -> tuple[Measured, Measured]:
 
 
 def measure_newmark(lab: Lab) -> tuple[Measured]:
-    """Shake level ground under a block by one rectangular pulse; it slides to rest."""
+    """Shake level ground under a block by one rectangular pulse; the block slides to rest."""
     push = PULSE * GRAVITY
     history = [(0.0, push, 0.0), (PULSE_TIME, push, 0.0), (PULSE_TIME, 0.0, 0.0)]
     scene = Scene(
@@ -136,7 +136,7 @@ def slide_case(
 
 HOLDS = (
     Check("creep, 1-60 s", "none: phi > th", "m", 1e-4, "bound"),
-    # rounding of 10,000 steps
+    # rounding errors of 10,000 steps
     Check("creep, 10-60 s", "none: phi > th", "m", 1e-8, "bound"),
 )
 

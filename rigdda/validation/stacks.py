@@ -1,4 +1,4 @@
-"""Cubes that stand on one another."""
+"""Stacks of cubes at rest."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, box, rock
 
 OFFSET = 1e-4
-"""Greatest random offset of a cube to either side [m]."""
+"""Greatest random horizontal offset of a cube [m]."""
 
 SPACING = 1.1
-"""Distance of the cubes of a row of the pyramid [m]: neighbours do not touch."""
+"""Spacing of the cubes in a row of the pyramid [m], such that neighbours do not touch."""
 
 
 def tower(rng: np.random.Generator, count: int) -> tuple[Block, ...]:
-    """Return one-metre cubes on one another, slightly out of line."""
+    """Return a tower of one-metre cubes, slightly out of line."""
     return tuple(box(x, 0.5 + i) for i, x in enumerate(rng.uniform(-OFFSET, OFFSET, count)))
 
 
 def pyramid(rng: np.random.Generator, rows: int) -> tuple[Block, ...]:
-    """Return rows of cubes, each row with one less, on the gaps of the row below."""
+    """Return rows of cubes, each with one cube less, placed on the gaps of the row below."""
     return tuple(
         box(SPACING * (i + 0.5 * row) + rng.uniform(-OFFSET, OFFSET), 0.5 + row)
         for row in range(rows)
@@ -32,13 +32,13 @@ def pyramid(rng: np.random.Generator, rows: int) -> tuple[Block, ...]:
 
 
 def heavy_on_light(rng: np.random.Generator, ratio: float) -> tuple[Block, ...]:
-    """Return a cube of 2.6 t on one whose mass is smaller by `ratio`."""
+    """Return a cube of 2.6 t on a cube whose mass is smaller by the factor `ratio`."""
     low, high = rng.uniform(-OFFSET, OFFSET, 2)
     return box(low, 0.5, density=2600.0 / ratio), box(high, 1.5)
 
 
 def measure(lab: Lab, blocks: Sequence[Block]) -> tuple[Measured, Measured, Measured]:
-    """Let blocks stand for 60 s, awake; their speed is taken over the last 10 s."""
+    """Simulate blocks at rest for 60 s without sleeping, and their speed over the last 10 s."""
     sim = lab.simulate(Scene(Terrain(FLAT), tuple(blocks), rock()), sleeping=False)
     start = sim.poses[:, :2]
     sim.step(lab.steps(50.0))
@@ -53,7 +53,7 @@ def measure(lab: Lab, blocks: Sequence[Block]) -> tuple[Measured, Measured, Meas
 def case(
     name: str, make: Callable[[np.random.Generator], Sequence[Block]], deepest: float, slow: bool
 ) -> Case:
-    """Return the case of blocks that must not sink by more than `deepest` [m]."""
+    """Return the case of blocks whose penetration must not exceed `deepest` [m]."""
     return Case(
         name,
         (

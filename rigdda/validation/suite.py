@@ -1,4 +1,4 @@
-"""All cases of the accuracy suite."""
+"""All cases of the validation suite."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fixed points do no work and bolts lose none, at any step."""
+"""Fixed points do no work and bolts conserve energy, for any step length."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import GRAVITY, box, polygon, rock
 
 LENGTH, WIDTH, ARM = 2.0, 0.2, 0.9
-"""A bar, and how far from its middle it is pinned [m]."""
+"""Length and width of a bar, and distance of its pin from its middle [m]."""
 START = math.radians(150.0)
-"""Angle from rest at which it is let go."""
+"""Initial angle from the hanging position [rad]."""
 RATE, SPUN = 20.0, 60.0
-"""Rate at which it spins without gravity [rad/s], and for how long [s]."""
+"""Rate of rotation without gravity [rad/s], and duration [s]."""
 SWINGS = 100
-"""Periods after which energies are compared."""
+"""Number of periods after which energies are compared."""
 COARSER = (0.2, 1.0, 4.0)
-"""Steps that are tried, over that of the lab: by default 1, 5 and 20 ms."""
+"""Steps relative to that of the lab, by default 1, 5 and 20 ms [-]."""
 STIFF = (1e5, 1e6, 1e7)
-"""Stiffnesses of a bolt [N/m], on which a block of 2.6 t swings in 1, 0.32 and 0.1 s."""
+"""Stiffnesses of a bolt [N/m], for which a block of 2.6 t has periods of 1, 0.32 and 0.1 s."""
 
 
 def pinned(angle: float, rate: float = 0.0, gravity: float = GRAVITY) -> Scene:
-    """Return a bar that is pinned at the origin, at an angle from hanging down [rad]."""
+    """Return a bar that is pinned at the origin, at an angle from the hanging position [rad]."""
     turn = angle - 0.5 * math.pi
     centre = ARM * np.array([math.cos(turn), math.sin(turn)])
     corners = 0.5 * np.array([LENGTH, WIDTH]) * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
@@ -45,13 +45,13 @@ def period() -> float:
 
 
 def total(sim: Simulation) -> float:
-    """Return what there is of energy [J]."""
+    """Return the total energy [J]."""
     energy = sim.energy()
     return energy.kinetic + energy.potential + energy.elastic
 
 
 def change(lab: Lab, scene: Scene, dt: float, time: float) -> float:
-    """Return by how much the energy of a scene changes in a time [J]."""
+    """Return the change of the energy of a scene in a time [J]."""
     sim = lab.simulate(scene, dt)
     before = total(sim)
     sim.step(round(time / dt))
@@ -59,7 +59,7 @@ def change(lab: Lab, scene: Scene, dt: float, time: float) -> float:
 
 
 def measure_swing(lab: Lab) -> tuple[Measured, Measured, Measured]:
-    """Let the bar swing, at several steps; time it from bottom to bottom at that of the lab."""
+    """Swing the bar with several steps; measure its period with the step of the lab."""
     scene, passed = pinned(START), list[float]()
     mass = lab.simulate(scene).energy().potential / (-GRAVITY * ARM * math.cos(START))
     height = mass * GRAVITY * ARM * (1.0 - math.cos(START))
@@ -79,7 +79,7 @@ def measure_swing(lab: Lab) -> tuple[Measured, Measured, Measured]:
 
 
 def measure_spin(lab: Lab) -> tuple[Measured]:
-    """Let the bar spin about its pin, at several steps."""
+    """Spin the bar about its pin with several steps."""
     scene = pinned(0.0, RATE, 0.0)
     energy = total(lab.simulate(scene))
     found = [change(lab, scene, k * lab.dt, SPUN) / energy for k in COARSER]
@@ -87,7 +87,7 @@ def measure_spin(lab: Lab) -> tuple[Measured]:
 
 
 def measure_drop(lab: Lab) -> tuple[Measured, Measured]:
-    """Load bolts all at once, at several steps."""
+    """Apply the weight of a block to bolts suddenly, with several steps."""
     peaks, changes = [], []
     block = box(0.0, 0.0)
     for stiffness in STIFF:

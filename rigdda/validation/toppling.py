@@ -1,6 +1,6 @@
-"""The toppling slope of 16 columns, in static mode, against its limit equilibrium.
+"""A toppling slope of 16 columns in static mode, compared with its limit equilibrium.
 
-The example of Goodman and Bray (1976), which Koo and Chern (1998) compute in Figs 6 to 8 and
+This is the example of Goodman and Bray (1976) that Koo and Chern (1998) analyse in Figs 6 to 8 and
 Table 1: base dip 30 deg, columns 10 m wide, base steps of 1 m, rock of 25 kN/m3.
 """
 
@@ -17,26 +17,26 @@ from rigdda.validation.case import Case, Check, Lab, Measured, Metered
 from rigdda.validation.scenes import GRAVITY, Floats, polygon
 
 WIDTH, STEP, DIP_DEG, WEIGHT = 10.0, 1.0, 30.0, 25e3
-"""Width of a column, step of the base [m], dip [deg], unit weight [N/m3]."""
+"""Width of a column [m], step of the base [m], dip [deg], unit weight [N/m3]."""
 
 HEIGHTS = columns(crest=10, above=6, rise=5.0, fall=5.0, step=STEP)
 """Heights of the columns from the toe upwards [m]."""
 
 LIMIT_DEG = 38.15
-"""Friction angle at which forces are compared [deg]; the limit is 38.151."""
+"""Friction angle at which forces are compared [deg]; the limit is 38.151 deg."""
 
 BOLTED_DEG = math.degrees(math.atan(0.65))
-"""Friction angle at which a bolt of 2,013 kN in the toe column is needed [deg]."""
+"""Friction angle at which a bolt force of 2,013 kN is required in the toe column [deg]."""
 
 STEPS, STEP_TIME, PENETRATION = 2000, 1e-2, 1e-3
-"""Steps of static mode, their time [s] and the wanted penetration [m].
+"""Number of static steps, their length [s] and the target penetration [m].
 
-k_n dt^2/M = g dt^2/penetration is about 1 for the highest column: much less, and forces are not
-settled in so many steps; much more, and they do not settle.
+k_n dt^2/M = g dt^2/penetration is about 1 for the highest column. If it is much smaller, forces do
+not converge in this number of steps; if it is much greater, they do not converge at all.
 """
 
 STILL = 1e-6
-"""Displacement in a step, over g dt^2/2 of a free fall, below which a slope stands [-]."""
+"""Displacement per step over that of a free fall, g dt^2/2, below which a slope is stable [-]."""
 
 
 def limit(friction_deg: float) -> Toppling:
@@ -61,9 +61,8 @@ def slope() -> tuple[Terrain, tuple[Block, ...]]:
 def relax(lab: Lab, friction_deg: float, bolt: float = 0.0) -> Metered:
     """Return the slope after static steps, with a horizontal force [N] into the toe column.
 
-    Contacts are the paper's plain springs: columns settle on them by more the higher they are, and
-    that mobilises the friction between columns that then slide together, which the limit
-    equilibrium supposes.
+    Contacts are the paper's plain springs. Higher columns settle more on them, which mobilises
+    friction between columns that then slide together, as the limit equilibrium assumes.
     """
     terrain, blocks = slope()
     centre = blocks[0].vertices.mean(axis=0)
@@ -76,7 +75,7 @@ def relax(lab: Lab, friction_deg: float, bolt: float = 0.0) -> Metered:
 
 
 def base_forces(sim: Metered) -> tuple[Floats, Floats]:
-    """Return normal and shear forces of the base on each column [N], shear up the dip."""
+    """Return normal and shear forces of the base on each column [N], shear positive up the dip."""
     contacts = sim.contacts()
     force = np.zeros((len(HEIGHTS), 2))
     for c in contacts[contacts["block_b"] == -1]:
@@ -88,10 +87,11 @@ def base_forces(sim: Metered) -> tuple[Floats, Floats]:
 
 
 def modes(sim: Metered, steps: int) -> list[str]:
-    """Return how each column moves in the next `steps` steps.
+    """Return the mode of motion of each column in the next `steps` steps.
 
-    The greater of what rotation moves its top by and what its lower corner slides by; stable where
-    both are under a hundredth of the greatest of all columns.
+    The mode is given by the greater of the displacement of its top by rotation and the sliding of
+    its lower corner. A column is stable if both are below a hundredth of the greatest displacement
+    of all columns.
     """
     heel, angle = heels(sim), sim.poses[:, 2]
     sim.step(steps)
@@ -115,13 +115,13 @@ def measure_forces(lab: Lab) -> tuple[Measured, Measured]:
 
 
 def measure_modes(lab: Lab) -> tuple[Measured]:
-    """Count the columns that move otherwise than the limit equilibrium says, below the limit."""
+    """Count the columns whose mode differs from the limit equilibrium, below the limit."""
     found, exact = modes(relax(lab, 38.0), STEPS), limit(38.0).mode
     return (Measured(sum(a != b for a, b in zip(found, exact, strict=True))),)
 
 
 def advance(sim: Metered) -> float:
-    """Return the greatest displacement of a column in a further step, over a free fall's [-]."""
+    """Return the greatest displacement of a column per step over that of a free fall [-]."""
     start, dt = sim.poses, sim.settings.dt
     sim.step(STEPS // 2)
     moved = float(np.hypot(*(sim.poses - start)[:, :2].T).max())
@@ -129,7 +129,7 @@ def advance(sim: Metered) -> float:
 
 
 def measure_standing(lab: Lab) -> tuple[Measured, Measured, Measured]:
-    """Compare a slope above the limit, one with enough of a bolt and one with too little."""
+    """Compare a slope above the limit, one with sufficient bolting and one with too little."""
     return (
         Measured(advance(relax(lab, 38.3))),
         Measured(advance(relax(lab, BOLTED_DEG, 2150e3))),

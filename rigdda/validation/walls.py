@@ -1,4 +1,4 @@
-"""A thin wall stops every fast block: nothing tunnels."""
+"""A thin wall stops fast blocks; no block tunnels through it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, polygon, rock, rough
 
 WALL = Wall(x=10.0, height=100.0, thickness=0.2)
-"""The wall; nothing that is thrown here flies over it."""
+"""The wall, too high for any of the blocks to fly over it."""
 
 SHOTS = 200
 FLIGHT = 0.3
-"""Longest time to the wall [s]."""
+"""Longest flight time to the wall [s]."""
 
 
 def shot(rng: np.random.Generator) -> Scene:
@@ -29,7 +29,7 @@ def shot(rng: np.random.Generator) -> Scene:
 
 
 def fly(lab: Lab, scene: Scene) -> tuple[bool, bool, float]:
-    """Return whether a block arrives, whether its centroid passes, a corner's depth [m]."""
+    """Return whether a block arrives, whether its centroid passes, and its corner depth [m]."""
     sim = lab.simulate(scene)
     deepest, centre = 0.0, 0.0
     for _ in range(lab.steps(FLIGHT + 0.5)):
@@ -37,12 +37,12 @@ def fly(lab: Lab, scene: Scene) -> tuple[bool, bool, float]:
         deepest = max(deepest, float(sim.vertices(0)[:, 0].max()) - WALL.x)
         centre = max(centre, float(sim.poses[0, 0]))
     energy = sim.energy()
-    arrived = energy.impact + energy.friction < 0.0  # a wall that is hit takes energy
+    arrived = energy.impact + energy.friction < 0.0  # an impact on the wall takes energy
     return arrived, centre > WALL.x, deepest
 
 
 def measure(lab: Lab) -> tuple[Measured, Measured, Measured]:
-    """Throw all blocks."""
+    """Simulate all shots."""
     arrived, passed, deepest = zip(
         *(fly(lab, shot(lab.random(i))) for i in range(SHOTS)), strict=True
     )
@@ -52,7 +52,7 @@ def measure(lab: Lab) -> tuple[Measured, Measured, Measured]:
 CHECKS = (
     Check("arrive", "all", "-", 0.0, "absolute"),
     Check("centroids pass", "none: rigid", "-", 0.0, "bound"),
-    # deeper, a corner would show on the far side
+    # a greater depth would put a corner on the far side
     Check("corner depth", "none: rigid", "m", WALL.thickness, "bound"),
 )
 

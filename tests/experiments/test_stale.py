@@ -17,7 +17,7 @@ def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
     told = CliRunner().invoke(stale.main, ["--out", str(tmp_path)])
     assert told.exit_code == 1
     assert [line.split(": ")[1] for line in told.output.splitlines()] == [
-        "not known by which kernels",
+        "made by unknown kernels",
         "0ld",
     ]
     for name in ("old.csv", "bench/unknown.csv"):

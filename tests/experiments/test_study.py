@@ -58,7 +58,7 @@ def test_what_was_stopped_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[
     rest = Measure()
     rows = tabulate(tmp_path / "t.csv", CASES[::-1], rest, told)
     assert rest.asked == [("b", 0.2)]
-    assert "goes on with 1 of 4" in capsys.readouterr().err
+    assert "resuming with 1 of 4" in capsys.readouterr().err
     assert [r["double"] for r in rows] == [0.4, 0.2, 0.4, 0.2]
 
 

@@ -1,6 +1,6 @@
-"""One adapter an engine: the same scene, loaded into it.
+"""Adapters of engines that load the same scene, one module each.
 
-Each module has a `NAME`, the `OPTIONS` that are swept beside the step and an `Engine`.
+Each module has a `NAME`, `OPTIONS` to be tried with each step, and a class `Engine`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import importlib
 from types import ModuleType
 
 PEERS = {"chipmunk": "pymunk", "box2d": "pyb2d3", "mjc": "mujoco"}
-"""Module of each peer and the package it needs."""
+"""Adapter module and required package of each peer."""
 
 HINT = 'pip install -c constraints.txt -e ".[bench]"'
 
@@ -19,7 +19,7 @@ class PeerMissing(ImportError):
 
 
 def load() -> list[ModuleType]:
-    """Return the adapters, this core's first.
+    """Return all adapters, this core's first.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Box2D v3 (pyb2d3): soft steps in single precision, one Python call a step."""
+"""Box2D v3 (pyb2d3): soft steps in single precision, one Python call per step."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ OPTIONS = (
     {"substeps": 1, "hertz": 120.0},
     {"substeps": 8, "hertz": 240.0},
 )
-"""What is swept beside the step; 4 sub-steps and 30 Hz are the defaults. Rockfalls take the first
-three: to 5 cm one sub-step costs 1.2 to 1.4 times as much, eight 1.3 to 1.8 times."""
+"""Options tried with each step; 4 substeps and 30 Hz are the defaults. Rockfalls use the first
+three: for 5 cm, one substep costs 1.2 to 1.4 times as much and eight substeps 1.3 to 1.8 times."""
 
 FASTEST = 1000.0
-"""Speed beyond which Box2D brakes bodies [m/s], above any rockfall."""
+"""Speed limit of Box2D [m/s], above that of any rockfall."""
 
 
 class Engine:
@@ -32,15 +32,15 @@ class Engine:
     Parameters
     ----------
     scene : rigdda.Scene
-        The scene; friction of a pair is the geometric mean of both.
+        The scene; the friction of a pair is the geometric mean of both.
     dt : float
         Step [s].
     sleeping : bool
         Whether blocks at rest may sleep.
     substeps : int
-        Of a step.
+        Number of substeps per step.
     hertz : float
-        Stiffness of contacts [1/s]; Box2D caps it at a quarter of the rate of sub-steps.
+        Stiffness of contacts [1/s]; Box2D limits it to a quarter of the substep rate.
     """
 
     def __init__(self, scene: Scene, dt: float, sleeping: bool, substeps: int, hertz: float):
@@ -62,7 +62,7 @@ class Engine:
         ]
 
     def _add_terrain(self, points: np.ndarray) -> None:
-        """Add a chain; it is solid on its left, and its outermost corners only guide."""
+        """Add a chain, which is solid on its left; its outermost corners only guide."""
         first, last = 2.0 * points[0] - points[1], 2.0 * points[-1] - points[-2]
         chain = np.concatenate([[first], points, [last]])[::-1]
         self._world.create_static_body().create_chain(
@@ -85,7 +85,7 @@ class Engine:
             step(dt, substeps)
 
     def poses(self) -> np.ndarray:
-        """Return x, y of the centroids [m] and rotation [rad], within half a turn, (N, 3)."""
+        """Return x, y of the centroids [m] and rotation [rad], wrapped to half a turn, (N, 3)."""
         return np.array([(*b.position, b.angle) for b in self._bodies])
 
     def velocities(self) -> np.ndarray:

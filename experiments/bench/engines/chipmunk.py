@@ -1,4 +1,4 @@
-"""pymunk (Chipmunk2D): sequential impulses, one Python call a step, no continuous collision."""
+"""pymunk (Chipmunk2D): sequential impulses, one Python call per step, discrete collision."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ OPTIONS = (
     {"iterations": 3, "slop": 1e-3},
     {"iterations": 30, "slop": 1e-4},
 )
-"""What is swept beside the step; 10 iterations are the default."""
+"""Options tried with each step; 10 iterations are the default."""
 
 RADIUS = 0.1
-"""Radius of the terrain's segments, which lie that deep in the ground [m]. With 0.5 m rounded
-corners hold blocks back on the benches that other engines let go."""
+"""Radius of the terrain's segments, which are sunk into the ground by it [m]. With 0.5 m, rounded
+corners hold blocks on the benches that other engines release."""
 
 
 class Engine:
@@ -32,15 +32,15 @@ class Engine:
     Parameters
     ----------
     scene : rigdda.Scene
-        The scene; friction of a pair is the product of both, so each has its root.
+        The scene; the friction of a pair is the product of both, so each has the square root.
     dt : float
         Step [s].
     sleeping : bool
         Whether blocks at rest may sleep.
     iterations : int
-        Of the solver.
+        Number of solver iterations.
     slop : float
-        Overlap that is left alone [m].
+        Permitted overlap [m].
     """
 
     def __init__(self, scene: Scene, dt: float, sleeping: bool, iterations: int, slop: float):

@@ -1,4 +1,4 @@
-"""The core of `rigdda`: many steps a call."""
+"""The core of `rigdda`, with many steps per call."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import rigdda
 NAME = "rigdda"
 
 OPTIONS: tuple[dict, ...] = ({},)
-"""What is swept beside the step: nothing, its defaults."""
+"""Options tried with each step: only the defaults."""
 
 
 class Engine:
-    """A scene in this core. It takes many steps a call.
+    """A scene in this core.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Engine:
     sleeping : bool
         Whether blocks at rest may sleep.
     settings
-        Settings beside these.
+        Further settings.
     """
 
     def __init__(self, scene: rigdda.Scene, dt: float, sleeping: bool, **settings: Any):

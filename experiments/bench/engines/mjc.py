@@ -1,4 +1,4 @@
-"""MuJoCo: soft contacts by convex optimisation, in 3D: extruded blocks on planar joints."""
+"""MuJoCo: soft contacts by convex optimisation, in 3D with extruded blocks on planar joints."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ OPTIONS = (
     {"softness": 4.0, "impedance": 0.95, "integrator": "EULER"},
     {"softness": 2.0, "impedance": 0.99, "integrator": "RK4"},
 )
-"""What is swept beside the step."""
+"""Options tried with each step."""
 
 FRICTION_STIFFNESS = 10.0
-"""Of friction over the normal contact, `impratio` [-]: blocks that hold creep less."""
+"""Stiffness of friction over that of the normal contact, `impratio` [-], which reduces creep."""
 
 GROUND = 10.0
-"""Thickness of the boxes that make the terrain [m]."""
+"""Thickness of the boxes that form the terrain [m]."""
 
 WIDTH = 1.0
-"""Width of the blocks across the plane [m]; the terrain is wider."""
+"""Width of the blocks normal to the plane [m]; the terrain is wider."""
 
 
 class Engine:
-    """A scene in MuJoCo; it has no restitution.
+    """A scene in MuJoCo, which has no restitution.
 
     Parameters
     ----------
     scene : Scene
-        The scene; friction of a pair is the greater of both.
+        The scene; the friction of a pair is the greater of both.
     dt : float
         Step [s].
     sleeping : bool
@@ -46,9 +46,9 @@ class Engine:
     softness : float
         Time constant of contacts over the step, at least 2 [-].
     impedance : float
-        Share of a contact's acceleration that its constraint prescribes, `solimp` [-].
+        Share of a contact's acceleration prescribed by its constraint, `solimp` [-].
     integrator : {"EULER", "RK4"}
-        Of time.
+        Time integrator.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Engine:
         self._start = centroids(scene)
 
     def _add_terrain(self, spec, points: np.ndarray) -> None:
-        """Add a plane for a terrain of one segment, else a box below each."""
+        """Add a plane for a terrain of one segment, or else a box below each segment."""
         for a, b in pairwise(points):
             along = b - a
             length = math.hypot(*along)
@@ -104,7 +104,7 @@ class Engine:
             )
 
     def _add_block(self, spec, i: int, block, centre, damping: float) -> None:
-        """Add an extruded polygon that slides in x and z and turns about -y."""
+        """Add an extruded polygon that translates in x and z and rotates about -y."""
         outline = block.vertices - centre
         area, _, second = polygon_properties(block.vertices)
         mass, inertia = block.density * area, block.density * second
@@ -157,5 +157,5 @@ def _is_rectangle(outline: np.ndarray) -> bool:
 
 
 def _about_y(angle: float) -> list[float]:
-    """Return the quaternion of a turn [rad], anticlockwise in x and z."""
+    """Return the quaternion of a rotation [rad], anticlockwise in x and z."""
     return [math.cos(0.5 * angle), 0.0, -math.sin(0.5 * angle), 0.0]

@@ -1,1 +1,1 @@
-"""Detection of contacts and the law that they follow."""
+"""Contact detection and the contact law."""

@@ -1,4 +1,4 @@
-"""Pairs of bodies whose swept boxes overlap, by sort and sweep along x."""
+"""Broad phase: pairs of bodies with overlapping swept boxes, by sort and sweep along x."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rigdda.kernel import kernel
 
 @kernel
 def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> None:
-    """Set the box of each body that holds it over the step, however deflected, with margin."""
+    """Set the swept box of each body, which contains it over the step even if it is deflected."""
     for i in range(len(bodies)):
         body, outline, grow = bodies[i], polygon[i], p.margin
         if body.status == AWAKE:
@@ -25,15 +25,15 @@ def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) 
         box.low_x, box.high_x = outline.low_x - grow, outline.high_x + grow
         box.low_y, box.high_y = outline.low_y - grow, outline.high_y + grow
         box.body, box.awake = i, body.status == AWAKE
-        if body.status == RETIRED:  # nothing overlaps it
+        if body.status == RETIRED:  # an empty box, which overlaps no other
             box.low_y, box.high_y = math.inf, -math.inf
 
 
 @kernel
 def sort_by_low(boxes: Boxes) -> None:
-    """Set `boxes.row` in order of low_x, ties by body, so that a sweep reads it in a row.
+    """Sort `boxes.row` by low_x, ties by body, so that a sweep reads it sequentially.
 
-    By insertion, since little changes from step to step.
+    Insertion sort is used because the order changes little from step to step.
     """
     row = boxes.row
     for k in range(len(row)):
@@ -49,10 +49,10 @@ def sort_by_low(boxes: Boxes) -> None:
 
 @kernel
 def overlapping_pairs(boxes: Boxes) -> int:
-    """Write pairs with at least one awake body into boxes.pairs.
+    """Write the pairs with at least one awake body into boxes.pairs.
 
-    Every candidate is written, and the next one over it unless they overlap: a branch that few
-    candidates take at random would cost five times the rest.
+    Every candidate is written, and overwritten by the next one if it does not overlap, because an
+    unpredictable branch that few candidates take would cost five times the rest.
 
     Returns
     -------
@@ -81,7 +81,10 @@ def overlapping_pairs(boxes: Boxes) -> int:
 
 @kernel
 def sweep_and_prune(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) -> int:
-    """Write the pairs of bodies that may touch in this step; returns how many, -1: too many."""
+    """Write the pairs of bodies that may touch in this step; return their number, or -1.
+
+    The number is -1 if they do not fit.
+    """
     sweep_boxes(bodies, polygon, boxes, p)
     sort_by_low(boxes)
     return overlapping_pairs(boxes)
@@ -89,7 +92,7 @@ def sweep_and_prune(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Paramete
 
 @kernel
 def partners_of_bodies(boxes: Boxes, count: int) -> None:
-    """Gather the second bodies of the pairs by their first one, in ascending order."""
+    """Group the second bodies of the pairs by first body, in ascending order."""
     start, pairs, partner = boxes.partner_start, boxes.pairs, boxes.partner
     for a in range(len(start)):
         start[a] = 0

@@ -1,15 +1,16 @@
-r"""Joints that hold by cohesion and tensile strength until they break, once and for good.
+r"""Joints with cohesion and tensile strength, which hold until they break irreversibly.
 
-A joint is what is closed at the start of a simulation. Each of its contacts stands for a share of
-its length L, but they are judged together. Here, unlike elsewhere, pulling is positive. The forces
-N_1 and N_2 of a joint's two ends, of sum N and moment M about its middle, are those of a traction
-that is linear along it, and at its end 1 that is
+A joint consists of the contacts that are closed at the start of a simulation. Each contact
+represents a share of its length L, but the strength is checked for the joint as a whole. In this
+module, unlike elsewhere, tension is positive. The forces N_1 and N_2 at the two ends of a joint,
+with sum N and moment M about its middle, are those of a traction that is linear along the joint,
+with the value at end 1
 
 .. math:: \sigma_1 = \frac{N}{L} + \frac{6 M}{L^2} = \frac{2 (2 N_1 - N_2)}{L} .
 
-Where it exceeds the tensile strength the joint opens, all along if the joint is pulled as a whole:
-the traction grows as the joint becomes shorter. Pressed as a whole, it opens at that end. In shear
-it bears what cohesion and friction give in sum.
+Where the traction exceeds the tensile strength, the joint opens: along its whole length if N is
+tensile, because the traction increases as the joint becomes shorter, and at that end only if N is
+compressive. The shear strength is the sum of cohesion and friction.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from rigdda.kernel import inlined, kernel
 
 @kernel
 def bond_joints(contacts: Contacts, low: int, high: int, p: Parameters) -> None:
-    """Share the length of each joint of one block among the contacts low:high that are on it."""
+    """Distribute the length of each joint of a block over those of the contacts low:high on it."""
     for k in range(low, high):
         c = contacts[k]
         c.bond = 0.0
@@ -41,22 +42,23 @@ def bond_joints(contacts: Contacts, low: int, high: int, p: Parameters) -> None:
 
 @inlined
 def of_one_joint(c: Contact, other: Contact) -> bool:
-    """Return whether two contacts are on one joint, and the other one still holds."""
+    """Return whether two contacts belong to the same joint and the other one is unbroken."""
     same = c.a == other.a and c.b == other.b and c.nx * other.nx + c.ny * other.ny > SAME_FACE
     return same and other.bond > 0.0
 
 
 @kernel
 def break_joint(c: Contact) -> None:
-    """Take the strength from a contact."""
+    """Remove the strength of a contact."""
     c.bond = c.cohesion = c.tension = 0.0
 
 
 @kernel
 def joint_breaks(contacts: Contacts, islands: Islands, low: int, high: int, item: int) -> bool:
-    """Break the joint of a contact, one of low:high of an island, if it must; returns whether.
+    """Break the joint of a contact if its strength is exceeded; return whether it breaks.
 
-    The forces that the contacts of the joint would bear are in `normal` and `shear`.
+    The contact is item `item` of the contacts low:high of an island. `normal` and `shear` of all
+    contacts of the joint must hold the forces of the unbroken joint.
     """
     c = contacts[islands.contact_item[item]]
     first = last = item

@@ -1,27 +1,27 @@
-r"""The law that a contact follows over one step in an island that is solved as a whole.
+r"""Contact law over one step, for islands that are solved as a whole.
 
 Every closed contact is a penalty spring on the *end* velocity of the step,
 
 .. math:: N = \kappa\,(b - \Delta t\,w_1), \qquad w_1 = 2 d_n / \Delta t - w_0,
 
-with d_n the relative normal displacement of the step and w_0, w_1 the normal relative velocities
-at its ends (positive separates). A spring on d_n itself (plain DDA) turns w_0 into -w_0 when it is
-stiff, which makes resting contacts chatter; on the end velocity it loses energy at any stiffness.
-What differs is the bias b:
+where d_n is the relative normal displacement of the step and w_0, w_1 are the relative normal
+velocities at its start and end (positive separates). A stiff spring on d_n itself (plain DDA) turns
+w_0 into -w_0, which makes resting contacts chatter. A spring on the end velocity dissipates energy
+at any stiffness. The kinds of contact differ in the bias b:
 
 =======  ====================================================================================
-at rest  b = N_0 / kappa, the force carried over from the last step; kappa = k_n, or in steps
-         shorter than the retardation time tau k_n tau / dt, of which k_n is elastic and carried
-         on, the rest viscous (Kelvin and Voigt's solid). An open gap gives b = -g: what would
-         close within the step is slowed down to the speed that closes it in one more.
-new      as at rest with N_0 = 0, but stiff for its first step: it finds the force that stops the
-         bodies, and carries on with it as if they had always touched.
-plain    b = -2 g and w_0 taken as 0: a penalty spring on the gap, the paper's contact.
+at rest  b = N_0 / kappa, with N_0 the force of the last step. kappa = k_n; in steps shorter
+         than the retardation time tau, kappa = k_n tau / dt, of which k_n is elastic and
+         carried over and the rest is viscous (a Kelvin-Voigt solid). An open gap has b = -g:
+         a contact that would close within the step is slowed to close one step later.
+new      As at rest with N_0 = 0, but stiff in its first step: it finds the force that stops the
+         bodies, and continues with it as if they had always been in contact.
+plain    b = -2 g with w_0 taken as 0: a penalty spring on the gap, the paper's contact.
 =======  ====================================================================================
 
-The shear spring is the same on the shear velocity, from the shear force of the last step, limited
-by Coulomb friction: a return mapping. Islands that move, and islands at rest at first, are relaxed
-instead (`rigdda.dynamics.relaxation`), where contacts are rigid.
+The shear spring acts in the same way on the shear velocity, starting from the shear force of the
+last step, and is limited by Coulomb friction in a return mapping. Islands in motion, and at first
+also islands at rest, are relaxed instead, with rigid contacts (`rigdda.dynamics.relaxation`).
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ from rigdda.kernel import inlined, kernel
 
 @kernel
 def effective_mass(bodies: Bodies, c: Contact) -> float:
-    """Return the mass [kg] that resists a normal impulse at a contact."""
-    a, b = bodies[c.a], bodies[c.b]  # b is not read where it is the terrain
+    """Return the effective mass [kg] for a normal impulse at a contact."""
+    a, b = bodies[c.a], bodies[c.b]  # b is not read if it is the terrain
     arm = c.ra_x * c.ny - c.ra_y * c.nx
     inverse = 1.0 / a.mass + arm * arm / a.inertia
     if c.b >= 0 and b.status == AWAKE:
@@ -58,7 +58,7 @@ def effective_mass(bodies: Bodies, c: Contact) -> float:
 
 @kernel
 def point_velocity(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
-    """Return the velocity [m/s] of the point (x, y) of body i; fixed and sleeping bodies rest."""
+    """Return the velocity [m/s] of point (x, y) of body i; 0 for fixed and sleeping bodies."""
     body = bodies[i]
     if i < 0 or body.status != AWAKE:
         return 0.0, 0.0
@@ -67,7 +67,7 @@ def point_velocity(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, f
 
 @kernel
 def set_arms(bodies: Bodies, c: Contact, time: float) -> None:
-    """Set the arms where the bodies will be after `time` [s]; so angular momentum is kept."""
+    """Set the lever arms at the positions after `time` [s], which conserves angular momentum."""
     a, b = bodies[c.a], bodies[c.b]
     vx, vy = point_velocity(bodies, c.a if c.owner == 1 else c.b, c.x, c.y)
     x, y = c.x + time * vx, c.y + time * vy
@@ -79,12 +79,12 @@ def set_arms(bodies: Bodies, c: Contact, time: float) -> None:
 
 @kernel
 def set_velocities(bodies: Bodies, c: Contact, dt: float) -> None:
-    """Set the relative velocities from where the bodies are at the start of the step.
+    """Set the relative velocities from the positions at the start of the step.
 
-    A point of a turning body does not go straight, and a face that turns comes nearer to what
-    slides along it. With both counted the law gives the true velocity at the end, to second order:
-    a block that rocks on a corner neither rises nor sinks. But w_0 is at most that of mid-step:
-    greater, it would let the contact give energy.
+    A point of a rotating body moves along a curve, and a rotating face approaches a point that
+    slides along it. With both effects, the contact law yields the true velocity at the end of the
+    step to second order, so that a block that rocks on a corner neither rises nor sinks. However,
+    w_0 must not exceed the velocity in mid-step, or the contact could add energy.
     """
     a, b = bodies[c.a], bodies[c.b]
     vx, vy = a.vx - a.omega * c.ra_y, a.vy + a.omega * c.ra_x
@@ -105,23 +105,23 @@ def set_velocities(bodies: Bodies, c: Contact, dt: float) -> None:
 
 @kernel
 def carried_weight(mass_a: float, mass_b: float, p: Parameters) -> float:
-    """Return the weight [N] of the heavier free body of a contact, the least load it may carry."""
+    """Return the weight [N] of the heavier free body, the least load assumed for a contact."""
     return max(mass_a, mass_b) * (p.gravity if p.gravity > 0.0 else 9.81)
 
 
 @kernel
 def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
-    """Return k_n [N/m] for the wanted penetration under the load that a contact carries.
+    """Return k_n [N/m], which gives the target penetration under the load of a contact.
 
-    At least for `weight` [N]. `prepare` lets it never fall: stiffness that fell with the load would
-    feed the sway of a stack.
+    The load is at least `weight` [N]. `prepare` never lets the stiffness decrease, because a
+    stiffness that decreased with the load would amplify the sway of a stack.
     """
     return max(weight, c.accumulated_normal) / p.penetration
 
 
 @kernel
 def set_rest(c: Contact, p: Parameters) -> None:
-    """Make a contact a spring that carries on with the force of the last step."""
+    """Set up a contact at rest, a spring that continues with the force of the last step."""
     c.kind = REST
     c.kappa = c.stiffness * max(1.0, RETARDATION_TIME / p.dt)
     if c.gap > p.penetration and c.bond == 0.0:
@@ -133,13 +133,13 @@ def set_rest(c: Contact, p: Parameters) -> None:
 
 @kernel
 def rigid_stiffness(mass: float, dt: float) -> float:
-    """Return the stiffness [N/m] that gives an effective mass its velocity within a step."""
+    """Return the stiffness [N/m] that brings an effective mass to its velocity within a step."""
     return RIGID * mass / (dt * dt)
 
 
 @kernel
 def set_new(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
-    """Make a contact one that closes now, or may close."""
+    """Set up a contact that closes in this step, or may close."""
     c.kind = NEW
     stiffness = rigid_stiffness(effective_mass(bodies, c), p.dt)
     c.kappa = max(stiffness if start else NEW_SHARE * stiffness, c.stiffness)
@@ -148,10 +148,11 @@ def set_new(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
 
 @kernel
 def set_plain(c: Contact, p: Parameters) -> None:
-    """Make a contact the paper's penalty spring on the displacement of the step.
+    """Set up the paper's contact, a penalty spring on the displacement of the step.
 
-    N = k_n (-gap - d_n) and S = S_0 - k_n d_s: the law above with w_0 = 0, and one k_n for all
-    contacts. It has no memory of speed, so its rebound is what step and stiffness make of it.
+    N = k_n (-gap - d_n) and S = S_0 - k_n d_s: the law above with w_0 = 0 and the same k_n for all
+    contacts. The law does not depend on the approach velocity, so rebound is determined by the step
+    and the stiffness.
     """
     c.kind = PLAIN
     c.stiffness = p.block_weight / p.penetration
@@ -164,9 +165,9 @@ def set_plain(c: Contact, p: Parameters) -> None:
 
 @inlined
 def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: Parameters) -> None:
-    """Set the law of a contact from its geometry and accumulated forces.
+    """Set up the law of a contact from its geometry and accumulated forces.
 
-    `start` tells whether this is the very first step.
+    `start` is whether this is the very first step.
     """
     a, b = bodies[c.a], bodies[c.b]
     mass_b = b.mass if c.b >= 0 and b.status == AWAKE else 0.0
@@ -189,7 +190,7 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
         set_rest(c, p)
     else:
         set_new(bodies, c, start, p)
-        # what touches starts closed: in a stack no block moves before those below it are held, and
-        # what hangs on a joint is held by it
+        # touching contacts start closed, so that no block of a stack moves before the blocks below
+        # it are supported, and hanging blocks are held by their joints
         if c.bond > 0.0 or (c.gap < p.margin and c.gap + c.un * p.dt < p.penetration):
             c.state = STICK

@@ -1,10 +1,10 @@
-"""Supports as contacts that may pull: bolts act along their line, pins in both directions.
+"""Supports as contacts that can pull: bolts act along their line, pins in both directions.
 
-They enter the system of equations, the exchange of forces and the ledger like any closed contact,
-and follow the same law (`contact.law`): a pin with b = 0. The mean tension of a bolt over a step,
-T + k d / 2, is this law with w_0 = 0, kappa = k / 4 and b = -T / kappa: no energy is lost,
-whatever the step. The state of a support is decided in `open_close.next_state_of_link`, and in
-relaxation by `relaxation.aim_row` and the limits of `relaxation.sweep`.
+Supports enter the system of equations, the exchange of forces and the ledger like closed contacts
+and follow the same law (`contact.law`). A pin has b = 0. A bolt has w_0 = 0, kappa = k / 4 and b =
+-T / kappa, so that N is minus its mean tension over the step, T + k d / 2; this conserves energy
+for any step length. The state of a support is decided in `open_close.next_state_of_link`, and in
+relaxation by `relaxation.aim_row` and the limits in `relaxation.sweep`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rigdda.kernel import entry_kernel, kernel
 
 @kernel
 def anchor(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
-    """Return the place now of a point given in body coordinates, of the ground if i < 0 [m]."""
+    """Return the current position of a point in body coordinates, or of the ground if i < 0 [m]."""
     if i < 0:
         return x, y
     body = bodies[i]
@@ -33,10 +33,11 @@ def anchor(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
 
 @kernel
 def arm(body: Body, x: float, y: float, dt: float) -> tuple[float, float]:
-    """Return the mean of the arms before and after a step of a point in body coordinates [m].
+    """Return the lever arm of a point in body coordinates, averaged over a step [m].
 
-    At the rate at which the body turns now. A point that is at rest before the step, and that the
-    displacement along this arm does not move, is at rest after it: exactly, if the rate stays.
+    It is the mean of the arms before and after the step at the current rate of rotation. A point
+    that is at rest before the step, and does not move by the displacement along this arm, is at
+    rest after the step: exactly so if the rate of rotation is constant.
     """
     half = 0.5 * dt * body.omega
     theta, mean = body.theta + half, math.cos(half)
@@ -52,7 +53,7 @@ def tension(link: Link, length: float) -> float:
 
 @entry_kernel
 def pull_of_bolts(bodies: Bodies, links: Links, out: NDArray) -> None:
-    """Write the force of each bolt on its block a now, (S, 2) [N], into `out`; 0 for a pin."""
+    """Write the current force of each bolt on its block a, (S, 2) [N], into `out`; 0 for a pin."""
     for q in range(len(links)):
         link = links[q]
         if link.kind == BOLT:
@@ -91,15 +92,15 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) ->
         c.kappa = c.stiffness = rigid_stiffness(mass, p.dt)
         c.tension = math.inf
         c.un, c.us = point_velocity(bodies, a, ax, ay)
-        c.bias = 0.0  # no velocity at the end
+        c.bias = 0.0  # zero velocity at the end of the step
 
 
 @kernel
 def mend_links(bodies: Bodies, outlines: Outlines, links: Links, p: Parameters) -> float:
-    """Yield bolts whose tension is above yield now, perfectly plastic; put pins in their place.
+    """Let overstressed bolts yield, perfectly plastically, and remove the drift of pins.
 
-    A turning block goes the arc of its pin only to second order; without post-correction it stays
-    where that brings it. Returns the work of moving it against gravity [J].
+    A rotating block follows the arc about its pin only to second order; without post-correction it
+    is not moved back. Returns the work done against gravity by moving blocks back [J].
     """
     work = 0.0
     for q in range(len(links)):

@@ -1,9 +1,9 @@
-"""Contacts between two polygons over a step, one convex part against another.
+"""Narrow phase: contacts between two polygons over a step, by pairs of convex parts.
 
-The face of contact is found by `separating_axes`; the edge that meets it is clipped to it.
+The contact face is found by `separating_axes`; the incident edge is clipped to it.
 
-Where the last edge to separate two parts, or the one that faces it, is inside its body, the way in
-leads through a neighbouring part, and that one has the contact.
+If the last separating edge of two parts, or the incident edge, lies inside its body, bodies can
+meet there only through a neighbouring part, which has the contact instead.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ from rigdda.kernel import inlined, kernel
 
 
 class Meeting(NamedTuple):
-    """Which edges of two bodies meet."""
+    """The edges at which two bodies meet."""
 
     a: int  # bodies; the normal of a contact points to a
     b: int
-    i: int  # polygon of the face of contact, and its edge
+    i: int  # polygon of the contact face, and its edge
     edge: int
     j: int  # the other polygon, and its incident edge
     other: int
 
 
 class Window(NamedTuple):
-    """Where corners of the incident edge make a contact with the face."""
+    """Limits within which corners of the incident edge form contacts with the face."""
 
-    shift_x: float  # moves polygon j to where it is at the time of entry, but for its turning [m]
+    shift_x: float  # moves polygon j to its position at the time of entry, without rotation [m]
     shift_y: float
     reach: float  # greatest gap [m]
-    margin: float  # a corner may be so far beyond an end of the face that is in a notch [m]
-    beside: float  # or so far beyond any end: it may come over the face within the step [m]
+    margin: float  # how far beyond an end of the face in a notch a corner may lie [m]
+    beside: float  # the same for any end: rotation may move a corner over the face [m]
 
 
 @kernel
@@ -81,7 +81,7 @@ def clip_contacts(
     s2 = tx * (two.x + window.shift_x - x0) + ty * (two.y + window.shift_y - y0)
     g1 = nx * (one.x - x0) + ny * (one.y - y0)
     g2 = nx * (two.x - x0) + ny * (two.y - y0)
-    # a corner of j that touches the next edge of a notch, too, may be a little beyond the face
+    # a corner of j that also touches the adjacent edge of a notch may lie slightly beyond the face
     start = -window.margin if face.reentrant else -window.beside
     stop = length + window.margin if next_corner.reentrant else length + window.beside
     low = s1 if s1 >= start else 0.0
@@ -102,7 +102,7 @@ def clip_contacts(
         else:
             own_corner = s2 > stop
             corner, other_corner = end, other
-        if own_corner:  # a corner of i on the incident edge
+        if own_corner:  # a corner of i meets the incident edge
             k = add_corner(bodies, outlines, contacts, k, meeting, i, corner, gap)
         else:
             k = add_corner(bodies, outlines, contacts, k, meeting, j, other_corner, gap)
@@ -111,10 +111,10 @@ def clip_contacts(
 
 @kernel
 def edges_in_line(outlines: Outlines, i: int, edge: int, way: int) -> int:
-    """Return how many edges of polygon i next to `edge` are in one line with it.
+    """Return the number of edges of polygon i that continue `edge` in a straight line.
 
-    Those after it where `way` is 1, those before it where `way` is -1. An edge with corners within
-    it is a line of several edges.
+    They follow the edge if `way` is 1 and precede it if `way` is -1. A side with corners within it
+    consists of several such edges.
     """
     n, own = outlines.polygon[i].count, outlines.corner[i, edge]
     for number in range(1, n):
@@ -129,11 +129,11 @@ def edges_in_line(outlines: Outlines, i: int, edge: int, way: int) -> int:
 def clip_lines(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting, window: Window
 ) -> int:
-    """Add the contacts of the line of the face of contact with that of the incident edge.
+    """Add the contacts of all edges collinear with the face and with the incident edge.
 
-    Each edge in line with the face is clipped against each edge in line with the incident one, so
-    that two bodies bear on each other over all of the length that they share. Returns the new
-    number of contacts, -1 if they do not fit.
+    Each edge collinear with the face is clipped against each edge collinear with the incident edge,
+    so that two bodies are in contact along their whole common length. Returns the new number of
+    contacts, or -1 if they do not fit.
     """
     a, b, i, edge, j, other = meeting
     first, n, m = k, outlines.polygon[i].count, outlines.polygon[j].count
@@ -158,7 +158,7 @@ def add_corner(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting, owner: int,
     corner: int, gap: float,
 ) -> int:  # fmt: skip
-    """Add the contact of a corner of polygon `owner` with the face of contact.
+    """Add the contact of a corner of polygon `owner` with the contact face.
 
     Its key is that of the corner of the body, so that parts share accumulated forces.
     """
@@ -176,7 +176,7 @@ def add_corner(
 
 @inlined
 def approach_of(bodies: Bodies, a: int, b: int, p: Parameters) -> Approach:
-    """Return how body b comes nearer to body a over the step."""
+    """Return the motion of body b relative to body a over the step."""
     dt = p.dt
     one, two = bodies[a], bodies[b]
     dx, dy = -one.vx * dt, -one.vy * dt
@@ -186,7 +186,7 @@ def approach_of(bodies: Bodies, a: int, b: int, p: Parameters) -> Approach:
         dy += two.vy * dt
         path += two.path
         fall = 0.0
-    # both turn about their centroids
+    # both bodies rotate about their centroids
     other = two.omega if two.status == AWAKE else 0.0
     return Approach(
         dx, dy, (other * two.y - one.omega * one.y) * dt, (one.omega * one.x - other * two.x) * dt,
@@ -198,7 +198,7 @@ def approach_of(bodies: Bodies, a: int, b: int, p: Parameters) -> Approach:
 def collide_pair(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int, p: Parameters
 ) -> int:
-    """Add the contacts of bodies a and b from entry k on; returns the new number, or -1."""
+    """Add the contacts of bodies a and b from entry k on; return the new number, or -1."""
     one, two = bodies[a], bodies[b]
     approach = approach_of(bodies, a, b, p)
     beside = 0.5 * p.dt * (abs(one.omega) * one.radius + abs(two.omega) * two.radius)
@@ -208,7 +208,7 @@ def collide_pair(
         )
     first = k
     k = collide_all_parts(bodies, outlines, contacts, k, a, b, approach, 0.0, beside)
-    if k == first:  # parts that overlap, deeper than to an edge inside a body: the way that is left
+    if k == first:  # the parts overlap beyond an inner edge: search among real edges
         still = Approach(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p.margin)
         k = collide_all_parts(bodies, outlines, contacts, k, a, b, still, 1e300, 0.0)
     return k
@@ -219,7 +219,7 @@ def collide_all_parts(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, a: int, b: int,
     approach: Approach, sunk: float, beside: float,
 ) -> int:  # fmt: skip
-    """Add the contacts of every convex part of a with every one of b; -1 if they do not fit."""
+    """Add the contacts of all pairs of convex parts of a and b; -1 if they do not fit."""
     first, one, two = k, bodies[a], bodies[b]
     for i in range(one.part, one.part + one.parts):
         for j in range(two.part, two.part + two.parts):
@@ -235,10 +235,10 @@ def collide_all_parts(
 
 @kernel
 def keep_nearest(contacts: Contacts, first: int, k: int, new: int) -> int:
-    """Move contact `new` to entry k, or over one of first:k of the same corner with the same face.
+    """Keep the nearer of contact `new` and an equal one among first:k; return the new number.
 
-    Parts that share a corner, or a face that a cut ends at, find the same contact. Returns the new
-    number.
+    Contacts are equal if they have the same corner and the same face. Parts that share a corner, or
+    a face that ends at a cut, find such contacts. A contact without an equal one moves to entry k.
     """
     place, c = k, contacts[new]
     for m in range(first, k):
@@ -257,14 +257,14 @@ def collide_parts(
     bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, i: int, j: int,
     approach: Approach, sunk: float, beside: float,
 ) -> int:  # fmt: skip
-    """Add the contacts of polygon i of one body with polygon j of another; returns the new number.
+    """Add the contacts of polygon i of one body with polygon j of another; return the new number.
 
-    `approach` is how the second body comes nearer, `sunk` see `face_of_contact`, and `beside` half
-    of how far both may turn [m].
+    `approach` is the motion of the second body relative to the first, `sunk` is explained in
+    `face_of_contact`, and `beside` is half of the distance by which both may rotate [m].
     """
     a, b = outlines.polygon[i].body, outlines.polygon[j].body
     dx, dy, margin = approach.dx, approach.dy, approach.margin
-    # what moves may be deflected by others before they meet
+    # a moving body may be deflected by others before they meet
     square = math.inf if bodies[b].status == AWAKE else SQUARE * math.sqrt(dx * dx + dy * dy)
     possible, time_i, gap_i, apart_i, edge_i = face_of_contact(
         outlines, i, j, approach, sunk, square
@@ -276,16 +276,16 @@ def collide_parts(
     )
     if not possible:
         return k
-    # near a tie keep the face of a, so that parallel faces do not alternate
+    # in a near tie keep the face of a, so that parallel faces do not alternate
     of_j = time_j > time_i or (time_j == time_i and gap_j > gap_i + TOUCH * margin)
     reach = (dx * dx + dy * dy) ** 0.5 + approach.spread
     touching = max(apart_i, apart_j) <= margin
-    # where they touch, not where they are deeper than the margin
+    # use the time of touching instead of that of exceeding the margin
     time_i = touch_time(gap_i, time_i, square, margin)
     time_j = touch_time(gap_j, time_j, square, margin)
     beside = 0.0 if touching else beside
-    # corner beside corner, the better face may miss the other body where the second one does not;
-    # and what is beside it at the time of entry may be driven into it from where it is now
+    # where two corners meet, the better face may miss the other body while the second one does
+    # not; and a body that is beside the face at the time of entry may be over it now
     for _ in range(2):
         face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
         facing = incident_edge(outlines, face, edge, other, outlines.polygon[other].count)
@@ -311,8 +311,8 @@ def add_deepest(
 ) -> int:
     """Add the contact of the nearest corner of the other polygon with the line of the face.
 
-    For bodies that touch although the face does not reach over the corner: nearly parallel edges
-    in a row, where rounding decides which of them is the face.
+    This serves bodies that touch although the face does not extend over the corner: with nearly
+    parallel successive edges, rounding decides which of them is the face.
     """
     face, n = outlines.corner[meeting.i, meeting.edge], outlines.polygon[meeting.j].count
     gap, corner = axis_gap(

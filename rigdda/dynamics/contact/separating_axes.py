@@ -1,12 +1,13 @@
-"""The face of contact of two convex polygons over a step.
+"""The contact face of two convex polygons over a step, by separating axes with time of entry.
 
-Separating axes with time of entry: of the axes that separate the polygons now, the one that they
-stop separating last is the face of contact. An axis along which they are farther apart than their
-paths in this step are long rules the contact out: a fast block cannot pass a thin wall, nor can one
-that a third block deflects within the step be driven into a neighbour.
+Of the axes that currently separate the polygons, the contact face is the one that stops separating
+them last. If the separation along an axis exceeds the length of both paths in this step, there is
+no contact. Therefore a fast block cannot pass through a thin wall, and a block that a third one
+deflects within the step cannot be driven into a neighbour.
 
-A face that they touch and do not approach separates them for the whole step: what slides along it
-is not caught by the side of the next body, whose face is flush with it.
+A face that touches the other polygon and is not approached by it separates them for the whole step.
+A block that slides along it is therefore not stopped by the side of the next body whose face is
+flush with it.
 """
 
 from __future__ import annotations
@@ -19,39 +20,40 @@ from rigdda.dynamics.records import Corners
 from rigdda.kernel import inlined, kernel, variable
 
 TOUCH = 2e-3
-"""Distance over the margin at which a face that is struck is entered [-]. It is the sooner reached
-the more oblique the face is: of an edge and the corner at its end the edge is struck."""
+"""Distance over the margin at which a face is entered in an impact [-]. The more oblique the face,
+the earlier it is reached, so that of an edge and the corner at its end the edge is hit."""
 
 SQUARE = 0.2
-"""Ratio of the approach normal to a face to the whole relative displacement, above which the face
-counts as struck rather than grazed [-]."""
+"""Ratio of the approach normal to a face to the total relative displacement, above which the face
+is hit rather than grazed [-]."""
 
 NEVER = 1e3
-"""Time of entry, over the step, of what comes nearer no faster than what is at rest may."""
+"""Time of entry, over the step, assigned to a face that is approached too slowly to be entered
+[-]."""
 
 
 class Approach(NamedTuple):
-    """How one body comes nearer to another over the step, if nothing deflects them."""
+    """Relative motion of two bodies over the step, if nothing deflects them."""
 
-    dx: float  # displacement of the one relative to the other [m]
+    dx: float  # displacement of one body relative to the other [m]
     dy: float
-    px: float  # (px - turn y, py + turn x) is what turning adds to it at (x, y) [m]
+    px: float  # rotation adds (px - turn y, py + turn x) to it at (x, y) [m]
     py: float
     turn: float  # [rad]
-    spread: float  # how far any of their points may come nearer, whatever deflects them [m]
-    margin: float  # of contact candidates [m]
+    spread: float  # bound on the approach of any of their points, even if deflected [m]
+    margin: float  # distance of contact candidates [m]
 
 
 @kernel
 def reverse(approach: Approach) -> Approach:
-    """Return how the other body comes nearer to the one."""
+    """Return the relative motion with the bodies exchanged."""
     dx, dy, px, py, turn, spread, margin = approach
     return Approach(-dx, -dy, -px, -py, -turn, spread, margin)
 
 
 @kernel
 def following(corner: int, corners: int) -> int:
-    """Return the corner after this one, anticlockwise."""
+    """Return the next corner, anticlockwise."""
     return corner + 1 if corner + 1 < corners else 0
 
 
@@ -59,7 +61,7 @@ def following(corner: int, corners: int) -> int:
 def axis_gap(
     nx: float, ny: float, x0: float, y0: float, corners: Corners, j: int, n: int
 ) -> tuple[float, int]:
-    """Return the least gap of the n corners of polygon j above a line [m], and the corner."""
+    """Return the least gap of the n corners of polygon j above a line [m], and its corner."""
     least, corner = 1e300, 0
     for k in range(n):
         own = corners[j, k]
@@ -71,7 +73,7 @@ def axis_gap(
 
 @kernel
 def over_edge(outlines: Outlines, i: int, edge: int, j: int) -> float:
-    """Return the gap of the middle of polygon j above an edge of polygon i [m]."""
+    """Return the gap of the mean corner of polygon j above an edge of polygon i [m]."""
     other, own = outlines.polygon[j], outlines.corner[i, edge]
     dx, dy = other.middle_x - own.x, other.middle_y - own.y
     return own.normal_x * dx + own.normal_y * dy
@@ -79,7 +81,7 @@ def over_edge(outlines: Outlines, i: int, edge: int, j: int) -> float:
 
 @kernel
 def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
-    """Return the edge of polygon i that the middle of polygon j is farthest over."""
+    """Return the edge of polygon i above which the mean corner of polygon j is highest."""
     facing, most = 0, -1e300
     for edge in range(edges):
         gap = over_edge(outlines, i, edge, j)
@@ -92,23 +94,24 @@ def facing_edge(outlines: Outlines, i: int, edges: int, j: int) -> int:
 def face_of_contact(
     outlines: Outlines, i: int, j: int, approach: Approach, sunk: float, square: float
 ) -> tuple[bool, float, float, float, int]:
-    """Return whether the edges of i leave a contact with j possible, and the best edge.
+    """Return whether the edges of i permit a contact with j, and the best edge.
 
-    Besides its time of entry, over the step, its gap now and the greatest gap of any edge that was
-    looked at [m]: (possible, time, gap, apart, edge). If a contact is ruled out, the rest is not to
-    be used.
+    The result is (possible, time, gap, apart, edge): the time of entry of the best edge over the
+    step, its current gap, and the greatest gap of any edge that was examined [m]. If `possible` is
+    False, the other values are meaningless.
 
-    `approach` is how j comes nearer to i. Edges inside the body count as deeper by `sunk` [m], so
-    that on a tie the real one is best.
+    `approach` is the motion of j relative to i. Edges inside the body count as deeper by `sunk`
+    [m], so that a real edge wins a tie.
 
-    A face that is struck, approached by more than `square` [m], is entered when the nearest corner
-    meets it. One that it touches, or that is grazed, is entered when the corner is deeper than the
-    margin: of two of these the one that is approached more slowly is the best. By the velocity of
-    the corner that touches then: the middle of a block that rolls comes down, where it rests does
-    not.
+    A face is hit if it is approached by more than `square` [m]; it is entered when the nearest
+    corner meets it. A face that is touching or grazed is entered when the corner is deeper than the
+    margin; of two such faces, the one approached more slowly is the best. The approach of a
+    touching face is that of the corner that touches it, because the centre of a rolling block
+    descends while its point of contact does not.
 
-    The edge that the middle of j is farthest over comes first: most often it is the best one, or
-    one that separates them. Others are looked at only as far as the circle in j may be over them.
+    The edge above which the mean corner of j is highest is examined first, because it usually is
+    the best one or rules out a contact. Another edge is examined only if the inscribed circle of j
+    permits that it is better.
     """
     dx, dy, px, py, turn, spread, margin = approach
     edges, corners = outlines.polygon[i].count, outlines.polygon[j].count
@@ -147,20 +150,20 @@ def face_of_contact(
 
 @kernel
 def touch_time(gap: float, time: float, square: float, margin: float) -> float:
-    """Return when a face that is entered at a time is touched, over the step; 0 if it is now."""
+    """Return the time, over the step, at which a face entered at `time` is touched; 0 if now."""
     near = TOUCH * margin
     if gap <= 2.0 * near or time <= 0.0:
         return 0.0
-    if gap - near > square * time:  # it is struck
+    if gap - near > square * time:  # the face is hit
         return time * gap / (gap - near)
     return time * gap / (gap + margin) if gap > margin else 0.0
 
 
 @kernel
 def edge_over_point(outlines: Outlines, i: int, edge: int, edges: int, x: float, y: float) -> int:
-    """Return the edge of i, nearly in line with `edge`, that lies over a point.
+    """Return the edge of i, nearly collinear with `edge`, that lies over a point.
 
-    Of edges in one line rounding alone decides which is the best face.
+    Among collinear edges, rounding alone decides which one is the best face.
     """
     nx, ny = outlines.corner[i, edge].normal_x, outlines.corner[i, edge].normal_y
     for _ in range(edges):
@@ -179,7 +182,7 @@ def edge_over_point(outlines: Outlines, i: int, edge: int, edges: int, x: float,
 
 @kernel
 def incident_edge(outlines: Outlines, i: int, edge: int, j: int, n: int) -> int:
-    """Return the edge of j at its nearest corner that faces edge `edge` of i most squarely."""
+    """Return the edge at the nearest corner of j that faces edge `edge` of i most squarely."""
     face = outlines.corner[i, edge]
     nx, ny = face.normal_x, face.normal_y
     _, corner = axis_gap(nx, ny, 0.0, 0.0, outlines.corner, j, n)

@@ -1,8 +1,8 @@
 """Contacts of a block with the terrain over a step.
 
-Corners of the block against segments, and convex corners of the terrain against edges of the
-convex parts of the block. Segments are lengthened into the ground at concave corners, or blocks
-fall through there.
+Corners of the block are tested against segments, and convex corners of the terrain against edges of
+the convex parts of the block. At concave corners, segments are extended into the ground; otherwise
+blocks would fall through there.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from rigdda.kernel import inlined, kernel, variable
 
 @kernel
 def below_segment(ground: GroundArrays, s: int, x: float, y: float) -> float:
-    """Return the gap of a point over the line of segment s [m]: < 0 in the ground."""
+    """Return the gap of a point above the line of segment s [m], negative in the ground."""
     one = ground.segment[s]
     return one.normal_x * (x - one.x) + one.normal_y * (y - one.y)
 
 
 @kernel
 def along_segment(ground: GroundArrays, s: int, x: float, y: float) -> float:
-    """Return how far along segment s a point lies [m]."""
+    """Return the distance of a point along segment s [m]."""
     one = ground.segment[s]
     return one.normal_y * (x - one.x) - one.normal_x * (y - one.y)
 
 
 @kernel
 def over_segment(ground: GroundArrays, s: int, x: float, y: float, depth: float) -> bool:
-    """Return whether a point lies over segment s, lengthened by what `depth` needs at its ends."""
+    """Return whether a point lies over segment s, extended at its ends as `depth` requires."""
     along, one = along_segment(ground, s, x, y), ground.segment[s]
     turn_end = ground.segment[s + 1].turn
-    # beyond a concave corner, as far as what is so deep is nearer to this segment than to the next
+    # beyond a concave corner, count a point at this depth if this segment is nearer than the next
     if along < 0.0 and one.turn > 0.0:
         return -along <= depth * math.tan(0.5 * one.turn)
     if along > one.length and turn_end > 0.0:
@@ -70,9 +70,9 @@ def crosses_segment(
 def along_neighbour(
     ground: GroundArrays, s: int, x: float, y: float, dx: float, dy: float
 ) -> tuple[float, float]:
-    """Return the displacement of a point less what would take it into segment s, if it is over it.
+    """Return the displacement of a point without the part that would take it into segment s.
 
-    It slides along that segment.
+    The point slides along the segment if it is over it.
     """
     one, gap = ground.segment[s], below_segment(ground, s, x, y)
     sunk = min(gap, 0.0) - gap - (one.normal_x * dx + one.normal_y * dy)
@@ -82,10 +82,11 @@ def along_neighbour(
 
 
 SHARP = 1e-9
-"""Cosine of the angle between normals beyond which a ridge turns by more than 90 degrees [-]."""
+"""Negative cosine of the angle between two normals beyond which a ridge counts as turning by more
+than 90 degrees [-]."""
 
 NEVER = 2.0
-"""Time of entry, over the step, of what does not come nearer or not soon."""
+"""Time of entry, over the step, assigned to edges that are not approached or only slowly [-]."""
 
 
 @kernel
@@ -100,8 +101,9 @@ def beneath_roof(
 ) -> bool:
     """Return whether a corner of block a under segment s lies in the air beneath an overhang.
 
-    Another segment is between them then. A corner that was pushed right through something thin is
-    no such case: the block still reaches through segment s.
+    In this case another segment lies between the corner and segment s. A corner that was pushed
+    right through a thin piece of ground does not count, because the block still extends through
+    segment s.
     """
     x, y = outlines.corner[a, vertex].x, outlines.corner[a, vertex].y
     foot_x, foot_y = x - gap * ground.segment[s].normal_x, y - gap * ground.segment[s].normal_y
@@ -133,10 +135,10 @@ def place_of_hit(
     gap: float,
     p: Parameters,
 ) -> tuple[float, float]:
-    """Return where in the step a corner of block a meets the line of segment s.
+    """Return the position at which a corner of block a meets the line of segment s in the step.
 
-    Or (x, y) if it never does, or is in the ground already, or touches it and does not strike it.
-    It may slide there along a neighbour, into a concave corner.
+    This is (x, y) if the corner does not meet it, is already in the ground, or touches it without
+    an impact. Before that, the corner may slide along a neighbouring segment into a concave corner.
     """
     if gap <= 0.0:
         return x, y
@@ -162,10 +164,10 @@ def leaves_over_end(
 ) -> bool:  # fmt: skip
     """Return whether a corner at (x, y) slides off a convex end of segment s.
 
-    It meets the line of the segment at (hit_x, hit_y), within `margin` [m] of that end or beyond.
-    An edge of the block rests on the end then and slides over it, so that the corner is aimed at
-    the end: rounding alone would decide whether it strikes the segment that it leaves. What comes
-    down more than along does not slide, but strikes.
+    The corner meets the line of the segment at (hit_x, hit_y), within `margin` [m] of that end or
+    beyond it. Then an edge of the block rests on the end and slides over it, so that the corner
+    moves towards the end, and rounding alone would decide whether it hits the segment that it
+    leaves. A corner that descends more than it moves along the segment hits it instead.
     """
     along, hit = along_segment(ground, s, x, y), along_segment(ground, s, hit_x, hit_y)
     one = ground.segment[s]
@@ -181,9 +183,10 @@ def meets_segment(
     ground: GroundArrays, s: int, x: float, y: float, hit_x: float, hit_y: float, gap: float,
     reach: float, margin: float,
 ) -> bool:  # fmt: skip
-    """Return whether a corner at (x, y) meets segment s; its line it meets at (hit_x, hit_y).
+    """Return whether a corner at (x, y), which meets its line at (hit_x, hit_y), meets segment s.
 
-    `gap` is that of the corner now, `reach` how far it may come in the step [m].
+    `gap` is the current gap of the corner, and `reach` the greatest distance that it may travel in
+    the step [m].
     """
     if not over_segment(ground, s, hit_x, hit_y, max(-gap, 0.0) + reach):
         return False
@@ -197,7 +200,7 @@ def corners_on_segment(
     bodies: Bodies, outlines: Outlines, ground: GroundArrays, contacts: Contacts, k: int,
     first: int, a: int, s: int, p: Parameters,
 ) -> int:  # fmt: skip
-    """Add contacts of the corners of block a with segment s; returns the new number."""
+    """Add contacts of the corners of block a with segment s; return the new number."""
     one, block = ground.segment[s], bodies[a]
     nx, ny, surface = one.normal_x, one.normal_y, one.surface
     reach = block.path + p.gravity * p.dt * p.dt + p.margin
@@ -220,7 +223,7 @@ def corners_on_segment(
         if gap < -p.margin and beneath_roof(bodies, outlines, ground, a, vertex, s, gap):
             continue
         again = False
-        for m in range(first, k):  # one face, cut in two segments
+        for m in range(first, k):  # the same face, divided into two segments
             c = contacts[m]
             if c.owner == 1 and c.key == key and c.nx * nx + c.ny * ny > SAME_FACE:
                 again = True
@@ -236,9 +239,9 @@ def corners_on_segment(
 def bridges(
     outlines: Outlines, ground: GroundArrays, part: int, edge: int, corner: int, least: float
 ) -> bool:
-    """Return whether the ends of an edge are on either side of a ridge, no deeper than `least` [m].
+    """Return whether an edge spans a ridge, with gaps of its ends of at least `least` [m].
 
-    The start on the left and the end on the right, since outlines run anticlockwise.
+    Its start is on the left and its end on the right, because outlines are anticlockwise.
     """
     start = outlines.corner[part, edge]
     end = outlines.corner[part, following(edge, outlines.polygon[part].count)]
@@ -251,10 +254,11 @@ def edge_on_ridge(
     bodies: Bodies, outlines: Outlines, ground: GroundArrays, box: Box, contacts: Contacts, k: int,
     a: int, part: int, corner: int, p: Parameters,
 ) -> int:  # fmt: skip
-    """Add the contact of a convex terrain corner with an edge of a part of block a, if it has one.
+    """Add the contact of a convex terrain corner with an edge of a part of block a, if any.
 
-    The edge is the last to separate the corner from the block, or about as deep; its normal must
-    lie about between those of the two segments, or a corner of the block is in contact instead.
+    The edge must be the last one to separate the corner from the block, or about as deep. Its
+    normal must lie approximately between those of the two segments, otherwise a corner of the block
+    is in contact instead.
     """
     left, right, block = ground.segment[corner - 1], ground.segment[corner], bodies[a]
     x, y = right.x, right.y
@@ -266,12 +270,12 @@ def edge_on_ridge(
     concave = part != a
     lean = abs(block.omega) * dt
     reach = block.path + p.gravity * dt * dt + p.margin
-    # on a ridge that turns by more than 90 deg a normal between both is not always along the left
+    # on a ridge that turns by more than 90 deg, a normal between both may oppose the left one
     out_x, out_y = left.normal_x, left.normal_y
     if left.normal_x * right.normal_x + left.normal_y * right.normal_y < -SHARP:
         out_x, out_y = out_x + right.normal_x, out_y + right.normal_y
     best, best_time, best_gap = variable(-1), -1.0, -1e300
-    last, depth = -1.0, -1e300  # of all edges, fitting or not
+    last, depth = -1.0, -1e300  # of all edges, whether they fit or not
     for edge in range(n):
         own = outlines.corner[part, edge]
         nx, ny = own.normal_x, own.normal_y
@@ -281,7 +285,7 @@ def edge_on_ridge(
             return k
         inner = concave and own.inner
         if inner and gap <= 0.0:
-            continue  # a corner inside the part is pushed out of the block, not into the next part
+            continue  # push the corner out of the block, not into the next part
         time = 0.0
         if gap > p.margin:
             time = NEVER if approach <= 0.0 else min(gap / approach, NEVER)
@@ -296,8 +300,8 @@ def edge_on_ridge(
             last, depth = time, gap
     if best < 0 or best_time < last:
         return k
-    # beside a corner that slides over the ridge another edge is soon the nearest one: what fits
-    # counts as long as the depths are alike, or while it bridges the ridge
+    # when a corner of the block slides over the ridge, another edge soon becomes the nearest one:
+    # keep the fitting edge while the depths are similar or while it bridges the ridge
     alike = best_gap >= 2.0 * min(depth, 0.0) - p.margin
     if not alike and not bridges(outlines, ground, part, best, corner, 0.5 * best_gap):
         return k
@@ -309,7 +313,7 @@ def edge_on_ridge(
     gap = nx * (x - start.x) + ny * (y - start.y)
     ex, ey = end.x - start.x, end.y - start.y
     along = (hit_x - start.x) * ex + (hit_y - start.y) * ey
-    # beyond the end of the edge the corner is not in the block, unless it is deep
+    # beyond the ends of the edge, the corner is outside the block unless it is deep
     if gap > -p.penetration and (along < 0.0 or along > ex * ex + ey * ey):
         return k
     key = len(bodies) * outlines.corner.shape[1] + corner
@@ -322,7 +326,7 @@ def collide_terrain(
     bodies: Bodies, outlines: Outlines, ground: GroundArrays, box: Box, contacts: Contacts, k: int,
     a: int, p: Parameters,
 ) -> int:  # fmt: skip
-    """Add the contacts of block a with the terrain from entry k; returns the new number.
+    """Add the contacts of block a with the terrain from entry k; return the new number.
 
     `box` is the swept box of the block.
     """
@@ -338,7 +342,7 @@ def collide_terrain(
             s = ground.bin_item[item]
             one = ground.segment[s]
             if cell != max(one.bin, low):
-                continue  # seen in an earlier cell
+                continue  # already examined in an earlier cell
             if one.left > box.high_x or one.right < box.low_x:
                 continue
             if one.bottom > box.high_y or one.top < box.low_y:

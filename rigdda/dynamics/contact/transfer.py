@@ -1,7 +1,7 @@
-"""What contacts carry from step to step: accumulated normal and shear force, stiffness.
+"""Transfer of accumulated normal and shear force and stiffness of contacts between steps.
 
-Keyed by the vertex (its owner included) and both bodies; the normals must agree, so that a corner
-in a notch keeps what its two contacts carry apart.
+Contacts are identified by the vertex, its owner and both bodies. Their normals must agree as well,
+so that the two contacts of a corner in a notch remain separate.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from rigdda.kernel import inlined, kernel
 
 @kernel
 def fits_another(contacts: Contacts, k: int, low: int, high: int, was: Contact) -> bool:
-    """Return whether of the new contacts low:high of the corner of k another fits `was` better."""
+    """Return whether another new contact low:high of the corner of k matches `was` better."""
     c = contacts[k]
     cosine = abs(c.nx * was.nx + c.ny * was.ny)
     for j in range(low, high):
@@ -32,7 +32,7 @@ def recall_from(
     contacts: Contacts, k: int, new_low: int, new_high: int, old: Contacts, low: int, high: int,
     b: int, sign: float,
 ) -> bool:  # fmt: skip
-    """Give contact k what the same closed contact among old[low:high] had, if there is one."""
+    """Transfer the data of the same closed contact among old[low:high] to contact k, if any."""
     c = contacts[k]
     for m in range(low, high):
         was = old[m]
@@ -41,7 +41,7 @@ def recall_from(
         cosine = sign * (c.nx * was.nx + c.ny * was.ny)
         if cosine < SAME_NORMAL:
             continue
-        # where a corner slides into a concave corner, the face ahead is not the one it comes from
+        # when a corner slides into a concave corner, the face ahead is a new contact
         if cosine < SAME_FACE and fits_another(contacts, k, new_low, new_high, was):
             continue
         c.state = was.state
@@ -55,12 +55,13 @@ def recall_from(
 def recall(
     contacts: Contacts, low: int, high: int, old: Contacts, first: NDArray, margin: float
 ) -> None:
-    """Give each new contact in low:high what it had in the last step, or it starts OPEN.
+    """Transfer data of the last step to each contact in low:high; others start OPEN.
 
-    A contact that has come apart by more than `margin` starts OPEN, too: it closes by an impact.
+    A contact that has opened by more than `margin` also starts OPEN, so that it closes by an
+    impact.
 
-    Bodies change sides (a, b) when one of them falls asleep or wakes, so a pair is looked up both
-    ways; its forces keep their sign, since normal and shear turn round together.
+    Bodies exchange their roles (a, b) when one of them falls asleep or wakes, so a pair is looked
+    up both ways. Its forces keep their signs, because the normal and shear directions both reverse.
     """
     for k in range(low, high):
         c = contacts[k]
@@ -77,7 +78,7 @@ def recall(
 
 @kernel
 def copy_contact(c: Contact, was: Contact) -> None:
-    """Keep a contact of the last step: between sleeping bodies nothing changes."""
+    """Copy a contact of the last step, as contacts of sleeping bodies do not change."""
     c.a, c.b, c.key, c.owner, c.other = was.a, was.b, was.key, was.owner, was.other
     c.x, c.y, c.nx, c.ny, c.gap = was.x, was.y, was.nx, was.ny, was.gap
     c.state, c.kind = was.state, was.kind

@@ -73,7 +73,9 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
               solid_capstyle="butt")  # fmt: skip
     for i, barrier in enumerate(run.scene.barriers):
         colour = BARRIER if run.times[frame] < run.failure(i) else BROKEN
-        draw_barrier(axes, barrier, run.outline(i, frame), colour)
+        start = run.outline(i, 0)
+        foot = float(start[:, 0].mean()), float(start[:, 1].max()) - barrier.left_height(0.0)
+        draw_barrier(axes, barrier, run.outline(i, frame), foot, colour)
     for i in range(len(run.scene.blocks)):
         axes.fill(*_corners(run, frame, i).T, color=ROCK, edgecolor="white", linewidth=0.2,
                   zorder=4)  # fmt: skip
@@ -82,7 +84,13 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
     axes.set_ylabel("y [m]")
 
 
-def draw_barrier(axes: Axes, barrier: Barrier, outline: Floats, colour: str = BARRIER) -> None:
+def draw_barrier(
+    axes: Axes,
+    barrier: Barrier,
+    outline: Floats,
+    foot: tuple[float, float] | None = None,
+    colour: str = BARRIER,
+) -> None:
     """Draw what stands: a fence as a post, a ditch as a shaded cut, all else as a body.
 
     Parameters
@@ -93,12 +101,16 @@ def draw_barrier(axes: Axes, barrier: Barrier, outline: Floats, colour: str = BA
         What it is, all but mesh.
     outline : (n, 2) array
         Its corners, of an earthwork those of the earth that was moved [m].
+    foot : (float, float), optional
+        Where the posts of a fence stand, which lean downhill once it has given way [m]; by default
+        below its top.
     colour : str
         Of its faces and edges.
     """
     if isinstance(barrier, Fence):
-        (x, _), (top_x, top) = outline[:2].mean(axis=0), outline[2:].mean(axis=0)
-        axes.plot([x, top_x], [top - barrier.height, top], color=colour, linewidth=POST,
+        x, top = outline[2:].mean(axis=0).tolist()
+        foot = foot or (x, top - barrier.height)
+        axes.plot([foot[0], x], [foot[1], top], color=colour, linewidth=POST,
                   solid_capstyle="butt", zorder=3.5)  # fmt: skip
     elif barrier.drawn == "line":
         axes.fill(*outline.T, facecolor=CUT, edgecolor=colour, hatch="////", linewidth=1.5,

@@ -1,7 +1,7 @@
-"""Gymnasium environments of barrier design, and the same problem without Gymnasium.
+"""Gymnasium environments for barrier design, and the same problem without Gymnasium.
 
 Importing this package registers the environments;
-`gymnasium.make("rigdda.envs:rigdda/BarrierDesign-v0")` imports it on its own.
+`gymnasium.make("rigdda.envs:rigdda/BarrierDesign-v0")` imports it automatically.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ __all__ = ["DesignProblem", "Difference", "Evaluation", "Targets", "compare", "s
 
 
 def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
-    """Return copies of an environment that Stable-Baselines3 steps together.
+    """Return a vectorised environment for Stable-Baselines3.
 
-    They are those of `gymnasium.make_vec(id, num_envs, ...)`, simulated in threads over all cores,
-    with SB3's own monitor of episodes around them. Needs the extra `rl`.
+    It wraps the copies that `gymnasium.make_vec(id, num_envs, ...)` creates. Releases are simulated
+    in threads on all cores, and SB3's `VecMonitor` records the episodes. Requires the extra `rl`.
 
     Parameters
     ----------
@@ -32,12 +32,12 @@ def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
     num_envs : int
         Number of copies.
     **keywords
-        Of each copy, and `max_episode_steps`.
+        Keywords of each copy, and `max_episode_steps`.
 
     Raises
     ------
     BadInput
-        If a keyword is unsound.
+        If a keyword is invalid.
     """
     from rigdda.envs import sb3
 

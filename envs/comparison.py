@@ -1,7 +1,8 @@
-"""What one layout costs more than another, from releases that both meet.
+"""Comparison of two layouts by the difference of their objective Z on common releases.
 
-Most releases cost the same with both. What the first one costs more, and what it costs less, are
-two means of costs that few releases have, with the intervals of such, see `rigdda.envs.intervals`.
+Most releases cost the same with both layouts. The extra cost of the first layout and its savings
+are therefore treated as two separate means of rarely incurred costs, each with its own interval
+(see `rigdda.envs.intervals`).
 """
 
 from __future__ import annotations
@@ -21,22 +22,22 @@ from rigdda.envs.intervals import Known, Mean, cost
 from rigdda.envs.problem import DesignProblem
 
 LEAST = 2
-"""Releases of an event that tell how much they differ."""
+"""Least number of releases of each event needed to estimate a difference."""
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Z of one layout less that of another [EUR per metre of road and year].
+    """Difference in Z between two layouts [EUR per metre of road and year].
 
     Parameters
     ----------
     value : float
-        Below 0 the first one costs less.
+        Z of the first layout minus Z of the second; negative if the first is cheaper.
     ci : (low, high)
-        95 % interval. Releases are paired: the same rock comes down with both, so that it is
-        shorter than that of two Z taken apart, the more so the more alike the layouts are.
+        95 % interval. Because both layouts are tested with the same releases, it is narrower than
+        the interval of two independent estimates of Z, particularly for similar layouts.
     releases, differ : int
-        How many both met, and in how many of these they did not cost the same.
+        Number of common releases, and the number of them in which the costs differ.
     """
 
     value: float
@@ -52,9 +53,10 @@ def compare(
     seeds: Sequence[int],
     executor: Executor | None = None,
 ) -> Difference:
-    """Return what one layout costs more than another in the same releases.
+    """Return the difference in Z between two layouts on the same releases.
 
-    Layouts, seeds and executor as of `DesignProblem.evaluate`; at least two seeds for each event.
+    The layouts, seeds and executor are those of `DesignProblem.evaluate`. At least two seeds per
+    event are needed.
 
     Raises
     ------
@@ -72,19 +74,24 @@ def difference(
     outcomes: tuple[Sequence[Outcome], Sequence[Outcome]],
     facts: Mapping[str, Facts],
 ) -> Difference:
-    """Return what the first layout costs more than the second.
+    """Return the difference in Z between two layouts from their outcomes.
 
     Parameters
     ----------
+    site : Site
+        The site.
+    layouts : (Layout, Layout)
+        The two layouts.
     outcomes : two sequences of Outcome
-        Of each layout, of the same releases in the same order.
+        The outcomes of each layout for the same releases in the same order.
     facts : mapping of str to Facts
-        What is known of each event: what a release may differ by, where none was seen to.
+        Barrier-free statistics of each event. They bound the difference for events in which no
+        release showed one.
 
     Raises
     ------
     BadInput
-        If an event that happens has fewer than `LEAST` releases.
+        If an event with a non-zero rate has fewer than `LEAST` releases.
     """
     one, two = (account(site, a, b) for a, b in zip(layouts, outcomes, strict=True))
     value = site.annual(layouts[0]) - site.annual(layouts[1])
@@ -95,7 +102,7 @@ def difference(
             continue
         own = one.event == name
         if own.sum() < LEAST:
-            mend = f"give {LEAST} or more of every event: {LEAST * len(site.events)} seeds in all"
+            mend = f"give {LEAST} or more per event: at least {LEAST * len(site.events)} seeds"
             raise BadInput("seeds", f"{own.sum()} of {name}", mend)
         more = rates[0] * _spent(one)[own] - rates[1] * _spent(two)[own]
         differ += int(np.count_nonzero(more))
@@ -120,5 +127,5 @@ def _above(mean: Mean) -> float:
 
 
 def _spent(found: Account) -> NDArray[np.float64]:
-    """Return harm and repair of each release [EUR]."""
+    """Return the harm plus repair cost of each release [EUR]."""
     return found.harm + found.repair

@@ -1,7 +1,8 @@
-"""From releases to the cost of a year and its parts, with intervals.
+"""Annual cost of a layout and its parts, with confidence intervals.
 
-What each release costs (`account`), what the releases of an event tell of it (`learn`), and the
-evaluation of a layout: expected harm, repair and capital, and the chances in design events.
+`account` computes the cost of each release, `learn` summarises the releases of an event, and
+`judge` evaluates a layout: its expected harm, repair cost and capital cost, and the probabilities
+that the road is reached and that a barrier fails.
 """
 
 from __future__ import annotations
@@ -22,41 +23,44 @@ from rigdda.envs.intervals import Estimate, Interval, Known, Mean, cost, estimat
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What a layout is worth on some releases.
+    """Evaluation of a layout on a set of releases.
 
     Parameters
     ----------
     layout : tuple of Barrier
         The barriers.
     seeds : tuple of int
-        Seed of each release, in the order of `outcomes`; empty where they are not kept.
+        Seed of each release, in the order of `outcomes`; empty if they are not kept.
     objective, ci : float, (float, float)
-        Z and its 95 % interval [EUR per metre of road and year]. Of fewer than two releases an
-        event, it and what is told of harm and debris may be negative, see `rigdda.envs.cost`.
+        Z and its 95 % interval [EUR per metre of road and year]. With fewer than two releases per
+        event, Z, `harm` and `debris` may be negative, because known barrier-free costs are used as
+        a control variate.
     capital, harm, repair : float
-        The parts of Z: what the barriers cost a year, what rock on the road costs, what mending and
-        emptying the barriers costs.
+        The parts of Z: annual cost of the barriers, expected harm on the road, and expected cost of
+        repairing and emptying the barriers.
     harm_ci, repair_ci : (float, float)
         Their 95 % intervals.
     cost : float
-        Price of the layout [EUR per metre of road].
+        Capital cost of the layout [EUR per metre of road].
     debris, debris_ci : float, (float, float)
-        Expected volume that comes onto the road [m3 per metre of road and year].
+        Expected volume of rock that reaches the road, and its interval [m3 per metre of road and
+        year].
     debris_share : float
-        The same over what comes onto it without barriers [-]; 0 where nothing does.
+        `debris` divided by its value without barriers [-]; 0 if no rock reaches the road without
+        barriers.
     reach, failure : dict of str to Estimate
-        For each event the probability that a block comes onto the road, and that a barrier fails.
+        For each event the probability that a block reaches the road, and that a barrier fails.
     by_event : dict of str to float
-        What each event adds to Z, harm and repair [EUR per metre of road and year].
+        Expected harm and repair cost due to each event [EUR per metre of road and year].
     targets : {"met", "missed", "undecided"} or None
-        Whether the layout meets what is asked of it; None if nothing is.
+        Whether the layout meets the targets; None if there are no targets.
     outcomes : tuple of Outcome
-        One for each release; empty where they are not kept.
+        One for each release; empty if they are not kept.
     releases, simulated : int
-        Releases that it rests on, and how many of these were simulated for it; what the others
-        give was known. The latter is not compared.
+        Number of releases, and how many of them were simulated for this evaluation; the others came
+        from the outcome cache. `simulated` is ignored in comparisons.
     seconds : float
-        Processor time of the simulations [s]; not compared.
+        Processor time of the simulations [s]; ignored in comparisons.
     """
 
     layout: Layout
@@ -83,18 +87,20 @@ class Evaluation:
 
     @property
     def typical(self) -> tuple[int, str]:
-        """Seed and event of a release that stands for the others.
+        """Seed and event of a representative release.
 
-        Of the event that adds most to Z the one that brings nearly the event's mean volume onto the
-        road, the first of equals.
+        The event is the one that contributes most to Z. Of its releases, the one whose volume on
+        the road is closest to the mean of the event is chosen; ties go to the first.
 
         Raises
         ------
         BadInput
-            If the evaluation was made without its seeds, or its outcomes are not kept.
+            If the evaluation has no seeds or no outcomes.
         """
         if not self.outcomes or len(self.seeds) != len(self.outcomes):
-            raise BadInput("seeds", self.seeds, "evaluate with the seeds of the releases")
+            raise BadInput(
+                "seeds", self.seeds, "evaluate the layout with seeds and keep the outcomes"
+            )
         seen = {outcome.event for outcome in self.outcomes}
         event = max(seen, key=lambda name: (self.by_event[name], name))
         own = [i for i, outcome in enumerate(self.outcomes) if outcome.event == event]
@@ -102,7 +108,7 @@ class Evaluation:
         return self.seeds[own[int(np.argmin(np.abs(volume - volume.mean())))]], event
 
     def _repr_html_(self) -> str:
-        """Return the figures as a table, for notebooks."""
+        """Return the results as an HTML table for notebooks."""
         unit = "EUR per metre and year"
         rows = [
             ("Z", f"{self.objective:,.1f}", _span(self.ci), unit),
@@ -126,7 +132,7 @@ class Evaluation:
         return f"<p>{html.escape(words)}</p>" + display.table(head, rows)
 
     def gain(self, nothing: Evaluation) -> float:
-        """Return the fall of Z over Z of nothing, see `DesignProblem.reward`."""
+        """Return the relative reduction of Z; see `DesignProblem.reward`."""
         if nothing.objective > 0.0:
             return (nothing.objective - self.objective) / nothing.objective
         if self.objective > 0.0:
@@ -135,23 +141,24 @@ class Evaluation:
 
 
 def _span(ends: Interval, form: str = ",.1f") -> str:
-    """Return an interval in words; one without ends is empty."""
+    """Return an interval as text; empty if an end is not finite."""
     low, high = ends
     return f"{low:{form}} to {high:{form}}" if math.isfinite(high - low) else ""
 
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What is known of an event from releases without barriers.
+    """Statistics of an event from releases without barriers.
 
     Parameters
     ----------
     releases, reached : int
-        How many there were, and in how many a block came onto the road.
+        Number of releases, and the number in which a block reached the road.
     harm, volume : Known
-        Harm [EUR] and volume [m3] where one did; where none ever did, of all that is released.
+        Harm [EUR] and volume [m3] given that a block reached the road. If none did, they are
+        computed as if all released rock had reached it.
     blocks : float
-        Mean number of blocks.
+        Mean number of blocks per release.
     """
 
     releases: int
@@ -167,7 +174,7 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What each of some releases of one layout costs, in arrays (n,)."""
+    """Costs and outcomes of the releases of one layout, as arrays of shape (n,)."""
 
     event: NDArray[np.str_]
     harm: Floats
@@ -177,7 +184,7 @@ class Account:
     failed: Bools
 
     def of(self, which: Bools) -> Account:
-        """Return the account of some of the releases."""
+        """Return the account of a selection of the releases."""
         return Account(
             self.event[which],
             self.harm[which],
@@ -189,7 +196,7 @@ class Account:
 
 
 def account(site: Site, layout: Layout, outcomes: Sequence[Outcome]) -> Account:
-    """Return what each release costs."""
+    """Return the costs and outcomes of each release."""
     bills = [site.bill(layout, outcome) for outcome in outcomes]
     return Account(
         event=np.array([outcome.event for outcome in outcomes]),
@@ -202,16 +209,19 @@ def account(site: Site, layout: Layout, outcomes: Sequence[Outcome]) -> Account:
 
 
 def learn(site: Site, own: Account, released: Floats, blocks: float) -> Facts:
-    """Return what some releases of an event tell of it.
+    """Return the statistics of an event from its releases.
 
-    If none came onto the road it is as if all rock had come: none of n is not never.
+    If no block reached the road, harm and volume are computed as if all released rock had reached
+    it: zero occurrences in n releases do not prove that the event is harmless.
 
     Parameters
     ----------
+    site : Site
+        The site.
     own : Account
-        What they cost.
+        The account of the releases of the event.
     released : (n,) array
-        Volume that each released [m3].
+        Volume of rock in each release [m3].
     blocks : float
         Mean number of blocks.
     """
@@ -224,13 +234,13 @@ def learn(site: Site, own: Account, released: Floats, blocks: float) -> Facts:
 
 
 REPAIR_VARIATION = 0.2
-"""Coefficient of variation of what the repair of a failed barrier costs [-]: widths of events
-differ little beyond the panel or element that is mended at least."""
+"""Coefficient of variation of the repair cost of a failed barrier [-]. It is small, because the
+widths of events seldom exceed by much the panel or element that is the least unit of repair."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sums:
-    """Sums over the releases of a layout, in EUR and m3 per metre of road and year."""
+    """Expected values for a layout, in EUR and m3 per metre of road and year."""
 
     harm: Mean
     repair: Mean
@@ -246,24 +256,24 @@ def judge(
     facts: Mapping[str, Facts],
     shares: Mapping[str, float],
 ) -> Evaluation:
-    """Return what a layout is worth that had these outcomes; nothing is asked of it.
+    """Return the evaluation of a layout from the outcomes of its releases; targets are ignored.
 
     Parameters
     ----------
     site, layout : Site, tuple of Barrier
-        The site and what stands on it.
+        The site and the layout.
     outcomes : sequence of Outcome
-        At least two for each event on the average, each event at least once; fewer must have drawn
-        their events by `shares`.
+        Either at least two per event on average with every event present, or fewer, whose events
+        were drawn with the probabilities `shares`.
     facts : mapping of str to Facts
-        What is known of each event; of those left out nothing is.
+        Barrier-free statistics of each event; events without statistics may be left out.
     shares : mapping of str to float
-        Chance of each event.
+        Probability of each event.
 
     Raises
     ------
     BadInput
-        If there are no releases, or none of an event that has a rate.
+        If there are no releases, or none of an event with a non-zero rate.
     """
     if not len(outcomes):
         raise BadInput("outcomes", outcomes, "give at least one")
@@ -297,12 +307,12 @@ def judge(
 
 
 def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, Facts]) -> Sums:
-    """Return sums in which each event's mean counts with its rate.
+    """Return the sums of the event means, each weighted by its annual rate.
 
     Raises
     ------
     BadInput
-        If there are no releases of an event that has a rate.
+        If there are no releases of an event with a non-zero rate.
     """
     parts: list[tuple[Mean, ...]] = []
     mend = _mending(site, layout)
@@ -313,7 +323,7 @@ def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, F
             by_event[name] = 0.0
             continue
         if not len(own.harm):
-            raise BadInput("outcomes", f"none of {name}", "give releases of every event")
+            raise BadInput("outcomes", f"none of {name}", "include releases of every event")
         known = facts.get(name)
         parts.append(tuple(part.times(rate) for part in _means(own, known, mend)))
         by_event[name] = parts[-1][2].value
@@ -328,10 +338,10 @@ def _weighted(
     facts: Mapping[str, Facts],
     shares: Mapping[str, float],
 ) -> Sums:
-    """Return sums in which each release counts with the rate of its event over its chance.
+    """Return the sums in which each release is weighted by rate over sampling probability.
 
-    What events cost without barriers is known, so that releases tell only what barriers change (a
-    control variate); else which events are drawn would decide most of a sum. It may be negative.
+    The known barrier-free costs of the events serve as a control variate, so that the sums do not
+    depend mainly on which events happened to be drawn. The result may be negative.
     """
     rate = {name: site.rate(name, layout) for name in site.event_names}
     weight = np.array([rate[name] / shares[name] for name in found.event.tolist()])
@@ -361,7 +371,7 @@ def _weighted(
 def _mixture(
     rate: Mapping[str, float], facts: Mapping[str, Facts], shares: Mapping[str, float]
 ) -> Facts:
-    """Return what is known of a release that draws its event, weighted by rate over chance."""
+    """Return the statistics of a release with a random event, weighted by rate over probability."""
     names = list(facts)
     chance = np.array([shares[n] * (facts[n].reached + 0.5) for n in names])
     chance /= np.array([facts[n].releases + 1.0 for n in names])
@@ -377,9 +387,9 @@ def _mixture(
 
 
 def _means(own: Account, known: Facts | None, mend: float) -> tuple[Mean, Mean, Mean, Mean]:
-    """Return the means of harm, repair, both and volume of releases that weigh the same.
+    """Return the means of harm, repair, their sum and volume over equally weighted releases.
 
-    A wall that slides onto the road does harm where no block reaches it.
+    Harm can occur without a block on the road if a wall slides onto it.
     """
     harm = cost(own.harm, own.reached | (own.harm > 0.0), known.harm if known else None)
     repair = cost(own.repair, own.failed, Known(mend, REPAIR_VARIATION))
@@ -388,14 +398,14 @@ def _means(own: Account, known: Facts | None, mend: float) -> tuple[Mean, Mean, 
 
 
 def _correlation(one: Floats, two: Floats) -> float:
-    """Return the correlation of two costs of releases, 0 where it is negative or unknown."""
+    """Return the correlation of two costs; 0 if it is negative or undefined."""
     a, b = one - one.mean(), two - two.mean()
     size = float(np.sqrt((a @ a) * (b @ b)))
     return max(float(a @ b) / size, 0.0) if size > 0.0 else 0.0
 
 
 def _probabilities(names: Sequence[str], found: Account, happened: Bools) -> dict[str, Estimate]:
-    """Return for each event how often something happened."""
+    """Return the estimated probability of an occurrence for each event."""
     out = {}
     for name in names:
         own = found.event == name
@@ -404,9 +414,9 @@ def _probabilities(names: Sequence[str], found: Account, happened: Bools) -> dic
 
 
 def _mending(site: Site, layout: Layout) -> float:
-    """Return what it costs to mend the dearest barrier of a layout that can fail [EUR].
+    """Return the repair cost of the most expensive barrier that can fail [EUR].
 
-    A panel of it, the least that is mended; 0 if none can.
+    It is the cost of one fence panel length, the least unit of repair; 0 if no barrier can fail.
     """
     prices = zip(layout, site.capitals(layout), strict=True)
     return PANEL * max((price for b, price in prices if b.fallible), default=0.0)

@@ -1,10 +1,10 @@
-"""Vectors in [-1, 1] that stand for layouts.
+"""Encoding of layouts as vectors in [-1, 1].
 
-One slot a barrier: presence (above 0: there is one), station across the zone, height, size, and one
-score for each kind if there are several; the largest wins, the first of equals. Every vector stands
-for a layout that may be built, so that an optimiser needs no constraints. A barrier that may not
-stand where its slot says moves to the nearest place where it may, and is absent if there is none;
-those of earlier slots stay where they are.
+A vector has one slot per barrier: presence (a barrier exists if it is above 0), station across the
+zone, height, size and, if there are several kinds, one score per kind. The kind with the largest
+score is chosen; ties go to the first. Every vector decodes to a feasible layout, so optimisers need
+no constraints. A barrier that is not feasible at its station moves to the nearest feasible place,
+or is dropped if there is none. Barriers of earlier slots take precedence and keep their places.
 
 ============  ===================================  =============================================
 kind          height                               size
@@ -17,7 +17,7 @@ wall          height                               thickness, least to greatest
 mesh          not used, nor is the station         option of the site, equal parts of the range
 ============  ===================================  =============================================
 
-Heights and depths run from 0.5 m to the greatest of the zone.
+Heights and depths range from 0.5 m to the maximum of the zone.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from rigdda.model.barrier_zone import BarrierZone
 Floats = NDArray[np.float64]
 
 NUMBERS = 4
-"""Numbers in a slot, without scores."""
+"""Length of a slot without the scores of the kinds."""
 
 
 def slot_size(kinds: Sequence[str]) -> int:
-    """Return the numbers in a slot for a choice of kinds."""
+    """Return the length of a slot for a choice of kinds."""
     return NUMBERS + (len(kinds) if len(kinds) > 1 else 0)
 
 
 def vector(field: str, value: ArrayLike, size: int) -> Floats:
-    """Return `value` as a vector of `size` numbers in [-1, 1], clipped.
+    """Return `value` as a float vector of length `size`, clipped to [-1, 1].
 
     Raises
     ------
@@ -68,21 +68,21 @@ def vector(field: str, value: ArrayLike, size: int) -> Floats:
 
 
 def decode(place: Room, values: Floats, kinds: Sequence[str]) -> Layout:
-    """Return the layout that a vector stands for, sorted downhill.
+    """Return the layout encoded by a vector, sorted downhill.
 
     Parameters
     ----------
     place : Room
-        Where what may be built.
+        Finds feasible places on the site.
     values : (slot_size n,) array
-        n slots in [-1, 1], see the module.
+        n slots in [-1, 1]; see the module docstring.
     kinds : sequence of str
         Kinds to choose from, in the order of their scores.
 
     Returns
     -------
     tuple of Barrier
-        At most n, each of which may be built where it stands.
+        At most n barriers, each feasible where it stands.
     """
     built, _ = built_and_dropped(place, values, kinds)
     return tuple(sorted(built, key=lambda barrier: barrier.x))
@@ -91,7 +91,7 @@ def decode(place: Room, values: Floats, kinds: Sequence[str]) -> Layout:
 def built_and_dropped(
     place: Room, values: Floats, kinds: Sequence[str]
 ) -> tuple[list[Barrier], list[str]]:
-    """Return the barriers that `decode` builds, and what it leaves out, each with the reason."""
+    """Return the barriers that `decode` builds, and the dropped ones, each with the reason."""
     built: list[Barrier] = []
     dropped: list[str] = []
     taken: list[Span] = []
@@ -102,13 +102,13 @@ def built_and_dropped(
         station, height, size = (0.5 * (slot[1:NUMBERS] + 1.0)).tolist()
         if kind == "mesh":
             if any(isinstance(barrier, Mesh) for barrier in built):
-                dropped.append(f"slot {number}: mesh: another mesh is built")
+                dropped.append(f"slot {number}: mesh: an earlier slot already has a mesh")
             else:
                 built.append(place.mesh(_part(size, len(place.site.meshes))))
             continue
         found = place.nearest(make(place.zone, kind, station, height, size), taken)
         if found is None:
-            dropped.append(f"slot {number}: {kind}: no place in the zone has room for it")
+            dropped.append(f"slot {number}: {kind}: no feasible place for it in the zone")
         else:
             built.append(found[0])
             taken.append(found[1])
@@ -116,25 +116,30 @@ def built_and_dropped(
 
 
 def make(zone: BarrierZone, kind: str, station: float, height: float, size: float) -> Barrier:
-    """Return the barrier of three shares from 0 to 1, wherever that is; no mesh."""
+    """Return the barrier for three shares from 0 to 1 without checking its place; not for mesh."""
     x = zone.start + station * (zone.end - zone.start)
     return KINDS[kind].of_shares(zone, x, height, size)
 
 
 def encode(place: Room, layout: Layout, slots: int, kinds: Sequence[str]) -> Floats:
-    """Return a vector that `decode` turns into `layout`, empty slots last.
+    """Return a vector that `decode` turns into `layout`; empty slots come last.
 
     Parameters
     ----------
     place : Room
-        Where what may be built.
+        Finds feasible places on the site.
     layout : tuple of Barrier
-        Barriers that may be built, of these kinds, at most `slots`.
+        Feasible barriers of the given kinds, at most `slots`.
+    slots : int
+        Number of slots.
+    kinds : sequence of str
+        Kinds to choose from, in the order of their scores.
 
     Raises
     ------
     BadInput
-        If a number that is not decided is not the usual one, or one is too small.
+        If a field that is not encoded differs from the value that `decode` assigns, or a height is
+        below the minimum.
     """
     out = np.full((slots, slot_size(kinds)), -1.0)
     for i, barrier in enumerate(layout):
@@ -146,7 +151,7 @@ def encode(place: Room, layout: Layout, slots: int, kinds: Sequence[str]) -> Flo
 
 
 def _numbers(place: Room, i: int, barrier: Barrier) -> list[float]:
-    """Return station, height and size of a barrier, -1 to 1."""
+    """Return the station, height and size of a barrier, each from -1 to 1."""
     zone = place.zone
     if isinstance(barrier, Mesh):
         names = [option.name for option in place.site.meshes]
@@ -156,7 +161,7 @@ def _numbers(place: Room, i: int, barrier: Barrier) -> list[float]:
         shares = (share_of(barrier.x, zone.start, zone.end), *barrier.shares(zone))
         tall = getattr(barrier, barrier.lengths[0].field)
         if tall < MIN_HEIGHT - TOLERANCE:
-            mend = f"give a number of at least {MIN_HEIGHT:g}"
+            mend = f"give a number >= {MIN_HEIGHT:g}"
             raise BadInput(f"layout[{i}].{barrier.lengths[0].field}", tall, mend)
         clipped = np.clip(shares, 0.0, 1.0).tolist()
         usual = place.put(make(zone, barrier.kind, *clipped), barrier.x) or barrier
@@ -165,7 +170,7 @@ def _numbers(place: Room, i: int, barrier: Barrier) -> list[float]:
 
 
 def _check_usual(where: str, barrier: Barrier, usual: Barrier) -> None:
-    """Check that a barrier is the one that its numbers stand for."""
+    """Check that a barrier equals the one that its encoded numbers decode to."""
     for name in barrier.__struct_fields__:
         value, decided = getattr(barrier, name), getattr(usual, name)
         if value == decided:
@@ -173,11 +178,13 @@ def _check_usual(where: str, barrier: Barrier, usual: Barrier) -> None:
         if isinstance(value, float) and isinstance(decided, float):
             if abs(value - decided) <= 1e-6 * max(1.0, abs(decided)):
                 continue
-        raise BadInput(f"{where}.{name}", value, f"give {decided!r}: no vector stands for another")
+        raise BadInput(
+            f"{where}.{name}", value, f"give {decided!r}: no vector encodes another value"
+        )
 
 
 def _part(share: float, parts: int) -> int:
-    """Return in which of some equal parts of 0 to 1 a share is."""
+    """Return the index of the equal part of [0, 1] that contains a share."""
     return min(int(share * parts), parts - 1)
 
 

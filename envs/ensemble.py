@@ -1,6 +1,6 @@
-"""What falls without barriers: the cost of nothing, and how releases spread over events.
+"""Barrier-free statistics of a site: the evaluation without barriers, and the share of each event.
 
-Known once a site, and kept on disk: every reward is measured against it.
+They are computed once per site and stored on disk. Rewards are measured relative to them.
 """
 
 from __future__ import annotations
@@ -18,31 +18,33 @@ from rigdda.envs.cost import Evaluation, Facts, account, judge, learn
 from rigdda.envs.outcome_cache import Memory, Sample
 
 SEEDS = 2**33
-"""First seed of the releases without barriers that a site is known by. Episodes score releases of
-seeds below 2**31, envelopes look at some from 2**32 on."""
+"""First seed of the releases used for barrier-free statistics. Episodes use seeds below 2**31, and
+envelopes use seeds from 2**32."""
 
 FIRST, ALL = 32, 2048
-"""Releases of each event from which the spread of its cost is judged, and of all together."""
+"""Number of releases of each event in the first round, and total number in both rounds together."""
 
 FLOOR = 0.2
-"""Least share of an event of single blocks, over an equal share, less of others as they take more
-time: one that costs nothing without barriers, or happens seldom, is looked at, too."""
+"""Minimum share of an event of single blocks relative to an equal share; events with more blocks
+have a lower minimum because they take longer to simulate. It ensures that events which are rare or
+cause no cost without barriers are sampled, too."""
 
 OWN_TIME, CROWDED = 1.0, 1.2
-"""Processor time of a release beyond that of its blocks, over that of a block, and the power of
-their number by which that of blocks grows [-]: on `shu-hwa` 1.5, 5 and 450 ms for 1, 7 and 120."""
+"""Model of the processor time of a release relative to that of one block [-]: a constant part, plus
+the number of blocks raised to a power. On `shu-hwa` releases of 1, 7 and 120 blocks take 1.5, 5 and
+450 ms."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ensemble:
-    """What is known of a site without barriers.
+    """Statistics of a site without barriers.
 
     Parameters
     ----------
     nothing : Evaluation
-        Of the layout without barriers; its outcomes are not kept.
+        Evaluation of the empty layout, without its outcomes.
     facts : dict of str to Facts
-        What is known of each event.
+        Statistics of each event.
     shares : dict of str to float
         Share of the releases for each event; they add up to 1.
     """
@@ -53,21 +55,21 @@ class Ensemble:
 
 
 NAME = "ensemble"
-"""Of what is kept on disk, see `rigdda.envs.site_store`."""
+"""Name under which ensembles are stored on disk; see `rigdda.envs.site_store`."""
 
 memory: Memory[bytes, Ensemble] = Memory(4096)
 """Ensembles by site, about 3 kB each."""
 
 
 def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
-    """Return what is known of a site without barriers, simulated if it is not kept.
+    """Return the barrier-free statistics of a site, simulating them if they are not stored.
 
     Parameters
     ----------
     site, key : Site, bytes
         The site and its `fingerprint`.
     executor : Executor, optional
-        Where to simulate; None: in threads over all cores.
+        Where to run the simulations; by default in threads on all cores.
 
     Raises
     ------
@@ -85,7 +87,7 @@ def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
 
 
 def _simulate(site: Site, executor: Executor | None) -> Ensemble:
-    """Simulate releases: at first as many of each event, then where they tell most."""
+    """Simulate an equal number of releases of each event, then more where they reduce variance."""
     names = site.event_names
     first = _releases(site, {name: range(SEEDS, SEEDS + FIRST) for name in names}, executor)
     wanted = _shared(_shares(site, _facts(site, first)), ALL)
@@ -103,7 +105,7 @@ def _releases(site: Site, seeds: Mapping[str, range], executor: Executor | None)
 
 
 def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:
-    """Return what releases without barriers tell of each event."""
+    """Return the statistics of each event from releases without barriers."""
     found, out = account(site, (), outcomes), {}
     released = np.array([o.released_volume for o in outcomes])
     for name in site.event_names:
@@ -116,12 +118,12 @@ def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:
 def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
     """Return the share of the releases for each event.
 
-    In proportion to rate x spread / root of the time of a release (Neyman's allocation), and no
-    less than a floor. The spread is the greatest that a layout can give the cost
-    of the event which lets it onto the road at most as often as nothing does: barriers make sure
-    harm a matter of chance.
+    The share is proportional to rate x standard deviation / sqrt(time per release) (Neyman
+    allocation), with a minimum share. The standard deviation is the largest that a layout can cause
+    if it lets the event reach the road at most as often as without barriers: barriers can turn
+    certain harm into random harm.
     """
-    free = all(fact.harm.mean == 0.0 for fact in facts.values())  # then debris is what counts
+    free = all(fact.harm.mean == 0.0 for fact in facts.values())  # then the debris is used instead
     weight = {}
     for name, fact in facts.items():
         dear = fact.volume if free else fact.harm
@@ -136,7 +138,7 @@ def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
 
 
 def _time(fact: Facts) -> float:
-    """Return the processor time of a release of an event, over that of a block [-]."""
+    """Return the processor time of a release of an event relative to that of one block [-]."""
     return float(OWN_TIME + fact.blocks**CROWDED)
 
 

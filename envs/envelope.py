@@ -1,4 +1,4 @@
-"""What comes down a site without barriers: how often, energies, bounce heights and the deposit."""
+"""Barrier-free envelope of a site: passage rates, energies, bounce heights and the deposit."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ from rigdda.geometry import polygon_properties
 Floats = NDArray[np.float64]
 
 STATIONS = 16
-"""Stations across the barrier zone."""
+"""Number of stations across the barrier zone."""
 
 BINS = 8
-"""Parts from the zone's start to the road's downhill edge in which the deposit is counted; one more
-uphill of it, and one beyond the road."""
+"""Number of equal bins from the start of the zone to the downhill edge of the road in which the
+deposit is counted. There is one more bin uphill of the zone and one beyond the road."""
 
 QUANTILE = 0.95
-"""Share of passing blocks below the envelope, the usual basis of a barrier's size."""
+"""Quantile of the energies and bounce heights of passing blocks that the envelope gives; the usual
+basis for the design of barriers."""
 
 CLASSES = ("single blocks", "groups")
-"""Classes of events that are told apart: blocks that fall alone, and those that push each other."""
+"""Classes of events: blocks that fall alone, and blocks that interact with each other."""
 
 FIRST = 2**32
-"""First seed of the releases behind an envelope; environments score seeds below 2**31 only."""
+"""First seed of the releases used for envelopes; environments use seeds below 2**31 for scoring."""
 
 BLOCKS, LEAST = 16, 2
-"""Blocks of each event that are looked at, and least number of its releases."""
+"""Number of blocks simulated for each event, and minimum number of its releases."""
 
 Job = tuple[Site, tuple[()], int, str]
 """A release without barriers: site, layout, seed, event."""
@@ -44,19 +45,19 @@ Job = tuple[Site, tuple[()], int, str]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Envelope:
-    """What passes and what is left, over some releases of every event of a site.
+    """Passage statistics and deposit over releases of every event of a site.
 
     Parameters
     ----------
     often : (2, STATIONS) array
-        How often a release passes a station [1/year per 100 m], of each of `CLASSES`.
+        Rate at which releases pass each station [1/year per 100 m], for each of `CLASSES`.
     energy : (2, STATIONS) array
-        95 % kinetic energy of the blocks that pass a station [J], 0 where none does.
+        95 % quantile of the kinetic energy of the blocks that pass a station [J]; 0 if none does.
     bounce : (2, STATIONS) array
-        95 % height of their centroids above the ground [m].
+        95 % quantile of the height of their centroids above the ground [m].
     deposit : (BINS + 2,) array
-        Share of what comes down in a year that ends uphill of the zone, in equal parts from its
-        start to the road's downhill edge, and beyond; adds up to 1.
+        Share of the rock released per year that comes to rest uphill of the zone, in each bin from
+        the start of the zone to the downhill edge of the road, and beyond; adds up to 1.
     """
 
     often: Floats
@@ -66,10 +67,10 @@ class Envelope:
 
 
 class Transit(NamedTuple):
-    """What passed in one release.
+    """Passages and deposit of one release.
 
-    `energy` [J] and `bounce` [m]: of each block's first passage of every station, STATIONS arrays;
-    `deposit`: (BINS + 2,) [m2].
+    `energy` [J] and `bounce` [m] hold one array per station, with one entry per block at its first
+    passage; `deposit` is (BINS + 2,) [m2].
     """
 
     energy: list[Floats]
@@ -78,7 +79,7 @@ class Transit(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """An envelope as it is kept on disk: its arrays as lists."""
+    """An envelope as stored on disk, with lists instead of arrays."""
 
     often: list[list[float]]
     energy: list[list[float]]
@@ -87,13 +88,13 @@ class Kept(NamedTuple):
 
     @classmethod
     def of(cls, found: Envelope) -> Kept:
-        """Return an envelope as it is kept."""
+        """Return the stored form of an envelope."""
         parts = (found.often, found.energy, found.bounce, found.deposit)
         return cls(*(part.tolist() for part in parts))
 
     @property
     def envelope(self) -> Envelope:
-        """The envelope, to the last bit."""
+        """The envelope, restored exactly."""
         arrays = [np.array(values) for values in self]
         for array in arrays:
             array.setflags(write=False)
@@ -101,19 +102,19 @@ class Kept(NamedTuple):
 
 
 NAME = "envelope"
-"""Of what is kept on disk, see `rigdda.envs.site_store`."""
+"""Name under which envelopes are stored on disk; see `rigdda.envs.site_store`."""
 
 memory: Memory[bytes, Envelope] = Memory(8192)
 """Envelopes by site, about 3 kB each."""
 
 
 def stations(site: Site) -> Floats:
-    """Return the chainages at which blocks are watched, (STATIONS,) [m]."""
+    """Return the chainages of the stations, (STATIONS,) [m]."""
     return np.linspace(site.barrier_zone.start, site.barrier_zone.end, STATIONS)
 
 
 def largest(site: Site, event: str) -> int:
-    """Return the greatest number of blocks of an event, that of a mass as it is wanted."""
+    """Return the maximum number of blocks of an event; for a jointed mass, the nominal number."""
     found = site.event(event)
     source = site.source(found.source)
     if source.band is not None:
@@ -122,7 +123,7 @@ def largest(site: Site, event: str) -> int:
 
 
 def envelope(site: Site) -> Envelope:
-    """Return the barrier-free envelope of a site; simulated once a process and site.
+    """Return the barrier-free envelope of a site, simulating it if it is not stored.
 
     Raises
     ------
@@ -133,9 +134,9 @@ def envelope(site: Site) -> Envelope:
 
 
 def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> list[Envelope]:
-    """Return the barrier-free envelope of every site; the unknown ones are simulated together.
+    """Return the barrier-free envelopes of sites, simulating those that are not stored together.
 
-    In threads over all cores, or in `executor`.
+    The simulations run in threads on all cores, or in `executor`.
 
     Raises
     ------
@@ -165,13 +166,13 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
 
 
 def _jobs(site: Site) -> list[Job]:
-    """Return the releases behind the envelope of a site: of large masses only a few."""
+    """Return the releases for the envelope of a site; fewer for events with many blocks."""
     counts = {name: max(LEAST, BLOCKS // largest(site, name)) for name in site.event_names}
     return [(site, (), FIRST + i, name) for name, count in counts.items() for i in range(count)]
 
 
 def _transit(job: Job) -> Transit:
-    """Simulate a release and return what passed."""
+    """Simulate a release and return its passages and deposit."""
     site, layout, seed, event = job
     lines = stations(site).tolist()
     scene = site.realise(layout, seed, event)
@@ -183,7 +184,7 @@ def _transit(job: Job) -> Transit:
 
 
 def _summary(site: Site, jobs: Sequence[Job], transits: Sequence[Transit]) -> Envelope:
-    """Return the envelope of some releases of a site."""
+    """Return the envelope from the transits of the releases of a site."""
     names = [event for *_, event in jobs]
     rates = {name: site.rate(name, ()) for name in site.event_names}
     weights = np.array([100.0 * rates[name] / names.count(name) for name in names])
@@ -205,7 +206,10 @@ def _summary(site: Site, jobs: Sequence[Job], transits: Sequence[Transit]) -> En
 
 
 def _quantile(parts: Sequence[Floats], weights: Sequence[float]) -> float:
-    """Return the `QUANTILE` of all values, each weighing as its part does; 0 of no values."""
+    """Return the weighted `QUANTILE` of all values, each with the weight of its part.
+
+    It is 0 if there are no values.
+    """
     if not any(map(len, parts)):
         return 0.0
     values = np.concatenate(parts)
@@ -216,7 +220,7 @@ def _quantile(parts: Sequence[Floats], weights: Sequence[float]) -> float:
 
 
 def _deposit(site: Site, run: Run) -> Floats:
-    """Return the area in each part at the end, (BINS + 2,) [m2]; see `Envelope`."""
+    """Return the final block area in each bin, (BINS + 2,) [m2]; see `Envelope`."""
     edges = np.linspace(site.barrier_zone.start, site.road.end, BINS + 1)
     part = np.searchsorted(edges, run.poses[-1, :, 0])
     area = [polygon_properties(block.vertices)[0] for block in run.scene.blocks]

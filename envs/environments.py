@@ -1,7 +1,8 @@
-"""The environments: a layout designed in one step, or barriers placed one by one.
+"""Gymnasium environments: `BarrierDesign` (one step) and `BarrierPlacement` (one barrier per step).
 
-What both share is an episode, in halves around each simulation: what an environment asks to be
-simulated, all of a batch at once, and what it makes of the answer.
+Their common base `BarrierEnv` splits each step in two around the simulation: `ask` returns what
+must be simulated and `tell` processes the answer, so that a batch of environments can be simulated
+together.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from rigdda.envs.site_sampling import Place, Venue
 
 
 class Ask(NamedTuple):
-    """A layout to evaluate on the releases of `seeds`, and to look at in `looks` of every event."""
+    """A layout to evaluate on releases `seeds`, and to observe in `looks` releases per event."""
 
     problem: DesignProblem
     layout: Layout
@@ -40,10 +41,11 @@ class Ask(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What an ask gave.
+    """Result of simulating an `Ask`.
 
-    `evaluation`: of the releases of the seeds, None without seeds. `looked`: outcomes of others,
-    that are never scored, the same for all layouts of a site.
+    `evaluation` is the evaluation on the releases of the seeds, or None if there are no seeds.
+    `looked` holds the outcomes of the observation releases, which are not scored and are the same
+    releases for all layouts of a site.
     """
 
     evaluation: Evaluation | None
@@ -51,7 +53,7 @@ class Answer(NamedTuple):
 
 
 def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> list[Answer | None]:
-    """Simulate every ask, their releases together over all cores, or in `executor`.
+    """Simulate all asks together, in threads on all cores or in `executor`.
 
     Raises
     ------
@@ -71,7 +73,7 @@ def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> li
 
 
 def _looks(ask: Ask) -> list[tuple[int, str]]:
-    """Return seed and event of the releases in which a layout is looked at."""
+    """Return the seed and event of each observation release."""
     seeds = range(FIRST, FIRST + ask.looks)
     return [(seed, name) for name in ask.problem.site.event_names for seed in seeds]
 
@@ -84,12 +86,14 @@ def _answer(ask: Ask, scored: Sample, looked: Sample) -> Answer:
 def look_ahead(
     sights: Sequence[tuple[DesignProblem, int]], executor: Executor | None = None
 ) -> list[Sample]:
-    """Look at the sites of new episodes, all together: at their envelopes, and in releases.
+    """Simulate the envelopes and the barrier-free observation releases of new episodes together.
 
     Parameters
     ----------
     sights : sequence of (DesignProblem, int)
-        Of each episode its problem, and the releases of every event to look at without barriers.
+        For each episode its problem and the number of observation releases per event.
+    executor : Executor, optional
+        Where to run the simulations; by default in threads on all cores.
 
     Raises
     ------
@@ -102,7 +106,7 @@ def look_ahead(
 
 
 def plain(outcomes: Sequence[Outcome]) -> tuple[dict[str, Any], ...]:
-    """Return what outcomes say of the road and of the barriers, as plain numbers."""
+    """Return the main results of outcomes as dicts of plain values."""
     return tuple(
         {
             "event": outcome.event,
@@ -123,36 +127,37 @@ Info = dict[str, Any]
 Step = tuple[Observation, float, bool, bool, Info]
 
 SCORED_SEEDS = 2**31
-"""Episodes draw the seeds of their releases below this; envelopes use others."""
+"""Upper limit of the seeds of scored releases; envelopes use others."""
 
 MOST_RELEASES = 100_000
-"""Most releases of an episode, all of which are simulated in a step."""
+"""Maximum number of releases of an episode; all of them are simulated in every step."""
 
 MOST_LOOKS = 4
-"""Releases of every event in which what stands is looked at, if as many are scored."""
+"""Maximum number of observation releases per event; it is also limited to the number of scored
+ones."""
 
 TOLD = ("objective", "capital", "harm", "repair", "debris", "debris_share", "cost")
-"""What `info` tells of an evaluation."""
+"""Fields of the evaluation that `info` contains."""
 
 
 class BarrierEnv(gymnasium.Env[Any, Action]):
-    """Barriers of a site, placed some slots a step; see the environments made of it.
+    """Base class of the environments: the barriers of a site, placed some slots per step.
 
     Attributes
     ----------
     problem : DesignProblem
-        That of this episode.
+        The problem of the current episode.
     venue : Venue
-        Where episodes play.
+        Provides the site of each episode.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
 
     name: ClassVar[str]
-    """Under which it is registered."""
+    """Registered name of the environment."""
 
     looks: ClassVar[bool]
-    """Whether what stands is looked at after every step, to be seen before the next."""
+    """Whether the current layout is simulated and observed after every step."""
 
     def __init__(
         self,
@@ -171,7 +176,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self.problem, self.slots = self.venue.first, self.venue.slots
         self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
         if record is None and record_trigger is not None:
-            raise BadInput("record_trigger", record_trigger, "name a folder in `record` as well")
+            raise BadInput("record_trigger", record_trigger, "also give a folder with `record`")
         self.recorder = None if record is None else Recorder(record, record_trigger)
         if render_mode is not None:
             check.one_of("render_mode", render_mode, self.metadata["render_modes"])
@@ -181,39 +186,39 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self.flat = check.boolean("flat", flat)
         self.observation_space = spaces.flatten_space(self._space) if flat else self._space
         self._episode = 0
-        self._numbers = np.zeros(0)  # of this episode's actions
-        self._asked = self._numbers  # and those of the one that is being simulated
-        self._seed: int | None = None  # of the reset that began the episode
+        self._numbers = np.zeros(0)  # all actions of this episode so far
+        self._asked = self._numbers  # the same with the action being simulated
+        self._seed: int | None = None  # seed given to the reset of this episode
         self.seeds: tuple[int, ...] = ()
         self._stages: list[Evaluation] = []  # without barriers, then after each step
-        self._rewards: list[float] = []  # of each step
-        self._looked = Sample()  # what was seen of what stands
+        self._rewards: list[float] = []  # one per step
+        self._looked = Sample()  # outcomes of the current layout in the observation releases
         self.open = False
-        self._wanted: bool | None = None  # whether the episode is to be recorded, once asked
+        self._wanted: bool | None = None  # whether to record the episode; None: not yet known
         self._shown: Run | None = None
 
     @property
     def width(self) -> int:
-        """Numbers in an action, of whole slots."""
+        """Length of an action; a multiple of the slot length."""
         raise NotImplementedError
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Draw the releases of a new episode, and its site if there is a choice.
+        """Draw the releases of a new episode and, if there is a choice, its site.
 
-        `options`: `site`, as the keyword, for this episode.
+        `options` may contain `site`, which sets the site of this episode.
         """
         self.draw(seed, options)
         return self.begin()
 
     def begin(self) -> tuple[Observation, Info]:
-        """Look at the site of the episode that was drawn, and start it."""
+        """Simulate the observation releases of the drawn episode and start it."""
         (looked,) = look_ahead([(self.problem, self.sights)])
         return self.start(looked)
 
     def step(self, action: Action) -> Step:
-        """Simulate the episode's releases with what `action` adds."""
+        """Simulate the releases of the episode with the barriers that `action` adds."""
         (answer,) = simulate([self.ask(action)])
         return self.tell(answer)
 
@@ -226,23 +231,23 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self.seeds = tuple(self.np_random.integers(SCORED_SEEDS, size=self.releases).tolist())
 
     def start(self, looked: Sample) -> tuple[Observation, Info]:
-        """Start the episode that was drawn and looked at; return its first observation and info."""
+        """Start the drawn episode and return its first observation and info."""
         self._numbers = self._asked = np.zeros(0)
         self._stages, self.open, self._wanted = [self.problem.nothing], True, None
         self._rewards, self._looked = [], looked
         return self._show()
 
     def ask(self, action: Action) -> Ask | None:
-        """Return what to simulate for an action, None if it changes nothing.
+        """Return the simulations that an action needs, or None if it does not change the layout.
 
-        If the action is refused, the episode can go on with another.
+        If the action is invalid, the episode can continue with another one.
         """
         if not self.open:
             raise ResetNeeded("the episode has ended: call reset() before the next step")
         numbers = encoding.vector("action", action, self.width)
         asked = np.concatenate([self._numbers, numbers])
         layout = self.slots.decode(self.problem, asked)
-        if self.recorder and self._wanted is None:  # if that raises, nothing is lost
+        if self.recorder and self._wanted is None:  # may raise: no state has changed yet
             self._wanted = self.recorder.wants(self._episode)
         self._asked = asked
         if layout == self._stages[-1].layout:
@@ -251,14 +256,14 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
 
     @property
     def sights(self) -> int:
-        """Releases of every event in which what stands is looked at."""
+        """Number of observation releases per event."""
         return min(self.releases, MOST_LOOKS) if self.looks else 0
 
     def tell(self, answer: Answer | None) -> Step:
-        """Finish the step whose ask gave `answer`."""
+        """Finish the step with the result of its ask."""
         before = now = self._stages[-1]
         if answer is not None:
-            assert answer.evaluation is not None  # an episode has releases
+            assert answer.evaluation is not None  # every episode has releases
             now, self._looked = answer.evaluation, answer.looked
         self._numbers = self._asked
         self._stages.append(now)
@@ -271,7 +276,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         return seen, float(reward), terminated, False, info
 
     def _show(self) -> tuple[Observation, Info]:
-        """Return the observation and the info of what stands."""
+        """Return the observation and the info of the current layout."""
         now, self._shown = self._stages[-1], None
         seen = observation.observe(self.problem)
         if self.looks:
@@ -293,9 +298,9 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         return seen, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return the end of the release that stands for the others as an image, (450, 800, 3)."""
+        """Return an RGB image of the end of the representative release, (450, 800, 3)."""
         if self.render_mode is None:
-            gymnasium.logger.warn("render() shows nothing: make the environment with a render_mode")
+            gymnasium.logger.warn("render() returns None: make the environment with a render_mode")
             return None
         if not self._stages:
             raise ResetNeeded("call reset() before render()")
@@ -308,18 +313,18 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
 
     @property
     def typical(self) -> tuple[int, str]:
-        """Seed and event of the release that stands for the others; of nothing, the first."""
+        """Seed and event of the representative release; without barriers, the first release."""
         now = self._stages[-1]
         return now.typical if now.outcomes else (self.seeds[0], self.problem.plan(self.seeds)[0])
 
     @property
     def shown(self) -> Shown:
-        """That release, for a replay."""
+        """The representative release, as the replay shows it."""
         return Shown(self.problem.site, *self.typical, self.releases)
 
     @property
     def record(self) -> EpisodeRecord:
-        """What it takes to compute this episode again as far as it has come."""
+        """The record from which this episode can be computed again, up to the current step."""
         shown = self.shown
         return EpisodeRecord(
             environment=self.name,
@@ -340,9 +345,10 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         )
 
     def _end(self) -> None:
-        """End the episode; write its replay if that is wanted.
+        """End the episode and write its replay if requested.
 
-        A replay that cannot be written, to a full disk for example, does not cost the step.
+        A replay that cannot be written, for example because the disk is full, only causes a
+        warning.
         """
         self.open = False
         if self.recorder and self._wanted:
@@ -353,12 +359,12 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self._episode += 1
 
     def _cut_off(self) -> None:
-        """End an episode that was truncated on its way, if there is one."""
+        """End an episode that was truncated after at least one step."""
         if self.open and len(self._stages) > 1:
             self._end()
 
     def close(self) -> None:
-        """End what is open."""
+        """End the current episode and close the environment."""
         self._cut_off()
         super().close()
 
@@ -368,55 +374,57 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
 
 
 class BarrierDesign(BarrierEnv):
-    """Design all barriers of a site at once: an episode is one step.
+    """Design all barriers of a site at once: an episode has one step.
 
     Action
-        Box(-1, 1, (size,), float32): for each barrier presence (above 0), station, height, size
-        or class, then one score for each kind if there are several, as `DesignProblem.decode`
-        reads them; size is 4 max_barriers for one kind, else (4 + kinds) max_barriers.
+        Box(-1, 1, (size,), float32): for each barrier presence (above 0), station, height, size or
+        class, then one score for each kind if there are several, as `DesignProblem.decode` reads
+        them; size is 4 max_barriers for one kind, else (4 + kinds) max_barriers.
     Observation
-        Dict of 1-D float32 arrays, see `rigdda.envs.observation`, or these as one array if `flat`.
-        It describes the site, and depends neither on the episode's releases nor on the action.
+        Dict of 1-D float32 arrays, see `rigdda.envs.observation`, or their concatenation if `flat`.
+        It describes the site, and depends neither on the releases of the episode nor on the action.
     Reward
-        (Z of nothing - Z of the layout) / Z of nothing, a float. Z of nothing is the site's cached
-        mean, Z of the layout that of the episode's releases. With targets, a layout that misses
-        one in the episode's releases counts -1 less its excess in place of that, and so does
-        nothing, see `DesignProblem.reward`: the reward is the difference from nothing.
+        (Z without barriers - Z of the layout) / Z without barriers, a float. Z without barriers is
+        the stored mean of the site; Z of the layout is the mean over the releases of the episode.
+        With targets, a layout that misses one in these releases is worth -1 minus the excess over
+        the target instead, and so is the empty layout, see `DesignProblem.reward`; the reward is
+        the difference between the two.
     Termination
         After one step. Truncated by a TimeLimit only.
     Info
         At reset without barriers, at step with the layout: `site` (name), `layout` (tuple of
-        Barrier), `dropped` (tuple of str: barriers that were asked for and are not built, each
-        with the reason), `targets` ("met", "missed", "undecided", None if nothing is asked),
-        `objective`, `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost`
-        (floats), `outcomes`: plain numbers of each release, none at reset.
+        Barrier), `dropped` (tuple of str: requested barriers that were not built, each with the
+        reason), `targets` ("met", "missed", "undecided", or None without targets), `objective`,
+        `capital`, `harm`, `repair`, `debris`, `debris_share`, `cost` (floats), `outcomes` (plain
+        values for each release; empty at reset).
     Randomness
-        `reset` draws the seeds of the episode's releases and, if there is a choice, the site;
-        `reset(seed=...)` fixes all that follows.
+        `reset` draws the seeds of the releases of the episode and, if there is a choice, the site;
+        `reset(seed=...)` makes all later draws reproducible.
 
     Parameters
     ----------
     site : str, path or Site
-        As `DesignProblem` takes it; "train", "validation" or "test": another site of the split in
-        every episode; "random" is "train". `reset(options={"site": ...})` takes the same.
+        As for `DesignProblem`; "train", "validation" or "test" draws another site of the split in
+        every episode; "random" is the same as "train". `reset(options={"site": ...})` takes the
+        same values.
     max_barriers, kinds, targets, fidelity
-        See `DesignProblem`. Where every episode draws its site, all kinds by default; mesh is
-        not offered where a site has none.
+        See `DesignProblem`. If every episode draws its site, the default is all kinds; mesh is not
+        available on sites without mesh options.
     releases : int
-        Random releases over which an episode averages.
+        Number of random releases over which an episode averages.
     flat : bool
         Whether observations are one array.
     record : path, optional
-        Folder for a replay of each episode: the release that stands for the others.
+        Folder for a replay of each episode, which shows a representative release.
     record_trigger : callable, optional
-        Whether to record an episode, by its number from 0; None: every one.
+        Whether to record an episode, given its number from 0; by default all are recorded.
     render_mode : {"rgb_array"}, optional
-        Pictures of the end of that release.
+        Images of the end of the representative release.
 
     Raises
     ------
     BadInput
-        If a keyword is unsound or, in `step`, the action.
+        If a keyword or, in `step`, the action is invalid.
     """
 
     name = "rigdda/BarrierDesign-v0"
@@ -424,7 +432,7 @@ class BarrierDesign(BarrierEnv):
 
     @property
     def width(self) -> int:
-        """Numbers in an action."""
+        """Length of an action."""
         return self.slots.size
 
     def _record(self, recorder: Recorder) -> None:
@@ -433,41 +441,42 @@ class BarrierDesign(BarrierEnv):
 
 
 class BarrierPlacement(BarrierEnv):
-    """Place one barrier a step, seeing what came down before: up to `max_barriers` steps.
+    """Place one barrier per step, observing the effect of those before: up to `max_barriers` steps.
 
     Action
         Box(-1, 1, (width,), float32): one slot, as `DesignProblem.decode` reads it: presence,
-        station, height, size or class, then one score for each kind if there are several. What
-        stands is what `BarrierDesign` would build of all the episode's actions: what stands stays
-        where it is, a barrier that may not stand where the action says goes to the nearest
-        place where it may.
+        station, height, size or class, then one score for each kind if there are several. The
+        layout is the one that `BarrierDesign` would build from all actions of the episode: existing
+        barriers keep their places, and a barrier that is not feasible where the action puts it
+        moves to the nearest feasible place.
     Observation
-        Dict of 1-D float32 arrays, see `rigdda.envs.observation`: that of `BarrierDesign`, and what
-        the barriers that stand take and let past. It depends on the site and on what stands, not on
-        the episode's releases.
+        Dict of 1-D float32 arrays, see `rigdda.envs.observation`: that of `BarrierDesign`, plus
+        what the existing barriers stop and let through. It depends on the site and on the layout,
+        but not on the releases of the episode.
     Reward
-        The fall of Z that the step caused over Z of nothing, a float. Every step is scored on the
-        same releases, those of the episode, so that its rewards add up to that of `BarrierDesign`.
+        Reduction of Z caused by the step, divided by Z without barriers, a float. Every step is
+        scored on the same releases, so that the rewards of an episode add up to that of
+        `BarrierDesign`.
     Termination
         When a step adds no barrier or the last slot is used. Truncated by a TimeLimit only.
     Info
-        As of `BarrierDesign`, for what stands.
+        As in `BarrierDesign`, for the current layout.
     Randomness
-        `reset` draws the seeds of the episode's releases and, if there is a choice, the site;
-        `reset(seed=...)` fixes all that follows.
+        `reset` draws the seeds of the releases of the episode and, if there is a choice, the site;
+        `reset(seed=...)` makes all later draws reproducible.
 
     Parameters
     ----------
     site, max_barriers, kinds, releases, targets, fidelity, flat, record_trigger, render_mode
         See `BarrierDesign`.
     record : path, optional
-        Folder for a replay of each episode: the release that stands for the others in the end,
-        after each placement.
+        Folder for a replay of each episode, which shows the representative release of the final
+        layout after each placement.
 
     Raises
     ------
     BadInput
-        If a keyword is unsound or, in `step`, the action.
+        If a keyword or, in `step`, the action is invalid.
     """
 
     name = "rigdda/BarrierPlacement-v0"
@@ -475,7 +484,7 @@ class BarrierPlacement(BarrierEnv):
 
     @property
     def width(self) -> int:
-        """Numbers in an action."""
+        """Length of an action."""
         return self.slots.width
 
     def _record(self, recorder: Recorder) -> None:

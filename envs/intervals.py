@@ -1,9 +1,10 @@
-"""95 % intervals that hold for rare outcomes, too: of probabilities, means of costs, and sums.
+"""95 % confidence intervals of probabilities, mean costs and sums, valid for rare events, too.
 
-A release costs little unless a block comes onto the road or a barrier fails. So the mean cost of an
-event is taken apart into the probability of that, of which even none of n tells something, and the
-mean cost with and without it; the parts are put together again by their distances from the ends of
-their intervals.
+A release costs little unless a block reaches the road or a barrier fails. The mean cost of an event
+is therefore split into the probability of such a costly release, which has a useful interval even
+if none of n was costly, and the mean costs of costly and cheap releases. The intervals of the parts
+are combined by the method of Zou and Donner (MOVER), which adds the squared distances between
+estimates and limits.
 
 Sources: Zou and Donner, Construction of confidence limits about effect measures: a general
 approach, Statistics in Medicine 27 (2008) 1693-1702; Berry and Armitage, Mid-P confidence
@@ -27,24 +28,24 @@ from scipy.special import betainc, betaincinv, stdtrit
 Interval = tuple[float, float]
 
 CONFIDENCE = 0.95
-"""Probability of every interval, and of the one-sided bounds."""
+"""Confidence level of all intervals and one-sided bounds."""
 
 BORROWED = 3
-"""Weight, in releases, of a spread that is known from elsewhere beside that of the sample: of two
-or three releases that reach the road the spread is hardly known."""
+"""Weight of a prior spread relative to that of the sample, in releases. Two or three releases that
+reach the road are too few to estimate a spread."""
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A probability as seen in some releases.
+    """Probability of an occurrence, estimated from releases.
 
     Parameters
     ----------
     probability, low, high : float
-        Share of the releases in which it happened, and its 95 % interval; without releases nan
-        and (0, 1).
+        Share of the releases in which it occurred, and its 95 % interval; without releases nan and
+        (0, 1).
     releases : int
-        How many.
+        Number of releases.
     """
 
     probability: float
@@ -54,24 +55,25 @@ class Estimate:
 
     @property
     def count(self) -> int:
-        """In how many releases it happened."""
+        """Number of releases in which it occurred."""
         return round(self.probability * self.releases) if self.releases else 0
 
     @property
     def bound(self) -> float:
-        """One-sided 95 % upper bound, by Clopper and Pearson."""
+        """One-sided 95 % upper bound (Clopper and Pearson)."""
         return upper_bound(self.count, self.releases)
 
     @property
     def floor(self) -> float:
-        """One-sided 95 % lower bound, by Clopper and Pearson."""
+        """One-sided 95 % lower bound (Clopper and Pearson)."""
         return lower_bound(self.count, self.releases)
 
 
 class Known(NamedTuple):
-    """What is known beforehand of the cost of a release that is dear.
+    """Prior knowledge of the cost of a costly release.
 
-    Its mean, used where the sample has no such release, and its coefficient of variation [-].
+    The mean is used if the sample has no costly release; `variation` is the coefficient of
+    variation [-].
     """
 
     mean: float
@@ -79,7 +81,7 @@ class Known(NamedTuple):
 
     @classmethod
     def of(cls, values: ArrayLike) -> Known:
-        """Return what a sample of at least one cost tells; without spread if all are 0."""
+        """Return the statistics of a non-empty sample of costs; the variation is 0 if all are 0."""
         sample = np.asarray(values, dtype=np.float64)
         mean = float(sample.mean())
         return cls(mean, float(sample.std() / mean) if mean > 0.0 else 0.0)
@@ -93,11 +95,11 @@ class Mean(NamedTuple):
     high: float
 
     def times(self, factor: float) -> Mean:
-        """Return the mean of what is `factor` (at least 0) times as much."""
+        """Return the mean multiplied by a factor >= 0."""
         return Mean(factor * self.value, factor * self.low, factor * self.high)
 
     def moved(self, by: float) -> Mean:
-        """Return a mean that is `by` greater, and an interval that holds it and all it held."""
+        """Return the mean shifted by `by`, with the interval extended to contain the new value."""
         value = self.value + by
         return Mean(value, min(self.low, value), max(self.high, value))
 
@@ -108,23 +110,24 @@ class Mean(NamedTuple):
 
 
 def estimate(count: int, releases: int) -> Estimate:
-    """Return the probability of what happened in `count` of some releases."""
+    """Return the estimated probability of what occurred in `count` of `releases`."""
     low, high = mid_p(count, releases)
     return Estimate(count / releases if releases else math.nan, low, high, releases)
 
 
 @lru_cache(maxsize=1 << 16)
 def mid_p(count: int, releases: int) -> Interval:
-    """Return the mid-P interval of a probability; of 0 of n the upper end is nearly 3/n.
+    """Return the mid-P interval of a probability; for 0 of n the upper limit is about 3/n.
 
-    The outcomes beyond the one seen and half the chance of that one have 2.5 % at each end.
+    At each limit, the probability of more extreme counts plus half the probability of the observed
+    count is 2.5 %.
     """
     if releases == 0:
         return 0.0, 1.0
     tail = 0.5 * (1.0 - CONFIDENCE)
 
     def beyond(p: float, least: int) -> float:
-        """Return the chance of at least so many."""
+        """Return the probability of at least `least` occurrences."""
         if least <= 0:
             return 1.0
         return float(betainc(least, releases - least + 1, p)) if least <= releases else 0.0
@@ -139,7 +142,7 @@ def mid_p(count: int, releases: int) -> Interval:
 
 @lru_cache(maxsize=1 << 16)
 def upper_bound(count: int, releases: int) -> float:
-    """Return the one-sided 95 % upper bound of a probability, by Clopper and Pearson."""
+    """Return the one-sided 95 % upper bound of a probability (Clopper and Pearson)."""
     if count >= releases:
         return 1.0
     return float(betaincinv(count + 1, releases - count, CONFIDENCE))
@@ -147,14 +150,17 @@ def upper_bound(count: int, releases: int) -> float:
 
 @lru_cache(maxsize=1 << 16)
 def lower_bound(count: int, releases: int) -> float:
-    """Return the one-sided 95 % lower bound of a probability, by Clopper and Pearson."""
+    """Return the one-sided 95 % lower bound of a probability (Clopper and Pearson)."""
     if count == 0:
         return 0.0
     return float(betaincinv(count, releases - count + 1, 1.0 - CONFIDENCE))
 
 
 def student_interval(values: ArrayLike) -> Interval:
-    """Return the 95 % interval of the mean of independent values; one alone tells nothing."""
+    """Return Student's 95 % interval of the mean of independent values.
+
+    For fewer than two values it is infinite.
+    """
     sample = np.asarray(values, dtype=np.float64)
     if len(sample) < 2:
         return -math.inf, math.inf
@@ -163,19 +169,20 @@ def student_interval(values: ArrayLike) -> Interval:
 
 
 def cost(values: ArrayLike, dear: ArrayLike, known: Known | None = None) -> Mean:
-    """Return the mean of costs that are small unless a release is `dear`.
+    """Return the mean of costs that are small unless a release is `dear` (costly).
 
-    mean = c + p (d - c), with the mean costs c of the cheap and d of the dear releases and the
-    share p of the latter: mid-P interval of p, Student's of c and d.
+    mean = c + p (d - c), where c and d are the mean costs of the cheap and of the costly releases
+    and p is the share of the latter. p has a mid-P interval, c and d have Student's intervals.
 
     Parameters
     ----------
     values : (n,) array
         Cost of each release, at least 0.
     dear : (n,) array of bool
-        Whether there was harm on the road, or a barrier failed.
+        Whether the release did harm on the road or a barrier failed.
     known : Known, optional
-        What is known of the cost of a dear release; its mean counts only where none was seen.
+        Prior knowledge of the cost of a costly release; its mean is used only if the sample has
+        none.
     """
     sample, which = np.asarray(values, dtype=np.float64), np.asarray(dear, dtype=bool)
     if not len(sample):
@@ -195,9 +202,9 @@ def cost(values: ArrayLike, dear: ArrayLike, known: Known | None = None) -> Mean
 
 
 def _half(sample: NDArray[np.float64], known: Known | None) -> float:
-    """Return half of Student's interval of a mean, with a spread known beforehand if there is one.
+    """Return half the width of Student's interval of a mean, including a prior spread if given.
 
-    Of one value alone, without such a spread, it is the value itself.
+    For a single value without a prior spread it is the absolute value itself.
     """
     n = len(sample)
     if n == 0:
@@ -214,12 +221,12 @@ def _half(sample: NDArray[np.float64], known: Known | None) -> float:
 
 @lru_cache(maxsize=1 << 12)
 def quantile(freedom: int) -> float:
-    """Return Student's t that the mean of normal values stays below in 97.5 %."""
+    """Return the 97.5 % quantile of Student's t distribution."""
     return float(stdtrit(freedom, 0.5 * (1.0 + CONFIDENCE)))
 
 
 def total(parts: Iterable[Mean]) -> Mean:
-    """Return the sum of independent means of costs, by the distances of their ends."""
+    """Return the sum of independent mean costs; interval limits combine by root sum of squares."""
     value = below = above = 0.0
     for part in parts:
         value += part.value
@@ -229,7 +236,7 @@ def total(parts: Iterable[Mean]) -> Mean:
 
 
 def pair(one: Mean, two: Mean, correlation: float) -> Mean:
-    """Return the sum of two means of the same releases, with the correlation of their values."""
+    """Return the sum of two means over the same releases, given the correlation of their values."""
 
     def reach(a: float, b: float) -> float:
         return math.sqrt(max(a * a + b * b + 2.0 * correlation * a * b, 0.0))

@@ -1,6 +1,6 @@
-"""What a designer sees of a site and of what stands on it.
+"""Observations of a site and of the layout on it.
 
-1-D float32 arrays of about unit spread, none of whose entries is always the same.
+They are 1-D float32 arrays, scaled to about unit spread. No entry is the same for all sites.
 """
 
 from __future__ import annotations
@@ -21,11 +21,15 @@ from rigdda.envs.problem import DesignProblem
 
 PROFILE_POINTS = 16
 BOUND = 10.0
-"""Bounds of all arrays but `layout`, in spreads."""
+"""Bound of all arrays except `layout`, in spreads."""
 
 
 class Field(NamedTuple):
-    """An array: its size, 0 for that of a layout's vector; centre and spread; what is in it."""
+    """An array of the observation.
+
+    `size` is its length (0: that of an encoded layout; -1: one entry per slot), `centre` and
+    `spread` scale it, and `entries` describes it.
+    """
 
     size: int
     centre: float
@@ -36,87 +40,94 @@ class Field(NamedTuple):
 FIELDS: dict[str, Field] = {
     "profile": Field(
         PROFILE_POINTS, 1.5, 0.9,
-        "elevation above the road's uphill edge at equal steps from the crest to it: "
+        "elevation above the uphill edge of the road at equal steps from the crest to it: "
         "asinh(y / 10 m)",
     ),
-    "span": Field(1, 1.6, 0.35, "log10 of the way from the crest to the road [m]"),
+    "span": Field(1, 1.6, 0.35, "log10 of the distance from the crest to the road [m]"),
     "zone": Field(
-        2, 0.3, 1.0, "log10 of the way from the zone's start and from its end to the road [m]"
+        2, 0.3, 1.0,
+        "log10 of the distance from the start and from the end of the barrier zone to the road [m]",
     ),
     "incline": Field(STATIONS, 0.6, 0.5, "inclination of the ground across the zone [rad]"),
     "ground": Field(
-        4, 0.45, 0.2, "tan of the friction angle and restitution at the zone's start and at its end"
+        4, 0.45, 0.2,
+        "tan of the friction angle and restitution at the start and at the end of the zone",
     ),
     "road": Field(1, 0.92, 0.06, "log10 of the width of the road [m]"),
-    "closure": Field(1, 4.75, 0.12, "log10 of the cost of a day of closure [EUR]"),
+    "closure": Field(1, 4.75, 0.12, "log10 of the cost of one day of road closure [EUR]"),
     "nothing": Field(1, 2.7, 0.25, "log10 of Z without barriers [EUR per metre and year]"),
-    "groups": Field(1, 0.3, 0.2, "share of groups in Z without barriers"),
+    "groups": Field(1, 0.3, 0.2, "share of Z without barriers due to groups of blocks"),
     "rates": Field(
-        2, -0.2, 0.7, "log10 of how often single blocks and groups fall [1/year per 100 m]"
+        2, -0.2, 0.7, "log10 of the rate of releases of single blocks and of groups "
+        "[1/year per 100 m]",
     ),
     "often": Field(
         2 * STATIONS, -0.2, 0.6,
-        "how often single blocks, then groups, pass the stations: "
-        "log10(0.001 + [1/year per 100 m])",
+        "rate at which single blocks, then groups, pass the stations: "
+        "log10(0.001 + rate in 1/year per 100 m)",
     ),
     "energy": Field(
-        2 * STATIONS, 5.4, 0.9, "95 % energy of the blocks that pass there: log10(1 + E / J)"
+        2 * STATIONS, 5.4, 0.9, "95 % quantile of the energy of passing blocks: log10(1 + E / J)"
     ),
     "bounce": Field(
-        2 * STATIONS, 0.8, 0.4, "95 % height of their centroids: log10(0.1 + [m])"
+        2 * STATIONS, 0.8, 0.4, "95 % quantile of the height of their centroids: log10(0.1 + h / m)"
     ),
     "deposit": Field(
         BINS + 2, 0.2, 0.2,
-        "root of the share of a year's rock that ends uphill of the zone, in equal parts from its "
-        "start to the road's downhill edge, and beyond",
+        "square root of the share of the annual rock volume that comes to rest uphill of the zone, "
+        "in equal bins from its start to the downhill edge of the road, and beyond",
     ),
     "prices": Field(
         3, -1.2, 0.6,
-        "log10 of what a fence of 1,000 kJ and 3 m, 10 m3 of embankment and 10 m3 of ditch cost a "
-        "year over Z without barriers",
+        "log10 of the annual cost of a fence of 1,000 kJ and 3 m, of 10 m3 of embankment and of "
+        "10 m3 of ditch, each divided by Z without barriers",
     ),
     "mesh": Field(
         2, 0.15, 0.3,
-        "greatest share of Z without barriers that an option of mesh takes off, and what that one "
-        "costs a year over Z",
+        "greatest reduction of Z by a mesh option, and the annual cost of that option, each "
+        "divided by Z without barriers",
     ),
 }  # fmt: skip
-"""What is seen of a site, in both environments."""
+"""Observation of a site, in both environments."""
 
 LOOKED: dict[str, Field] = {
-    "spent": Field(1, 0.0, 0.5, "what stands costs a year, over Z without barriers"),
+    "spent": Field(1, 0.0, 0.5, "annual cost of the layout divided by Z without barriers"),
     "layout": Field(
-        0, 0.0, 1.0, "what stands, downhill and mesh last, encoded as the actions of an episode"
+        0, 0.0, 1.0, "the layout, sorted downhill with mesh last, encoded like actions"
     ),
-    "harm_now": Field(1, 0.5, 0.5, "harm and repair of what stands over Z without barriers"),
-    "reached_now": Field(2, 0.5, 0.5, "share of single blocks, and of groups, that reach the road"),
+    "harm_now": Field(
+        1, 0.5, 0.5, "harm and repair cost with the layout divided by Z without barriers"
+    ),
+    "reached_now": Field(
+        2, 0.5, 0.5, "share of releases of single blocks, and of groups, that reach the road"
+    ),
     "taken": Field(
-        -1, 3.0, 3.0, "greatest energy at each barrier, downhill without mesh: log10(1 + E / J)"
+        -1, 3.0, 3.0,
+        "greatest impact energy on each barrier, downhill, without mesh: log10(1 + E / J)",
     ),
     "topped": Field(-1, 0.0, 0.5, "share of releases in which a block passes over each barrier"),
     "broken": Field(-1, 0.0, 0.5, "share of releases in which each barrier fails"),
     "slots_left": Field(1, 0.5, 0.5, "share of the slots that may still be filled"),
 }  # fmt: skip
-"""What is seen of what stands, where barriers are placed one by one. A size of -1: one a slot.
+"""Observation of the current layout, in the environment that places barriers one by one.
 
-An episode that designs a whole layout in one step begins where nothing stands: there these would
-never change.
-"""
+The environment that designs a whole layout in one step does not use these: it starts without
+barriers, so they would never change."""
 
 
 Arrays = dict[str, NDArray[np.float32]]
 Values = dict[str, ArrayLike]
 
 CHECKED = Fence(0.0, 3.0, energy_class=1000)
-"""The fence whose price is told."""
+"""Fence whose price is part of the observation."""
 
 
 memory: Memory[bytes, Arrays] = Memory(4096)
-"""What lasts of observations, by site, about 2 kB each."""
+"""Site observations by site, about 2 kB each."""
 
 
 def space(size: int, slots: int, looks: bool) -> spaces.Dict:
-    """Return the space of observations of layouts of `size` numbers in `slots` slots."""
+    """Return the observation space for `slots` slots whose layout vector has `size` entries."""
     fields = FIELDS | LOOKED if looks else FIELDS
     sizes = {0: size, -1: slots}
     bounds = {name: 1.0 if name == "layout" else BOUND for name in fields}
@@ -129,9 +140,9 @@ def space(size: int, slots: int, looks: bool) -> spaces.Dict:
 
 
 def observe(problem: DesignProblem) -> Arrays:
-    """Return what is seen of the site of a problem, in arrays of its own.
+    """Return the observation of the site of a problem, as new arrays.
 
-    The first observation of a site in a process simulates its envelope.
+    The first observation of a site in a process computes or loads its envelope.
 
     Raises
     ------
@@ -142,9 +153,10 @@ def observe(problem: DesignProblem) -> Arrays:
 
 
 def mesh_last(layout: Layout) -> Layout:
-    """Return a layout in the order in which it is seen.
+    """Return a layout in the order of the observation: sorted downhill, mesh last.
 
-    Downhill mesh would come first, so that the later slots would never tell of it.
+    Sorted by position alone, mesh would always come first, and the entries for mesh in the later
+    slots would never vary.
     """
     return tuple(sorted(layout, key=lambda barrier: (isinstance(barrier, Mesh), barrier.x)))
 
@@ -153,22 +165,22 @@ def looked(
     problem: DesignProblem, now: Evaluation, stands: ArrayLike, outcomes: Sequence[Outcome],
     slots: int, left: float,
 ) -> Arrays:  # fmt: skip
-    """Return what is seen of what stands when barriers are placed one by one.
+    """Return the observation of the current layout when barriers are placed one by one.
 
     Parameters
     ----------
     problem : DesignProblem
-        The site.
+        The problem.
     now : Evaluation
-        Of the layout that stands.
+        Evaluation of the current layout.
     stands : (size,) array
-        The layout in the order of `mesh_last`, as the numbers of all slots.
+        The layout in the order of `mesh_last`, encoded as the numbers of all slots.
     outcomes : sequence of Outcome
-        Of releases of every event with this layout in place.
+        Outcomes of releases of every event with this layout.
     slots : int
-        Barriers that may stand.
+        Number of slots.
     left : float
-        Share of them that may still be placed.
+        Share of the slots that may still be filled.
     """
     site, layout = problem.site, now.layout
     names = [outcome.event for outcome in outcomes]
@@ -199,12 +211,12 @@ def _mean(values: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
 
 
 def _worth(problem: DesignProblem) -> float:
-    """Return Z without barriers, 1 where that is nothing [EUR per metre and year]."""
+    """Return Z without barriers, or 1 if it is 0 [EUR per metre and year]."""
     return problem.nothing.objective or 1.0
 
 
 def _scaled(values: Values) -> Arrays:
-    """Return values less their centres over their spreads, as float32 within their bounds."""
+    """Return (value - centre) / spread of each field as float32, clipped to its bound."""
     out = {}
     for name, value in values.items():
         field = FIELDS.get(name) or LOOKED[name]
@@ -215,7 +227,7 @@ def _scaled(values: Values) -> Arrays:
 
 
 def _lasting(problem: DesignProblem) -> Arrays:
-    """Return what is the same with any layout in place; computed once a process and site."""
+    """Return the observation of the site without the layout, computed once per process and site."""
     key = problem.key
     known = memory.recall([key])
     if key not in known:
@@ -228,7 +240,7 @@ def _lasting(problem: DesignProblem) -> Arrays:
 
 
 def _slope(site: Site) -> Values:
-    """Return the ground, the road and where barriers may stand."""
+    """Return the fields that describe the ground, the road and the barrier zone."""
     crest, road, ground, zone = site.slope.points[0][0], site.road, site.profile, site.barrier_zone
     edge = ground.height(road.start)
     x = np.linspace(crest, road.start, PROFILE_POINTS + 1)[:-1]
@@ -251,7 +263,7 @@ def _slope(site: Site) -> Values:
 
 
 def _passing(seen: Envelope) -> Values:
-    """Return what passes and what is left."""
+    """Return the fields of the barrier-free envelope."""
     return {
         "often": np.log10(1e-3 + seen.often),
         "energy": np.log10(1.0 + seen.energy),
@@ -261,7 +273,7 @@ def _passing(seen: Envelope) -> Values:
 
 
 def _worthy(problem: DesignProblem) -> Values:
-    """Return what is at stake, what falls, and what barriers cost beside that."""
+    """Return the fields of consequences, rates of events and relative prices of barriers."""
     site, nothing, worth = problem.site, problem.nothing, _worth(problem)
     groups = {name for name in site.event_names if largest(site, name) > 1}
     often = {name: 100.0 * site.rate(name) for name in site.event_names}
@@ -288,7 +300,7 @@ def _worthy(problem: DesignProblem) -> Values:
 
 
 def _mesh(problem: DesignProblem) -> Values:
-    """Return what the best option of mesh takes off, and costs."""
+    """Return the relative reduction of Z by the best mesh option, and its relative annual cost."""
     site, worth = problem.site, _worth(problem)
     best = 0.0, 0.0
     for option in site.meshes:

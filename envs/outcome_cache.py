@@ -1,8 +1,9 @@
-"""Outcomes of releases, many at once; what need not be simulated again is not.
+"""Cached outcomes of releases; simulates many releases at once and skips those already known.
 
-A release without barriers none of whose blocks comes near a layout is that of the layout, too. A
-block that came to rest uphill of a barrier counts as held by it where it lies below the line that
-rises from the top of the barrier, see `rigdda.Outcome`; where it lies is known of a single block.
+If no block of a release without barriers comes near a layout, the outcome with the layout follows
+from the outcome without barriers. A block that came to rest uphill of a barrier counts as held by
+it if it lies below a line that rises from the top of the barrier, see `rigdda.Outcome`. Its
+position is known exactly only for a single block.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from rigdda.model.terrain import REACH
 
 @cache
 def mechanics() -> str:
-    """Return a hash of all sources, and numba's version, that an evaluation depends on."""
+    """Return a hash of all sources that affect an evaluation, and of the version of numba."""
     digest = hashlib.sha256(source_hash().encode())
     for folder in (Path(rigdda.__file__).parent, Path(__file__).parent):
         for path in sorted(folder.rglob("*.py")):
@@ -52,17 +53,17 @@ V = TypeVar("V")
 
 
 def fingerprint(site: Site) -> bytes:
-    """Return a key for a site: a hash of the whole of it as JSON, in which numbers are exact."""
+    """Return a key of a site: the hash of its JSON encoding, in which numbers are exact."""
     return hashlib.sha256(msgspec.json.encode(site)).digest()[:16]
 
 
 class Memory(Generic[K, V]):
-    """Values by key, the latest `room` of them.
+    """Thread-safe cache that keeps the `room` most recently used values.
 
     Parameters
     ----------
     room : int
-        How many values are kept.
+        Maximum number of values.
     """
 
     def __init__(self, room: int):
@@ -71,7 +72,7 @@ class Memory(Generic[K, V]):
         self._lock = Lock()
 
     def recall(self, keys: Iterable[K]) -> dict[K, V]:
-        """Return the known ones of some keys with their values."""
+        """Return the values of those keys that are known."""
         known = {}
         with self._lock:
             for key in keys:
@@ -81,7 +82,7 @@ class Memory(Generic[K, V]):
         return known
 
     def remember(self, values: Mapping[K, V]) -> None:
-        """Keep values by key and forget the oldest beyond `room`."""
+        """Store values by key and discard the oldest if there are more than `room`."""
         with self._lock:
             self._kept.update(values)
             while len(self._kept) > self.room:
@@ -89,12 +90,12 @@ class Memory(Generic[K, V]):
 
 
 class Sample(tuple[Outcome, ...]):
-    """Outcomes of releases, and what they took.
+    """Outcomes of releases, and the time of their simulation.
 
     Attributes
     ----------
     ran : tuple of bool
-        Whether each was simulated; of equal releases one was.
+        Whether each was simulated; of identical releases only one is.
     seconds : float
         Processor time of the simulations [s].
     """
@@ -105,18 +106,18 @@ class Sample(tuple[Outcome, ...]):
     def __new__(
         cls, outcomes: Iterable[Outcome] = (), ran: Sequence[bool] = (), seconds: float = 0.0
     ) -> Sample:
-        """Make one; without `ran` nothing was simulated."""
+        """Create a sample; without `ran` none counts as simulated."""
         made = super().__new__(cls, outcomes)
         made.ran = tuple(ran) if ran else (False,) * len(made)
         made.seconds = seconds
         return made
 
     def __getnewargs__(self) -> tuple[tuple[Outcome, ...], tuple[bool, ...], float]:
-        """Return what makes it anew."""
+        """Return the arguments that recreate the sample when it is unpickled."""
         return tuple(self), self.ran, self.seconds
 
     def __add__(self, other: object) -> Sample:
-        """Return both, one after the other."""
+        """Return the concatenation of both samples."""
         if not isinstance(other, Sample):
             return NotImplemented
         both = (*self, *other), (*self.ran, *other.ran)
@@ -124,40 +125,42 @@ class Sample(tuple[Outcome, ...]):
 
     @property
     def simulated(self) -> int:
-        """How many were simulated."""
+        """Number of simulated releases."""
         return sum(self.ran)
 
     def split(self, ends: Sequence[int]) -> list[Sample]:
-        """Return the parts between ends, the time shared out by what was simulated."""
+        """Return the parts between `ends`; time is divided in proportion to simulated releases."""
         each = self.seconds / max(self.simulated, 1)
         parts = [(self[a:b], self.ran[a:b]) for a, b in pairwise(ends)]
         return [Sample(outcomes, ran, each * sum(ran)) for outcomes, ran in parts]
 
 
 MARGIN = 0.1
-"""Distance from a barrier beyond which blocks are sure not to touch it, at ends of steps [m]."""
+"""Distance from a barrier beyond which a block at the end of a step cannot touch it [m]."""
 
 LARGEST = 1.5
-"""Upper bound of the radius of a block over the root of its area [-]."""
+"""Upper bound of the radius of a block divided by the square root of its area [-]."""
 
 UNIT = 1.0
-"""Width of an event for which resistances are kept [m]."""
+"""Width of an event for which cached resistances are stored [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class BarrierReach:
-    """A barrier of a layout where it stands.
+    """Region in which a barrier of a layout can be touched or can hold blocks.
 
     Parameters
     ----------
     start, end : float
-        Chainages between which blocks may touch it that do so within a step and go back [m]: the
-        reach of a release is taken at the ends of steps.
+        Chainages between which a block may touch the barrier [m]. They include a margin for blocks
+        that touch it and rebound within a step, because the reach of a release is recorded at the
+        ends of steps.
     face, top : float
-        Where the line begins below which it holds what lies uphill [m]; -inf of what holds nothing
-        there.
+        Start of the line below which the barrier holds rock that lies uphill [m]; `face` is -inf if
+        it cannot hold any.
     bears : float
-        Thrust that it bears in an event of `UNIT` width, without scatter of friction [N/m].
+        Thrust that the barrier resists in an event of `UNIT` width, without scatter of friction
+        [N/m].
     """
 
     start: float
@@ -170,20 +173,20 @@ class BarrierReach:
 standing_layouts: Memory[tuple[bytes, tuple[Built, ...]], tuple[BarrierReach, ...]] = Memory(
     1 << 12
 )
-"""What stands of a layout on a site."""
+"""Barrier regions by site and layout."""
 
 
 def misses(site: Site, key: bytes, layout: tuple[Built, ...], outcome: Outcome) -> bool:
-    """Tell whether the blocks of a release stay clear of a layout.
+    """Return whether the blocks of a release stay clear of a layout.
 
     Parameters
     ----------
     site, key : Site, bytes
         The site and its `fingerprint`.
     layout : tuple of Built
-        What stands.
+        The barriers.
     outcome : Outcome
-        Of the release, with or without the layout.
+        Outcome of the release, with or without the layout.
     """
     low, high = outcome.reach
     stands = _standing(site, key, layout) if layout else ()
@@ -193,9 +196,9 @@ def misses(site: Site, key: bytes, layout: tuple[Built, ...], outcome: Outcome) 
 def inferred_outcome(
     site: Site, key: bytes, layout: tuple[Built, ...], without: Outcome
 ) -> Outcome | None:
-    """Return the outcome of a layout that follows from one without barriers.
+    """Return the outcome with a layout as it follows from the outcome without barriers.
 
-    None if it does not, or is not known without simulating it; see `misses`.
+    Returns None if it cannot be inferred without simulation; see `misses`.
     """
     if not layout:
         return without
@@ -218,7 +221,7 @@ def inferred_outcome(
 
 
 def _holds(site: Site, barrier: BarrierReach, without: Outcome) -> bool | None:
-    """Tell whether a barrier holds a block that came to rest uphill of it; None if in doubt."""
+    """Return whether a barrier holds a block that came to rest uphill of it; None if uncertain."""
     low, high = without.reach
     if without.slope_fraction == 0.0 or low > barrier.face or barrier.face == -math.inf:
         return False
@@ -229,7 +232,7 @@ def _holds(site: Site, barrier: BarrierReach, without: Outcome) -> bool | None:
     x = np.array([at[0]] if alone else [low, *inner, high])
     over = barrier.top + rise * (barrier.face - x) - np.interp(x, *points.T)
     if site.pit_spacing > 0.0:
-        return None  # it may lie in a pit
+        return None  # the block may lie in a pit
     if not site.friction_varies and (over <= 0.0).all():
         return False
     radius = LARGEST * math.sqrt(without.released_volume / without.width)
@@ -239,12 +242,12 @@ def _holds(site: Site, barrier: BarrierReach, without: Outcome) -> bool | None:
 
 
 def _known_to_bear(layout: Sequence[Built]) -> bool:
-    """Tell whether what a layout bears does not depend on friction."""
+    """Return whether the resistance of a layout is independent of friction."""
     return not any(barrier.by_friction for barrier in layout)
 
 
 def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[BarrierReach, ...]:
-    """Return what stands of a layout."""
+    """Return the regions of the barriers of a layout."""
     known = standing_layouts.recall([(key, layout)]).get((key, layout))
     if known is None:
         drawn = site.draw(0, site.event_names[0])
@@ -263,21 +266,21 @@ def _standing(site: Site, key: bytes, layout: tuple[Built, ...]) -> tuple[Barrie
 
 
 def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) -> BarrierReach:
-    """Return where a barrier stands, with the corners of the earth moved for it."""
+    """Return the region of a barrier; `moved` holds the corners of its earthworks."""
     if moved is None:
         assert isinstance(barrier, Standing)
         moved = barrier.outline(site.profile)
     (start, _), (end, top) = moved.min(axis=0).tolist(), moved.max(axis=0).tolist()
     face = barrier.holds(moved, site.profile, 0.0).end if barrier.left_height(0.0) else -math.inf
-    # half of what a corner moves in a step that has all the energy of a fall from the top: its
-    # speed is at most twice that of the fall
+    # half of the distance that a corner moves in a step if the block has the full energy of a fall
+    # from the top of the slope: its speed is at most twice the speed of the fall
     drop = float(np.ptp(site.profile.points[:, 1]))
     near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop) + REACH * site.pit_spacing
     return BarrierReach(start - near, end + near, face, top, bears)
 
 
 def _idle(built: Built, barrier: Built, there: BarrierReach, holds: bool) -> BarrierOutcome:
-    """Return what happens to a barrier that no block comes near."""
+    """Return the outcome of a barrier that no block comes near."""
     return BarrierOutcome(
         hits=0,
         max_energy=0.0,
@@ -297,11 +300,11 @@ def _idle(built: Built, barrier: Built, there: BarrierReach, holds: bool) -> Bar
 
 
 Job = tuple[Site, Layout, int, str]
-"""A site, what stands on it, the seed of a release and the name of its event."""
+"""A release to simulate: site, layout, seed and name of the event."""
 
 
 class Key(NamedTuple):
-    """A release: on which site, with what but mesh, and which one."""
+    """Key of a release: site, layout without mesh, seed and event."""
 
     site: bytes
     layout: tuple[Built, ...]
@@ -314,14 +317,14 @@ bare_outcomes: Memory[Key, Outcome] = Memory(1 << 16)
 
 
 def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
-    """Return the outcome of every job; equal jobs are simulated once.
+    """Return the outcome of every job; identical jobs are simulated once.
 
     Parameters
     ----------
     jobs : sequence of (Site, Layout, int, str)
-        Releases.
+        The releases.
     executor : Executor, optional
-        Where to simulate; None: in threads over all cores.
+        Where to run the simulations; by default in threads on all cores.
 
     Raises
     ------
@@ -346,7 +349,7 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
 
 
 def _simulate(jobs: list[Job], executor: Executor | None) -> tuple[list[Outcome], float]:
-    """Return outcomes and the processor time that they took [s]."""
+    """Return the outcomes and the processor time of their simulation [s]."""
     if executor is not None:
         timed = list(executor.map(_timed, jobs))
         return [outcome for outcome, _ in timed], sum(seconds for _, seconds in timed)
@@ -356,14 +359,14 @@ def _simulate(jobs: list[Job], executor: Executor | None) -> tuple[list[Outcome]
 
 
 def _timed(job: Job) -> tuple[Outcome, float]:
-    """Return an outcome and its processor time; at module level, for process pools to find it."""
+    """Return an outcome and its processor time; at module level so that it can be pickled."""
     start = time.process_time()
     (outcome,) = rigdda.release_many([job])
     return outcome, time.process_time() - start
 
 
 def _recall(keys: Sequence[Key], jobs: Sequence[Job]) -> dict[Key, Outcome]:
-    """Return the outcomes that follow from what was simulated before."""
+    """Return the outcomes that follow from earlier simulations."""
     sites = {key.site: job[0] for key, job in zip(keys, jobs, strict=True)}
     wanted = set(keys)
     bare = bare_outcomes.recall({key._replace(layout=()) for key in wanted})
@@ -378,10 +381,10 @@ def _recall(keys: Sequence[Key], jobs: Sequence[Job]) -> dict[Key, Outcome]:
 
 
 def _remember(fresh: Mapping[Key, Outcome], jobs: Mapping[Key, Job]) -> None:
-    """Keep what later releases may follow from."""
+    """Store the outcomes from which those of later releases can be inferred."""
     bare = {}
     for key, outcome in fresh.items():
-        # a wall that moved before may be struck where it did not stand
+        # a wall that has moved may be hit outside its original position
         struck = any(barrier.hits for barrier in outcome.barriers)
         if not struck and misses(jobs[key][0], key.site, key.layout, outcome):
             lies = outcome.slope_fraction + outcome.held_fraction

@@ -1,8 +1,8 @@
-"""Barrier design as an optimisation problem: vectors, layouts, and what a layout is worth.
+"""Barrier design as an optimisation problem: vectors, layouts, evaluation, targets and fidelity.
 
-Targets ask something of a layout beside a low cost. Fidelity says whether a site is simulated as it
-is or by a cheaper one that stands for it. Releases of an evaluation spread over the events of the
-site.
+`Targets` limit the probabilities that the road is reached or a barrier fails. The fidelity selects
+whether the site itself is simulated or a cheaper approximation of it. The releases of an evaluation
+are distributed over the events of the site.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from rigdda.envs.siting import Room
 from rigdda.model.site_tables import BarrierZone
 
 MET, MISSED, UNDECIDED = "met", "missed", "undecided"
-"""What targets are: the upper bounds of all probabilities are low enough; the lower bound of one is
-too high; there are too few releases to say."""
+"""States of targets: the upper bounds of all probabilities are low enough; the lower bound of at
+least one is too high; there are too few releases to decide."""
 
 
 @dataclass(frozen=True, slots=True)
 class Targets:
-    """Greatest probabilities in every design event, asked of one-sided 95 % bounds.
+    """Greatest acceptable probabilities in every design event, compared with one-sided 95 % bounds.
 
     Parameters
     ----------
     reach : float, optional
-        Of a block that comes onto the road.
+        That a block reaches the road.
     failure : float, optional
-        Of a barrier that fails.
+        That a barrier fails.
 
     Raises
     ------
@@ -66,14 +66,14 @@ class Targets:
         reach: Mapping[str, Estimate],
         failure: Mapping[str, Estimate],
     ) -> str | None:
-        """Return "met", "missed" or "undecided" over the design events, None if nothing is asked.
+        """Return "met", "missed" or "undecided" over the design events, or None without targets.
 
         Parameters
         ----------
         events : iterable of str
             The design events.
         reach, failure : mapping of str to Estimate
-            What was seen in each event.
+            Estimates for each event.
         """
         states = {
             decide(seen[event], greatest)
@@ -94,19 +94,20 @@ def decide(seen: Estimate, greatest: float) -> str:
 FIDELITIES = ("fast", "full")
 
 COARSER = 1.5
-"""How much larger the mean area of blocks cut by joints is at fidelity "fast"; so their number
-is two thirds. With twice the area the debris on quick is too high by 5 % of the mass."""
+"""Factor by which the mean area of blocks cut by joints is increased at fidelity "fast", so that
+there are two thirds as many blocks. A factor of 2 would increase the debris on `quick` by 5 % of
+the released mass."""
 
 FAST_DT = 1.25e-2
-"""Time step at fidelity "fast", if the site's is shorter [s]."""
+"""Time step at fidelity "fast", unless that of the site is longer [s]."""
 
 
 def site_at_fidelity(site: Site, fidelity: str) -> Site:
-    """Return the site to simulate.
+    """Return the site to simulate at a fidelity.
 
-    "full": as it is; "fast": with fewer, larger blocks of jointed masses and a longer step. Other
-    blocks stay as they are. The bias and the gain are measured by `rigdda fidelity` and told in
-    docs/fidelity.md.
+    "full" returns the site unchanged. "fast" uses fewer, larger blocks in jointed masses and a
+    longer time step; other blocks are unchanged. `rigdda fidelity` measures the bias and the
+    speed-up, which are reported in docs/fidelity.md.
 
     Raises
     ------
@@ -124,15 +125,15 @@ def site_at_fidelity(site: Site, fidelity: str) -> Site:
 
 
 MOST_BARRIERS = 100
-"""Most slots of a layout; a site has room for a few."""
+"""Maximum number of slots of a layout; a site has room for only a few barriers."""
 
 USUAL_KINDS = tuple(name for name, kind in KINDS.items() if kind.designed and name != "mesh")
-"""Kinds of barrier that are designed if none are named, and mesh where a site has options. Not the
-rigid wall, which nothing moves: it is for experiments."""
+"""Default kinds of barrier, to which mesh is added on sites that have mesh options. The rigid wall,
+which cannot move, is for experiments only and not included."""
 
 
 def checked_site(site: object, cheaper: str) -> Site:
-    """Return a site at a fidelity."""
+    """Return a site, loaded if necessary, at a fidelity."""
     if isinstance(site, str | os.PathLike):
         site = Site.load(site)
     if not isinstance(site, Site):
@@ -141,18 +142,18 @@ def checked_site(site: object, cheaper: str) -> Site:
 
 
 def checked_zone(site: Site, zone: object) -> BarrierZone:
-    """Return the zone of a site, or the part of it between two chainages."""
+    """Return the barrier zone of a site, or the part of it between two chainages."""
     own = site.barrier_zone
     if zone is None:
         return own
     start, end = check.interval("zone", zone, own.start, own.end)
     if start == end:
-        raise BadInput("zone", zone, "give two chainages, the first one less than the other")
+        raise BadInput("zone", zone, "give two chainages, the first less than the second")
     return msgspec.structs.replace(own, start=start, end=end)
 
 
 def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the kinds of barrier to choose from."""
+    """Return the validated kinds of barrier to choose from."""
     if kinds is None:
         return (*USUAL_KINDS, "mesh") if site.meshes else USUAL_KINDS
     if not isinstance(kinds, Sequence) or isinstance(kinds, str):
@@ -166,7 +167,7 @@ def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def read_targets(targets: Targets | Mapping[str, float | None] | None) -> Targets:
-    """Return targets that were given as such, or as a mapping of their names to numbers.
+    """Return targets given as `Targets`, as a mapping, or as None for no targets.
 
     Raises
     ------
@@ -184,7 +185,7 @@ def read_targets(targets: Targets | Mapping[str, float | None] | None) -> Target
 
 
 def checked_targets(site: Site, given: Targets | Mapping[str, float | None] | None) -> Targets:
-    """Return what is asked of a layout on a site: nothing by default."""
+    """Return the validated targets on a site; none by default."""
     targets = read_targets(given)
     if targets != Targets() and not any(event.design for event in site.events):
         raise BadInput("targets", targets, f"mark an event of {site.name} with design = true")
@@ -192,7 +193,7 @@ def checked_targets(site: Site, given: Targets | Mapping[str, float | None] | No
 
 
 def checked_seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int, ...]:
-    """Return seeds as a tuple of at least so many, all different."""
+    """Return seeds as a tuple of at least `least` distinct whole numbers."""
     try:
         drawn = tuple(check.integer(f"{name}[{i}]", seed, 0) for i, seed in enumerate(seeds))
     except TypeError:
@@ -205,21 +206,23 @@ def checked_seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int,
 
 
 def is_vector(layout: object) -> bool:
-    """Tell whether what is to be evaluated begins with a number."""
+    """Return whether `layout` is a sequence that begins with a number."""
     return isinstance(layout, Sequence) and len(layout) > 0 and isinstance(layout[0], int | float)
 
 
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-"""Points this far apart on a circle of length 1 spread evenly, however many there are."""
+"""Golden ratio minus 1. Points at multiples of it, modulo 1, are evenly distributed on [0, 1) for
+any number of points."""
 
 
 def events_of_seeds(shares: Mapping[str, float], seeds: Sequence[int]) -> tuple[str, ...]:
-    """Return the event of each release; the first ones' do not depend on how many follow.
+    """Return the event of each release; earlier ones do not depend on how many follow.
 
-    With at least two releases an event on the average, each event has one, then one more, and then
-    as many as its share asks for. With fewer, each draws its event with its share as the chance:
-    one number, drawn from the first seed, and steps of `GOLDEN` from it, so that every release
-    has the right chances and together they are spread evenly.
+    With at least two releases per event on average, each event first gets two releases, and the
+    others are distributed so that the counts follow the shares. With fewer, the events are random
+    with the shares as probabilities: one uniform number, drawn from the first seed, is advanced in
+    steps of `GOLDEN`, so that each release has the correct probabilities and the releases together
+    are evenly distributed.
 
     Parameters
     ----------
@@ -239,7 +242,7 @@ def events_of_seeds(shares: Mapping[str, float], seeds: Sequence[int]) -> tuple[
 
 @lru_cache(maxsize=256)
 def _order(shares: tuple[float, ...], releases: int) -> tuple[int, ...]:
-    """Return the place of the event of each release."""
+    """Return the index of the event of each release."""
     number = len(shares)
     out = [*range(number), *range(number)]
     counts = [2] * number
@@ -259,29 +262,32 @@ Ask = tuple[Sequence[Barrier], Mapping[str, Sequence[int]]]
 
 @dataclass(frozen=True, slots=True, init=False)
 class DesignProblem:
-    """Which barriers to put where on a site, so that a year costs least.
+    """Barrier design on a site: find the layout with the lowest annual cost.
 
-    Z [EUR per metre of road and year] = what the barriers cost a year + expected harm on the road +
-    expected repair, see `rigdda.envs.cost`.
+    Z [EUR per metre of road and year] = annual cost of the barriers + expected harm on the road +
+    expected repair cost, see `rigdda.envs.cost`.
 
     Parameters
     ----------
     site : str, path or Site
         Name of a built-in or generated site, a TOML file or the site itself.
     max_barriers : int
-        Slots for barriers; each may be empty.
+        Number of slots for barriers; each may be empty.
     kinds : sequence of str, optional
         Kinds of barrier to choose from: "fence", "ditch", "embankment", "gravity_wall", "mesh",
-        "wall"; None: all but the last, mesh where the site has options.
+        "wall". By default all but "wall", and "mesh" only on sites with mesh options.
     targets : Targets or mapping, optional
-        What is asked of the design events beside a low cost, such as {"reach": 0.01}.
+        Greatest acceptable probabilities in the design events, such as {"reach": 0.01}.
     fidelity : {"full", "fast"}
-        At "fast" a cheaper site stands for it, see `rigdda.envs.problem`.
+        "fast" simulates a cheaper approximation of the site, see `site_at_fidelity`.
     zone : (start, end), optional
-        Chainages between which barriers may stand [m], inside the site's own zone; the attribute
-        is that zone so narrowed.
+        Chainages between which barriers may stand [m], within the barrier zone of the site. The
+        attribute `zone` is the barrier zone limited to them.
 
-    Raises BadInput if there is no such site, or an argument is outside its range.
+    Raises
+    ------
+    BadInput
+        If there is no such site, or an argument is outside its range.
     """
 
     site: Site
@@ -322,28 +328,34 @@ class DesignProblem:
 
     @property
     def size(self) -> int:
-        """Numbers in a vector: 4 a slot, and a score for each kind if there are several."""
+        """Length of a vector: 4 per slot, plus one score for each kind if there are several."""
         return encoding.slot_size(self.kinds) * self.max_barriers
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
-        """Lowest and highest vector, -1 and 1, each (size,)."""
+        """Lower and upper bounds of vectors, -1 and 1, each (size,)."""
         return np.full(self.size, -1.0), np.full(self.size, 1.0)
 
     def dropped(self, vector: ArrayLike) -> tuple[str, ...]:
-        """Return which barriers that a (size,) vector asks for are not built, and why.
+        """Return the barriers that a (size,) vector requests but that are not built, with reasons.
 
-        Raises BadInput if the vector is unsound.
+        Raises
+        ------
+        BadInput
+            If the vector is invalid.
         """
         values = encoding.vector("vector", vector, self.size)
         return tuple(encoding.built_and_dropped(self.place, values, self.kinds)[1])
 
     def decode(self, vector: ArrayLike) -> Layout:
-        """Return the layout that a (size,) vector stands for, see `rigdda.envs.encoding`.
+        """Return the layout encoded by a (size,) vector, see `rigdda.envs.encoding`.
 
-        Every vector has one, that may be built; entries beyond [-1, 1] are clipped.
+        Every vector decodes to a feasible layout; entries are clipped to [-1, 1].
 
-        Raises BadInput if the shape is wrong or an entry is not a number.
+        Raises
+        ------
+        BadInput
+            If the shape is wrong or an entry is not a number.
         """
         values = encoding.vector("vector", vector, self.size)
         return encoding.decode(self.place, values, self.kinds)
@@ -351,23 +363,26 @@ class DesignProblem:
     def encode(self, layout: Sequence[Barrier]) -> Floats:
         """Return a (size,) vector that `decode` turns into `layout`.
 
-        Raises BadInput if the layout is not one that `decode` can give.
+        Raises
+        ------
+        BadInput
+            If `decode` cannot return this layout.
         """
         return encoding.encode(self.place, self.check(layout), self.max_barriers, self.kinds)
 
     def check(self, layout: Sequence[Barrier]) -> Layout:
-        """Return a layout sorted downhill, if it may be built.
+        """Return a feasible layout, sorted downhill.
 
         Raises
         ------
         BadInput
-            If barriers are too many, not of the kinds allowed or too large, outside the zone, on
-            ground that is too steep, or too near the road or one another.
+            If barriers are too many, of other kinds or too large, outside the zone, on ground that
+            is too steep, or too close to the road or to each other.
         """
         return self.place.check_layout(layout, self.kinds, self.max_barriers)
 
     def fits(self, layout: Sequence[Barrier]) -> bool:
-        """Tell whether a layout may be built, see `check`."""
+        """Return whether a layout is feasible, see `check`."""
         try:
             self.check(layout)
         except BadInput:
@@ -375,17 +390,17 @@ class DesignProblem:
         return True
 
     def allocation(self, releases: int, seed: int = 0) -> dict[str, int]:
-        """Return how many of some releases each event has, in proportion to what it tells.
+        """Return the number of releases of each event when `releases` are distributed.
 
-        With at least two releases an event each has two or more; with fewer it is by chance, which
-        `seed` decides.
+        With at least two releases per event on average each event has two or more; with fewer the
+        distribution is random and depends on `seed`.
         """
         first, n = check.integer("seed", seed, 0), check.integer("releases", releases, 1)
         count = Counter(self.plan(range(first, first + n)))
         return {name: count[name] for name in self.site.event_names}
 
     def plan(self, seeds: Sequence[int]) -> tuple[str, ...]:
-        """Return the event of each release; a part of the seeds has a part of them."""
+        """Return the event of each release; a prefix of the seeds gives a prefix of the events."""
         return events_of_seeds(self._known.shares, checked_seeds("seeds", seeds))
 
     @property
@@ -394,7 +409,7 @@ class DesignProblem:
 
     @property
     def nothing(self) -> Evaluation:
-        """The layout without barriers, known once a site; its outcomes are not kept."""
+        """Evaluation of the empty layout, computed once per site; its outcomes are not kept."""
         return replace(self._known.nothing, targets=self._state(self._known.nothing))
 
     def evaluate(
@@ -403,15 +418,22 @@ class DesignProblem:
         seeds: Sequence[int],
         executor: Executor | None = None,
     ) -> Evaluation:
-        """Simulate a layout in one release for each seed, spread over the events.
+        """Evaluate a layout by simulating one release per seed, distributed over the events.
 
-        The layout is one that may be built, see `check`, or a (size,) vector. An executor, for
-        example a process pool, gives the same numbers as the threads that are used without.
+        Parameters
+        ----------
+        layout : sequence of Barrier or (size,) array
+            A feasible layout, see `check`, or a vector.
+        seeds : sequence of int
+            Distinct seeds of the releases.
+        executor : Executor, optional
+            Where to run the simulations, for example a process pool; by default in threads on all
+            cores. The result is the same.
 
         Raises
         ------
         BadInput
-            If the layout may not be built, or the seeds are unsound.
+            If the layout is not feasible, or the seeds are invalid.
         Diverged
             If a simulation diverges.
         """
@@ -428,14 +450,17 @@ class DesignProblem:
     ) -> Sample:
         """Return the outcomes of releases of chosen events, in the order of `seeds`.
 
-        Raises as `evaluate`, and if there is no such event.
+        Raises
+        ------
+        BadInput, Diverged
+            As `evaluate` does, and if there is no such event.
         """
         return self.sample_many([(layout, seeds)], executor)[0]
 
     def sample_many(self, asks: Sequence[Ask], executor: Executor | None = None) -> list[Sample]:
-        """Return what `sample` does of several layouts, simulated together.
+        """Return the samples of several layouts, simulated together; see `sample`.
 
-        The processor time is shared out by the releases that were simulated.
+        The processor time is divided in proportion to the number of simulated releases.
         """
         jobs, ends = [], [0]
         for layout, chosen in asks:
@@ -451,15 +476,15 @@ class DesignProblem:
     def judge(
         self, layout: Layout, outcomes: Sequence[Outcome], seeds: Sequence[int] = ()
     ) -> Evaluation:
-        """Return what a layout is worth that had these outcomes.
+        """Return the evaluation of a layout from its outcomes.
 
-        There is at least one of every event; fewer than two an event on the average must be those
-        of a `plan`. `seeds` are kept beside them.
+        There must be at least one outcome of every event; fewer than two per event on average must
+        come from a `plan`. `seeds` are stored in the evaluation.
 
         Raises
         ------
         BadInput
-            If there are no outcomes, or none of an event that happens.
+            If there are no outcomes, or none of an event with a non-zero rate.
         """
         known = self._known
         found = cost.judge(self.site, layout, outcomes, known.facts, known.shares)
@@ -474,18 +499,19 @@ class DesignProblem:
         )
 
     def reward(self, evaluation: Evaluation) -> float:
-        """Return the fall of Z over Z of nothing; without prices the share of debris kept off.
+        """Return the reduction of Z divided by Z without barriers.
 
-        Of a slope from which nothing comes onto the road it is 0, and -1 of whatever is built.
-        Of a layout that misses a target it is -1 less the greatest excess of a probability over its
-        target, whatever the layout costs.
+        If Z is 0 both without barriers and for the layout, it is the share of debris kept off the
+        road, or 0 if none reaches it without barriers. If only Z without barriers is 0, it is -1.
+        If the layout misses a target, it is -1 minus the greatest excess of a probability over its
+        target, regardless of cost.
         """
         if evaluation.targets == MISSED:
             return -1.0 - self._excess(evaluation)
         return evaluation.gain(self._known.nothing)
 
     def _excess(self, evaluation: Evaluation) -> float:
-        """Return the most by which a probability in a design event exceeds its target [-]."""
+        """Return the greatest excess of a probability in a design event over its target [-]."""
         return max(
             seen[name].probability - greatest
             for greatest, seen in (
@@ -504,7 +530,7 @@ class DesignProblem:
         return self.targets.state(self._design_events, found.reach, found.failure)
 
     def _standing(self, layout: Sequence[Barrier] | ArrayLike) -> Layout:
-        """Return the layout of a vector, or one that was checked."""
+        """Return the layout of a vector, or a checked layout."""
         if isinstance(layout, np.ndarray) or is_vector(layout):
             return self.decode(layout)  # type: ignore[arg-type]
-        return self.check(layout)  # type: ignore[arg-type]  # it says what is wrong
+        return self.check(layout)  # type: ignore[arg-type]  # raises if it is not a layout

@@ -1,6 +1,6 @@
-"""Replays of episodes, written as they end.
+"""Recorder that writes a replay at the end of each episode.
 
-The replay writer is imported when it is used.
+The replay writer is imported on first use.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Trigger = Callable[[int], bool]
 
 
 class Shown(NamedTuple):
-    """The release of an episode that its replay shows, of so many."""
+    """The release of an episode that its replay shows, and the number of scored releases."""
 
     site: Site
     seed: int
@@ -30,27 +30,27 @@ class Shown(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Say which it is."""
-        return f"{self.seed}, event {self.event}, which stands for the {self.releases} scored"
+        """Description of the release."""
+        return f"{self.seed}, event {self.event}, representative of the {self.releases} scored"
 
 
 @dataclass(frozen=True, slots=True)
 class Recorder:
-    """Writes replays into a folder.
+    """Writer of replays into a folder.
 
     Parameters
     ----------
     folder : path
-        Where `episode-NNNNNN.rrd` goes; made when it is needed. No file is overwritten: the
-        second of the same number, of another copy of the environment or of a former run, is
-        `episode-NNNNNN-2.rrd`.
+        Folder for the files `episode-NNNNNN.rrd`; created when needed. No file is overwritten: if
+        another copy of the environment or an earlier run has written the same number, the name is
+        `episode-NNNNNN-2.rrd`, and so on.
     trigger : callable, optional
-        Whether to record an episode, by its number from 0; None: every one.
+        Whether to record an episode, given its number from 0; by default all are recorded.
 
     Raises
     ------
     BadInput
-        If the folder is a file or cannot be made, or the trigger cannot be called.
+        If the folder is a file or cannot be created, or the trigger is not callable.
     """
 
     folder: Path
@@ -58,7 +58,7 @@ class Recorder:
 
     def __init__(self, folder: str | os.PathLike[str], trigger: Trigger | None = None):
         if not isinstance(folder, str | os.PathLike):
-            raise BadInput("record", folder, "name a folder or give None")
+            raise BadInput("record", folder, "give the path of a folder or None")
         _check_room(Path(folder))
         if trigger is not None and not callable(trigger):
             raise BadInput("record_trigger", trigger, "give a function of the episode's number")
@@ -77,20 +77,21 @@ class Recorder:
         rewards: Sequence[float],
         record: str,
     ) -> Path:
-        """Write the replay of an episode of one step and return its path; no stream stays open.
+        """Write the replay of an episode of one step, close the file and return its path.
 
         Parameters
         ----------
         episode : int
-            Its number.
+            Number of the episode.
         shown : Shown
             The release to show.
         stages : sequence of Evaluation
-            What stood at the start, nothing, and in the end.
+            Evaluations at the start (no barriers) and at the end.
         rewards : sequence of float
-            Of each step.
+            Reward of each step.
         record : str
-            What it takes to compute the episode again, see `rigdda.envs.replay_record`.
+            The record from which the episode can be computed again, see
+            `rigdda.envs.replay_record`.
         """
         from rigdda.replay.recording import Marks
 
@@ -119,14 +120,14 @@ class Recorder:
     ) -> Path:
         """Write the replay of an episode of several steps and return its path.
 
-        All stages show one release.
+        All stages show the same release.
 
         Parameters
         ----------
         episode, shown, rewards, record
             See `write`.
         stages : sequence of Evaluation
-            What stood at the start, nothing, and after each step.
+            Evaluations at the start (no barriers) and after each step.
         """
         from rigdda.replay.episode import Placement, write_episode
 
@@ -147,7 +148,7 @@ class Recorder:
         return path
 
     def _path(self, episode: int) -> Path:
-        """Return the name of a new file: copies of an environment may share the folder."""
+        """Return the path of a new file; copies of an environment may share the folder."""
         path, number = self.folder / f"episode-{episode:06d}.rrd", 2
         while path.exists():
             path = path.with_name(f"episode-{episode:06d}-{number}.rrd")
@@ -156,12 +157,12 @@ class Recorder:
 
 
 def _check_room(folder: Path) -> None:
-    """Check that a folder can be made and written into; it is made when it is needed."""
+    """Check that a folder can be created and written into, without creating it."""
     try:
         there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
         tempfile.TemporaryDirectory(dir=there).cleanup()
     except OSError as error:
-        mend = f"name a folder that can be made and written into ({error.strerror})"
+        mend = f"name a folder that can be created and written into ({error.strerror})"
         raise BadInput("record", str(folder), mend) from None
 
 

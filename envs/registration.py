@@ -1,4 +1,4 @@
-"""The table of environments that Gymnasium knows by a name."""
+"""Registration of the environments with Gymnasium."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ ENVIRONMENTS = {
         "rigdda.envs.vector:BarrierPlacementVector",
     ),
 }
-"""Entry points of every environment, alone and batched, imported when it is made first."""
+"""Entry points of each environment, single and vectorised; they are imported on first use."""
 
 
 def register() -> None:
-    """Register every environment of the table; no time limit, an episode ends by itself."""
+    """Register all environments, without a time limit because every episode ends by itself."""
     for name, (alone, batched) in ENVIRONMENTS.items():
         gymnasium.register(id=name, entry_point=alone, vector_entry_point=batched)

@@ -1,6 +1,6 @@
-"""Pictures of a slope: the ground, the road, what stands and where blocks lie.
+"""Images of a slope with the ground, the road, the barriers and the blocks.
 
-Matplotlib is imported when it is used.
+Matplotlib is imported on first use.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 SIZE = (8.0, 4.5)
-"""Width and height of a picture [inch], 100 pixels each."""
+"""Width and height of an image [inch], at 100 pixels per inch."""
 
 PROPORTION = 2.0
-"""Width over height of what is shown: the picture less its title and numbers."""
+"""Aspect ratio of the plotted area: the image without its title and axis labels."""
 
 GROUND, ROCK, BARRIER, ROAD, ZONE = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04", "#9dc3e6"
 CUT, BROKEN = "#dbe7f3", "#d62846"
-"""Colours of the inside of a ditch and of what has failed."""
+"""Colours of the inside of a ditch and of failed barriers."""
 
 POST = 5.0
-"""Width of the post of a fence [points]: wide enough to be seen on a slope of 200 m."""
+"""Line width of a fence post [points], wide enough to be visible on a slope of 200 m."""
 
 BAND = 0.02
-"""Thickness of the band that stands for mesh, as a share of the height of the picture."""
+"""Thickness of the band that represents mesh, as a share of the height of the image."""
 
 GAP = 16.0
 """Distance of a label from the top of its barrier [points]."""
 
 
 class Label(NamedTuple):
-    """Words about a barrier, and the point to which they belong [m]."""
+    """Label of a barrier, and the point to which it refers [m]."""
 
     words: str
     at: tuple[float, float]
@@ -50,7 +50,7 @@ class Label(NamedTuple):
 
 
 def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> None:
-    """Draw one frame of a run into axes, in metres and to scale.
+    """Draw one frame of a run in metres, with equal axis scales.
 
     Parameters
     ----------
@@ -59,9 +59,9 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
     run : Run
         A release on a slope.
     road : (float, float)
-        Chainages of the road's uphill and downhill edge [m].
+        Chainages of the uphill and downhill edges of the road [m].
     frame : int
-        Index of the frame, the last by default.
+        Index of the frame; by default the last.
     """
     terrain = run.ground
     assert terrain is not None
@@ -91,21 +91,21 @@ def draw_barrier(
     foot: tuple[float, float] | None = None,
     colour: str = BARRIER,
 ) -> None:
-    """Draw what stands: a fence as a post, a ditch as a shaded cut, all else as a body.
+    """Draw a barrier: a fence as a post, a ditch as a hatched cut, all others as filled bodies.
 
     Parameters
     ----------
     axes : matplotlib axes
         Where to draw.
     barrier : Barrier
-        What it is, all but mesh.
+        Any barrier except mesh.
     outline : (n, 2) array
-        Its corners, of an earthwork those of the earth that was moved [m].
+        Its corners; for an earthwork those of the soil that was moved [m].
     foot : (float, float), optional
-        Where the posts of a fence stand, which lean downhill once it has given way [m]; by default
-        below its top.
+        Foot of the posts of a fence, which lean downhill after a deflection [m]; by default
+        vertically below the top.
     colour : str
-        Of its faces and edges.
+        Colour of its faces and edges.
     """
     if isinstance(barrier, Fence):
         x, top = outline[2:].mean(axis=0).tolist()
@@ -124,8 +124,14 @@ def draw_mesh(axes: Axes, site: Site, mesh: Mesh, thickness: float) -> tuple[flo
 
     Parameters
     ----------
+    axes : matplotlib axes
+        Where to draw.
+    site : Site
+        The site.
+    mesh : Mesh
+        The mesh.
     thickness : float
-        Of the band [m].
+        Thickness of the band [m].
     """
     held = {event.source for event in site.events if event.name in site.mesh(mesh.option).factors}
     bands = [source.band for source in site.sources if source.name in held and source.band]
@@ -137,14 +143,14 @@ def draw_mesh(axes: Axes, site: Site, mesh: Mesh, thickness: float) -> tuple[flo
 
 
 def ground_between(site: Site, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return the ground between two chainages, x and y [m]."""
+    """Return the ground profile between two chainages, x and y [m]."""
     inner = [x for x, _ in site.slope.points if start < x < end]
     at = np.array([start, *inner, end])
     return at, np.array([site.profile.height(x) for x in at])
 
 
 def name_places(axes: Axes, site: Site, zone: tuple[float, float]) -> None:
-    """Draw the zone as a line on the ground, and write its name and the road's below it."""
+    """Draw the barrier zone as a line on the ground, and label it and the road from below."""
     x, y = ground_between(site, *zone)
     axes.plot(x, y, color=ZONE, linewidth=5, solid_capstyle="butt", zorder=2.5)
     for words, (start, end), side in (
@@ -165,10 +171,10 @@ def name_places(axes: Axes, site: Site, zone: tuple[float, float]) -> None:
 
 
 def write_labels(axes: Axes, labels: Sequence[Label]) -> None:
-    """Write labels above what they belong to, so that none lies on another.
+    """Write labels above their points without overlaps.
 
-    Limits and size of the axes must be final. Each label begins above its point, further up where
-    another is in the way, and moves left where it would leave the axes.
+    The limits and the size of the axes must be final. Each label starts above its point, moves up
+    if another label is in the way, and moves left if it would leave the axes.
     """
     figure = axes.get_figure(root=True)
     assert figure is not None
@@ -183,7 +189,7 @@ def write_labels(axes: Axes, labels: Sequence[Label]) -> None:
         measured.remove()
         left = max(min(x, frame.x1 - box.width), frame.x0)
         bottom = min(_free(taken, left, box, y + GAP * point), frame.y1 - box.height)
-        begins = min(max((x - left) / box.width, 0.0), 1.0)  # where the label is above its point
+        begins = min(max((x - left) / box.width, 0.0), 1.0)  # where the leader line meets the label
         axes.annotate(
             label.words,
             label.at,
@@ -203,7 +209,7 @@ def write_labels(axes: Axes, labels: Sequence[Label]) -> None:
 
 
 def _free(taken: Sequence[Bbox], left: float, box: Bbox, bottom: float) -> float:
-    """Return the least height from `bottom` on at which a label meets no other [pixels]."""
+    """Return the lowest position >= `bottom` at which a label overlaps no other [pixels]."""
     for other in sorted(taken, key=lambda one: one.y0):
         apart = left >= other.x1 + 4.0 or left + box.width <= other.x0 - 4.0
         if not apart and bottom < other.y1 + 2.0 and bottom + box.height > other.y0 - 2.0:
@@ -219,14 +225,16 @@ def picture(run: Run, site: Site, layout: Layout, title: str) -> NDArray[np.uint
     run : Run
         A release on the site with the layout.
     site, layout : Site, tuple of Barrier
-        Where, and what stands.
+        The site and the layout.
     title : str
-        Words above the picture.
+        Title of the image.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(SIZE, dpi=100, layout="constrained")  # unknown to pyplot: nothing to close
+    figure = Figure(
+        SIZE, dpi=100, layout="constrained"
+    )  # not registered with pyplot: need not be closed
     canvas = FigureCanvasAgg(figure)
     axes = figure.subplots()
     draw(axes, run, (site.road.start, site.road.end))
@@ -251,14 +259,14 @@ def picture(run: Run, site: Site, layout: Layout, title: str) -> NDArray[np.uint
 
 
 def top_of(outline: Floats) -> tuple[float, float]:
-    """Return the middle of the top of what stands [m]."""
+    """Return the middle of the top of an outline [m]."""
     return float(outline[:, 0].mean()), float(outline[:, 1].max())
 
 
 def window(run: Run, site: Site) -> tuple[float, float, float, float]:
-    """Return left, right, bottom, top of what is to be seen of a run's last frame [m].
+    """Return the left, right, bottom and top limits for the last frame of a run [m].
 
-    From the highest source or block to beyond the road, or to where the last block lies.
+    They range from the highest source or block to beyond the road or the furthest block.
     """
     blocks = np.concatenate(
         [_corners(run, f, i) for i in range(len(run.scene.blocks)) for f in (0, -1)]
@@ -278,7 +286,7 @@ def window(run: Run, site: Site) -> tuple[float, float, float, float]:
 
 
 def _corners(run: Run, frame: int, block: int) -> Floats:
-    """Return the (n, 2) corners of a block in a frame; the first frame is turned by 0."""
+    """Return the (n, 2) corners of a block in a frame; the rotation is 0 in the first frame."""
     x, y, theta = run.poses[frame, block]
     cos, sin = np.cos(theta), np.sin(theta)
     turn = np.array([[cos, -sin], [sin, cos]])

@@ -1,4 +1,4 @@
-"""Computing the episode or the release of a replay again, from the record that it holds."""
+"""Repetition of the episode or release of a replay from the record that it contains."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rigdda.envs.replay_record import EpisodeRecord, ReleaseRecord, Versions, as
 
 @dataclass(frozen=True, slots=True)
 class Repetition:
-    """What was recorded and what is computed again, as texts that are equal if every bit is."""
+    """Recorded and recomputed results, as texts that are equal only if every bit is."""
 
     what: str
     recorded: str
@@ -30,13 +30,13 @@ class Repetition:
 
     @property
     def other_versions(self) -> list[str]:
-        """Programs that are not those of the record, in words."""
+        """Descriptions of the programs whose versions differ from those of the record."""
         then, now = (msgspec.structs.asdict(v) for v in (self.versions, Versions.of_today()))
         return [f"{name} {then[name]}, now {now[name]}" for name in then if then[name] != now[name]]
 
 
 def repeat(record: EpisodeRecord | ReleaseRecord) -> Repetition:
-    """Compute an episode or a release again."""
+    """Compute a recorded episode or release again."""
     if isinstance(record, EpisodeRecord):
         return _repeat_episode(record)
     return _repeat_release(record)
@@ -57,7 +57,7 @@ def _repeat_episode(record: EpisodeRecord) -> Repetition:
 
 
 def _environment(record: EpisodeRecord) -> environments.BarrierEnv:
-    """Return an environment with the keywords of a record; the site is that of the episode."""
+    """Return an environment with the keywords of a record; its site is set on `draw`."""
     name = ENVIRONMENTS[record.environment][0].rpartition(":")[2]
     made: environments.BarrierEnv = getattr(environments, name)(
         "random",

@@ -1,6 +1,6 @@
-"""Records in replays: what it takes to compute an episode or a release again.
+"""Records in replays, from which an episode or a release can be computed again.
 
-A record has the whole site, so that it needs no other file, and what was computed, to the last bit.
+A record contains the whole site, so that no other file is needed, and the exact results.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rigdda.kernel import source_hash
 
 
 class Versions(msgspec.Struct, frozen=True):
-    """Programs that computed a record, and a hash of the kernels' sources."""
+    """Versions of the programs that computed a record, and a hash of the kernel sources."""
 
     rigdda: str
     kernels: str
@@ -31,7 +31,7 @@ class Versions(msgspec.Struct, frozen=True):
 
     @classmethod
     def of_today(cls) -> Versions:
-        """Return those of this process."""
+        """Return the versions of this process."""
         return cls(
             rigdda=__version__,
             kernels=source_hash(),
@@ -43,31 +43,31 @@ class Versions(msgspec.Struct, frozen=True):
 
 
 class EpisodeRecord(msgspec.Struct, frozen=True, tag="episode", forbid_unknown_fields=True):
-    """An episode of an environment.
+    """Record of an episode of an environment.
 
     Parameters
     ----------
     environment : str
-        Its registered name.
+        Registered name of the environment.
     max_barriers, kinds, releases, targets
         Keywords of the environment.
     fidelity : str
-        That of the site, which is kept as it was simulated.
+        Fidelity at which `site` was derived.
     site : Site
-        Where the episode played.
+        The site as it was simulated.
     episode, seed : int
-        Its number in the environment, and the seed of its `reset`, None if it went on with the
-        random numbers of the episode before.
+        Number of the episode in the environment, and the seed of its `reset`; None if the random
+        numbers continued from the previous episode.
     release_seeds : list of int
-        Of the scored releases.
+        Seeds of the scored releases.
     shown_seed, shown_event : int, str
         The release that the replay shows.
     actions : list of list of float
-        Of every step, clipped to [-1, 1].
+        Action of each step, clipped to [-1, 1].
     rewards : list of float
-        Of every step.
+        Reward of each step.
     versions : Versions
-        Of what computed it.
+        Versions of the programs that computed it.
     """
 
     environment: str
@@ -88,18 +88,18 @@ class EpisodeRecord(msgspec.Struct, frozen=True, tag="episode", forbid_unknown_f
 
 
 class ReleaseRecord(msgspec.Struct, frozen=True, tag="release", forbid_unknown_fields=True):
-    """A release of a site with a layout.
+    """Record of a release on a site with a layout.
 
     Parameters
     ----------
     site, seed, event
         As `rigdda.release` takes them.
     barriers : list of dict
-        What stands, a table each as in layout files.
+        The layout, one table per barrier as in layout files.
     outcome : str
-        Its outcome as JSON.
+        The outcome as JSON.
     versions : Versions
-        Of what computed it.
+        Versions of the programs that computed it.
     """
 
     site: Site
@@ -118,19 +118,19 @@ def as_json(value: Outcome | EpisodeRecord | ReleaseRecord) -> str:
 def release_record(
     site: Site, layout: Layout, seed: int, event: str | None, outcome: Outcome
 ) -> str:
-    """Return the record of a release that gave an outcome, for a replay of it."""
+    """Return the record of a release and its outcome as JSON, for a replay."""
     tables, found = to_tables(layout), as_json(outcome)
     made = ReleaseRecord(site, tables, seed, event, found, Versions.of_today())
     return as_json(made)
 
 
 def load(path: str | os.PathLike[str]) -> EpisodeRecord | ReleaseRecord:
-    """Return the record that a replay holds.
+    """Return the record in a replay.
 
     Raises
     ------
     BadInput
-        If the file is missing, is not a replay, or holds no record of this version.
+        If the file is missing, is not a replay, or contains no record of this version.
     """
     from rigdda.replay.recording import read_record
 

@@ -1,4 +1,4 @@
-"""The bridge to Stable-Baselines3, the only module that knows it."""
+"""Adapter to Stable-Baselines3, the only module that imports it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rigdda.envs.vector import BarrierVector, stacked
 
 
 class Bridge(VecEnv):
-    """A batched environment as Stable-Baselines3 wants it.
+    """Adapter of a vectorised environment to the `VecEnv` interface of Stable-Baselines3.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ class Bridge(VecEnv):
     Raises
     ------
     BadInput
-        If its copies do not start anew in the step that ends an episode.
+        If its autoreset mode is not SAME_STEP.
     """
 
     def __init__(self, batch: BarrierVector):
         if batch.mode is not AutoresetMode.SAME_STEP:
-            mend = f"Stable-Baselines3 needs {AutoresetMode.SAME_STEP.value}"
+            mend = f"give {AutoresetMode.SAME_STEP.value}, which Stable-Baselines3 needs"
             raise BadInput("autoreset_mode", batch.mode.value, mend)
         self.batch = batch
         self.render_mode = batch.render_mode
@@ -39,7 +39,7 @@ class Bridge(VecEnv):
         self._actions: NDArray[np.float32] | None = None
 
     def reset(self) -> Any:
-        """Start an episode in every copy, with what `seed` and `set_options` gave."""
+        """Start an episode in every copy, with the pending seeds and options."""
         starts = self.batch.start(self._seeds, self._options).values()
         self._reset_seeds()
         self._reset_options()
@@ -47,11 +47,11 @@ class Bridge(VecEnv):
         return stacked([seen for seen, _ in starts])
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Take actions to be stepped with."""
+        """Store the actions of the next step."""
         self._actions = actions
 
     def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """Step every copy; those that end start anew and say what they saw last in their info."""
+        """Step every copy; finished copies restart, with the last observation in the info."""
         assert self._actions is not None
         shown, rewards, dones, infos = [], [], [], []
         for i, (step, start) in enumerate(self.batch.advance(self._actions)):
@@ -68,21 +68,21 @@ class Bridge(VecEnv):
         return stacked(shown), np.array(rewards, dtype=np.float32), np.array(dones), infos
 
     def close(self) -> None:
-        """Release the environment."""
+        """Close the environment."""
         self.batch.close()
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Return the picture of every copy."""
+        """Return the image of every copy."""
         return list(self.batch.render())
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
-        """Return an attribute of some copies."""
+        """Return an attribute of the selected copies."""
         return [getattr(copy, attr_name) for copy in self._some(indices)]
 
     def set_attr(
         self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None
     ) -> None:
-        """Set an attribute of some copies."""
+        """Set an attribute of the selected copies."""
         for copy in self._some(indices):
             setattr(copy, attr_name, value)
 
@@ -93,7 +93,7 @@ class Bridge(VecEnv):
         indices: int | Iterable[int] | None = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """Call a method of some copies."""
+        """Call a method of the selected copies."""
         return [
             getattr(copy, method_name)(*method_args, **method_kwargs)
             for copy in self._some(indices)
@@ -104,7 +104,7 @@ class Bridge(VecEnv):
         wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
         indices: int | Iterable[int] | None = None,
     ) -> list[bool]:
-        """Return that no copy is wrapped."""
+        """Return False for each selected copy: copies are never wrapped."""
         return [False for _ in self._some(indices)]
 
     def _some(self, indices: int | Iterable[int] | None) -> list[Any]:
@@ -112,7 +112,7 @@ class Bridge(VecEnv):
 
 
 def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
-    """Return a batched environment for Stable-Baselines3; see `rigdda.envs.sb3_vec_env`."""
+    """Return a vectorised environment for Stable-Baselines3; see `rigdda.envs.sb3_vec_env`."""
     batch = gymnasium.make_vec(
         id, num_envs=num_envs, vectorization_mode="vector_entry_point", **keywords
     )

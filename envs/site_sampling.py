@@ -1,6 +1,6 @@
-"""Where episodes play and what their actions are: sites of a split, and slots for barriers.
+"""Sites of episodes, fixed or drawn from a split, and the slots that actions fill.
 
-The slots of a problem's vector are of one width for all sites of an environment.
+The slots have the same width for all sites of an environment, even if some lack mesh.
 """
 
 from __future__ import annotations
@@ -20,30 +20,30 @@ from rigdda.envs.problem import FIDELITIES, DesignProblem, Targets, read_targets
 from rigdda.envs.problem import USUAL_KINDS as USUAL
 
 Place = str | os.PathLike[str] | Site
-"""Name of a built-in or generated site, a TOML file, a site, or what `drawn_from` knows."""
+"""Name of a built-in or generated site, a TOML file, a `Site`, or a split; see `drawn_from`."""
 
 RANDOM = "random"
-"""Another name of the split "train"."""
+"""Alias of the split "train"."""
 
 SPLITS = ("train", "validation", "test")
 """Splits of the generated sites."""
 
 MOST_POSED = 512
-"""Problems that are kept: checking a site takes longer than an episode."""
+"""Number of problems kept in memory, because checking a site takes longer than an episode."""
 
 
 MESH = "mesh"
-"""The kind that only some sites offer."""
+"""The kind of barrier that only some sites offer."""
 
 KINDS = (*USUAL, MESH)
-"""Kinds to choose from where every episode draws its site and none are named."""
+"""Default kinds of barrier if every episode draws its site."""
 
 
 @dataclass(frozen=True)
 class Slots:
-    """So many slots for barriers of these kinds.
+    """A number of slots for barriers of some kinds.
 
-    A site without mesh has no use for its score, which is left out there.
+    On a site without mesh options the score of mesh is ignored.
     """
 
     kinds: tuple[str, ...]
@@ -51,36 +51,36 @@ class Slots:
 
     @property
     def width(self) -> int:
-        """Numbers in a slot."""
+        """Length of a slot."""
         return slot_size(self.kinds)
 
     @property
     def size(self) -> int:
-        """Numbers in all slots."""
+        """Length of all slots together."""
         return self.count * self.width
 
     def shared(self, site: Site) -> tuple[str, ...]:
-        """Return the kinds that a site offers, all where that leaves none."""
+        """Return the kinds available on a site; all kinds if none would be left."""
         offered = tuple(kind for kind in self.kinds if kind != MESH or site.meshes)
         return offered or self.kinds
 
     def decode(self, problem: DesignProblem, numbers: Floats) -> Layout:
-        """Return the layout of the first slots, the others being empty."""
+        """Return the layout of the first slots; the others are empty."""
         return problem.decode(self._vector(problem, numbers))
 
     def dropped(self, problem: DesignProblem, numbers: Floats) -> tuple[str, ...]:
-        """Return which barriers that the first slots ask for are not built, and why."""
+        """Return the barriers that the first slots request but that are not built, with reasons."""
         return problem.dropped(self._vector(problem, numbers))
 
     def _vector(self, problem: DesignProblem, numbers: Floats) -> Floats:
-        """Return the problem's vector of the first slots, the others being empty."""
+        """Return the vector of the problem for the first slots; the others are empty."""
         used = numbers.reshape(-1, self.width)
         vector = np.full((problem.max_barriers, slot_size(problem.kinds)), -1.0)
         vector[: len(used)] = used[:, self._columns(problem.kinds)]
         return vector.ravel()
 
     def encode(self, problem: DesignProblem, layout: Layout) -> Floats:
-        """Return the numbers of all slots that `decode` turns into a layout that it gave."""
+        """Return the numbers of all slots that `decode` turns into `layout`."""
         place, slots, kinds = problem.place, problem.max_barriers, problem.kinds
         vector = encode(place, layout, slots, kinds).reshape(slots, -1)
         numbers = np.full((self.count, self.width), -1.0)
@@ -88,18 +88,18 @@ class Slots:
         return numbers.ravel()
 
     def _columns(self, kinds: Sequence[str]) -> list[int]:
-        """Return which numbers of a slot a problem of these kinds reads."""
+        """Return the columns of a slot that a problem with these kinds uses."""
         scores = [NUMBERS + self.kinds.index(kind) for kind in kinds]
         return [*range(NUMBERS), *(scores if len(kinds) > 1 else [])]
 
 
 def named(kinds: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of kinds of barrier.
+    """Return the validated names of kinds of barrier.
 
     Raises
     ------
     BadInput
-        If they are not a sequence of different ones.
+        If they are not a sequence of distinct names of kinds.
     """
     if isinstance(kinds, str) or not isinstance(kinds, Sequence):
         raise BadInput("kinds", kinds, "give a sequence of names")
@@ -115,7 +115,7 @@ def _split(name: str) -> tuple[str, ...]:
 
 
 def drawn_from(site: Place) -> tuple[str, ...]:
-    """Return the names of the sites of which every episode draws one, none if `site` is one."""
+    """Return the names of the sites from which episodes draw; empty if `site` is a single site."""
     if not isinstance(site, str) or site not in (RANDOM, *SPLITS):
         return ()
     return _split("train" if site == RANDOM else site)
@@ -128,7 +128,7 @@ def pose(
     fidelity: str,
     targets: Targets | None = None,
 ) -> DesignProblem:
-    """Return the problem of a site; that of a name is made once a process.
+    """Return the design problem of a site; problems of named sites are cached.
 
     Raises
     ------
@@ -148,23 +148,23 @@ def _named(
 
 
 class Venue:
-    """Where an environment's episodes play, and the slots that its actions fill.
+    """Sites on which an environment plays its episodes, and the slots that its actions fill.
 
     Parameters
     ----------
     site : Place
-        Where.
+        A site or a split.
     max_barriers, kinds, fidelity, targets
-        As of `DesignProblem`; where every episode draws its site, all kinds by default.
+        As for `DesignProblem`; if every episode draws its site, the default is all kinds.
 
     Attributes
     ----------
     home : DesignProblem or None
-        That of every episode, None where each draws its own.
+        Problem of every episode; None if each draws its own.
     first : DesignProblem
-        One of them.
+        One of the problems.
     slots : Slots
-        Of every action.
+        Slots of the actions.
 
     Raises
     ------
@@ -192,30 +192,30 @@ class Venue:
             self.slots = Slots(self.first.kinds, max_barriers)
 
     def pose(self, site: Place) -> DesignProblem:
-        """Return the problem of a site, of the kinds that it offers."""
+        """Return the problem of a site with those kinds that the site offers."""
         count = self.slots.count
         whole = pose(site, count, None, self.fidelity)
         kinds = self.slots.shared(whole.site)
         return pose(site, count, kinds, self.fidelity, self.targets)
 
     def settle(self, site: Place) -> None:
-        """Play here from the next episode on."""
+        """Change the site or split from the next episode on."""
         self._drawn = drawn_from(site)
         self.home = None if self._drawn else self.pose(site)
 
     def draw(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> DesignProblem:
-        """Return the problem of an episode; `options` may name its site.
+        """Return the problem of an episode; `options` may specify its site.
 
         Raises
         ------
         BadInput
-            If there is no such site, or there are other options.
+            If there is no such site, or `options` has other keys.
         """
         if options is not None and not isinstance(options, Mapping):
             raise BadInput("options", options, "give a mapping, such as {'site': 'quick'}")
         unknown = [name for name in options or () if name != "site"]
         if unknown:
-            raise BadInput("options", unknown, "give nothing but site")
+            raise BadInput("options", unknown, "the only option is site")
         site: Any = (options or {}).get("site")
         if site is None and self.home is not None:
             return self.home

@@ -1,7 +1,7 @@
-"""What is known of sites without barriers, kept on disk.
+"""Persistent store of barrier-free statistics of sites.
 
-In the user's cache, where it is written, and in a file that ships with the package. Both are read
-only if the sources that decide it are those of today.
+Values are written to the cache of the user and also read from a file that ships with the package.
+Both are used only if they were computed by the current sources.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from rigdda.kernel import cache_directory
 T = TypeVar("T")
 
 SHIPPED = Path(__file__).parent / "site_store.msgpack.xz"
-"""The file of the package; `python -m experiments.known_sites` makes it."""
+"""File that ships with the package, made by `python -m experiments.known_sites`."""
 
 
 class Content(msgspec.Struct, frozen=True):
-    """What the file of the package holds.
+    """Content of the file that ships with the package.
 
     Parameters
     ----------
     sources : str
-        Hash of the sources that decided it.
+        Hash of the sources that computed the values.
     values : mapping of str to bytes
-        By name and key.
+        Encoded values by name and key.
     """
 
     sources: str
@@ -41,12 +41,12 @@ class Content(msgspec.Struct, frozen=True):
 
 
 def path_of(name: str, key: bytes) -> Path:
-    """Return the file of a value in the user's cache, beside the compiled kernels."""
+    """Return the file of a value in the cache of the user, next to the compiled kernels."""
     return cache_directory().parent / f"sites-{mechanics()}" / f"{name}-{key.hex()}.msgpack"
 
 
 def read(name: str, key: bytes, kind: type[T]) -> T | None:
-    """Return a value that is kept, None if there is none or it is no longer sound."""
+    """Return a stored value, or None if there is none or it cannot be decoded."""
     found: bytes | msgspec.Raw | None = None
     path = path_of(name, key)
     with suppress(OSError):
@@ -59,21 +59,21 @@ def read(name: str, key: bytes, kind: type[T]) -> T | None:
 
 
 def write(name: str, key: bytes, value: Any) -> None:
-    """Keep a value in the user's cache; a disk that is full costs time later, no result now."""
+    """Store a value in the cache of the user; errors such as a full disk are ignored."""
     path = path_of(name, key)
     with suppress(OSError), atomic(path) as part:
         part.write_bytes(msgspec.msgpack.encode(value))
 
 
 def pack(values: Mapping[str, Any]) -> bytes:
-    """Return the content of the file of the package, of values by name and key."""
+    """Return the content of the file that ships with the package, from values by name and key."""
     raw = {key: msgspec.Raw(msgspec.msgpack.encode(value)) for key, value in values.items()}
     return lzma.compress(msgspec.msgpack.encode(Content(mechanics(), raw)), preset=9)
 
 
 @lru_cache(maxsize=1)
 def _shipped() -> dict[str, msgspec.Raw]:
-    """Return what ships with the package, nothing if other sources made it."""
+    """Return the values that ship with the package; empty if other sources computed them."""
     now = mechanics()
     with suppress(OSError, lzma.LZMAError, msgspec.MsgspecError):
         content = msgspec.msgpack.decode(lzma.decompress(SHIPPED.read_bytes()), type=Content)

@@ -1,4 +1,7 @@
-"""What may be built where on a site: rules, sizes, clear distances, nearest possible places."""
+"""Siting rules: where barriers may stand on a site, their sizes and clear distances.
+
+`Rules` checks layouts, and `Room` finds the nearest feasible places.
+"""
 
 from __future__ import annotations
 
@@ -17,66 +20,66 @@ from rigdda.model.barrier_zone import BarrierZone
 Span = tuple[float, float]
 
 MIN_GAP = 0.5
-"""Least distance between the works of two barriers [m]."""
+"""Minimum distance between the works of two barriers [m]."""
 
 
 def room(barrier: Barrier, works: Span) -> Span:
-    """Return the chainages that a barrier needs: its works, and where it gives way to [m]."""
+    """Return the chainages that a barrier occupies, including its elongation downhill [m]."""
     start, end = works
     return start, end + barrier.elongation_path
 
 
 def meet(one: Span, two: Span) -> bool:
-    """Tell whether two barriers are nearer than `MIN_GAP`."""
+    """Return whether two barriers are closer than `MIN_GAP`."""
     return one[0] < two[1] + MIN_GAP - TOLERANCE and two[0] < one[1] + MIN_GAP - TOLERANCE
 
 
 def check_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> None:
-    """Check that no two barriers meet.
+    """Check that no two barriers are too close to each other.
 
     Parameters
     ----------
     rooms : sequence of (str, Barrier, (start, end))
-        What messages call each, each, and the room that it needs [m].
+        Name in messages, barrier and occupied chainages [m] of each.
 
     Raises
     ------
     BadInput
-        If two do.
+        If two barriers are too close.
     """
     ordered = sorted(rooms, key=lambda item: item[2])
     for (_, before, one), (where, barrier, two) in pairwise(ordered):
         if meet(one, two):
-            mend = f"put it {MIN_GAP:g} m beyond {one[1]:g}, up to where the {before.words} needs"
+            mend = f"give at least {one[1] + MIN_GAP:g}: {MIN_GAP:g} m clear of the {before.words}"
             raise BadInput(f"{where}.x", barrier.x, mend)
 
 
 Floats = NDArray[np.float64]
 
 MACHINE = 3.0
-"""Width of a machine that builds, empties and mends what is dug, filled or cast [m]: so much ground
-that it can stand on lies beside the works, above and below together."""
+"""Width of the machine that builds, empties and repairs earthworks and walls [m]. Gentle ground of
+this total width, uphill and downhill, must adjoin the works."""
 
 
 class Rules:
-    """What may be built where, on the ground of a site.
+    """Siting rules for the ground of a site.
 
     Parameters
     ----------
     site : Site
-        Its ground, road and sources.
+        Provides the ground, the road and the sources.
     zone : BarrierZone
         Where barriers may stand, and how large they may be.
 
     Attributes
     ----------
     parts : list of (start, end)
-        Parts of the zone that are free of loose rock [m].
+        Parts of the zone without loose rock [m].
 
     Raises
     ------
     BadInput
-        If there are none.
+        If there are no such parts.
     """
 
     def __init__(self, site: Site, zone: BarrierZone):
@@ -84,14 +87,14 @@ class Rules:
         cut = [(max(low, zone.start), min(high, zone.end)) for low, high in site.rooms]
         self.parts = [(low, high) for low, high in cut if low < high]
         if not self.parts:
-            mend = f"leave room in {site.rooms}: elsewhere loose rock lies"
+            mend = f"overlap one of {site.rooms}, which are free of loose rock"
             raise BadInput("zone", (zone.start, zone.end), mend)
         self._x, self._y = site.profile.points.T
         angles = {kind.steepest for kind in KINDS.values()} - {None}
         self._gentle = {angle: self._stretches(angle) for angle in angles if angle is not None}
 
     def _stretches(self, steepest: float) -> list[Span]:
-        """Return the stretches of the ground that are at most so steep [deg], each whole."""
+        """Return the maximal stretches of ground that are at most `steepest` steep [deg]."""
         rise, run = np.abs(np.diff(self._y)), np.diff(self._x)
         found: list[Span] = []
         for k in np.flatnonzero(rise <= run * math.tan(math.radians(steepest)) + TOLERANCE):
@@ -102,7 +105,7 @@ class Rules:
         return found
 
     def beside(self, start: Floats, end: Floats, steepest: float) -> Floats:
-        """Return how wide the ground beside works is, that is at most so steep [deg]: (n,) [m]."""
+        """Return the width of ground beside works that is at most `steepest` [deg], (n,) [m]."""
         low, high = np.array(self._gentle[steepest]).reshape(-1, 2).T[:, :, None]
         above = np.where((low <= start) & (start <= high), start - low, 0.0)
         below = np.where((low <= end) & (end <= high), high - end, 0.0)
@@ -114,7 +117,7 @@ class Rules:
         return np.interp(x, self._x, self._y)
 
     def held(self, option: MeshOption) -> Span:
-        """Return the chainages of the sources whose events an option of mesh makes rarer [m]."""
+        """Return the chainages of the sources whose events a mesh option makes rarer [m]."""
         names = {
             event.source for event in self.site.events if option.factors.get(event.name, 1) < 1
         }
@@ -123,16 +126,16 @@ class Rules:
         return min(min(x) for x in ends), max(max(x) for x in ends)
 
     def works(self, barrier: Barrier) -> Span:
-        """Return the chainages between which a barrier takes up the ground [m]."""
+        """Return the chainages between which a barrier occupies the ground [m]."""
         return barrier.works(self.site.profile)
 
     def check_layout(self, layout: Sequence[Barrier], kinds: Sequence[str], most: int) -> Layout:
-        """Return a layout of some kinds and at most so many barriers, sorted downhill.
+        """Return a feasible layout of given kinds and at most `most` barriers, sorted downhill.
 
         Raises
         ------
         BadInput
-            If it may not be built.
+            If it is not feasible.
         """
         barriers = tuple(sorted(as_layout(layout), key=lambda barrier: barrier.x))
         if len(barriers) > most:
@@ -146,12 +149,12 @@ class Rules:
             else:
                 rooms.append((where, barrier, room(barrier, self.check(where, barrier))))
         if len(barriers) - len(rooms) > 1:
-            raise BadInput("layout", "several meshes", "give at most one: choose another option")
+            raise BadInput("layout", "several meshes", "give at most one")
         check_gaps(rooms)
         return barriers
 
     def check_mesh(self, where: str, mesh: Mesh) -> None:
-        """Check that mesh is an option of the site, over the rock that it holds.
+        """Check that mesh is an option of the site and lies over the rock that it holds.
 
         Raises
         ------
@@ -163,12 +166,12 @@ class Rules:
         check.number(f"{where}.x", mesh.x, *self.held(options[mesh.option]))
 
     def check(self, where: str, barrier: Barrier) -> Span:
-        """Return the works of a barrier that may be built where it stands.
+        """Return the works of a barrier after checking that it is feasible where it stands.
 
         Raises
         ------
         BadInput
-            If it may not; the message begins with `where`.
+            If it is not feasible; the message begins with `where`.
         """
         self._check_size(where, barrier)
         start, end = self.works(barrier)
@@ -184,7 +187,7 @@ class Rules:
             beside = float(self.beside(np.array([start]), np.array([end]), steepest)[0])
             if beside < MACHINE - TOLERANCE:
                 mend = (
-                    f"put it where {MACHINE:g} m beside it are left to a machine, not {beside:.1f}"
+                    f"put it where {MACHINE:g} m beside it are free for a machine, not {beside:.1f}"
                 )
                 raise BadInput(f"{where}.x", barrier.x, mend)
         if isinstance(barrier, Earthwork):
@@ -199,12 +202,12 @@ class Rules:
             value, (low, high) = getattr(barrier, length.field), length.limits(self.zone)
             slack = TOLERANCE * max(1.0, high)
             if not low - slack <= value <= high + slack:
-                mend = f"give a number of at least {low:g} and at most {high:g}"
+                mend = f"give a number >= {low:g} and <= {high:g}"
                 raise BadInput(f"{where}.{length.field}", value, mend)
         barrier.check_design(where, self.site)
 
     def _check_place(self, where: str, barrier: Barrier, start: float, end: float) -> None:
-        """Check that it is in a part of the zone, and its distance from the road."""
+        """Check that a barrier lies within a part of the zone, and its distance from the road."""
         slack = TOLERANCE * max(1.0, abs(self.zone.end))
         if not any(low - slack <= start and end <= high + slack for low, high in self.parts):
             rooms = " or ".join(f"{low:g} to {high:g} m" for low, high in self.parts)
@@ -214,7 +217,7 @@ class Rules:
         give = barrier.elongation_path
         if give > 0.0 and end + give > road + slack:
             most = road - give - barrier.extent
-            mend = f"put it at {most:g} or uphill: it gives way by {give:g} m"
+            mend = f"give at most {most:g}: it deflects by up to {give:g} m"
             raise BadInput(f"{where}.x", barrier.x, f"{mend}, and the road begins at {road:g}")
 
     def inclination(self, start: float, end: float) -> float:
@@ -223,10 +226,11 @@ class Rules:
         return math.degrees(math.atan2(abs(high - low), end - start))
 
     def foundation(self, start: float, end: float, most: float) -> tuple[float, float]:
-        """Return the steepest ground under a gravity wall, and what it may be at most [deg].
+        """Return the steepest ground under a gravity wall, and the permitted inclination [deg].
 
-        A wall of which a corner stands on ground that is steeper than its friction angle slides
-        before any rock comes; `most` is what the ground may be beside that [deg].
+        A wall with a corner on ground steeper than the friction angle would slide before any
+        impact. The permitted inclination is therefore the smaller of `most` and the least friction
+        angle.
         """
         under = np.flatnonzero((self._x[:-1] < end) & (start < self._x[1:]))
         rise, run = np.abs(np.diff(self._y))[under], np.diff(self._x)[under]
@@ -237,41 +241,41 @@ class Rules:
 
 
 STEP = 0.25
-"""Distance of the places that are looked at for a barrier that does not fit [m]."""
+"""Spacing of the candidate places for a barrier that is not feasible where it should stand [m]."""
 
 NEAR_ZERO = 1e-3
-"""Flatter ground than this is not looked at for its inclination [-]."""
+"""Tolerance of the slope when candidate places are preselected [-]."""
 
 
 class Room(Rules):
-    """Where there is room for barriers: the rules of what may be built, and places that obey them.
+    """Siting rules of a site, and the search for feasible places.
 
-    Parameters as of `Rules`.
+    The parameters are those of `Rules`.
     """
 
     def mesh(self, option: int) -> Mesh:
-        """Return an option of the site's meshes, in the middle of the rock that it holds."""
+        """Return a mesh option of the site, placed in the middle of the rock that it holds."""
         low, high = self.held(self.site.meshes[option])
         return Mesh(0.5 * (low + high), self.site.meshes[option].name)
 
     def put(self, barrier: Barrier, x: float) -> Barrier | None:
-        """Return a barrier moved to `x` with the sizes that it needs there; None if it cannot."""
+        """Return a barrier moved to `x` with the sizes required there, or None if impossible."""
         return barrier.placed(x, self.site, self.zone)
 
     def nearest(self, barrier: Barrier, taken: Sequence[Span]) -> tuple[Barrier, Span] | None:
-        """Return a barrier moved as little as need be to where it may stand, and its works.
+        """Return a barrier moved to the nearest feasible place, and the room that it occupies.
 
         Parameters
         ----------
         barrier : Barrier
-            Where and what it should be.
+            The barrier at its desired place.
         taken : sequence of (start, end)
-            The room of what stands already [m].
+            The room of existing barriers [m].
 
         Returns
         -------
         (Barrier, (start, end)) or None
-            None if there is none every `STEP`.
+            None if no candidate place, spaced `STEP` apart, is feasible.
         """
         found = self._try(barrier, barrier.x, taken)
         if found is not None:
@@ -298,9 +302,9 @@ class Room(Rules):
         return there, span
 
     def _places(self, barrier: Barrier, taken: Sequence[Span]) -> list[float]:
-        """Return where it may stand as far as is seen without building it, the nearest first."""
+        """Return candidate places after quick checks of the room and the ground, nearest first."""
         length = barrier.extent
-        give = room(barrier, (0.0, length))[1]  # with what it needs downhill
+        give = room(barrier, (0.0, length))[1]  # includes the elongation downhill
         last = self.site.road.start - give if barrier.elongation_path > 0.0 else math.inf
         ends = [(low, min(high - length, last)) for low, high in self.parts]
         ends = [(low, high) for low, high in ends if low <= high]

@@ -1,4 +1,4 @@
-"""Batched environments: copies of one environment whose releases are simulated together."""
+"""Vectorised environments: copies of one environment whose releases are simulated together."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from rigdda.envs.environments import (
 from rigdda.envs.recorder import Recorder
 
 MASK = "reset_mask"
-"""Option of `reset` that says which copies start anew."""
+"""Option of `reset` that selects the copies to restart."""
 
 Options = Mapping[str, Any] | None
 
 
 def reset_mode(given: AutoresetMode | str) -> AutoresetMode:
-    """Return the mode of a name.
+    """Return the autoreset mode of a name.
 
     Raises
     ------
     BadInput
-        If there is none.
+        If there is no such mode.
     """
     try:
         return AutoresetMode(given)
@@ -48,29 +48,29 @@ def reset_mode(given: AutoresetMode | str) -> AutoresetMode:
 
 
 def reset_mask(options: Options, copies: int) -> tuple[NDArray[np.bool_] | None, Options]:
-    """Return which copies start anew, None for all, and the other options.
+    """Return the mask of copies to restart, or None for all, and the other options.
 
     Raises
     ------
     BadInput
-        If the option `reset_mask` is not one boolean a copy, or none is true.
+        If the option `reset_mask` is not one boolean per copy with at least one True.
     """
-    if not isinstance(options, Mapping) or MASK not in options:  # others are checked by each copy
+    if not isinstance(options, Mapping) or MASK not in options:  # each copy checks the others
         return None, options
     chosen = np.asarray(options[MASK])
     if chosen.shape != (copies,) or chosen.dtype != np.bool_ or not chosen.any():
-        mend = f"give {copies} booleans, one of them true at least"
+        mend = f"give {copies} booleans, at least one of them True"
         raise BadInput(MASK, options[MASK], mend)
     return chosen, {name: value for name, value in options.items() if name != MASK}
 
 
 def copy_seeds(seed: int | Sequence[int | None] | None, copies: int) -> list[int | None]:
-    """Return the seed of every copy, None for one that goes on with its random numbers.
+    """Return the seed of every copy; None if its random numbers continue.
 
     Raises
     ------
     BadInput
-        If they are not whole numbers >= 0, one a copy.
+        If they are not whole numbers >= 0, one per copy.
     """
     if seed is None:
         return [None] * copies
@@ -78,14 +78,14 @@ def copy_seeds(seed: int | Sequence[int | None] | None, copies: int) -> list[int
         first = check.integer("seed", seed, 0)
         return [first + i for i in range(copies)]
     if number_of_rows(seed) != copies:
-        raise BadInput("seed", seed, f"give one number, or {copies}, one a copy")
+        raise BadInput("seed", seed, f"give one number, or {copies}, one per copy")
     return [
         None if one is None else check.integer(f"seed[{i}]", one, 0) for i, one in enumerate(seed)
     ]
 
 
 def number_of_rows(values: Any) -> int | None:
-    """Return the length of what should have one entry a copy, None if it has none."""
+    """Return the length of values that should have one entry per copy; None without a length."""
     try:
         return len(values)
     except TypeError:
@@ -93,47 +93,48 @@ def number_of_rows(values: Any) -> int | None:
 
 
 def stacked(seen: Sequence[Any]) -> Any:
-    """Return the observations of all copies, each array with the copies as its first axis."""
+    """Return the observations of all copies, stacked along a new first axis."""
     if isinstance(seen[0], np.ndarray):
         return np.stack(seen)
     return {name: np.stack([one[name] for one in seen]) for name in seen[0]}
 
 
 MOST_COPIES = 100_000
-"""Most copies; what is above is taken for a slip of the pen."""
+"""Maximum number of copies; a larger number is taken for a typing error."""
 
 Start = tuple[Observation, Info]
 Turn = tuple[Step | None, Start | None]
-"""A copy's step, and the start of its next episode; one of them may be missing."""
+"""Step of a copy, and start of its next episode; one of them may be None."""
 Batch = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
 class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
-    """Copies of one environment that step together, in threads over all cores.
+    """Copies of one environment that step together, in threads on all cores.
 
-    Each copy gives exactly what it would give alone: copy i of `reset(seed=s)` is the environment
-    after `reset(seed=s + i)`. `reset(options={"site": ...})` is for every copy.
+    Each copy returns exactly what it would return alone: after `reset(seed=s)` copy i is identical
+    to the environment after `reset(seed=s + i)`. `reset(options={"site": ...})` applies to every
+    copy.
 
     Parameters
     ----------
     num_envs : int
         Number of copies.
     max_episode_steps : int, optional
-        Steps after which an episode is truncated, as by a TimeLimit.
+        Number of steps after which an episode is truncated, as by a TimeLimit.
     autoreset_mode : AutoresetMode or its value
-        What follows the end of a copy's episode. SAME_STEP: the next begins in the same step, the
-        last observation and info are `final_obs` and `final_info` of the infos. NEXT_STEP: it
-        begins in the next step, whose action for that copy is not read. DISABLED: with
-        `reset(options={"reset_mask": mask})`.
+        What happens after the end of an episode of a copy. SAME_STEP: the next episode begins in
+        the same step, and the last observation and info are `final_obs` and `final_info` of the
+        infos. NEXT_STEP: it begins in the next step, which ignores the action for that copy.
+        DISABLED: it begins on `reset(options={"reset_mask": mask})`.
     record : path, optional
-        Folder for replays; copy i writes into its folder `copy-i`.
+        Folder for replays; copy i writes into its subfolder `copy-i`.
     **keywords
-        Of each copy, see `BarrierDesign` and `BarrierPlacement`.
+        Keywords of each copy, see `BarrierDesign` and `BarrierPlacement`.
 
     Raises
     ------
     BadInput
-        If a keyword is unsound or, in `step`, an action; nothing has changed then.
+        If a keyword or, in `step`, an action is invalid; the environment is then unchanged.
     """
 
     metadata: dict[str, Any] = BarrierEnv.metadata | {"autoreset_mode": AutoresetMode.SAME_STEP}
@@ -166,7 +167,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         self.observation_space = batch_space(first.observation_space, num_envs)
         self._elapsed = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=np.bool_)
-        self._seen: list[Observation] = []  # of every copy, once all have started
+        self._seen: list[Observation] = []  # latest of every copy; empty until all have started
 
     def reset(
         self,
@@ -174,7 +175,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
-        """Start an episode in every copy, or in those of the option `reset_mask`.
+        """Start an episode in every copy, or in those selected by the option `reset_mask`.
 
         Options: `site` as the keyword, for these episodes; `reset_mask`: (num_envs,) booleans.
         """
@@ -185,7 +186,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         return stacked(self._seen), infos
 
     def step(self, actions: NDArray[np.float32]) -> Batch:
-        """Take a step in every copy, (num_envs, width) actions."""
+        """Take a step in every copy; `actions` has shape (num_envs, width)."""
         infos: dict[str, Any] = {}
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), dtype=np.bool_)
@@ -205,19 +206,19 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         options: Sequence[Options] | None = None,
         mask: NDArray[np.bool_] | None = None,
     ) -> dict[int, Start]:
-        """Start an episode in every copy, or in those of a mask; return what each says."""
+        """Start an episode in every copy, or in those of a mask; return observations and infos."""
         seeds = copy_seeds(seed, self.num_envs)
         given = [None] * self.num_envs if options is None else options
         chosen = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
         if len(chosen) < self.num_envs and not self._seen:
-            raise ResetNeeded("call reset() of all copies before that of some")
+            raise ResetNeeded("call reset() for all copies before resetting some of them")
         return self._restart(chosen.tolist(), seeds, given)
 
     def advance(self, actions: NDArray[np.float32]) -> list[Turn]:
-        """Take a step in every copy; return what each says, see `Turn`.
+        """Take a step in every copy; return the results, see `Turn`.
 
-        A copy has no step where its episode ended in the step before (NEXT_STEP), and no start
-        where its episode goes on or is not followed by another at once.
+        The step of a copy is None if its episode had ended in the previous step (NEXT_STEP). Its
+        start is None if its episode continues, or no new one begins immediately.
         """
         rows = self._checked(actions)
         resting = self._ended.copy()
@@ -235,11 +236,11 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         return [(steps.get(i), starts.get(i)) for i in range(self.num_envs)]
 
     def _checked(self, actions: NDArray[np.float32]) -> dict[int, NDArray[np.float64]]:
-        """Return the action of every copy whose episode goes on."""
+        """Return the validated actions of the copies whose episode continues."""
         given = number_of_rows(actions)
         if given != self.num_envs:
             found = actions if given is None else f"{given} rows"
-            raise BadInput("actions", found, f"give {self.num_envs} rows, one a copy")
+            raise BadInput("actions", found, f"give {self.num_envs} rows, one per copy")
         if not self._seen:
             raise ResetNeeded("call reset() before the first step")
         if self.mode is AutoresetMode.DISABLED and self._ended.any():
@@ -255,7 +256,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
     def _restart(
         self, chosen: Sequence[int], seeds: Sequence[int | None], options: Sequence[Options]
     ) -> dict[int, Start]:
-        """Start an episode in some copies; return what each says."""
+        """Start an episode in the chosen copies; return their observations and infos."""
         for i in chosen:
             self.copies[i].draw(seeds[i], options[i])
         sights = [(self.copies[i].problem, self.copies[i].sights) for i in chosen]
@@ -272,17 +273,17 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
             copy.close()
 
     def render(self) -> tuple[Any, ...]:
-        """Return the picture of every copy."""
+        """Return the image of every copy."""
         return tuple(copy.render() for copy in self.copies)
 
 
 class BarrierDesignVector(BarrierVector):
-    """Copies of `BarrierDesign`."""
+    """Vectorised `BarrierDesign`."""
 
     single = BarrierDesign
 
 
 class BarrierPlacementVector(BarrierVector):
-    """Copies of `BarrierPlacement`."""
+    """Vectorised `BarrierPlacement`."""
 
     single = BarrierPlacement

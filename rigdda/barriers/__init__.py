@@ -1,7 +1,7 @@
-"""Protective structures: what a layout is made of.
+"""Protective structures, the elements of a layout.
 
-Walls, gravity walls and fences stand on the ground; ditches and embankments change it; mesh lies on
-the face. The x of each is the chainage where it begins for a block that comes down the slope.
+Walls, gravity walls and fences stand on the ground; ditches and embankments change the ground; mesh
+covers the face. The `x` of a barrier is the chainage of its uphill edge (of mesh: its middle).
 """
 
 from rigdda.barriers.base import Barrier, Earthwork, Standing, section

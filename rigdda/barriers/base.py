@@ -1,4 +1,4 @@
-"""What every barrier has, and what barriers share that stand on the ground."""
+"""Base classes of barriers: `Barrier`, `Earthwork` and `Standing`."""
 
 from __future__ import annotations
 
@@ -25,82 +25,83 @@ Floats = NDArray[np.float64]
 Drawn = Literal["solid", "moving", "line"]
 
 STANDS = "stands"
-"""State of a barrier as it was built."""
+"""State of an intact barrier."""
 
 GONE = ("failed", "overturned", "pushed")
-"""States in which a barrier holds nothing."""
+"""States in which a barrier holds no rock."""
 
 ELEMENT = 5.0
-"""Length of an element along the slope, which acts whole, and the least that is mended [m]."""
+"""Length along the slope of an element, which acts as a unit and is the least that is repaired
+[m]."""
 
 THINNEST, LARGEST = 1e-3, 1e3
-"""Least and greatest length of a barrier [m]: beyond them it is a slip of the pen, and a face that
-thin is lost in rounding."""
+"""Least and greatest length of a barrier [m]. Values beyond them are taken for typing errors, and
+thinner faces would be lost in rounding errors."""
 
 Metres = Annotated[float, about(ge=THINNEST, le=LARGEST)]
 
 
 class Reach(NamedTuple):
-    """Where a barrier holds rock: between two chainages, below a line that rises uphill."""
+    """Region in which a barrier holds rock, between two chainages and below a rising line."""
 
     start: float
     end: float
     top: float
     """Elevation of the line at `end` [m]."""
     rise: float
-    """Rise over run of the line: the steepest surface of a deposit [-]."""
+    """Slope of the line: the steepest surface of a deposit, rise over run [-]."""
 
     def includes(self, x: float, y: float) -> bool:
-        """Return whether a point is there."""
+        """Return whether a point is inside."""
         return self.start <= x < self.end and y < self.top + self.rise * (self.end - x)
 
 
 MIN_HEIGHT = 0.5
-"""Least height of a barrier that is designed, and least depth of a ditch [m]."""
+"""Minimum height of a barrier, and minimum depth of a ditch, in a design [m]."""
 
 STEP = 0.5
-"""Step of heights, depths and widths in a search [m]; of thickness half as much."""
+"""Increment of heights, depths and widths in a search [m]; thickness has half of it."""
 
 TOLERANCE = 1e-9
-"""Rounding that is forgiven at limits: share of the limit, and of 1 [m]."""
+"""Rounding error that is tolerated at limits, relative to the limit or, if larger, 1 [m]."""
 
 NEAR = 0.05
-"""Distance from a bound at which a length lies on it [m]."""
+"""Distance from a bound within which a length counts as being at the bound [m]."""
 
 HEIGHTS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
-"""Heights of barriers of the catalogue of a search [m]."""
+"""Heights of barriers in the catalogue of a search [m]."""
 
 
 class Length(NamedTuple):
-    """A length of a kind of barrier that a design decides."""
+    """A dimension of a kind of barrier that is a design variable."""
 
     field: str
     """Field of the barrier."""
     most: str
-    """Field of the zone that limits it."""
+    """Field of the zone with its greatest value."""
     least: str | None = None
-    """Field of the zone that is its least value; None: `MIN_HEIGHT` in a design."""
+    """Field of the zone with its least value; None: `MIN_HEIGHT` in a design."""
     step: float = STEP
-    """Step in a search [m]."""
+    """Increment in a search [m]."""
 
     def limits(self, zone: BarrierZone) -> tuple[float, float]:
-        """Return the least and the greatest value that the zone allows [m]."""
+        """Return the least and the greatest value that the zone permits [m]."""
         return getattr(zone, self.least) if self.least else 0.0, getattr(zone, self.most)
 
     def range(self, zone: BarrierZone) -> tuple[float, float]:
-        """Return the range in which it is designed [m]."""
+        """Return the range of the design variable [m]."""
         low, high = self.limits(zone)
         return (low if self.least else MIN_HEIGHT), high
 
 
 def at_ends(value: float, low: float, high: float, name: str) -> list[str]:
-    """Return in words whether a length is the least or the greatest."""
+    """Return in words whether a length is at its least or greatest value."""
     found = [f"least {name}"] if value - low <= NEAR else []
     return found + ([f"greatest {name}"] if high - value <= NEAR else [])
 
 
 class MeshPrice(Protocol):
-    """What a mesh costs: its area per metre of road [m2/m] and its price [EUR/m2]."""
+    """Interface of a mesh option with its area per metre of road and its price."""
 
     @property
     def area(self) -> float:
@@ -112,7 +113,7 @@ class MeshPrice(Protocol):
 
 
 class KnownSite(Protocol):
-    """What a barrier needs to know of a site, as `rigdda.Site` knows it."""
+    """Interface of a site as barriers use it; implemented by `rigdda.Site`."""
 
     @property
     def profile(self) -> Terrain:
@@ -123,17 +124,17 @@ class KnownSite(Protocol):
         """Prices of the site."""
 
     def surface_at(self, x: float) -> str:
-        """Return the surface of the ground at a chainage."""
+        """Return the name of the ground surface at a chainage."""
 
     def ditch_side(self, x: float, width: float) -> float:
-        """Return the side slope of a ditch [-]."""
+        """Return the side slope of a ditch, run over rise [-]."""
 
     def mesh(self, name: str) -> MeshPrice:
-        """Return an option of mesh by its name."""
+        """Return a mesh option by its name."""
 
 
 class Subsoil(Protocol):
-    """What a barrier needs to know of a scene to resist thrust: `rigdda.Scene` knows it."""
+    """Interface of a scene for the resistance of barriers; implemented by `rigdda.Scene`."""
 
     @property
     def terrain(self) -> Terrain | None:
@@ -145,41 +146,42 @@ class Subsoil(Protocol):
 
     @property
     def fill(self) -> str:
-        """Surface of embankments."""
+        """Name of the surface of embankments."""
 
     @property
     def barrier_surface(self) -> str:
-        """Surface of barriers."""
+        """Name of the surface of barriers."""
 
     def interface(self, first: str, second: str) -> Surface:
-        """Return how two surfaces meet."""
+        """Return the contact properties of two surfaces."""
 
 
 class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fields=True):
-    """What every barrier has; written as a table with its `kind`.
+    """Base class of barriers; in files a barrier is a table with its `kind`.
 
     Attributes
     ----------
     fails : str
-        Its state when the kernels found that it gave way, by energy or thrust.
+        State after a failure found by the kernels, due to energy or thrust.
     repaired : float
-        Least length that is built anew of one that failed [m].
+        Least length that is rebuilt after a failure [m].
     drawn : str
-        How replays and pictures show it: as a body, as one that moves, or as a line.
+        How replays and images show it: as a fixed body, as a moving body, or as a line.
     designed : bool
-        Whether designers choose it unless they are told which kinds to choose from.
+        Whether designers use the kind by default.
     fallible : bool
         Whether it can fail.
     upkeep : float
-        Upkeep of a kind that the table `Prices.upkeep` does not know [1/year of the capital].
+        Annual maintenance cost as a share of the capital cost if `Prices.upkeep` has no value for
+        the kind [1/year].
     by_friction : bool
         Whether its resistance depends on the friction of the ground.
     steepest : float or None
-        Greatest mean inclination of the ground under it [deg]; None: it stands on any ground.
+        Greatest mean inclination of the ground under it [deg]; None: no limit.
     has_sides : bool
-        Whether its works end where its downhill side meets the ground, not after its extent.
+        Whether its works end where its downhill side meets the ground instead of after `extent`.
     lengths : tuple of Length
-        The lengths that a design decides, its height or depth first, at most two.
+        Its design variables, height or depth first; at most two.
     """
 
     x: Annotated[float, about("Chainage of its uphill face.", "m")]
@@ -199,91 +201,96 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
 
     @property
     def end(self) -> float:
-        """Chainage beyond which a block has passed it [m]."""
+        """Chainage beyond which a block has passed the barrier [m]."""
         raise NotImplementedError
 
     @property
     def extent(self) -> float:
-        """Length that it takes up along the slope, on level ground [m]."""
+        """Length along the slope, on level ground [m]."""
         raise NotImplementedError
 
     @property
     def elongation_path(self) -> float:
-        """Distance downhill that it needs to give way [m]."""
+        """Clear distance downhill that it needs for its deflection [m]."""
         return 0.0
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
-        """Return what it costs to build at the height of the road [EUR per metre of road].
+        """Return the capital cost without the surcharge for height [EUR per metre of road].
 
-        `outline`: what an earthwork moves, (n, 2) [m].
+        Parameters
+        ----------
+        site : KnownSite
+            The site with its prices.
+        outline : (n, 2) array or None
+            Corners of the soil that an earthwork moves [m].
         """
         raise NotImplementedError
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
-        """Return the thrust that it bears, standing as `outline` [N/m]; inf: none moves it."""
+        """Return the thrust that it resists, standing as `outline` [N/m]; inf if it cannot move."""
         return math.inf
 
     def changes(self, times: Floats, poses: Floats, failure: float) -> list[tuple[float, str]]:
-        """Return when it came into which state: by its poses at times, or failure, in [s]."""
+        """Return the times [s] and new states of its changes, from poses or failure time [s]."""
         return [(failure, self.fails)] if math.isfinite(failure) else []
 
     def holds(self, outline: Floats, ground: Terrain | None, rise: float) -> Reach:
-        """Return where it holds rock, standing as `outline`, with a deposit that rises so."""
+        """Return the region in which it holds rock with deposits of slope `rise`."""
         return Reach(-math.inf, float(outline[:, 0].min()), float(outline[:, 1].max()), rise)
 
     def left_height(self, displacement: float) -> float:
-        """Return the height that is left after it has moved so far [m]."""
+        """Return the remaining height after a displacement [m]."""
         raise NotImplementedError
 
     def area_beyond(self, x: float, outline: Floats) -> float:
-        """Return its area that came to lie beyond a chainage, as `outline` at the end [m2]."""
+        """Return its area beyond a chainage, given its final `outline` [m2]."""
         return 0.0
 
     def idle_resistance(self, other: Barrier, resistance: float) -> float:
-        """Return the thrust that it bears [N/m], by that of one for another width.
+        """Return the thrust that it resists, scaled from that of `other` [N/m].
 
-        Both stand in the same place.
+        `other` is the same barrier at the same place, but for another width of event.
         """
         return resistance
 
     def sizes(self, metres: Callable[[float], str]) -> str:
-        """Return its sizes in words; `metres` writes a length."""
+        """Return its dimensions in words; `metres` formats a length."""
         raise NotImplementedError
 
     @property
     def label(self) -> str:
-        """Kind, class and main size in words, as the label of a picture."""
+        """Kind, class and main dimension in words, for the label in an image."""
         raise NotImplementedError
 
     def order(self, road: float) -> tuple[str, str]:
-        """Return what an order says of it beside `label`: more of its sizes, and more of its place.
+        """Return what a specification adds to `label`: dimensions and notes on the location.
 
         `road` is the chainage of the uphill edge of the road [m].
         """
         return "", ""
 
-    # What designs decide of it, and where it may be built.
+    # Design variables and siting.
 
     def works(self, ground: Terrain) -> tuple[float, float]:
-        """Return the chainages between which it takes up the natural ground [m]."""
+        """Return the chainages between which it occupies the natural ground [m]."""
         return self.x, self.x + self.extent
 
     def check_design(self, where: str, site: KnownSite) -> None:
-        """Check what the rules of design say of its kind beside the limits of the zone.
+        """Check the design rules of its kind, in addition to the limits of the zone.
 
         Raises
         ------
         BadInput
-            If it may not be built; the message begins with `where`.
+            If it breaks a rule; the message begins with `where`.
         """
 
     def placed(self, x: float, site: KnownSite, zone: BarrierZone) -> Self | None:
-        """Return it at another chainage with the sizes that it needs there; None if it cannot."""
+        """Return it at another chainage with the sizes required there; None if impossible."""
         return msgspec.structs.replace(self, x=x)
 
     @classmethod
     def of_shares(cls, zone: BarrierZone, x: float, first: float, second: float) -> Self:
-        """Return one at a chainage, its lengths at shares of their ranges, from 0 to 1."""
+        """Return a barrier whose dimensions are given as shares of their ranges, from 0 to 1."""
         sizes = {}
         for length, share in zip(cls.lengths, (first, second), strict=False):
             low, high = length.range(zone)
@@ -291,48 +298,48 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
         return cls(x=x, **sizes)
 
     def shares(self, zone: BarrierZone) -> tuple[float, float]:
-        """Return at which shares of their ranges its lengths are, as `of_shares` takes them."""
+        """Return its dimensions as shares of their ranges; the inverse of `of_shares`."""
         found = [share_of(getattr(self, n.field), *n.range(zone)) for n in self.lengths]
         first, second, *_ = [*found, 0.5, 0.5]
         return first, second
 
     @classmethod
     def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
-        """Yield barriers of every size that a search tries first, at the start of the zone."""
+        """Yield barriers of the sizes that a search tries first, at the start of the zone."""
         raise NotImplementedError
 
     def bounds(self, zone: BarrierZone) -> dict[str, tuple[float, float]]:
-        """Return the range of each length in a search [m]."""
+        """Return the range of each dimension in a search [m]."""
         return {length.field: length.range(zone) for length in self.lengths}
 
     def resized(self, name: str, value: float, zone: BarrierZone) -> Self:
-        """Return it with another length, within its range."""
+        """Return it with one dimension changed, clipped to its range."""
         low, high = self.bounds(zone)[name]
         return msgspec.structs.replace(self, **{name: min(max(value, low), high)})
 
     def varied(self, level: int, zone: BarrierZone) -> Iterator[Self]:
-        """Yield it with each length longer and shorter by so many steps."""
+        """Yield it with each dimension reduced and increased by `level` increments."""
         for length in self.lengths:
             for way in (-level, level):
                 value = max(getattr(self, length.field) + way * length.step, MIN_HEIGHT)
                 yield self.resized(length.field, value, zone)
 
     def thickest(self, zone: BarrierZone) -> Self:
-        """Return it as thick as the zone allows."""
+        """Return it with the greatest thickness that the zone permits."""
         return self
 
     @property
     def numbers(self) -> list[float]:
-        """What a search compares barriers of its kind by: its chainage and sizes."""
+        """Chainage and sizes by which a search compares barriers of the same kind."""
         return [self.x, *(getattr(self, length.field) for length in self.lengths[:1])]
 
     @property
     def size(self) -> float:
-        """How large it is among those of its kind."""
+        """Measure of size among barriers of its kind."""
         return float(getattr(self, self.lengths[0].field)) if self.lengths else 0.0
 
     def sizes_at_bounds(self, zone: BarrierZone) -> list[str]:
-        """Return in words which of its sizes are the least or the greatest."""
+        """Return in words which of its dimensions are at their least or greatest value."""
         found = []
         for name, (low, high) in self.bounds(zone).items():
             found += at_ends(getattr(self, name), low, high, name)
@@ -340,15 +347,15 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
 
     @property
     def kind(self) -> str:
-        """Name of the kind, as in layout files."""
+        """Name of the kind in layout files."""
         return str(type(self).__struct_config__.tag)
 
     def for_width(self, width: float) -> Self:
-        """Return it as it resists, per metre, an event of this width [m]."""
+        """Return an equivalent barrier per metre that resists an event of this width [m]."""
         return self
 
     def _with(self, **values: float | None) -> Self:
-        """Return it with other values, which are known to be sound and are not checked."""
+        """Return a copy with other, valid values, which are not checked."""
         other = copy.copy(self)
         for name, value in values.items():
             msgspec.structs.force_setattr(other, name, value)
@@ -361,7 +368,7 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
 
 
 def share_of(value: float, low: float, high: float) -> float:
-    """Return at which share of a range a value is; 0.5 of an empty range."""
+    """Return the position of a value in a range as a share; 0.5 for an empty range."""
     return (value - low) / (high - low) if high > low else 0.5
 
 
@@ -369,9 +376,9 @@ class Earthwork(Barrier, frozen=True):
     """A barrier that changes the ground."""
 
     def build(self, ground: Terrain, surface: str) -> tuple[Floats, Terrain]:
-        """Return the (n, 2) corners of what it moves of `ground`, and the ground with it.
+        """Return the (n, 2) corners of the soil moved from or onto `ground`, and the new ground.
 
-        `surface` names that of a fill.
+        `surface` names the surface of a fill.
 
         Raises
         ------
@@ -382,14 +389,14 @@ class Earthwork(Barrier, frozen=True):
 
 
 def section(outline: Floats) -> float:
-    """Return the area of an outline [m2], in whichever direction it is walked."""
+    """Return the area of an outline [m2], independent of its orientation."""
     return abs(polygon_properties(outline)[0])
 
 
 def base_friction(scene: Subsoil, density: float, own: str, outline: Floats) -> float:
-    """Return weight times friction of what stands on the ground as an outline [N/m].
+    """Return the sliding resistance of a body on the ground: weight times base friction [N/m].
 
-    The friction is the least of its surface, `own`, on those under it.
+    The friction is the least between its surface `own` and the surfaces under it.
     """
     assert scene.terrain is not None
     below = surfaces_below(scene.terrain, outline)
@@ -398,7 +405,7 @@ def base_friction(scene: Subsoil, density: float, own: str, outline: Floats) -> 
 
 
 def surfaces_below(terrain: Terrain, outline: Floats) -> list[str]:
-    """Return the names of the surfaces of the terrain below an outline, each segment's."""
+    """Return the surface name of each terrain segment below an outline."""
     low, high = outline[:, 0].min(), outline[:, 0].max()
     extents = (sorted(ends) for ends in pairwise(terrain.points[:, 0]))
     return [
@@ -409,25 +416,25 @@ def surfaces_below(terrain: Terrain, outline: Floats) -> list[str]:
 
 
 def sliding_resistance(gravity: float, density: float, area: float, friction_deg: float) -> float:
-    """Return the thrust that slides a body over level ground [N/m].
+    """Return the thrust at which a body slides on level ground [N/m].
 
-    Its weight times the coefficient of friction, for gravity [m/s2], density [kg/m3], area [m2] and
-    angle of friction [deg].
+    It is the weight times the coefficient of friction, for gravity [m/s2], density [kg/m3], area
+    [m2] and friction angle [deg].
     """
     return gravity * density * area * math.tan(math.radians(friction_deg))
 
 
 FOUNDATION = 1.0
-"""Depth to which walls and fences reach below the lowest ground under them [m]."""
+"""Depth of the foundations of walls and fences below the lowest ground under them [m]."""
 
 
 SLENDER = 0.4
-"""Least thickness over height of a gravity wall [-]: it stands by its weight, also in the wind and
-on ground that gives."""
+"""Least ratio of thickness to height of a gravity wall [-], for stability under its own weight,
+wind and settlement of the ground."""
 
 
 class Standing(Barrier, frozen=True):
-    """A barrier that stands on the ground: two vertical faces and a level top."""
+    """A barrier that stands on the ground, with two vertical faces and a level top."""
 
     height: Annotated[Metres, about("Height above the highest ground under it.", "m")]
     lengths: ClassVar[tuple[Length, ...]] = (
@@ -437,17 +444,17 @@ class Standing(Barrier, frozen=True):
 
     @property
     def thickness(self) -> float:
-        """Extent downhill of `x` [m], a field of every kind."""
+        """Extent downhill of `x` [m]; a field of every subclass."""
         raise NotImplementedError
 
     @property
     def end(self) -> float:
-        """Chainage beyond which a block has passed it where it stood at the start [m]."""
+        """Chainage beyond which a block has passed its original position [m]."""
         return self.x + self.thickness
 
     @property
     def extent(self) -> float:
-        """Length that it takes up along the slope, on level ground [m]."""
+        """Length along the slope, on level ground [m]."""
         return self.thickness
 
     def left_height(self, displacement: float) -> float:
@@ -461,14 +468,14 @@ class Standing(Barrier, frozen=True):
 
     @classmethod
     def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
-        """Yield barriers of every height, as thick as a wall that stands by its weight."""
+        """Yield barriers of every height, with the least thickness of a gravity wall."""
         for height in (h for h in HEIGHTS if h <= zone.max_height):
             thick = min(max(round(SLENDER * height, 1), zone.min_thickness), zone.max_thickness)
             sizes = {"height": height, "thickness": thick}
             yield cls(x=zone.start, **sizes)
 
     def outline(self, ground: Terrain) -> Floats:
-        """Return the (4, 2) corners, the foot in `ground`.
+        """Return the (4, 2) corners, with the foot in `ground`.
 
         Raises
         ------
@@ -480,7 +487,7 @@ class Standing(Barrier, frozen=True):
         return np.array([[x[0], foot], [x[-1], foot], [x[-1], top], [x[0], top]])
 
     def _under(self, ground: Terrain) -> tuple[Floats, Floats]:
-        """Return chainages and elevations of the ground's corners under it, its faces included."""
+        """Return chainages and elevations of the ground under it, at corners and at its faces."""
         inner = {float(x) for x in ground.points[:, 0] if self.x < x < self.end}
         x = np.array([self.x, *sorted(inner), self.end])
         try:

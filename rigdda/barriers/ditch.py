@@ -1,4 +1,4 @@
-"""A ditch, cut into the ground."""
+"""Ditch, cut into the ground."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
 MIN_FLOOR = 1.0
-"""Least width of the floor of a ditch that is designed [m]: a machine empties it, and what falls
-into a notch stops it up."""
+"""Minimum width of the floor of a designed ditch [m]. A machine must be able to empty it, and rock
+would clog a V-shaped notch."""
 
 DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
-"""Depths and widths of ditches of the catalogue of a search [m]."""
+"""Depths and widths of ditches in the catalogue of a search [m]."""
 
 
 @documented
@@ -69,13 +69,13 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
 
     @property
     def extent(self) -> float:
-        """Length that it takes up along the slope [m]."""
+        """Length along the slope [m]."""
         return self.width
 
     def build(self, ground: Terrain, surface: str) -> tuple[Floats, Terrain]:
-        """Return the (n, 2) corners of what is dug out of `ground`, and the ground with it.
+        """Return the (n, 2) corners of the cut in `ground`, and the new ground.
 
-        `surface`, that of a fill, is not used.
+        `surface`, which names the surface of fills, is ignored.
 
         Raises
         ------
@@ -92,16 +92,16 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
             raise BadInput(
                 "ditch width",
                 self.width,
-                f"give more than {least:g}, or less depth: its sides meet above its floor",
+                f"give more than {least:g}, or less depth: its sides meet above the floor",
             )
         line = np.array([[left, high], [first, floor], [last, floor], [right, low]])
         return regrade("ditch x", ground, line, np.minimum, None)
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
-        """Return the price at the height of the road, by the surface of what is dug [EUR/m].
+        """Return the cost of the excavation without the surcharge for height [EUR/m].
 
-        `outline` has the new ground from left to right, then the old one back, see
-        `rigdda.barriers.grading.regrade`.
+        Each ground surface has its own price. `outline` has the new ground from left to right,
+        followed by the old ground in reverse, see `rigdda.barriers.grading.regrade`.
         """
         assert outline is not None
         prices = site.prices.ditch
@@ -116,30 +116,36 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
         return site.prices.ditch_base + float(dug)
 
     def left_height(self, displacement: float) -> float:
-        """Return 0: it has none [m]."""
+        """Return 0: a ditch has no height [m]."""
         return 0.0
 
     def holds(self, outline: Floats, ground: Terrain | None, rise: float) -> Reach:
-        """Return that it holds what lies between its edges, below a deposit that it stops."""
+        """Return the region between its edges, below the surface of a deposit that it stops."""
         assert ground is not None
         return Reach(self.x, self.end, ground.height(self.end), rise)
 
     @property
     def label(self) -> str:
-        """Kind and sizes in words."""
+        """Kind and dimensions in words."""
         return f"ditch {self.depth:.1f} m deep, {self.width:.1f} m wide"
 
     def check_design(self, where: str, site: KnownSite) -> None:
-        """Check that its sides stand in the ground. Raises as that of `Barrier`."""
+        """Check that its sides are flat enough to be stable.
+
+        Raises
+        ------
+        BadInput
+            If they are too steep; the message begins with `where`.
+        """
         least = site.ditch_side(self.x, self.width)
         if self.side_slope < least - TOLERANCE:
-            mend = f"give at least {least:g}, at which a cut in this ground stands"
+            mend = f"give at least {least:g}, the stable side slope of a cut in this ground"
             raise BadInput(f"{where}.side_slope", self.side_slope, mend)
 
     def placed(self, x: float, site: KnownSite, zone: BarrierZone) -> Self | None:
-        """Return it at another chainage with the sides that it needs there.
+        """Return it at another chainage with the side slope required there.
 
-        It is as deep as these sides allow; None if that is less than `MIN_HEIGHT`.
+        The depth is limited by these sides; returns None if it would be less than `MIN_HEIGHT`.
         """
         high, low = np.interp(np.array([x, x + self.width]), *site.profile.points.T).tolist()
         side = site.ditch_side(x, self.width)
@@ -151,7 +157,7 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
 
     @classmethod
     def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
-        """Yield ditches of every depth and width that the zone allows."""
+        """Yield ditches of every depth and width that the zone permits."""
         for depth in DEPTHS:
             for width in WIDTHS:
                 if depth <= zone.max_depth and zone.min_width <= width <= zone.max_width:
@@ -168,5 +174,5 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
         return self.depth * self.width
 
     def sizes(self, metres: Callable[[float], str]) -> str:
-        """Return its sizes in words."""
+        """Return its dimensions in words."""
         return f"{metres(self.depth)} deep, {metres(self.width)} wide"

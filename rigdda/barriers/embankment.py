@@ -1,4 +1,4 @@
-"""A dam of earth, raised on the ground."""
+"""Embankment of compacted soil on the ground."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
 CREST = 1.0
-"""Least width of the crest of an embankment in a search [m]: a machine builds it from above."""
+"""Minimum width of the crest of an embankment in a search [m], so that a machine can build it."""
 
 
 @documented
 class Embankment(Earthwork, frozen=True, tag="embankment"):
-    """A dam of earth with a level crest, raised on the terrain.
+    """An embankment of compacted soil with a level crest, raised on the terrain.
 
-    Its surface is "soil" where the scene defines it, else that of the other barriers. If the thrust
-    of what lies and strikes on it, as a mean over a second, exceeds its weight times the friction
-    of its base, it is pushed away, and gone.
+    Its surface is "soil" if the scene defines it, otherwise that of the other barriers. If the
+    thrust of resting and impacting rock, averaged over one second, exceeds its weight times its
+    base friction, it is pushed away and has no further effect.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
     side_slope: Annotated[
         float,
         about(
-            "Run over rise of its sides; 0.5 is usual for reinforced earth. The downhill side ends "
+            "Run over rise of its sides; 0.5 is usual for reinforced soil. The downhill side ends "
             "where it meets the ground.",
             "-",
             ge=LEAST_SLOPE,
@@ -59,7 +59,7 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         ),
     ] = 0.5
     density: Annotated[
-        float, about("Density of the earth; 1900 is compacted soil.", "kg/m3", gt=0.0)
+        float, about("Density of the fill; 1900 for compacted soil.", "kg/m3", gt=0.0)
     ] = 1900.0
     fails: ClassVar[str] = "pushed"
     fallible: ClassVar[bool] = True
@@ -72,10 +72,9 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
     )
 
     def for_width(self, width: float) -> Self:
-        """Return the embankment that resists what is so wide [m].
+        """Return an equivalent embankment for an event of this width [m].
 
-        It resists over the width and its height on either side, into which the load spreads at 45
-        degrees.
+        The load spreads at 45 degrees, so that the width plus the height on either side resists.
         """
         factor = (width + 2.0 * self.height) / width
         return self._with(density=self.density * factor)
@@ -87,13 +86,13 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
 
     @property
     def extent(self) -> float:
-        """Length that it takes up along the slope, on level ground [m]."""
+        """Length along the slope, on level ground [m]."""
         return 2.0 * self.side_slope * self.height + self.width
 
     def build(self, ground: Terrain, surface: str) -> tuple[Floats, Terrain]:
-        """Return the (n, 2) corners of what is filled in on `ground`, and the ground with it.
+        """Return the (n, 2) corners of the fill on `ground`, and the new ground.
 
-        `surface` names that of the fill.
+        `surface` names the surface of the fill.
 
         Raises
         ------
@@ -117,7 +116,7 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         corners = ground.points
         ahead = corners[corners[:, 0] > self.end, 0]
         for x in ahead:
-            # ordered along the chain: span refuses what turns back before the side meets it
+            # span raises if the ground turns back before the side meets it
             piece = span("embankment x", ground, self.end, float(x))
             over = top - (piece[:, 0] - self.end) / self.side_slope - piece[:, 1]
             if over[-1] <= 0.0:
@@ -128,25 +127,25 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         raise BadInput(
             "embankment x",
             self.x,
-            "put it where the ground is flatter than its side, which does not meet the ground",
+            "put it where the ground is flatter than its downhill side, which must meet the ground",
         )
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
-        """Return the price at the height of the road, that of its fill [EUR/m]."""
+        """Return the cost of its fill without the surcharge for height [EUR/m]."""
         assert outline is not None
         return site.prices.embankment * section(outline)
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
-        """Return its weight times the friction of its base [N/m]."""
+        """Return its weight times its base friction [N/m]."""
         return base_friction(scene, self.density, scene.fill, outline)
 
     def idle_resistance(self, other: Barrier, resistance: float) -> float:
-        """Return the thrust that it bears, in proportion to its weight [N/m]."""
+        """Return the thrust that it resists, in proportion to its weight [N/m]."""
         assert isinstance(other, Embankment)
         return resistance * self.density / other.density
 
     def holds(self, outline: Floats, ground: Terrain | None, rise: float) -> Reach:
-        """Return what it holds: its uphill side belongs to it."""
+        """Return the region in which it holds rock, which includes its uphill side."""
         usual = super().holds(outline, ground, rise)
         return usual._replace(end=usual.end + self.side_slope * self.height)
 
@@ -164,9 +163,10 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         return f"crest {self.width:.1f} m wide", ""
 
     def works(self, ground: Terrain) -> tuple[float, float]:
-        """Return the chainages up to which it takes up the natural ground [m].
+        """Return the chainages between which it occupies the natural ground [m].
 
-        Up to where its downhill side meets the ground; to the end of the ground if it does not.
+        It ends where its downhill side meets the ground, or at the end of the ground if it does
+        not.
         """
         along, level = ground.points.T
         top = float(np.interp(np.array([self.x]), along, level)[0]) + self.height
@@ -174,7 +174,7 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         x = np.concatenate([[self.end], along[ahead]])
         y = np.concatenate([np.interp(x[:1], along, level), level[ahead]])
         over = top - (x - self.end) / self.side_slope - y
-        k = int(np.argmax(over <= 0.0))  # the first corner below which the side is
+        k = int(np.argmax(over <= 0.0))  # first corner at or above the side
         if over[k] > 0.0:
             return self.x, float(x[-1])
         if k == 0:
@@ -184,7 +184,7 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
 
     @classmethod
     def least_crest(cls, zone: BarrierZone) -> float:
-        """Return the least width of the crest in a search [m]."""
+        """Return the minimum width of the crest in a search [m]."""
         return min(max(CREST, zone.min_thickness), zone.max_thickness)
 
     @classmethod
@@ -194,13 +194,13 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         yield from (cls(zone.start, h, crest) for h in HEIGHTS if h <= zone.max_height)
 
     def bounds(self, zone: BarrierZone) -> dict[str, tuple[float, float]]:
-        """Return the range of its height and of the width of its crest in a search [m]."""
+        """Return the ranges of its height and crest width in a search [m]."""
         return super().bounds(zone) | {"width": (self.least_crest(zone), zone.max_thickness)}
 
     def thickest(self, zone: BarrierZone) -> Self:
-        """Return it with the widest crest that the zone allows."""
+        """Return it with the widest crest that the zone permits."""
         return msgspec.structs.replace(self, width=zone.max_thickness)
 
     def sizes(self, metres: Callable[[float], str]) -> str:
-        """Return its sizes in words."""
+        """Return its dimensions in words."""
         return f"{metres(self.height)} high, crest {metres(self.width)} wide"

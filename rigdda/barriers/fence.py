@@ -1,4 +1,4 @@
-"""A flexible fence."""
+"""Flexible rockfall fence."""
 
 from __future__ import annotations
 
@@ -29,33 +29,34 @@ from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
 PANEL = 10.0
-"""Length of a panel of a fence along the slope, which acts whole [m]."""
+"""Length of a fence panel along the slope, which acts as a unit [m]."""
 
 LOST = 0.5
-"""Share of its height that a fence has lost when its elongation is spent [-]: after an impact of
-its class at least half is left (EAD 340059, class A)."""
+"""Share of its height that a fence loses at full elongation [-]: at least half of the height must
+remain after an impact of its class (EAD 340059, class A)."""
 
 MASS = 6.0
-"""Mass of net and ropes, which move with the rock, per area of a fence [kg/m2], from memory."""
+"""Mass per area of the net and the ropes that move with the rock [kg/m2]; an estimate without a
+source."""
 
 LEAST_CAPACITY, WEAK = 1e3, 1e4
-"""Capacities of a fence below which it is refused, and a warning is given [J/m]: a block of 50 kg
-at 6 m/s and one of 500 kg, 0.5 m wide, at 4.5 m/s."""
+"""Capacities of a fence below which it is rejected or causes a warning [J/m]. They correspond to a
+block of 50 kg at 6 m/s and to one of 500 kg at 4.5 m/s, both 0.5 m wide."""
 
 
 SHORTEST = 0.05
-"""Least elongation of a fence [m]."""
+"""Minimum elongation of a fence [m]."""
 
 
 class FenceClass(NamedTuple):
-    """What fences of an energy class are like."""
+    """Properties of the fences of an energy class."""
 
     lowest: float
-    """Least height that is made [m]: a lower one costs as much."""
+    """Minimum height on the market [m]; a lower fence costs the same."""
     height: float
-    """Greatest height [m]."""
+    """Maximum height [m]."""
     elongation: float
-    """Distance downhill over which it stops an impact of its energy [m]."""
+    """Deflection downhill in an impact of its energy [m]."""
 
 
 FENCE_CLASSES = {
@@ -69,8 +70,8 @@ FENCE_CLASSES = {
     5000: FenceClass(5.0, 7.0, 7.5),
     8500: FenceClass(6.0, 8.0, 9.0),
 }
-"""Fences on the market by the energy of the impact that they stop [kJ], as EAD 340059 classifies
-kits; heights and elongations are orders of magnitude, from memory."""
+"""Fences on the market by impact energy [kJ], following the classification of kits in EAD 340059.
+Heights and elongations are orders of magnitude without a source."""
 
 
 CLASSES = tuple(FENCE_CLASSES)
@@ -84,18 +85,18 @@ Elongation = Annotated[float, about(ge=SHORTEST)]
 class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     """A flexible fence, which brakes rock with a constant force over its elongation.
 
-    It stands still until it is pushed downhill with more than capacity / elongation, by a blow or
-    by what lies against it. Then it gives way against that force, and so takes that force times
-    its path. Its top sinks in proportion, by half when its elongation is spent. Then it fails, and
-    what is left of the energy goes on with the blocks. Impacts on it are plastic whatever its
-    surface and without friction, and the mass of its net moves with the rock. What pushes it uphill
-    does not move it.
+    It does not move until the force of an impact or of resting rock exceeds capacity / elongation
+    in the downhill direction. It then deflects at this constant force and absorbs the force times
+    the deflection. Its top sinks in proportion, to half the height at full elongation. The fence
+    then fails, and the blocks continue with the remaining energy. Impacts on it are plastic and
+    frictionless regardless of its surface, and the mass of its net moves with the rock. Uphill
+    forces do not move it.
 
     Raises
     ------
     BadInput
-        If a value is of the wrong type or outside its range, the height is more than its
-        class has, or there is not either a capacity or a class.
+        If a value is of the wrong type or outside its range, the height exceeds that of its class,
+        or not exactly one of capacity and class is given.
 
     Warns
     -----
@@ -114,8 +115,8 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     energy_class: Annotated[
         int | None,
         about(
-            "Energy class of a certified fence. `for_width` gives the capacity that it has in "
-            "a scene.",
+            "Energy class of a certified fence. `for_width` converts it to the capacity in a "
+            "scene.",
             "kJ",
             choices=FENCE_CLASSES,
         ),
@@ -124,8 +125,8 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     elongation: Annotated[
         Elongation | None,
         about(
-            "Distance over which it absorbs its capacity. The default is that of its class or, "
-            "with a capacity, of the next class with a panel of 10 m.",
+            "Distance over which it absorbs its capacity. The default is that of its class; if "
+            "`capacity` is given, that of the lowest class with this capacity on a 10 m panel.",
             "m",
         ),
     ] = None
@@ -137,31 +138,32 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         super().__post_init__()
         if (self.capacity is None) == (self.energy_class is None):
             given = (self.capacity, self.energy_class)
-            raise BadInput("fence capacity, energy_class", given, "give one of them")
+            raise BadInput("fence capacity, energy_class", given, "give exactly one of them")
         if self.capacity is None:
             self._check_class()
         elif self.elongation is None:
             msgspec.structs.force_setattr(self, "elongation", _usual_elongation(self.capacity))
         if self.capacity is not None and self.capacity < WEAK:
-            told = f"fence capacity = {self.capacity:g}: is it meant? It is in J per metre"
+            told = f"fence capacity = {self.capacity:g}: check the unit, J per metre of road"
             warnings.warn(told, DoubtfulInput, stacklevel=3)
 
     def _check_class(self) -> None:
-        """Check the height, and set the elongation."""
+        """Check the height and the elongation, and set the elongation."""
         assert self.energy_class is not None
         found = FENCE_CLASSES[self.energy_class]
         if self.height > found.height:
             mend = f"give at most {found.height:g} m, or a higher class than {self.energy_class} kJ"
             raise BadInput("fence height", self.height, mend)
         if self.elongation not in (None, found.elongation):
-            mend = f"leave it out: of {self.energy_class} kJ it is {found.elongation:g} m"
+            mend = f"leave it out: it is {found.elongation:g} m for {self.energy_class} kJ"
             raise BadInput("fence elongation", self.elongation, mend)
         msgspec.structs.force_setattr(self, "elongation", found.elongation)
 
     def for_width(self, width: float) -> Self:
-        """Return the fence of a scene that is so wide [m]: its class a metre, at most of a panel.
+        """Return the fence for a scene of this width [m], with a capacity instead of a class.
 
-        One of given capacity is itself.
+        The capacity is the class energy divided by the width, or by the panel length if that is
+        less. A fence with a given capacity is returned unchanged.
         """
         if self.energy_class is None:
             return self
@@ -170,12 +172,12 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
 
     @property
     def elongation_path(self) -> float:
-        """Its elongation, the distance downhill that it needs to give way [m]."""
+        """Its elongation: the clear distance downhill that it needs for its deflection [m]."""
         assert self.elongation is not None  # set at the start
         return self.elongation
 
     def outline(self, ground: Terrain) -> Floats:
-        """Return the (4, 2) corners, the foot below all ground over which it may give way.
+        """Return the (4, 2) corners, with the foot below all ground that the fence may sweep over.
 
         Raises
         ------
@@ -192,29 +194,29 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         return corners
 
     def left_height(self, displacement: float) -> float:
-        """Return its height after it has given way so far [m]."""
+        """Return its height after a deflection [m]."""
         return self.height - self.sag * displacement
 
     @property
     def sag(self) -> float:
-        """Height that it loses by what it gives way [-]."""
+        """Loss of height per deflection [-]."""
         assert self.elongation is not None  # set at the start
         return LOST * self.height / self.elongation
 
     @property
     def braking_force(self) -> float:
-        """Force against which it gives way [N/m], inf for a class whose width is not known."""
+        """Force at which it deflects [N/m]; inf for a class without a known width."""
         assert self.elongation is not None  # set at the start
         return self.capacity / self.elongation if self.capacity is not None else math.inf
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
-        """Return the force against which it gives way [N/m]."""
+        """Return the force at which it deflects [N/m]."""
         return self.braking_force
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
-        """Return the price at the height of the road [EUR/m], with its foundations.
+        """Return the capital cost without the surcharge for height, with foundations [EUR/m].
 
-        One that is lower than any of its class costs as much as the lowest.
+        A fence lower than the minimum height of its class costs as much as one of that height.
         """
         if self.energy_class is None:
             mend = "give an energy_class instead: only a certified fence has a price"
@@ -226,12 +228,12 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         return prices.fence[name] * height + prices.fence_base
 
     def idle_resistance(self, other: Barrier, resistance: float) -> float:
-        """Return the force against which it gives way [N/m]."""
+        """Return the force at which it deflects [N/m]."""
         return self.braking_force
 
     @property
     def strength(self) -> str:
-        """What it withstands, in words: its energy class, or its capacity per metre."""
+        """Its energy class, or its capacity per metre, in words."""
         if self.energy_class is not None:
             return f"{self.energy_class:,g} kJ"
         assert self.capacity is not None
@@ -243,50 +245,58 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         return f"fence {self.strength}, {self.height:.1f} m high"
 
     def order(self, road: float) -> tuple[str, str]:
-        """Return how far it gives way, and what is left to the road, in words."""
+        """Return its deflection and the remaining clearance to the road in words."""
         clear = road - self.end - self.elongation_path
-        told = f"; it gives way by {self.elongation_path:.1f} m, to {clear:.1f} m from the road"
+        told = (
+            f"; it deflects by up to {self.elongation_path:.1f} m, to {clear:.1f} m from the road"
+        )
         return "", told
 
     @property
     def rated(self) -> int:
-        """Its energy class [kJ], of a fence that is designed: it has one."""
+        """Its energy class [kJ]; every designed fence has one."""
         assert self.energy_class is not None
         return self.energy_class
 
     def check_design(self, where: str, site: KnownSite) -> None:
-        """Check that it has an energy class. Raises as that of `Barrier`."""
+        """Check that it has an energy class.
+
+        Raises
+        ------
+        BadInput
+            If it has none; the message begins with `where`.
+        """
         if self.energy_class is None:
             mend = "give its energy class instead of a capacity"
             raise BadInput(f"{where}.capacity", self.capacity, mend)
 
     @classmethod
     def of_shares(cls, zone: BarrierZone, x: float, first: float, second: float) -> Self:
-        """Return one at a chainage: its height and its energy class by shares from 0 to 1."""
+        """Return a fence whose height and energy class are given by shares from 0 to 1."""
         energy_class = CLASSES[min(int(second * len(CLASSES)), len(CLASSES) - 1)]
         tall = MIN_HEIGHT + first * (tallest(zone) - MIN_HEIGHT)
         return cls(x, min(tall, FENCE_CLASSES[energy_class].height), energy_class=energy_class)
 
     def shares(self, zone: BarrierZone) -> tuple[float, float]:
-        """Return the shares of its height, and of its energy class, the middle of its part."""
+        """Return the shares of its height and of its energy class (the middle of its interval)."""
         size = (CLASSES.index(self.rated) + 0.5) / len(CLASSES)
         return share_of(self.height, MIN_HEIGHT, tallest(zone)), size
 
     @classmethod
     def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
-        """Yield fences of every class and every height that is made of it."""
+        """Yield fences of every class and of every height on the market."""
         for name, row in FENCE_CLASSES.items():
             for height in (h for h in HEIGHTS if h <= zone.max_height):
                 if row.lowest <= height <= row.height:
                     yield cls(zone.start, height, energy_class=name)
 
     def bounds(self, zone: BarrierZone) -> dict[str, tuple[float, float]]:
-        """Return the range of the height that is made of its class [m]."""
+        """Return the range of heights on the market for its class [m]."""
         row = FENCE_CLASSES[self.rated]
         return {"height": (row.lowest, min(zone.max_height, row.height))}
 
     def varied(self, level: int, zone: BarrierZone) -> Iterator[Self]:
-        """Yield it higher and lower, and of the classes so many steps above and below."""
+        """Yield it higher and lower, and with the classes `level` steps above and below."""
         yield from super().varied(level, zone)
         at = CLASSES.index(self.rated)
         for other in (at - level, at + level):
@@ -306,9 +316,9 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         return self.rated * self.height
 
     def sizes_at_bounds(self, zone: BarrierZone) -> list[str]:
-        """Return in words whether its height or its class is the least or the greatest.
+        """Return in words whether its height or class is the least or the greatest.
 
-        The greatest height of its class does not count: the next class is higher.
+        The greatest height of its class does not count, because the next class may be higher.
         """
         found = at_ends(self.height, MIN_HEIGHT, zone.max_height, "height")
         if self.energy_class in (CLASSES[0], CLASSES[-1]):
@@ -316,7 +326,7 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         return found
 
     def sizes(self, metres: Callable[[float], str]) -> str:
-        """Return its sizes in words."""
+        """Return its dimensions and capacity in words."""
         capacity, named = self.capacity, self.energy_class
         takes = f"{named} kJ" if capacity is None else f"{capacity / 1e3:.0f} kJ/m"
         return f"{metres(self.height)} high, {takes}"
@@ -328,6 +338,6 @@ def tallest(zone: BarrierZone) -> float:
 
 
 def _usual_elongation(capacity: float) -> float:
-    """Return the elongation of the next class that takes so much on a panel [J/m, m]."""
+    """Return the elongation [m] of the lowest class with this capacity [J/m] on a panel."""
     above = [c for energy, c in FENCE_CLASSES.items() if 1e3 * energy >= capacity * PANEL]
     return (above or [FENCE_CLASSES[max(FENCE_CLASSES)]])[0].elongation

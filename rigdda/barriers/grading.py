@@ -1,4 +1,4 @@
-"""Cutting into the ground and filling it up, along a line."""
+"""Grading: cutting the ground down to a line, or filling it up to a line."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ LEAST_SLOPE, FLATTEST_SLOPE = 0.02, 5.0
 """Steepest and flattest side of an earthwork, run over rise [-]."""
 
 NEAR = 1e-6
-"""Distance within which two corners are one [m]."""
+"""Distance within which two corners are merged [m]."""
 
 
 def span(field: str, ground: Terrain, start: float, end: float) -> Floats:
-    """Return the corners of the ground from chainage `start` to `end`, both included, (n, 2).
+    """Return the corners of the ground between two chainages, with both ends, (n, 2).
 
     Raises
     ------
@@ -36,30 +36,32 @@ def span(field: str, ground: Terrain, start: float, end: float) -> Floats:
 def regrade(
     field: str, ground: Terrain, line: Floats, pick: Any, surface: str | None
 ) -> tuple[Floats, Terrain]:
-    """Return what is moved, and the ground cut down to a line or filled up to it.
+    """Cut the ground down to a line, or fill it up to a line.
 
     Parameters
     ----------
     field : str
-        Named if it cannot be done.
+        Name of the field in error messages.
+    ground : Terrain
+        The ground.
     line : (k, 2) array
         Corners of the line, x ascending [m].
     pick : ufunc
-        np.minimum cuts, np.maximum fills.
+        `np.minimum` to cut, `np.maximum` to fill.
     surface : str or None
-        Of the new ground; None: that of the ground above it.
+        Name of the surface of a fill; None: the existing surfaces are kept.
 
     Returns
     -------
     outline : (n, 2) array
-        What is cut or filled, a polygon whose parts are joined by pieces without width [m].
+        Polygon of the cut or fill [m]; separate parts are connected by pieces of zero thickness.
     ground : Terrain
         The new ground.
 
     Raises
     ------
     BadInput
-        If nothing changes, or the ground there is no single line.
+        If nothing changes, or the ground there is not single-valued.
     """
     start, end = line[0, 0], line[-1, 0]
     old = span(field, ground, start, end)
@@ -80,7 +82,7 @@ def regrade(
 
 
 def _segments(field: str, ground: Terrain, start: float, end: float) -> tuple[int, int]:
-    """Return the first and the last segment between two chainages."""
+    """Return the indices of the first and last segment between two chainages."""
     x = ground.points[:, 0]
     if start < x.min() or end > x.max():
         raise BadInput(field, start, f"stay on the terrain, {x.min():g} to {x.max():g} m")
@@ -92,7 +94,7 @@ def _segments(field: str, ground: Terrain, start: float, end: float) -> tuple[in
 
 
 def _corners(old: Floats, line: Floats) -> Floats:
-    """Return the chainages of all corners of two lines and of where they cross."""
+    """Return the chainages of the corners of two lines and of their crossings."""
     x = np.union1d(old[:, 0], line[:, 0])
     over = np.interp(x, *line.T) - np.interp(x, *old.T)
     k = np.flatnonzero(over[:-1] * over[1:] < 0.0)
@@ -103,8 +105,8 @@ def _corners(old: Floats, line: Floats) -> Floats:
 
 
 def _insert(ground: Terrain, first: int, last: int, piece: Floats, names: list[str]) -> Terrain:
-    """Return the ground with a piece of it, within segments first to last, replaced."""
-    kept = [0]  # a corner in the middle of one straight segment is left out
+    """Return the ground with the part within segments `first` to `last` replaced by a piece."""
+    kept = [0]  # corners within a straight segment are dropped
     for k in range(1, len(piece) - 1):
         (ax, ay), (bx, by), (cx, cy) = piece[kept[-1]], piece[k], piece[k + 1]
         bend = abs((bx - ax) * (cy - by) - (by - ay) * (cx - bx))
@@ -117,7 +119,7 @@ def _insert(ground: Terrain, first: int, last: int, piece: Floats, names: list[s
         *(names[k] for k in kept[:-1]),
         *ground.surfaces[last:],
     ]
-    at = first + len(kept)  # place of the piece's last corner
+    at = first + len(kept)  # index of the last corner of the piece
     for joint, segment in ((at, at), (first, first)):
         if np.hypot(*(points[joint + 1] - points[joint])) < NEAR:
             # the piece begins or ends at a corner of the ground

@@ -1,4 +1,4 @@
-"""A wall that stands by its weight."""
+"""Gravity wall, which resists by its weight."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.terrain import Terrain
 
 SLID = 0.1
-"""Displacement of a corner beyond which a gravity wall has slid [m]: what its contacts give under
-load is a hundredth of it."""
+"""Displacement of a corner beyond which a gravity wall counts as slid [m]. The elastic deformation
+of its contacts is about a hundredth of it."""
 
 
 @documented
 class GravityWall(Standing, frozen=True, tag="gravity_wall"):
-    """A concrete block that stands on the terrain by its weight, and can slide and overturn.
+    """A concrete block that stands on the terrain by its weight and can slide and overturn.
 
     Its faces are vertical and its top is level. Its base is straight: the chord of the ground
-    between its faces or, where that would dip into the ground, the edge of the ground's convex
-    hull below its middle.
+    between its faces or, if that chord would cut into the ground, the edge of the convex hull of
+    the ground below its middle.
 
     Raises
     ------
@@ -50,7 +50,7 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     height: Annotated[Metres, about("Height above the higher end of its base.", "m")]
     thickness: Annotated[Metres, about("Extent downhill of `x`.", "m")] = 1.0
     density: Annotated[
-        float, about("Density of the wall; 2400 is plain concrete.", "kg/m3", gt=0.0)
+        float, about("Density of the wall; 2400 for plain concrete.", "kg/m3", gt=0.0)
     ] = 2400.0
     drawn: ClassVar[Drawn] = "moving"
     fallible: ClassVar[bool] = True
@@ -58,12 +58,12 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     steepest: ClassVar[float | None] = 30.0
 
     def for_width(self, width: float) -> Self:
-        """Return the wall that resists what is so wide [m]: its elements of 5 m act whole."""
+        """Return an equivalent wall for an event of this width [m]; 5 m elements act as units."""
         factor = ELEMENT / min(width, ELEMENT)
         return msgspec.structs.replace(self, density=self.density * factor)
 
     def outline(self, ground: Terrain) -> Floats:
-        """Return the (4, 2) corners at the start, on `ground`.
+        """Return the (4, 2) initial corners on `ground`.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
             i, j = pair
             return float(y[i] + (y[j] - y[i]) * (at - x[i]) / (x[j] - x[i]))
 
-        # of all chords across the middle the highest there is the edge of the convex hull
+        # the chord that is highest at the middle is the edge of the convex hull
         over = [pair for pair in ends if x[pair[0]] <= middle <= x[pair[1]]]
         edge = max(over, key=lambda pair: base(pair, middle))
         left, right = base(edge, x[0]), base(edge, x[-1])
@@ -86,22 +86,22 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
         return np.array([[x[0], left], [x[-1], right], [x[-1], top], [x[0], top]])
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
-        """Return the price at the height of the road, that of its concrete [EUR/m]."""
+        """Return the cost of its concrete without the surcharge for height [EUR/m]."""
         return site.prices.concrete * self.height * self.thickness
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
-        """Return its weight times the friction of its base [N/m]."""
+        """Return its weight times its base friction [N/m]."""
         return base_friction(scene, self.density, scene.barrier_surface, outline)
 
     def idle_resistance(self, other: Barrier, resistance: float) -> float:
-        """Return the thrust that it bears, in proportion to its weight [N/m]."""
+        """Return the thrust that it resists, in proportion to its weight [N/m]."""
         assert isinstance(other, GravityWall)
         return resistance * self.density / other.density
 
     def changes(self, times: Floats, poses: Floats, failure: float) -> list[tuple[float, str]]:
-        """Return when it "slid" for good and when it "overturned", after which it slides no more.
+        """Return the times at which it finally "slid" and "overturned"; it cannot slide after that.
 
-        One that rocks and comes back to its place has not slid; one that is left leaning has.
+        A wall that rocks and returns to its place has not slid; a wall that remains tilted has.
         """
         x, y, theta = (poses - poses[0]).T
         cos, sin = np.cos(theta) - 1.0, np.sin(theta)
@@ -118,7 +118,7 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
         return [*found, (turned, "overturned")] if turned < math.inf else found
 
     def area_beyond(self, x: float, outline: Floats) -> float:
-        """Return its area that came to lie beyond a chainage, as `outline` at the end [m2]."""
+        """Return its area beyond a chainage, given its final `outline` [m2]."""
         (_, low), (far, high) = outline.min(axis=0), outline.max(axis=0)
         if far <= x:
             return 0.0
@@ -129,25 +129,31 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
         return f"{self.thickness:.1f} m thick", ""
 
     def check_design(self, where: str, site: KnownSite) -> None:
-        """Check that it is thick enough to stand by its weight. Raises as that of `Barrier`."""
+        """Check that it is thick enough for its height.
+
+        Raises
+        ------
+        BadInput
+            If it is not; the message begins with `where`.
+        """
         least = SLENDER * self.height
         if self.thickness < least - TOLERANCE:
-            mend = f"give at least {least:g}: a gravity wall stands by its weight"
+            mend = f"give at least {least:g}: {SLENDER:g} times the height"
             raise BadInput(f"{where}.thickness", self.thickness, mend)
 
     def placed(self, x: float, site: KnownSite, zone: BarrierZone) -> Self:
-        """Return it at another chainage, as thick as its height needs.
+        """Return it at another chainage, with the thickness required by its height.
 
-        It is at most as high as the greatest thickness allows.
+        The height is limited to that for which the zone permits the required thickness.
         """
         tall = min(self.height, zone.max_thickness / SLENDER)
         thick = max(self.thickness, SLENDER * tall)
         return msgspec.structs.replace(self, x=x, height=tall, thickness=thick)
 
     def thickest(self, zone: BarrierZone) -> Self:
-        """Return it as thick as the zone allows."""
+        """Return it with the greatest thickness that the zone permits."""
         return msgspec.structs.replace(self, thickness=zone.max_thickness)
 
     def sizes(self, metres: Callable[[float], str]) -> str:
-        """Return its sizes in words."""
+        """Return its dimensions in words."""
         return f"{metres(self.height)} high, {metres(self.thickness)} thick"

@@ -1,4 +1,4 @@
-"""Layouts of barriers: the ground that they leave, their files, their words."""
+"""Layouts of barriers: the ground with their earthworks, layout files and descriptions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from rigdda.files import atomic, read
 from rigdda.model.terrain import Terrain
 
 Built = Standing | Earthwork
-"""What a scene has: all kinds but mesh."""
+"""Barriers that are part of a scene: all kinds except mesh."""
 
 Layout = tuple[Barrier, ...]
 
@@ -33,30 +33,32 @@ KINDS: dict[str, type[Barrier]] = {
     str(kind.__struct_config__.tag): kind
     for kind in (Fence, Ditch, Embankment, GravityWall, Wall, Mesh)
 }
-"""Registered kinds of barrier by their names in layout files, in the order of the numbers of a
-design. A kind is registered here and nowhere else."""
+"""Kinds of barrier by name in layout files, in the order of the scores in encoded layouts. This is
+the only place where kinds are registered."""
 
 
 def earthworks(
     terrain: Terrain, layout: Iterable[Barrier], surface: str
 ) -> tuple[Terrain, dict[Barrier, Floats]]:
-    """Return the ground with the ditches and embankments of a layout, and what each moved.
+    """Return the ground with the ditches and embankments of a layout, and their outlines.
 
-    They are built from the crest down, each on the ground that those above it left.
+    They are built from the crest down, each on the ground left by those uphill of it.
 
     Parameters
     ----------
     terrain : Terrain
         The natural ground.
+    layout : iterable of Barrier
+        The barriers; those that are not earthworks are ignored.
     surface : str
-        Surface of embankments.
+        Name of the surface of embankments.
 
     Returns
     -------
     ground : Terrain
-        The ground with them.
+        The new ground.
     outlines : dict of barrier to (n, 2) array
-        Corners of what each digs out or fills in [m].
+        Corners of the cut or fill of each [m].
 
     Raises
     ------
@@ -72,7 +74,7 @@ def earthworks(
 def _graded(
     terrain: Terrain, works: tuple[Earthwork, ...], surface: str
 ) -> tuple[Terrain, tuple[Floats, ...]]:
-    """Return the ground after earthworks, and their outlines: asked for by every release."""
+    """Return the ground after earthworks, and their outlines; cached for repeated releases."""
     outlines: list[Floats] = []
     for work in works:
         outline, terrain = work.build(terrain, surface)
@@ -94,7 +96,7 @@ def as_layout(layout: Any) -> Layout:
 
 
 def from_table(where: str, table: Any) -> Barrier:
-    """Return the barrier of a table of a layout file, by default a wall.
+    """Return the barrier of a table in a layout file; the default kind is a wall.
 
     Raises
     ------
@@ -114,17 +116,17 @@ def from_table(where: str, table: Any) -> Barrier:
 
 
 def to_tables(layout: Sequence[Barrier]) -> list[dict[str, Any]]:
-    """Return the tables of a layout file; `from_table` gives each barrier back."""
+    """Return the tables of a layout file; the inverse of `from_table`."""
     return [msgspec.to_builtins(barrier) for barrier in layout]
 
 
 def standing(layout: Iterable[Barrier]) -> tuple[Built, ...]:
-    """Return the barriers of a layout that are in a scene, in its order: all but meshes."""
+    """Return the barriers of a layout that are part of a scene, in order: all except mesh."""
     return tuple(barrier for barrier in layout if isinstance(barrier, Built))
 
 
 def describe(barrier: Barrier, digits: int = 1) -> str:
-    """Return a barrier in words, lengths with so many digits after the point."""
+    """Return a description of a barrier, with `digits` decimals of its lengths."""
 
     def metres(value: float) -> str:
         return f"{value:.{digits}f} m"
@@ -133,7 +135,7 @@ def describe(barrier: Barrier, digits: int = 1) -> str:
 
 
 def load_layout(path: str | os.PathLike[str]) -> Layout:
-    """Read a layout from a TOML or JSON file with one table `barriers` a barrier.
+    """Read a layout from a TOML or JSON file with one table in `barriers` per barrier.
 
     Each table has the parameters of its class, and `kind` = "wall" (the default), "gravity_wall",
     "fence", "ditch", "embankment" or "mesh".
@@ -145,7 +147,7 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     """
     file = Path(path)
     if not file.is_file():
-        raise BadInput("layout", str(path), "name an existing TOML or JSON file")
+        raise BadInput("layout", str(path), "give the path of an existing TOML or JSON file")
     form = "JSON" if file.suffix == ".json" else "TOML"
     tables = fields.parse("layout", str(path), read("layout", file), form)
     layout = fields.read(_LayoutFile, tables).barriers
@@ -163,6 +165,6 @@ def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None
 
 
 class _LayoutFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An empty file is no layout; `barriers = []` is one without barriers."""
+    """Content of a layout file. An empty file is invalid; `barriers = []` is an empty layout."""
 
     barriers: Annotated[tuple[dict[str, Any], ...], about("The barriers; there may be none.")]

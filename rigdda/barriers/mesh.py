@@ -1,4 +1,4 @@
-"""Mesh over the face: it holds rock where it is, so that events are rarer."""
+"""Mesh over a rock face, which holds rock in place and makes events rarer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from rigdda.fields import about, documented
 
 @documented
 class Mesh(Barrier, frozen=True, tag="mesh"):
-    """Mesh, one of a site's options. It is not part of a scene: it changes how often rock falls.
+    """Mesh over a rock face, one of the options of a site.
+
+    It is not part of a scene: instead, it reduces the rates of events.
 
     Raises
     ------
@@ -23,22 +25,23 @@ class Mesh(Barrier, frozen=True, tag="mesh"):
     """
 
     x: Annotated[
-        float, about("Chainage of its middle, whose height above the road sets the price.", "m")
+        float,
+        about("Chainage of its middle. The height there above the road affects the price.", "m"),
     ]
-    option: Annotated[str, about("Name of one of the meshes of the site.")]
+    option: Annotated[str, about("Name of one of the mesh options of the site.")]
 
     @property
     def end(self) -> float:
-        """Its chainage [m]; nothing passes it, nor stands in its way."""
+        """Its chainage [m]; blocks are not affected by mesh."""
         return self.x
 
     @property
     def extent(self) -> float:
-        """Length that it takes up among barriers on the slope [m]: none."""
+        """Length along the slope [m]: 0."""
         return 0.0
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
-        """Return the price at the height of the road, of its option [EUR/m]."""
+        """Return the capital cost of its option without the surcharge for height [EUR/m]."""
         option = site.mesh(self.option)
         return option.area * option.price
 
@@ -48,11 +51,11 @@ class Mesh(Barrier, frozen=True, tag="mesh"):
         return f"mesh: {self.option}"
 
     def left_height(self, displacement: float) -> float:
-        """Return 0: it has none [m]."""
+        """Return 0: mesh has no height [m]."""
         return 0.0
 
     def sizes(self, metres: Callable[[float], str]) -> str:
-        """Return its sizes in words."""
+        """Return the name of its option."""
         return self.option
 
 
@@ -61,7 +64,7 @@ Factor = Annotated[float, about(ge=0.0, le=1.0)]
 
 @documented
 class MeshOption(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A mesh that a site offers.
+    """A mesh that is available on a site.
 
     Raises
     ------
@@ -74,7 +77,7 @@ class MeshOption(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     price: Annotated[float, about("Price of the mesh.", "EUR/m2", ge=0.0, le=10_000.0)]
     factors: Annotated[
         dict[str, Factor],
-        about("Factor on the rate of each event that it makes rarer, by the event's name.", "-"),
+        about("Factors by which it multiplies the rates of events, by name of the event.", "-"),
     ]
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""A rigid retaining wall."""
+"""Rigid retaining wall."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rigdda.fields import about, documented
 
 @documented
 class Wall(Standing, frozen=True, tag="wall"):
-    """A rigid retaining wall that stands on the terrain and cannot be moved.
+    """A rigid retaining wall that stands on the terrain and cannot move.
 
     Raises
     ------
@@ -24,9 +24,9 @@ class Wall(Standing, frozen=True, tag="wall"):
     steepest: ClassVar[float | None] = 30.0
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
-        """Return the price at the height of the road, that of its concrete [EUR/m]."""
+        """Return the cost of its concrete without the surcharge for height [EUR/m]."""
         return site.prices.concrete * self.height * self.thickness
 
     def sizes(self, metres: Callable[[float], str]) -> str:
-        """Return its sizes in words."""
+        """Return its dimensions in words."""
         return f"{metres(self.height)} high, {metres(self.thickness)} thick"

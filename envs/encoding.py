@@ -161,7 +161,7 @@ def _numbers(place: Room, i: int, barrier: Barrier) -> list[float]:
         shares = (share_of(barrier.x, zone.start, zone.end), *barrier.shares(zone))
         tall = getattr(barrier, barrier.lengths[0].field)
         if tall < MIN_HEIGHT - TOLERANCE:
-            mend = f"give a number >= {MIN_HEIGHT:g}"
+            mend = f"give a number of at least {MIN_HEIGHT:g}"
             raise BadInput(f"layout[{i}].{barrier.lengths[0].field}", tall, mend)
         clipped = np.clip(shares, 0.0, 1.0).tolist()
         usual = place.put(make(zone, barrier.kind, *clipped), barrier.x) or barrier

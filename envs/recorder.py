@@ -58,7 +58,7 @@ class Recorder:
 
     def __init__(self, folder: str | os.PathLike[str], trigger: Trigger | None = None):
         if not isinstance(folder, str | os.PathLike):
-            raise BadInput("record", folder, "give the path of a folder or None")
+            raise BadInput("record", folder, "name a folder or give None")
         _check_room(Path(folder))
         if trigger is not None and not callable(trigger):
             raise BadInput("record_trigger", trigger, "give a function of the episode's number")

@@ -202,7 +202,7 @@ class Rules:
             value, (low, high) = getattr(barrier, length.field), length.limits(self.zone)
             slack = TOLERANCE * max(1.0, high)
             if not low - slack <= value <= high + slack:
-                mend = f"give a number >= {low:g} and <= {high:g}"
+                mend = f"give a number of at least {low:g} and at most {high:g}"
                 raise BadInput(f"{where}.{length.field}", value, mend)
         barrier.check_design(where, self.site)
 

@@ -1,6 +1,6 @@
-"""Checks of input, beside those that the fields of files declare (`rigdda.fields`).
+"""Validation of values, in addition to the declared checks of file fields (`rigdda.fields`).
 
-Each raises one error that names the field, the value and what to write instead.
+Each function raises one error that names the field, the value and what to give instead.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda.errors import BadInput
 
 LARGEST = 1e15
-"""Greatest size of a number that is taken for meant: no quantity in SI units of a slope comes near
-it, and products of such numbers stay finite."""
+"""Greatest accepted magnitude of a number. No quantity of a slope in SI units comes near it, and
+products of such numbers remain finite."""
 
 
 def number(
@@ -29,15 +29,15 @@ def number(
     open_low: bool = False,
     unit: str = "",
 ) -> float:
-    """Return `value` as a float in [low, high], or (low, high] with `open_low`.
+    """Return `value` as a float in [low, high], or in (low, high] with `open_low`.
 
-    An error gives the bounds in `unit`.
+    The error message gives the bounds in `unit`.
 
     Raises
     ------
     BadInput
-        If it is not a number, not finite, beyond `LARGEST` or outside the interval. Booleans and
-        arrays are no numbers, though Python takes them for such.
+        If it is not a number, not finite, larger than `LARGEST` in magnitude or outside the
+        interval. Booleans and arrays are not accepted, although Python can convert them.
     """
     if isinstance(value, bool | np.bool_ | np.ndarray):
         raise BadInput(field, value, "give a number")
@@ -52,7 +52,7 @@ def number(
     if not math.isfinite(out):
         raise BadInput(field, value, "give a finite number")
     if abs(out) > LARGEST:
-        raise BadInput(field, value, f"give a number of at most {LARGEST:g} in size")
+        raise BadInput(field, value, f"give a number of at most {LARGEST:g} in magnitude")
     if out < low or out > high or (open_low and out == low):
         bounds = f"above {low:g}" if open_low else f"of at least {low:g}"
         if math.isfinite(high):
@@ -76,12 +76,12 @@ def boolean(field: str, value: Any) -> bool:
 
 
 def sequence(field: str, value: Any, kind: Any, what: str) -> tuple[Any, ...]:
-    """Return `value` as a tuple of members of a class or union of classes, `what` in words.
+    """Return `value` as a tuple; each member must be an instance of `kind`, described by `what`.
 
     Raises
     ------
     BadInput
-        If it cannot be walked through, or a member is something else.
+        If it is not iterable, or a member is of another type.
     """
     try:
         members = tuple(value)
@@ -94,12 +94,12 @@ def sequence(field: str, value: Any, kind: Any, what: str) -> tuple[Any, ...]:
 
 
 def mapping(field: str, value: Any, kind: type, what: str) -> dict[Any, Any]:
-    """Return `value` as a dict to members of a class, `what` in words.
+    """Return `value` as a dict; each member must be an instance of `kind`, described by `what`.
 
     Raises
     ------
     BadInput
-        If it is no mapping, or a member is something else.
+        If it is not a mapping, or a member is of another type.
     """
     if not isinstance(value, Mapping):
         raise BadInput(field, value, f"give a mapping of names to {what}")
@@ -115,7 +115,7 @@ def integer(field: str, value: Any, low: int, high: float = math.inf) -> int:
     Raises
     ------
     BadInput
-        If it is not a whole number or outside the interval.
+        If it is not a whole number, or outside the interval.
     """
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or value < low or value > high:
@@ -132,9 +132,9 @@ def interval(
     *,
     open_low: bool = False,
 ) -> tuple[float, float]:
-    """Return `value` as two numbers in [low, high] that do not fall.
+    """Return `value` as two numbers in [low, high] in ascending order, which may be equal.
 
-    With `open_low` they are above `low`, and the second is above the first.
+    With `open_low` both are above `low`, and the second is greater than the first.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def interval(
     first = number(field, first, low, high, open_low=open_low)
     second = number(field, second, low, high, open_low=open_low)
     if second < first or (open_low and second == first):
-        raise BadInput(field, value, "give the lesser number first, then the greater")
+        raise BadInput(field, value, "give the smaller number first, then the larger")
     return first, second
 
 
@@ -188,7 +188,7 @@ def points(field: str, value: ArrayLike, least: int) -> NDArray[np.float64]:
         raise BadInput(f"{field}[{bad[0]}]", array[bad[0]].tolist(), "give finite coordinates")
     far = np.flatnonzero((np.abs(array) > LARGEST).any(axis=1))
     if far.size:
-        mend = f"give coordinates of at most {LARGEST:g} in size"
+        mend = f"give coordinates of at most {LARGEST:g} in magnitude"
         raise BadInput(f"{field}[{far[0]}]", array[far[0]].tolist(), mend)
     array.setflags(write=False)
     return array
@@ -200,7 +200,7 @@ def one_of(field: str, value: Any, choices: Iterable[str]) -> str:
     Raises
     ------
     BadInput
-        If it is none of them.
+        If it is not.
     """
     known = sorted(choices)
     if not isinstance(value, str) or value not in known:
@@ -217,46 +217,46 @@ def set_number(
     open_low: bool = False,
     field: str = "",
 ) -> None:
-    """Set a field of a frozen dataclass or struct to its value as a float, see `check.number`.
+    """Convert a field of a frozen dataclass or struct to a valid float, see `number`.
 
-    `field` is what an error calls it, `name` by default. A whole number or one of numpy's in its
-    place would be another type to the kernels, which would be compiled again, and to files.
+    `field` is its name in error messages, `name` by default. Integers and NumPy scalars are
+    converted because they would be other types in files and for kernels, which would be recompiled.
     """
     value = number(field or name, getattr(record, name), low, high, open_low=open_low)
     _set(record, name, value)
 
 
 def set_booleans(record: object, *names: str) -> None:
-    """Set fields of a frozen dataclass, each to its value as a bool.
+    """Convert fields of a frozen dataclass to bool.
 
     Raises
     ------
     BadInput
-        If one is neither True nor False.
+        If a value is neither True nor False.
     """
     for name in names:
         _set(record, name, boolean(name, getattr(record, name)))
 
 
 def set_integers(what: str, record: object, *names: str) -> None:
-    """Set fields of a frozen dataclass, each to its value as a whole number of at least 0.
+    """Convert fields of a frozen dataclass to whole numbers of at least 0.
 
     Raises
     ------
     BadInput
-        If one is not such a number.
+        If a value is not such a number.
     """
     for name in names:
         _set(record, name, integer(f"{what}: {name}", getattr(record, name), 0))
 
 
 def set_vectors(what: str, record: object, *names: str) -> None:
-    """Set fields of a frozen dataclass, each to its value as two finite numbers.
+    """Convert fields of a frozen dataclass to pairs of finite numbers.
 
     Raises
     ------
     BadInput
-        If one is not two finite numbers.
+        If a value is not two finite numbers.
     """
     for name in names:
         object.__setattr__(record, name, vector(f"{what}: {name}", getattr(record, name)))

@@ -1,7 +1,7 @@
-"""How objects show themselves in a notebook: pictures of a section and tables as HTML.
+"""Display of objects in notebooks: images of slope sections and HTML tables.
 
-`Site`, `Run`, `Evaluation` and `DesignResult` have `_repr_png_` or `_repr_html_`, which notebooks
-call; what these share is here. Matplotlib is imported when a picture is drawn.
+`Site`, `Run`, `Evaluation` and `DesignResult` have `_repr_png_` or `_repr_html_` methods, which
+notebooks call; this module has the code that they share. Matplotlib is imported on first use.
 """
 
 from __future__ import annotations
@@ -22,27 +22,28 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 WIDTH = 8.0
-"""Width of a picture [inch], 100 pixels each."""
+"""Width of an image [inch], at 100 pixels per inch."""
 
 LOWEST, HIGHEST = 2.6, 5.5
-"""Least and greatest height of a picture [inch]; between them a section is to scale."""
+"""Minimum and maximum height of an image [inch], which otherwise follows from the shape of the
+section."""
 
 GROUND, ROCK, BARRIER, ROAD, ZONE = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04", "#7fb2dd"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """A barrier in a picture.
+    """A barrier in an image.
 
     Parameters
     ----------
     corners : (n, 2) array
         Its outline [m].
     label : str
-        What is written above it.
+        Text above it.
     filled : bool
-        Whether it is solid and hidden below the ground; a ditch or an embankment is drawn as a
-        line on it.
+        Whether it is filled and hidden below the ground; a ditch or an embankment is drawn as a
+        line on the ground.
     """
 
     corners: Floats
@@ -52,20 +53,20 @@ class Outline:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Section:
-    """What a picture of a slope shows, in metres.
+    """Content of an image of a slope, in metres.
 
     Parameters
     ----------
     ground : (m, 2) array
         Corners of the ground.
     road, zone : (float, float), optional
-        Chainages between which the road lies, and between which barriers may stand.
+        Chainages of the ends of the road and of the barrier zone.
     sources : sequence of (n, 2) array
-        Where rock starts: polygons, or the line of the ground in a band.
+        Sources of rock: polygons, or the line of the ground in a band.
     blocks : sequence of (n, 2) array
         Corners of each block.
     barriers : sequence of Outline
-        What stands.
+        The barriers.
     """
 
     ground: Floats
@@ -77,12 +78,12 @@ class Section:
 
 
 def png(section: Section, title: str = "") -> bytes:
-    """Return a picture of a section as PNG, to scale."""
+    """Return an image of a section as PNG, with equal axis scales."""
     from matplotlib.figure import Figure
 
     wide, high = np.ptp(section.ground, axis=0)
     height = min(max(LOWEST, 1.6 + WIDTH * high / wide), HIGHEST)
-    figure = Figure((WIDTH, height), dpi=100, layout="constrained")  # unknown to pyplot
+    figure = Figure((WIDTH, height), dpi=100, layout="constrained")  # not registered with pyplot
     axes = figure.subplots()
     draw(axes, section)
     if title:
@@ -100,13 +101,13 @@ def draw(axes: Axes, section: Section) -> None:
     x, y = section.ground.T
     axes.fill_between(x, y, y.min() - 0.05 * np.ptp(y), color=GROUND, linewidth=0)
     for name, span, colour in (
-        ("barriers may stand here", section.zone, ZONE),
+        ("barrier zone", section.zone, ZONE),
         ("road", section.road, ROAD),
     ):
         if span is not None:
             axes.plot(*along(section.ground, span).T, color=colour, linewidth=4, label=name)
     for i, corners in enumerate(section.sources):
-        label = "rock starts here" if i == 0 else None
+        label = "rock source" if i == 0 else None
         axes.plot(*corners.T, color="black", linewidth=2.5, label=label)
     for corners in section.blocks:
         axes.fill(*corners.T, facecolor=ROCK, edgecolor=ROCK, linewidth=0.8)
@@ -126,7 +127,7 @@ def draw(axes: Axes, section: Section) -> None:
 
 
 def along(ground: Floats, span: tuple[float, float]) -> Floats:
-    """Return the (n, 2) corners of the ground between two chainages, both included [m]."""
+    """Return the (n, 2) corners of the ground between two chainages, with both ends [m]."""
     x, y = ground.T
     inner = (x > span[0]) & (x < span[1])
     ends = np.interp(span, x, y)
@@ -134,7 +135,7 @@ def along(ground: Floats, span: tuple[float, float]) -> Floats:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return an HTML table; the first cell of each row is its name."""
+    """Return an HTML table; the first cell of each row is its header."""
     top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
     body = "".join(
         f"<tr><th>{html.escape(name)}</th>"
@@ -146,6 +147,6 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def image(picture: bytes, words: str) -> str:
-    """Return an HTML image that holds a PNG; `words` say what it shows."""
+    """Return an HTML image that contains a PNG; `words` is its description."""
     data = base64.b64encode(picture).decode("ascii")
     return f'<img src="data:image/png;base64,{data}" alt="{html.escape(words, quote=True)}">'

@@ -1,12 +1,13 @@
-"""Fields of files, declared once: what each means, its unit and what it may be.
+"""Declarations of file fields: meaning, unit and permitted values, given in one place.
 
 A table of a site, layout or study file is read into a `msgspec.Struct`. Each field is annotated
 with `about`::
 
     height: Annotated[float, about("Height of the crest.", "m", ge=0.001, le=1000.0)] = 1.0
 
-From this follow the checks of files (`read`) and of structs that are built in Python (`check`), the
-docstrings (`documented`), and the reference and JSON Schema of files (`rigdda.sites.document`).
+The declarations are used for the validation of files (`read`) and of structs created in Python
+(`check`), for docstrings (`documented`), and for the reference and the JSON Schema of files
+(`rigdda.sites.document`).
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from rigdda.errors import BadInput
 
 Table = TypeVar("Table", bound=msgspec.Struct)
 Check = Callable[[str, Any], Any]
-"""Takes what errors call a field and its value; returns the value, or raises `BadInput`."""
+"""Function of the name of a field in messages and its value; returns the value, or raises
+`BadInput`."""
 
 
 def about(
@@ -42,22 +44,23 @@ def about(
     choices: Iterable[str | int] | None = None,
     rising: bool = False,
 ) -> msgspec.Meta:
-    """Return the declaration of a field, to stand in its `Annotated` type.
+    """Return the declaration of a field, for use in its `Annotated` type.
 
     Parameters
     ----------
     text : str
-        What the field means, in whole sentences.
+        Meaning of the field, in complete sentences.
     unit : str
         Its unit, "-" for pure numbers.
     ge, gt, le : float, optional
-        What a number must be at least, above, and at most. Whole numbers are at least 0 by default.
+        Inclusive lower bound, exclusive lower bound and inclusive upper bound of a number. Whole
+        numbers are at least 0 by default.
     least : int, optional
-        The least number of members of a list.
+        Minimum length of a list.
     choices : iterable, optional
-        All values that are allowed.
+        The permitted values.
     rising : bool
-        Whether no number of a list may be less than the one before it.
+        Whether the numbers of a list must not decrease.
     """
     bounds: dict[str, Any] = {"ge": ge, "gt": gt, "le": le, "min_length": least}
     return msgspec.Meta(
@@ -69,10 +72,11 @@ def about(
 
 
 def check(record: msgspec.Struct, prefix: str = "") -> None:
-    """Check the fields of a struct, and set each to its value in the type that is declared.
+    """Check the fields of a struct, and convert each value to its declared type.
 
-    A whole number or one of numpy's in place of a float would be another type to the kernels, which
-    would be compiled again, and to files. Errors call a field by its name after `prefix`.
+    Integers and NumPy scalars given for floats are converted because they would be other types in
+    files and for kernels, which would be recompiled. Messages call a field by `prefix` and its
+    name.
 
     Raises
     ------
@@ -86,35 +90,35 @@ def check(record: msgspec.Struct, prefix: str = "") -> None:
 
 
 def parse(what: str, name: str, text: str, form: str = "TOML") -> dict[str, Any]:
-    """Return the tables of a TOML or JSON text; errors call it `what` = `name`.
+    """Return the content of a TOML or JSON text, called `what` = `name` in error messages.
 
     Raises
     ------
     BadInput
-        If it is not TOML or JSON, or holds no table.
+        If the text is not valid, or its top level is not a table.
     """
     try:
         found = (msgspec.json if form == "JSON" else msgspec.toml).decode(text)
     except (msgspec.DecodeError, RecursionError) as error:
-        raise BadInput(what, name, f"mend its {form}: {error}") from None
+        raise BadInput(what, name, f"correct its {form}: {error}") from None
     if not isinstance(found, dict):
-        raise BadInput(what, name, "put what it holds into a table, {...}")
+        raise BadInput(what, name, "give a table, {...}, at the top level")
     return found
 
 
 def read(table: type[Table], value: Any, where: str = "") -> Table:
-    """Return the struct of a table of a file, whose path is `where`.
+    """Return the struct of a table of a file; `where` is the path of the table in the file.
 
     Raises
     ------
     BadInput
-        As `checked` does, and if fields are at odds with one another.
+        As `checked` does, and if fields are inconsistent.
     """
     return table(**checked(table, value, where))
 
 
 def checked(table: type[msgspec.Struct], value: Any, where: str = "") -> dict[str, Any]:
-    """Return the fields of a table of a file, each checked; an error names its path in the file.
+    """Return the validated fields of a table of a file; errors name the path in the file.
 
     Raises
     ------
@@ -146,7 +150,7 @@ def _checks(table: type[msgspec.Struct]) -> dict[str, tuple[Check, Any]]:
 
 
 def _check(kind: kinds.Type, unit: str = "") -> Check:
-    """Return the check of values of a type; `unit` is that of its numbers."""
+    """Return the validator of a type; `unit` is that of its numbers."""
     bare = _bare(kind)
     if bare != kind:
         sound = _check(bare, unit)
@@ -181,7 +185,7 @@ def _check(kind: kinds.Type, unit: str = "") -> Check:
 
 
 def _number(kind: Any, unit: str) -> Check:
-    """Return the check of a number by its bounds, `unit` in its message."""
+    """Return the validator of a number with bounds; `unit` is used in its message."""
     if isinstance(kind, kinds.IntType):
         return lambda field, value: integer(field, value, kind.ge or 0, kind.le or inf)
     is_open = kind.gt is not None
@@ -212,7 +216,7 @@ def _rising(sound: Check) -> Check:
     def in_order(field: str, value: Any) -> Any:
         found = sound(field, value)
         if any(second < first for first, second in pairwise(found)):
-            raise BadInput(field, value, "give the lesser number first, then the greater")
+            raise BadInput(field, value, "give the smaller number first, then the larger")
         return found
 
     return in_order
@@ -248,24 +252,24 @@ def _dict(key: Check, sound: Check) -> Check:
 
 
 class Described(NamedTuple):
-    """What a field declares, in words."""
+    """Description of a field in words."""
 
     name: str
     kind: str
-    """Its type, as in Python and TOML."""
+    """Type as in Python and TOML."""
     unit: str
     range: str
-    """Which values are allowed; empty if all are."""
+    """Permitted values; empty if all are."""
     text: str
-    """What it means."""
+    """Meaning of the field."""
     needed: bool
     default: Any
-    """Of no meaning where it is needed."""
+    """Default; without meaning if the field is needed."""
 
 
 @cache
 def described(table: type[msgspec.Struct]) -> tuple[Described, ...]:
-    """Return what the fields of a table declare, in their order."""
+    """Return the descriptions of the fields of a table, in order."""
     found = []
     types = kinds.type_info(table).fields  # type: ignore[attr-defined]
     for field, one in zip(msgspec.structs.fields(table), types, strict=True):
@@ -280,13 +284,13 @@ def described(table: type[msgspec.Struct]) -> tuple[Described, ...]:
 
 
 def documented(table: type[Table]) -> type[Table]:
-    """Add the fields of a struct to its docstring, as parameters."""
+    """Add the fields of a struct to its docstring as parameters (a class decorator)."""
     table.__doc__ = _Docstring(table.__doc__ or "")  # type: ignore[assignment]
     return table
 
 
 class _Docstring:
-    """A docstring with the fields of a struct, written when it is asked for: imports stay quick."""
+    """A docstring with the fields of a struct, created on first access to keep imports fast."""
 
     def __init__(self, text: str):
         self.before, *self.after = text.partition("    Raises\n")
@@ -304,7 +308,7 @@ class _Docstring:
 
 
 def _bare(kind: kinds.Type) -> kinds.Type:
-    """Return a type without its alternative None."""
+    """Return a type without the alternative None."""
     match kind:
         case kinds.Metadata(type=inner):
             return msgspec.structs.replace(kind, type=_bare(inner))
@@ -338,13 +342,13 @@ def _words(kind: kinds.Type) -> str:
 
 
 def _plural(words: str) -> str:
-    """Return several of a type: floats, tables, lists of floats, [float, float]."""
+    """Return the plural of a type: floats, tables, lists of floats, [float, float]."""
     first, of, rest = words.partition(" ")
     return words if words.startswith("[") else f"{first}s{of}{rest}"
 
 
 def _range(kind: kinds.Type) -> str:
-    """Return the allowed values of a type in words."""
+    """Return the permitted values of a type in words."""
     match kind:
         case kinds.Metadata(type=inner):
             choices = (kind.extra_json_schema or {}).get("enum")

@@ -147,7 +147,7 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     """
     file = Path(path)
     if not file.is_file():
-        raise BadInput("layout", str(path), "give the path of an existing TOML or JSON file")
+        raise BadInput("layout", str(path), "name an existing TOML or JSON file")
     form = "JSON" if file.suffix == ".json" else "TOML"
     tables = fields.parse("layout", str(path), read("layout", file), form)
     layout = fields.read(_LayoutFile, tables).barriers

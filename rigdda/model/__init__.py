@@ -1,1 +1,1 @@
-"""What is described: a scene of blocks and barriers, and a site with its events and prices."""
+"""Descriptions of mechanical problems: scenes of blocks and barriers, and sites with their data."""

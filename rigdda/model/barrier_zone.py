@@ -1,4 +1,4 @@
-"""The zone of a site in which barriers may stand, and how large they may be there."""
+"""Barrier zone of a site, with limits of the sizes of barriers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigdda.fields import about, documented
 
 @documented
 class BarrierZone(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where barriers may stand, and how large they may be.
+    """The zone in which barriers may stand, and limits of their sizes.
 
     Raises
     ------
@@ -24,16 +24,16 @@ class BarrierZone(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     start: Annotated[
         float,
         about(
-            "Chainage where the zone begins. No barrier may stand in a band of loose rock, even "
-            "where it lies within the zone.",
+            "Chainage where the zone begins. Barriers may not stand in a band of loose rock, even "
+            "within the zone.",
             "m",
         ),
     ]
     end: Annotated[
-        float, about("Chainage where the zone ends, which is not beyond the edge of the road.", "m")
+        float, about("Chainage where the zone ends, at most the uphill edge of the road.", "m")
     ]
     max_height: Annotated[
-        float, about("Greatest height of barriers of all kinds but ditches.", "m", gt=0.5, le=100.0)
+        float, about("Greatest height of all barriers except ditches.", "m", gt=0.5, le=100.0)
     ] = 5.0
     min_thickness: Annotated[
         float,

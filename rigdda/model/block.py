@@ -1,4 +1,4 @@
-"""Blocks of rock: polygons with checked, anticlockwise, read-only corners."""
+"""Blocks of rock: polygons with validated, anticlockwise, read-only corners."""
 
 from __future__ import annotations
 
@@ -45,11 +45,13 @@ def simple_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:
         raise BadInput(where, corners.tolist(), f"untangle it: {explain_validity(polygon)}")
     size = polygon.length
     if polygon.area < 1e-9 * size**2:
-        raise BadInput(where, corners.tolist(), "give it an area")
+        raise BadInput(where, corners.tolist(), "give a polygon with a non-zero area")
     short = np.flatnonzero(np.hypot(*edges(corners).T) < 1e-9 * size)
     if short.size:
         raise BadInput(
-            f"{where}[{short[0]}]", corners[short[0]].tolist(), "remove it: the next one repeats it"
+            f"{where}[{short[0]}]",
+            corners[short[0]].tolist(),
+            "remove it: the next one repeats it",
         )
     if not polygon.exterior.is_ccw:
         corners = corners[::-1]
@@ -60,12 +62,12 @@ def simple_polygon(where: str, value: ArrayLike) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """A rigid simple polygon, convex or not.
+    """A rigid block in the shape of a simple polygon, convex or not.
 
     Parameters
     ----------
     vertices : (n, 2) array_like
-        Corners in either winding [m]; kept anticlockwise.
+        Corners in either orientation [m]; stored anticlockwise.
     density : float
         Density [kg/m3]; the mass is per metre of slope width.
     surface : str
@@ -73,7 +75,7 @@ class Block:
     velocity : (vx, vy, omega)
         Initial velocity of the centroid and rate of rotation [m/s, m/s, rad/s].
     fixed : bool
-        A fixed block has no unknowns.
+        Whether the block cannot move.
 
     Raises
     ------
@@ -118,10 +120,10 @@ class Block:
         surface: str,
         velocity: tuple[float, float, float],
     ) -> Block:
-        """Return a block of finite floats that are known to be sound, unchecked.
+        """Return a block of valid, finite values without checking them.
 
-        Corners anticlockwise, of a simple polygon; they are copied. Checks take longer than all
-        else in drawing a release of one block.
+        The corners must form a simple polygon, anticlockwise; they are copied. Checks would take
+        longer than the rest of drawing a release of one block.
         """
         block = object.__new__(cls)
         vertices = np.array(corners)

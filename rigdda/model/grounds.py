@@ -1,10 +1,10 @@
-"""The library of grounds: friction, restitution, damping and roughness of what slopes are made of.
+"""Library of grounds: friction, restitution, damping and roughness of common slope materials.
 
-A surface names its ground (``ground = "meadow"``) and overrides what is known of it. Each number
-has a typical value and a plausible range, and says where it comes from. The numbers are those of
-rigid blocks with corners: restitution is that of a central impact, friction that of a corner that
-slides, and damping is what a block loses beside both while it touches the ground. They are not the
-coefficients of a point mass, whose normal restitution also depends on how the block turns.
+A surface refers to its ground (``ground = "meadow"``) and overrides known values. Each value has a
+typical value, a plausible range and a source. The values are those of rigid blocks with corners:
+restitution is that of a central impact, friction that of a sliding corner, and damping is the
+additional loss of a block in contact with the ground. They are not the coefficients of a point
+mass, whose normal restitution also depends on the rotation of the block.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 
 class Span(NamedTuple):
-    """A typical value, the plausible range about it and the source of both."""
+    """A typical value, its plausible range and the source of both."""
 
     typical: float
     low: float
@@ -22,28 +22,28 @@ class Span(NamedTuple):
 
 
 class Ground(NamedTuple):
-    """What a ground does to a block that strikes it and slides or rolls on it."""
+    """Contact properties of a ground for blocks that hit it and slide or roll on it."""
 
     words: str
-    """What it is, in a few words."""
+    """Short description."""
     friction_deg: Span
     """Coulomb friction angle of rock on it [deg]."""
     restitution: Span
     """Coefficient of restitution of a central impact [-]."""
     damping: Span
-    """Mass-proportional damping of a block that touches it [1/s]."""
+    """Mass-proportional damping of a block in contact with it [1/s]."""
     roughness: Span
     """Root-mean-square depth of its pits at the scale of a block [m]."""
     friction_sd_deg: float
     """Standard deviation of friction from release to release [deg]."""
     restitution_sd: float
-    """The same of restitution [-]."""
+    """Standard deviation of restitution from release to release [-]."""
     damping_sd: float
-    """The same of damping [1/s]."""
+    """Standard deviation of damping from release to release [1/s]."""
 
     @property
     def values(self) -> dict[str, float]:
-        """The fields of a `Surface` that it fills in, at their typical values."""
+        """The fields of a `Surface` that it provides, at their typical values."""
         return {
             "friction_deg": self.friction_deg.typical,
             "restitution": self.restitution.typical,
@@ -137,10 +137,10 @@ GROUNDS: dict[str, Ground] = {
         0.1,
     ),
 }
-"""Every ground of the library by its name."""
+"""Grounds of the library by name."""
 
 USUAL = {"rock": "hard_rock", "soil": "hard_soil", "concrete": "concrete", "asphalt": "asphalt"}
-"""Ground of a surface that names none, by the name of the surface."""
+"""Ground of a surface that does not specify one, by the name of the surface."""
 
 OTHER = "weathered_rock"
-"""Ground of a surface of any other name."""
+"""Ground of a surface with any other name that does not specify one."""

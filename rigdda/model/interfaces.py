@@ -1,9 +1,10 @@
-"""How the surfaces of a site meet in a release, in numbers that a kernel varies with what is drawn.
+"""Contact properties of all pairs of surfaces of a site in a release, computed by a kernel.
 
-The same as `rigdda.Site.strength` and `rigdda.Scene.interface` give, to the bit, in a
-hundredth of the time: no surfaces are built and checked. Contacts of two surfaces have the smaller
-value of each property, and other pairs those of one surface; so that every pair has the smaller
-values of two rows of a table, which may be the same row.
+The values are bit-identical to those of `rigdda.Site.strength` and `rigdda.Scene.interface`, but
+take a hundredth of the time because no surfaces are built and checked. A contact of two surfaces
+has the smaller value of each property, except for pairs that have the properties of one surface.
+Every pair is therefore represented by two rows of a table, possibly the same, whose smaller values
+apply.
 """
 
 from __future__ import annotations
@@ -23,35 +24,36 @@ if TYPE_CHECKING:
     from rigdda.model.site_tables import Drawn
 
 FRICTION, FRICTION_SD, RESTITUTION, RESTITUTION_SD, DAMPING, DAMPING_SD, VARIES = range(7)
-"""Columns of the table of surfaces: angle of friction [deg], coefficient of restitution [-] and
-damping [1/s], inf where it is left to the scene, each with its standard deviation; 1 if a release
-draws them."""
+"""Columns of the table of surfaces: friction angle [deg], coefficient of restitution [-] and
+damping [1/s] (inf: that of the scene), each followed by its standard deviation; then 1 if releases
+vary them."""
 
 Rows = tuple[int, int, int, int]
-"""Two rows whose smaller values of friction and restitution count, and two for those of damping."""
+"""Two rows whose smaller friction and restitution apply, and two for damping."""
 
 
 class Meetings:
-    """How each two surfaces of a site meet in a release.
+    """Contact properties of all pairs of surfaces of a site in a release.
 
-    N: the surfaces of the site in their order. S: these, and last that of fences if there are any.
+    N is the number of surfaces of the site, in order. S is N, plus one for the surface of fences if
+    there are any.
 
     Parameters
     ----------
     site : Site
         The site, without surfaces of restitution None.
     fences : str or None
-        Name of the surface whose damping fences have, None: there are no fences.
+        Name of the surface whose damping fences have; None if there are no fences.
 
     Attributes
     ----------
     friction_deg : (S, S) array
-        Angle of friction of each two surfaces in the last release that was drawn [deg]; fences have
-        none, whatever stands in their rows.
+        Friction angle of each pair in the last drawn release [deg]; fences are frictionless, so
+        their rows are not used.
     restitution : (N, N) array
-        Coefficient of restitution of each two surfaces of the site [-].
+        Coefficient of restitution of each pair of surfaces of the site [-].
     damping : (S, S) array
-        Damping of blocks that touch [1/s].
+        Damping of blocks in contact [1/s].
     """
 
     def __init__(self, site: Site, fences: str | None):
@@ -89,7 +91,7 @@ class Meetings:
         self.restitution, self.damping = np.zeros((len(names),) * 2), np.zeros(shape)
 
     def draw(self, drawn: Drawn) -> None:
-        """Set the numbers to those of a release."""
+        """Set the values to those of a release."""
         strengths = np.array(drawn.strengths) if drawn.strengths else self._no_strengths
         _vary.call(
             self._table, strengths, float(drawn.friction_deg), self._left_open, self._rows,
@@ -98,12 +100,12 @@ class Meetings:
 
     @property
     def least_friction_deg(self) -> float:
-        """Least angle of friction of a surface of the site in the last release [deg]."""
+        """Least friction angle of a surface of the site in the last release [deg]."""
         return min(self._now[: self._names, FRICTION].tolist())
 
 
 def _rows(site: Site, names: list[str]) -> dict[tuple[int, int], Rows]:
-    """Return the rows of pairs of surfaces that do not simply have the smaller values of both."""
+    """Return the rows of pairs that do not simply have the smaller values of both surfaces."""
     place = {name: i for i, name in enumerate(names)}
     found: dict[tuple[int, int], Rows] = {}
     for (first, second), row in pairs(site, place).items():
@@ -121,24 +123,24 @@ def vary(
     table: NDArray, strengths: NDArray, shift: float, left_open: float, rows: NDArray,
     now: NDArray, friction_deg: NDArray, restitution: NDArray, damping: NDArray,
 ) -> None:  # fmt: skip
-    """Write the values of each two surfaces.
+    """Write the contact properties of all pairs.
 
     Parameters
     ----------
     table : (T, 7) array
         Surfaces of the site, then its interfaces, see `VARIES`.
     strengths : (N, 3) array
-        Standard normal numbers of friction, restitution and damping of the first rows.
+        Standard normal numbers for friction, restitution and damping of the first rows.
     shift : float
-        Shift of all angles of friction [deg].
+        Shift of all friction angles [deg].
     left_open : float
-        Damping where no surface states one [1/s].
+        Damping if no surface of a pair specifies one [1/s].
     rows : (S, S, 4) array of int
-        Which rows count of each two surfaces.
+        Rows of each pair, see `Rows`.
     now : (T, 7) array
-        The table in this release, which is written.
+        Output: the table in this release.
     friction_deg, restitution, damping : (S, S), (N, N) and (S, S) arrays
-        What is written [deg, -, 1/s].
+        Output [deg, -, 1/s].
     """
     for k in range(len(table)):
         angle = table[k, FRICTION]
@@ -165,5 +167,5 @@ _vary = Direct(vary)
 
 @kernel
 def _steepened(angle: float, change: float) -> float:
-    """Return a changed angle of friction within its bounds [deg]."""
+    """Return a changed friction angle, clipped to its bounds [deg]."""
     return min(max(angle + change, 0.0), max(angle, STEEPEST_DEG))

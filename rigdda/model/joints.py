@@ -1,4 +1,4 @@
-"""Cutting a rock mass into blocks by joint sets."""
+"""Cutting of a rock mass into blocks by joint sets."""
 
 from __future__ import annotations
 
@@ -16,20 +16,22 @@ from rigdda.fields import about, documented
 from rigdda.geometry import FLAT, without_straight_corners
 
 SLIVER = 0.35
-"""Blocks below this share of the wanted area are joined to a neighbour if that stays convex."""
+"""Share of the specified mean area below which a block is merged with a neighbour if the union is
+convex."""
 
 CHIP = 0.1
-"""Blocks below this share of the wanted area that no union with a neighbour keeps convex are joined
-all the same: a chip makes the heaviest block 1,000 times the lightest, and contacts harder."""
+"""Share of the specified mean area below which a block is merged with a neighbour even if the union
+is not convex: very small blocks would make mass ratios of 1000 and contacts harder to solve."""
 
 AREA_TOLERANCE = 0.05
-"""Accepted relative error of the mean block area; joints are drawn, and their spacings scaled,
-until it is met."""
+"""Tolerated relative error of the mean block area. Joints are redrawn, with their spacings
+rescaled, until it is met."""
 
 DRAWS = 200
 
 NEAR = 1e-7
-"""Distance over the perimeter of a cell up to which a corner lies on an edge [-]: rounding."""
+"""Distance within which a corner counts as on an edge, relative to the perimeter of the cell [-];
+allows for rounding."""
 
 
 @documented
@@ -49,8 +51,8 @@ class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     spacing: Annotated[
         float,
         about(
-            "Mean spacing. The spacings of all sets are scaled by one factor, so that blocks have "
-            "the mean area that the source gives.",
+            "Mean spacing. The spacings of all sets are multiplied by a common factor so that the "
+            "mean area of the blocks is that specified by the source.",
             "m",
             ge=1e-3,
             le=1e3,
@@ -63,8 +65,8 @@ class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     persistence: Annotated[
         float,
         about(
-            "Share of a joint that is open. Across the rest, pairs of blocks stay joined where "
-            "they make a convex block.",
+            "Share of a joint that is open. Across the rest, pairs of blocks stay joined if their "
+            "union is convex.",
             "-",
             gt=0.0,
             le=1.0,
@@ -81,7 +83,9 @@ def cut(
     block_area: float,
     rng: np.random.Generator,
 ) -> list[NDArray[np.float64]]:
-    """Cut a convex rock mass into blocks of a wanted mean area, convex but for those with a chip.
+    """Cut a convex rock mass into blocks of a given mean area.
+
+    Blocks are convex except where a very small block was merged with a neighbour.
 
     Parameters
     ----------
@@ -90,9 +94,9 @@ def cut(
     joints : tuple of JointSet
         At least two sets of different dip.
     block_area : float
-        Wanted mean area [m2]; met within 5 %.
+        Mean area [m2]; met within 5 %.
     rng : numpy.random.Generator
-        Draws offsets, spacings and rock bridges.
+        Generator for offsets, spacings and rock bridges.
 
     Returns
     -------
@@ -125,7 +129,7 @@ def _cells(
     """Return the pieces between the joints of all sets."""
     centre = np.array(source.centroid.coords[0])
     reach = source.length
-    around = source.buffer(1e-3 * reach)  # ends beyond the source, so that no cut falls short
+    around = source.buffer(1e-3 * reach)  # so that traces cut the source completely
     shapely.prepare(around)
     lines: list[shapely.LineString] = [source.exterior]
     for joint in joints:
@@ -152,7 +156,7 @@ def _join_bridges(
     block_area: float,
     rng: np.random.Generator,
 ) -> list[shapely.Polygon]:
-    """Join cells across rock bridges, then slivers, wherever the union stays convex."""
+    """Merge cells across rock bridges, and then small cells, where the union is convex."""
     centres = shapely.get_coordinates(shapely.centroid(cells)).tolist()
     order = sorted(range(len(cells)), key=centres.__getitem__)
     parts: list[shapely.Polygon | None] = [cells[i] for i in order]
@@ -164,7 +168,7 @@ def _join_bridges(
         bridged = [drawn < 1.0 - joint.persistence for joint in joints]
         if any(bridged):
             _join(parts, beside, place, Bridges(joints, bridged))
-    size = shapely.area(parts)  # not a number where a part is gone
+    size = shapely.area(parts)  # nan for parts that were merged
     for i in np.argsort(np.where(size > 0.0, size, math.inf), kind="stable"):
         if 0.0 < shapely.area(parts[i]) < SLIVER * block_area:
             _join(parts, beside, int(i))
@@ -175,16 +179,16 @@ def _join_bridges(
 
 
 class Bridges(NamedTuple):
-    """The joint sets, and across which of them a block stays joined."""
+    """Joint sets, and which of them have a rock bridge at a block."""
 
     joints: tuple[JointSet, ...]
     bridged: list[bool]
 
     def across(self, edges: NDArray[np.object_]) -> NDArray[np.bool_]:
-        """Return which common edges of blocks are of a set across which blocks stay joined.
+        """Return which common edges of blocks belong to a joint set with a rock bridge.
 
-        An edge may be in several pieces, in any order, so its ends are its first and its last point
-        from left to right.
+        An edge may consist of several pieces in any order; its ends are its leftmost and rightmost
+        points.
         """
         dips = np.array([joint.dip_deg for joint in self.joints])
         points = [shapely.get_coordinates(edge).tolist() for edge in edges]
@@ -200,17 +204,17 @@ def _join(
     bridges: Bridges | None = None,
     convex: bool = True,
 ) -> None:
-    """Join part i to the neighbour with the longest common edge that gives a convex block.
+    """Merge part `i` with the neighbour with the longest common edge whose union is convex.
 
-    Across such edges only as are bridged, if any are told. Or to the one that gives any simple
-    polygon, if not `convex`.
+    With `bridges`, only edges across rock bridges are considered. If not `convex`, the union may be
+    any simple polygon.
     """
     cell = parts[i]
     others = [j for j in beside[i] if parts[j] is not None]
     if cell is None or not others:
         return
     shapes = np.array([parts[j] for j in others])
-    if not convex:  # where cells were joined, an edge may have lost the node that they share
+    if not convex:  # merging may have removed a shared node from an edge
         near = NEAR * cell.length
         cell = shapely.snap(cell, shapely.multipolygons(shapes), near)
         shapes = shapely.snap(shapes, cell, near)
@@ -236,10 +240,10 @@ def _join(
 
 
 def _union(cell: shapely.Polygon, other: shapely.Polygon) -> shapely.Polygon | None:
-    """Return the union of two cells that share an edge, None if it is no simple polygon.
+    """Return the union of two cells that share an edge, or None if it is not a simple polygon.
 
-    Where a cell has lost a node of that edge, the edges nearly coincide, and GEOS 3.14 may return
-    only one of the two cells. It does not once the nodes are put back.
+    If a cell has lost a node of that edge, the edges nearly coincide, and GEOS 3.14 may return only
+    one of the two cells. Restoring the nodes by snapping avoids this.
     """
     area, near = cell.area + other.area, NEAR * cell.length
     for _ in range(2):

@@ -1,7 +1,7 @@
-"""What acts on blocks beside their weight: loads, supports and the motion of the ground.
+"""Loads on blocks, supports, and acceleration histories of the ground.
 
-Loads are the paper's point load, line load and body force, supports its fixed point and rock bolt;
-`rigdda.dynamics.contact.links` computes what supports do.
+The loads are the point load, line load and body force of the paper, the supports its fixed point
+and rock bolt. `rigdda.dynamics.contact.links` computes the effect of supports.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ def history(value: ArrayLike) -> NDArray[np.float64]:
     if not np.isfinite(history).all():
         raise BadInput("base_motion", "NaN or infinity", "give finite numbers")
     if (np.diff(history[:, 0]) < 0.0).any() or history[0, 0] < 0.0:
-        raise BadInput("base_motion", "times", "give times from 0 on that never fall")
+        raise BadInput("base_motion", "times", "give times >= 0 that do not decrease")
     history.setflags(write=False)
     return history
 
 
 @dataclass(frozen=True, slots=True)
 class FixedPoint:
-    """A point of a block that stays where it is; the block may turn about it.
+    """A point of a block that cannot move; the block can rotate about it.
 
     Parameters
     ----------
     block : int
         Index of the block.
     point : (x, y)
-        The point at the start [m].
+        Initial position of the point [m].
 
     Raises
     ------
@@ -64,20 +64,20 @@ class Bolt:
     Parameters
     ----------
     block_a, point_a : int, (x, y)
-        Block at one end and where it is anchored at the start [m].
+        Block at one end, and the initial position of the anchor [m].
     block_b, point_b : int or None, (x, y)
         The other end; None: anchored in the ground.
     stiffness : float
         Tension per elongation, per metre of slope width [N/m].
     prestress : float
-        Tension at the start [N].
+        Initial tension [N].
     yield_force : float or None
-        Tension at which it yields, perfectly plastic [N]; None: never.
+        Tension at which it yields, perfectly plastic [N]; None: it does not yield.
 
     Raises
     ------
     BadInput
-        If a value is not finite or out of its range, or both ends are at one point or block.
+        If a value is not finite or out of its range, or both ends are on one block or at one point.
     """
 
     block_a: int
@@ -93,7 +93,7 @@ class Bolt:
         if self.block_b is not None:
             check.set_integers("bolt", self, "block_b")
             if self.block_b == self.block_a:
-                raise BadInput("bolt: block_b", self.block_b, "give another block than block_a")
+                raise BadInput("bolt: block_b", self.block_b, "give a block other than block_a")
         check.set_vectors("bolt", self, "point_a", "point_b")
         if math.dist(self.point_a, self.point_b) < 1e-6:
             raise BadInput("bolt: point_b", self.point_b, "put it apart from point_a")
@@ -111,14 +111,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class PointLoad:
-    """A dead force on a point of a block: its direction stays, the point moves with the block.
+    """A dead load at a point of a block: it keeps its direction and moves with the block.
 
     Parameters
     ----------
     block : int
         Index of the block.
     point : (x, y)
-        Where it acts at the start [m].
+        Initial position of the point [m].
     force : (fx, fy)
         Force per metre of slope width [N].
 
@@ -137,20 +137,20 @@ class PointLoad:
         check.set_vectors("point load", self, "point", "force")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
-        """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
+        """Return the force [N] and its point of action [m] on a block of `area` and `centre`."""
         return np.array(self.force), np.array(self.point)
 
 
 @dataclass(frozen=True, slots=True)
 class LineLoad:
-    """A dead load spread evenly over a line of a block.
+    """A uniform dead load on a line of a block.
 
     Parameters
     ----------
     block : int
         Index of the block.
     start, end : (x, y)
-        Ends of the line at the start [m].
+        Initial ends of the line [m].
     force_per_length : (fx, fy)
         Force per metre of the line and of slope width [N/m].
 
@@ -170,7 +170,7 @@ class LineLoad:
         check.set_vectors("line load", self, "start", "end", "force_per_length")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
-        """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
+        """Return the force [N] and its point of action [m] on a block of `area` and `centre`."""
         start, end = np.array(self.start), np.array(self.end)
         length = float(np.hypot(*(end - start)))
         return length * np.array(self.force_per_length), 0.5 * (start + end)
@@ -178,7 +178,7 @@ class LineLoad:
 
 @dataclass(frozen=True, slots=True)
 class BodyForce:
-    """A dead force spread evenly over the area of a block, beside its weight.
+    """A uniform dead load on the area of a block, in addition to its weight.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ class BodyForce:
         check.set_vectors("body force", self, "force_per_area")
 
     def resultant(self, area: float, centre: Floats) -> tuple[Floats, Floats]:
-        """Return the force [N] and where it acts [m] on a block of `area` and `centre`."""
+        """Return the force [N] and its point of action [m] on a block of `area` and `centre`."""
         return area * np.array(self.force_per_area), centre
 
 

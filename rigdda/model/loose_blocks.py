@@ -1,8 +1,8 @@
-"""Loose blocks of a band: random convex polygons that rest on the ground and on one another.
+"""Loose blocks of a band: random convex polygons that rest on the ground and on each other.
 
-Corners of a block lie on an ellipse, so that they are convex, at angles that are spaced at random
-within `JITTER`. A block that was measured fills a face of its box: natural blocks of given edges
-weigh half to two thirds of a full box, as such outlines do.
+The corners of a block lie on an ellipse, which makes it convex, at angles that vary at random
+within `JITTER`. The outline of a measured block fills a face of its box. Natural blocks with given
+edges have half to two thirds of the mass of a full box, as have these outlines.
 """
 
 from __future__ import annotations
@@ -19,21 +19,22 @@ from rigdda.model.site_tables import Event
 from rigdda.model.source import Point, Source
 
 JITTER = 0.35
-"""Greatest shift of a corner over the mean spacing of corners [-]: with four corners the widest gap
-is 153 deg, so that the centre stays inside."""
+"""Maximum shift of a corner relative to the mean angle between corners [-]. With four corners the
+widest gap is 153 deg, so that the centre remains inside."""
 
 CLEAR = 0.01
-"""Height of a block above what it rests on at the start [m]: clear of it whatever the rounding."""
+"""Initial gap between a block and what it rests on [m], larger than rounding errors."""
 
 EVEN = 1e-9
-"""Power of a power law of areas below which it counts as 0, so that the law is a logarithm [-]."""
+"""Exponent of a power law of areas below which it is treated as 0, which makes the law logarithmic
+[-]."""
 
 AREA, CORNERS, ASPECT, TURN, PLACE, SPEED, SPIN = 0, 1, 2, 3, 4, 5, 6
-"""Random numbers in [0, 1) of a block, by their place among those drawn for it. Of a block that was
-measured the first one picks its face, and the third one turns the corners within it."""
+"""Indices of the random numbers in [0, 1) of a block. For a measured block the first one selects
+the face, and the third one rotates the corners on it."""
 
 DRAWN = 7
-"""How many these are; those of the places of its corners follow."""
+"""Number of these random numbers; those for the angles of the corners follow."""
 
 
 @short_kernel
@@ -42,30 +43,31 @@ def write_shapes(
     greatest_area: float, power: float, least_aspect: float, greatest_aspect: float, long: float,
     middle: float, short: float, measured: bool, corners: NDArray, count: NDArray, area: NDArray,
 ) -> None:  # fmt: skip
-    """Write the outlines of blocks about their places, anticlockwise.
+    """Write the outlines of blocks about the origin, anticlockwise.
 
     Parameters
     ----------
     numbers : (N, DRAWN + most_corners) array
         Random numbers of each block, in [0, 1).
     least_corners, most_corners : int
-        How many corners a block has.
+        Range of the number of corners.
     least_area, greatest_area : float
-        Areas of blocks that were not measured [m2].
+        Range of the areas of blocks that were not measured [m2].
     power : float
-        The number of blocks larger than an area falls as the area to the power of minus this [-].
+        Exponent of the power law: the number of blocks larger than an area is proportional to the
+        area to the power of -`power` [-].
     least_aspect, greatest_aspect : float
-        Length over breadth of such blocks [-].
+        Range of length over breadth of such blocks [-].
     long, middle, short : float
-        Edges of the box around a block that was measured [m].
+        Edges of the box around a measured block [m].
     measured : bool
         Whether blocks were measured.
     corners : (N, most_corners, 2) array
-        Corners that are written [m].
+        Output: corners [m].
     count : (N,) array of int
-        Number of corners that is written.
+        Output: number of corners.
     area : (N,) array
-        Areas that are written [m2].
+        Output: areas [m2].
     """
     for i in range(len(numbers)):
         u, corner = numbers[i], corners[i]
@@ -101,8 +103,8 @@ def _face(
 ) -> tuple[float, float]:
     """Return the half axes of the ellipse whose corners fill a face of a box [m].
 
-    The angles, the first column of `corner`, are turned by a random phase first: else a corner is
-    at the end of an axis.
+    The angles, the first column of `corner`, are first rotated by a random phase; otherwise a
+    corner would always be near the end of an axis.
     """
     phase = 2.0 * math.pi * u[ASPECT]
     left, right, low, high = math.inf, -math.inf, math.inf, -math.inf
@@ -119,7 +121,7 @@ def _face(
 
 @kernel
 def truncated_power(u: float, least: float, greatest: float, power: float) -> float:
-    """Return the area whose share u of a truncated power law is above it [m2]."""
+    """Return the area that a share `u` of a truncated power law exceeds [m2]."""
     if power < EVEN:
         return least * (greatest / least) ** u
     low, high = least**-power, greatest**-power
@@ -131,22 +133,22 @@ def lay_blocks(
     numbers: NDArray, start: float, end: float, row: int, ground: NDArray, corners: NDArray,
     count: NDArray,
 ) -> None:  # fmt: skip
-    """Move blocks to their places in a band, one after the other, just above what they rest on.
+    """Move blocks to their places in a band one after another, just above what they rest on.
 
     Parameters
     ----------
     numbers : (N, ...) array
         Random numbers of each block, in [0, 1).
     start, end : float
-        The band [m].
+        Chainages of the band [m].
     row : int
-        How many blocks lie side by side.
+        Number of blocks side by side.
     ground : (m, 2) array
-        Corners of the ground, which never turns back [m].
+        Corners of the ground, which has no overhangs [m].
     corners : (N, P, 2) array
-        Corners of the blocks about their places; then where they are [m].
+        Corners of the blocks about the origin; replaced by their final positions [m].
     count : (N,) array of int
-        Number of corners of each.
+        Number of corners of each block.
     """
     for i in range(len(count)):
         x = start + (end - start) * (i % row + numbers[i, PLACE]) / row
@@ -166,7 +168,7 @@ lay_blocks_directly = Direct(lay_blocks)
 
 @kernel
 def _extent(corners: NDArray) -> tuple[float, float]:
-    """Return least and greatest chainage of a polygon [m]."""
+    """Return the least and the greatest chainage of a polygon [m]."""
     left, right = corners[0, 0], corners[0, 0]
     for k in range(1, len(corners)):
         left, right = min(left, corners[k, 0]), max(right, corners[k, 0])
@@ -175,10 +177,10 @@ def _extent(corners: NDArray) -> tuple[float, float]:
 
 @kernel
 def _lift(corners: NDArray, ground: NDArray) -> float:
-    """Return how far a block must be lifted to rest on the ground [m]."""
+    """Return the distance by which a block must be lifted to rest on the ground [m]."""
     left, right = _extent(corners)
     lift = -math.inf
-    for s in range(len(ground) - 1):  # each piece of the ground that is below it
+    for s in range(len(ground) - 1):  # segments of the ground below the block
         x, y, end, low = ground[s, 0], ground[s, 1], ground[s + 1, 0], ground[s + 1, 1]
         if end <= left or x > right:
             continue
@@ -187,14 +189,17 @@ def _lift(corners: NDArray, ground: NDArray) -> float:
             for k in range(len(corners)):
                 if x <= corners[k, 0] <= end:
                     lift = max(lift, y + rise * (corners[k, 0] - x) - corners[k, 1])
-        if end <= right:  # and each corner of it
+        if end <= right:  # corners of the ground below the block
             lift = max(lift, low - _cut_at(corners, end)[0])
     return lift
 
 
 @kernel
 def _lift_off(corners: NDArray, other: NDArray) -> float:
-    """Return how far a block must be lifted to rest on another one, -inf: it is not over it [m]."""
+    """Return the distance by which a block must be lifted to rest on another [m].
+
+    It is -inf if the block is not above the other.
+    """
     left, right = _extent(corners)
     its_left, its_right = _extent(other)
     lift = -math.inf
@@ -210,7 +215,7 @@ def _lift_off(corners: NDArray, other: NDArray) -> float:
 def _cut_at(corners: NDArray, x: float) -> tuple[float, float]:
     """Return the least and the greatest elevation of a polygon at a chainage [m].
 
-    inf and -inf where it does not reach.
+    They are inf and -inf if the polygon does not extend to it.
     """
     low, high = math.inf, -math.inf
     last = len(corners) - 1
@@ -225,16 +230,16 @@ def _cut_at(corners: NDArray, x: float) -> tuple[float, float]:
 
 
 SPREAD = 1.1
-"""Distance of neighbours of a group over their mean length [-]; what does not fit side by side in
-the band lies in a layer above."""
+"""Spacing of neighbours in a group relative to their mean length [-]. Blocks that do not fit side
+by side in the band lie in a layer above."""
 
 
 def draw(
     rng: np.random.Generator, source: Source, event: Event, ground: NDArray[np.float64]
 ) -> tuple[list[float], list[Block]]:
-    """Return areas [m2] and blocks of an event of a band, clear of ground and one another.
+    """Return the areas [m2] and blocks of an event of a band, without overlaps.
 
-    `ground` has its corners, (m, 2) [m].
+    `ground` has the corners of the ground, (m, 2) [m].
     """
     assert source.band is not None
     low, high = event.number
@@ -250,7 +255,7 @@ def draw(
         *map(int, source.corners),
         float(least_area),
         float(greatest_area),
-        1.5 * event.exponent,  # a volume is an area times its root
+        1.5 * event.exponent,  # volume = area ** 1.5
         float(source.aspect[0]),
         float(source.aspect[1]),
         float(long),
@@ -263,7 +268,7 @@ def draw(
     )
     areas: list[float] = area.tolist()
     start, end = source.band
-    row = 1  # so many lie side by side
+    row = 1  # number of blocks side by side
     if count > 1:
         length = SPREAD * math.sqrt(sum(areas) / count * source.aspect[1])
         row = min(max(1, int((end - start) / length)), count)
@@ -283,7 +288,7 @@ def draw(
 
 
 def reach(source: Source, event: Event) -> float:
-    """Return the greatest distance of a corner of a block from its place [m]."""
+    """Return the greatest distance of a corner of a block from its centre [m]."""
     if source.edges is not None:
         return max(source.edges)
     if event.area is None:
@@ -291,11 +296,11 @@ def reach(source: Source, event: Event) -> float:
     corners = source.corners[0]
     gap = 2.0 * math.pi / corners
     narrow, wide = (1.0 - 2.0 * JITTER) * gap, (1.0 + 2.0 * JITTER) * gap
-    least = 0.25 * corners * (math.sin(narrow) + math.sin(wide))  # of a circle of radius 1
+    least = 0.25 * corners * (math.sin(narrow) + math.sin(wide))  # area on a circle of radius 1
     return math.sqrt(event.area[1] / least * source.aspect[1])
 
 
 @lru_cache(maxsize=256)
 def line(points: tuple[Point, ...]) -> NDArray[np.float64]:
-    """Return the ground as an array of its corners, (m, 2) [m]."""
+    """Return the corners of the ground as an array, (m, 2) [m]."""
     return np.array(points, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The outcome of a release: what it means for the road, and what each barrier took and holds."""
+"""Outcome of a release: rock on the road, and loads and damage of each barrier."""
 
 from __future__ import annotations
 
@@ -7,49 +7,49 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class BarrierOutcome:
-    """What one barrier took in a release.
+    """Outcome of a release for one barrier.
 
-    Ditches and embankments are ground: what happens on them counts as no hit, and they absorb
-    nothing here.
+    Ditches and embankments are part of the ground: contacts with them do not count as hits, and the
+    energy that they absorb is not recorded here.
 
     Parameters
     ----------
     hits : int
-        Hits, counted anew after 0.1 s apart.
+        Number of hits; contacts less than 0.1 s apart count as one.
     max_energy, total_energy : float
-        Largest and summed energy of the hits, of translation and rotation just before the first
-        touch [J].
+        Largest and total energy of the hits, translational and rotational, just before first
+        contact [J].
     absorbed_energy : float
-        Work that contact forces of the barrier took from the blocks [J]: of a fence the force of
-        its brakes times its path, and what its own mass took.
+        Work that contact forces of the barrier do against the blocks [J]; for a fence the braking
+        force times its deflection, plus the energy taken up by its own mass.
     impact_heights : tuple of float
-        Height of each hit above the ground at the barrier's uphill face at the start [m].
+        Height of each hit above the initial ground at the uphill face of the barrier [m].
     overtopped : int
-        Blocks that started uphill of the barrier and first passed it before it failed, was pushed
-        away or overturned: beyond its downhill face, the downhill edge of a ditch or of an
-        embankment's crest. A gravity wall counts as where it stood at the start.
+        Number of blocks that started uphill of the barrier and first passed it before it failed,
+        was pushed away or overturned. A block has passed when it is beyond the downhill face, or
+        the downhill edge of a ditch or of the crest of an embankment. For a gravity wall the
+        initial position counts.
     failed : bool
-        Whether it no longer stands as it was built.
+        Whether it is no longer in its original state.
     caught : float
-        Share of the released mass at rest at the end that it holds, or that is in the ditch.
-    state : {"stands", "failed", "slid", "overturned", "pushed"}
-        At the end. A fence failed, a gravity wall has slid if a corner is more than 0.1 m away from
-        its place, and is overturned if it was turned beyond the angle of its diagonal; an
-        embankment was pushed away.
-    displacement : float
-        Distance of its centroid at the end from where it was at the start [m]; of a fence the
-        elongation that was used.
-    road_area : float
-        Its area that lies beyond the uphill edge of the road at the end [m2]: only a gravity wall
-        comes there.
-    thrust : float
-        Greatest mean over a second of the horizontal force on it, downhill [N/m], of a ditch none.
-    resistance : float
-        Thrust that it bears [N/m], inf where none can move it, see `rigdda.Scene.resistance`; of
-        a fence the force against which it gives way.
-    left_height : float
-        Height that is left of it [m]: none of what failed, was overturned or pushed away, nor of a
+        Share of the released mass that is at rest at the end and held by the barrier or lies in the
         ditch.
+    state : {"stands", "failed", "slid", "overturned", "pushed"}
+        Final state. A fence can have "failed". A gravity wall has "slid" if a corner is more than
+        0.1 m from its original place, and is "overturned" if it rotated beyond the angle of its
+        diagonal. An embankment can be "pushed" away.
+    displacement : float
+        Final distance of its centroid from the initial position [m]; for a fence the elongation
+        used.
+    road_area : float
+        Its final area beyond the uphill edge of the road [m2]; above 0 for gravity walls only.
+    thrust : float
+        Greatest one-second mean of the downhill horizontal force on it [N/m]; 0 for a ditch.
+    resistance : float
+        Thrust that it resists [N/m], inf if it cannot move, see `rigdda.Scene.resistance`; for a
+        fence the force at which it deflects.
+    left_height : float
+        Remaining height [m]; 0 for a ditch and after failing, overturning or being pushed away.
     """
 
     hits: int
@@ -70,46 +70,45 @@ class BarrierOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a release means for the road.
+    """Outcome of a release for the road.
 
     Parameters
     ----------
     event : str
         Name of the event.
     width : float
-        Its width along the road [m].
+        Width of the event along the road [m].
     released_mass : float
-        Mass of all blocks that could move [kg per metre of width].
+        Mass of all blocks that can move [kg per metre of width].
     released_volume : float
-        Volume of all blocks that could move, their area times the width [m3].
+        Volume of all blocks that can move, their area times the width [m3].
     road_volume : float
-        Of this, volume of the blocks whose centroid ever passed the uphill edge of the road [m3].
+        Volume of those blocks whose centroid ever passed the uphill edge of the road [m3].
     reached : bool
-        Whether any did.
+        Whether there were any such blocks.
     reach : (low, high)
-        Chainages between which all blocks stayed, corners included [m]: barriers wholly outside
-        change nothing.
+        Range of chainages within which all blocks stayed, including their corners [m]. Barriers
+        entirely outside it have no effect.
     debris_fraction : float
-        Share of the released mass whose centroid ever passed the uphill edge of the road, in the
-        air included: what the reward measures.
+        Share of the released mass whose centroid ever passed the uphill edge of the road, including
+        in the air.
     debris_on_road : float
         Area of the blocks whose centroid is on the road at the end [m2].
     max_energy_on_road : float
         Largest kinetic energy of a block over the road [J].
     run_out : tuple of float
-        Chainages that 50, 95 and 100 % of the mass have not passed at the end [m], at most that of
-        the downhill edge of the road: a release is over when nothing moves but what goes on there.
+        Final chainages beyond which 50, 5 and 0 % of the mass lie [m], limited to the downhill edge
+        of the road: a release ends when nothing moves uphill of that edge.
     slope_fraction, held_fraction, road_fraction, beyond_fraction : float
-        Where the mass is at the end, by centroid; they add up to 1 exactly. Held: uphill of a
-        barrier that stands and below the line that rises uphill from its top at the angle of
-        friction, the steepest surface of a deposit that leans on it. Not of one that failed or
-        was overturned; what a ditch holds is between its edges, below that line from its
-        downhill edge.
+        Final distribution of the mass by centroid; adds up to exactly 1. Mass is held if it lies
+        uphill of a barrier that has not failed or overturned, below a line that rises uphill from
+        its top at the friction angle (the steepest surface of a deposit). A ditch holds what lies
+        between its edges below such a line from its downhill edge.
     barriers : tuple of BarrierOutcome
         One for each barrier of the layout.
     cut_off : bool
-        Whether half of the rock still moved above the road when `motion.duration` was over: it
-        counts as if it had stopped there.
+        Whether half of the rock still moved uphill of the road when `motion.duration` ended. The
+        outcome is computed as if it had stopped there.
     """
 
     event: str

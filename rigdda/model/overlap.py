@@ -1,4 +1,7 @@
-"""Blocks that start deep in one another or in the ground: refused, no way out is the right one."""
+"""Checks for blocks that overlap each other, the ground or a barrier at the start.
+
+Such blocks are rejected, because there is no unique way to separate them.
+"""
 
 from __future__ import annotations
 
@@ -16,35 +19,35 @@ from rigdda.kernel import Direct, short_kernel
 from rigdda.model.terrain import Terrain
 
 FEW = 16
-"""Blocks up to which bounding boxes are compared one by one: for more a tree is quicker."""
+"""Number of blocks up to which bounding boxes are compared in pairs; a tree is faster for more."""
 
 MOST_SHARED = 0.01
-"""Share of the smaller of two blocks that may be in the other one at the start [-]: that is pushed
-out; blocks deeper in one another may stay wedged so, or part where no one expects it. The same of a
-block in the ground or in a barrier."""
+"""Maximum overlap of two blocks at the start, relative to the area of the smaller one [-]; it is
+removed by the contacts. Blocks with larger overlaps may remain wedged or separate in an unexpected
+direction. The limit also applies to a block in the ground or in a barrier."""
 
 
 class Sunk(NamedTuple):
-    """The place of a block in a list, and its area that is in something else [m2]."""
+    """Index of a block, and its area of overlap with something else [m2]."""
 
     block: int
     shared: float
 
 
 def check_apart(outlines: Sequence[NDArray[np.float64]], fixed: Sequence[bool]) -> None:
-    """Check that no block starts deep in another one, unless both are fixed.
+    """Check that no two blocks overlap by too much, unless both are fixed.
 
     Parameters
     ----------
     outlines : sequence of (n, 2) arrays
         Corners of the blocks [m].
     fixed : sequence of bool
-        Which are fixed.
+        Whether each is fixed.
 
     Raises
     ------
     BadInput
-        If two blocks share more than a hundredth of the smaller one.
+        If two blocks overlap by more than a hundredth of the smaller one.
     """
     if len(outlines) <= FEW and all_beside(outlines):
         return
@@ -55,19 +58,19 @@ def check_apart(outlines: Sequence[NDArray[np.float64]], fixed: Sequence[bool]) 
     pair = (i < j) & ~(held[i] & held[j])
     i, j = i[pair], j[pair]
     most = MOST_SHARED * np.minimum(area[i], area[j])
-    # quick and, where edges nearly coincide, too much at times: what it finds is looked at again
+    # fast, but sometimes too large if edges nearly coincide: verify what it finds
     for k in np.flatnonzero(shapely.area(shapely.intersection(polygons[i], polygons[j])) > most):
         shared = overlap(polygons[i[k]], polygons[j[k]])
         if shared > most[k]:
             raise BadInput(
                 f"blocks[{j[k]}]",
                 outlines[j[k]].tolist(),
-                f"move it: {shared:.3g} m2 of it are in block {i[k]}",
+                f"move it: it overlaps block {i[k]} by {shared:.3g} m2",
             )
 
 
 def all_beside(outlines: Sequence[NDArray[np.float64]]) -> bool:
-    """Return whether the bounding boxes of all outlines are apart."""
+    """Return whether the bounding boxes of all outlines are disjoint."""
     if len(outlines) == 1:
         return True
     boxes = [_box(corners) for corners in outlines]
@@ -75,7 +78,7 @@ def all_beside(outlines: Sequence[NDArray[np.float64]]) -> bool:
 
 
 def _box(corners: NDArray[np.float64]) -> tuple[float, float, float, float]:
-    """Return least x and y, greatest x and y of corners [m]."""
+    """Return the least x and y and the greatest x and y of corners [m]."""
     x, y = zip(*corners.tolist(), strict=True)
     return min(x), min(y), max(x), max(y)
 
@@ -85,7 +88,7 @@ def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
 
 
 def in_ground(ground: Terrain, outlines: Sequence[NDArray[np.float64]]) -> Sunk | None:
-    """Return the first block of which more than a hundredth is in the ground, None if none is."""
+    """Return the first block with more than a hundredth of its area in the ground, or None."""
     chain = np.array(ground.points)
     doubtful = [k for k, o in enumerate(outlines) if not _on_ground.call(chain, np.array(o))]
     if not doubtful:
@@ -96,10 +99,10 @@ def in_ground(ground: Terrain, outlines: Sequence[NDArray[np.float64]]) -> Sunk 
 
 @short_kernel
 def surely_on_ground(chain: NDArray, corners: NDArray) -> bool:
-    """Return whether surely no more than a hundredth of a polygon is below a chain.
+    """Return whether at most a hundredth of a polygon is certainly below a chain.
 
-    The chain must run from left to right: so much as the polygon is below it at most, times its
-    width, bounds the area. The depth is greatest over a corner of either.
+    The chain must run from left to right. The area below it is bounded by the greatest depth times
+    the width of the polygon; the greatest depth is at a corner of either.
     """
     n, last = len(corners), len(chain) - 1
     low, high, twice, depth = math.inf, -math.inf, 0.0, 0.0
@@ -136,7 +139,7 @@ _on_ground = Direct(surely_on_ground)
 
 
 def deepest(solid: NDArray[np.float64], outlines: Sequence[NDArray[np.float64]]) -> Sunk | None:
-    """Return the first block of which more than a hundredth is in a polygon, None if none is.
+    """Return the first block with more than a hundredth of its area in a polygon, or None.
 
     Parameters
     ----------
@@ -154,12 +157,12 @@ def deepest(solid: NDArray[np.float64], outlines: Sequence[NDArray[np.float64]])
 
 
 def _deepest(solid: shapely.Polygon, outlines: Sequence[NDArray[np.float64]]) -> Sunk | None:
-    """Return the first block of which more than a hundredth is in a solid, None if none is."""
+    """Return the first block with more than a hundredth of its area in a solid, or None."""
     polygons = shapely.polygons([shapely.linearrings(corners) for corners in outlines])
     near = np.flatnonzero(shapely.intersects(solid, polygons))
     most = MOST_SHARED * shapely.area(polygons)
     shared = shapely.area(shapely.intersection(solid, polygons[near]))
-    # as above: what the quick way finds is looked at again
+    # verify what the fast intersection finds, as in `check_apart`
     for k in near[shared > most[near]]:
         sure = overlap(solid, polygons[k])
         if sure > most[k]:

@@ -1,10 +1,10 @@
-"""What barriers cost, and what a release costs: EUR per metre of road and year in the end.
+"""Prices of barriers and costs of releases.
 
-The design problem is to have least of
+The design problem is to minimise the annual cost per metre of road [EUR per metre and year]
 
     Z = sum_b capital_b (annuity + upkeep_b) + sum_k rate_k E[harm_k + repair_k]
 
-over barriers b and events k. All prices are orders of magnitude and a user's to replace.
+over barriers b and events k. All default prices are orders of magnitude; users should replace them.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from rigdda import fields
 from rigdda.fields import about, documented
 
 ACCESS_HEIGHT = 60.0
-"""Height above the road at which access costs `Prices.access` times the price at the road [m]."""
+"""Height above the road at which the surcharge for access is `Prices.access` times the price
+[m]."""
 
 MOST = 1e6
-"""Greatest price [EUR per m, m2 or m3]."""
+"""Maximum price [EUR per m, m2 or m3]."""
 
 FENCES = {
     "100": 150.0,
@@ -54,7 +55,7 @@ Protection = Annotated[str, about(choices=UPKEEP)]
 
 @documented
 class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What barriers cost.
+    """Prices of barriers.
 
     Raises
     ------
@@ -67,18 +68,18 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = msgspec.field(default_factory=lambda: dict(FENCES))
     fence_base: Annotated[
         Price,
-        about("Price of a fence per metre of road, for foundations.", "EUR/m"),
+        about("Additional price of a fence per metre of road, for foundations.", "EUR/m"),
     ] = 300.0
     ditch: Annotated[
         dict[str, Price],
         about(
-            "Price of digging by the surface of the ground. Other surfaces cost as much as the "
-            "dearest in the table.",
+            "Price of excavation by the surface of the ground. Other surfaces cost as much as the "
+            "most expensive one in the table.",
             "EUR/m3",
         ),
     ] = msgspec.field(default_factory=lambda: dict(DITCHES))
-    ditch_base: Annotated[Price, about("Price of a ditch per metre of road.", "EUR/m")] = 20.0
-    embankment: Annotated[Price, about("Price of reinforced earth.", "EUR/m3")] = 80.0
+    ditch_base: Annotated[Price, about("Additional price of a ditch.", "EUR/m")] = 20.0
+    embankment: Annotated[Price, about("Price of reinforced soil.", "EUR/m3")] = 80.0
     concrete: Annotated[Price, about("Price of the concrete of walls.", "EUR/m3")] = 350.0
     removal: Annotated[Price, about("Price of removing the rock that barriers hold.", "EUR/m3")] = (
         100.0
@@ -86,54 +87,54 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     access: Annotated[
         float,
         about(
-            "Share by which prices rise for each 60 m of height above the road.",
+            "Share by which prices increase per 60 m of height above the road.",
             "-",
             ge=0.0,
             le=20.0,
         ),
     ] = 1.5
     interest: Annotated[
-        float, about("Rate of interest after inflation.", "1/year", ge=0.0, le=0.5)
+        float, about("Real rate of interest, after inflation.", "1/year", ge=0.0, le=0.5)
     ] = 0.03
     life: Annotated[float, about("Service life of barriers.", "years", ge=1.0, le=1000.0)] = 50.0
     upkeep: Annotated[
         dict[Protection, Upkeep],
         about(
-            "Yearly upkeep as a share of the capital, by the kind of barrier. A kind that is not "
-            "in the table has none.",
+            "Annual upkeep as a share of the capital cost, by kind of barrier. A kind that is not "
+            "in the table has no upkeep.",
             "1/year",
         ),
     ] = msgspec.field(default_factory=lambda: dict(UPKEEP))
     shed: Annotated[
         Price,
-        about("Price of a rock shed over the road, the reference that nothing passes.", "EUR/m"),
+        about("Price of a rock shed over the road, a reference with full protection.", "EUR/m"),
     ] = 25_000.0
-    source: Annotated[str, about("Where the prices are from.")] = "orders of magnitude, from memory"
+    source: Annotated[str, about("Source of the prices.")] = "orders of magnitude, from memory"
 
     def __post_init__(self) -> None:
         fields.check(self, "prices.")
 
     @property
     def annuity(self) -> float:
-        """Share of the capital to pay a year [1/year]."""
+        """Annual payment as a share of the capital cost [1/year]."""
         if self.interest < 1e-9:
             return 1.0 / self.life
         return self.interest / -np.expm1(-self.life * np.log1p(self.interest))
 
     def annual(self, kind: str, usual: float = 0.0) -> float:
-        """Return what a barrier of a kind costs a year, as a share of its capital [1/year].
+        """Return the annual cost of a kind of barrier as a share of its capital cost [1/year].
 
-        `usual` is the upkeep of a kind that the table `upkeep` does not know.
+        `usual` is the upkeep of a kind that is neither in the table `upkeep` nor built-in.
         """
         return float(self.annuity + self.upkeep.get(kind, 0.0 if kind in UPKEEP else usual))
 
 
 @documented
 class Consequences(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What rock on the road costs.
+    """Costs of rock on the road.
 
-    The road is closed for days_base + days_factor V^days_exponent days, V being the volume that
-    came onto it [m3].
+    The road is closed for days_base + days_factor V^days_exponent days, where V is the volume of
+    rock that reaches it [m3].
 
     Raises
     ------
@@ -151,25 +152,23 @@ class Consequences(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ),
     ] = 50_000.0
     days_base: Annotated[
-        float, about("Days of closure whatever the volume.", "days", ge=0.0, le=1000.0)
+        float, about("Days of closure for any volume.", "days", ge=0.0, le=1000.0)
     ] = 0.2
     days_factor: Annotated[
-        float, about("Further days of closure for 1 m3 of rock.", "days", ge=0.0, le=1000.0)
+        float, about("Additional days of closure for 1 m3 of rock.", "days", ge=0.0, le=1000.0)
     ] = 0.15
     days_exponent: Annotated[
         float,
-        about("Exponent with which these days grow with the volume.", "-", ge=0.0, le=2.0),
+        about("Exponent of the volume in the additional days of closure.", "-", ge=0.0, le=2.0),
     ] = 0.6
     clearing: Annotated[Price, about("Cost of clearing the road.", "EUR/m3")] = 300.0
-    source: Annotated[str, about("Where these costs are from.")] = (
-        "orders of magnitude, from memory"
-    )
+    source: Annotated[str, about("Source of these costs.")] = "orders of magnitude, from memory"
 
     def __post_init__(self) -> None:
         fields.check(self, "consequences.")
 
     def harm(self, volume: float, reached: bool) -> float:
-        """Return the cost of so much rock on the road [EUR]; `volume` in m3."""
+        """Return the cost of a volume of rock on the road [EUR]; `volume` in m3."""
         if not reached:
             return 0.0
         days = self.days_base + self.days_factor * volume**self.days_exponent
@@ -177,7 +176,7 @@ class Consequences(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Bill(NamedTuple):
-    """What a release costs [EUR]: harm on the road, and repair of barriers with emptying them."""
+    """Cost of a release [EUR]: harm on the road, and repair and emptying of barriers."""
 
     harm: float
     repair: float

@@ -1,7 +1,7 @@
-"""One concrete mechanical problem: terrain, blocks, surfaces and barriers.
+"""Scene: one concrete mechanical problem of terrain, blocks, surfaces and barriers.
 
-Its members are checked together: how they refer to one another, that nothing starts in something
-else, and that barriers stand one behind the other. Scenes are kept as JSON.
+Its members are checked for consistency: their references to each other, overlaps at the start, and
+the order of barriers. Scenes can be stored as JSON.
 """
 
 from __future__ import annotations
@@ -51,16 +51,16 @@ MEMBERS = (
     ("loads", Load, "loads: rigdda.PointLoad, LineLoad or BodyForce"),
     ("supports", Support, "supports: rigdda.FixedPoint or Bolt"),
 )
-"""Fields of a scene that are sequences, the class of their members, and that in words."""
+"""Fields of a scene that are sequences, the class of their members, and its description."""
 
 
 def set_members(scene: Scene) -> None:
-    """Check what a scene is made of, and set sequences to tuples and mappings to dicts.
+    """Check the members of a scene, and convert sequences to tuples and mappings to dicts.
 
     Raises
     ------
     BadInput
-        If a member is of another kind.
+        If a member is of another type.
     """
     if not isinstance(scene.terrain, Terrain | None):
         raise BadInput("terrain", scene.terrain, "give a rigdda.Terrain or None")
@@ -73,12 +73,12 @@ def set_members(scene: Scene) -> None:
 
 
 def check_indices(scene: Scene) -> None:
-    """Check that every block is there that a load or a support is on.
+    """Check that every block to which a load or a support refers exists.
 
     Raises
     ------
     BadInput
-        If one is not.
+        If one does not.
     """
     for i, load in enumerate(scene.loads):
         _check_index(scene, f"loads[{i}]: block", load.block)
@@ -97,12 +97,12 @@ def _check_index(scene: Scene, where: str, index: int) -> None:
 
 
 def check_names(scene: Scene) -> None:
-    """Check that every surface that is named is there.
+    """Check that every surface name is defined.
 
     Raises
     ------
     BadInput
-        If one is not, or an interface is not of two.
+        If one is not, or an interface is not a pair of names.
     """
     for i, block in enumerate(scene.blocks):
         check_known(scene.surfaces, f"block {i}: surface", block.surface)
@@ -116,7 +116,7 @@ def check_names(scene: Scene) -> None:
 
 
 def check_known(surfaces: Mapping[str, Surface], where: str, name: str) -> None:
-    """Check that a surface is there.
+    """Check that a surface is defined.
 
     Raises
     ------
@@ -129,26 +129,26 @@ def check_known(surfaces: Mapping[str, Surface], where: str, name: str) -> None:
 
 
 def check_capacities(barriers: Sequence[Barrier]) -> None:
-    """Check that the capacity of every fence is that of a metre.
+    """Check that every fence has a capacity per metre.
 
     Raises
     ------
     BadInput
-        If a fence has only the class of a panel.
+        If a fence has only an energy class, which refers to a panel.
     """
     for i, barrier in enumerate(barriers):
         if isinstance(barrier, Fence) and barrier.capacity is None:
-            mend = "give fence.for_width(width): a scene is a metre wide"
+            mend = "give fence.for_width(width): a scene needs the capacity per metre"
             raise BadInput(f"barriers[{i}].energy_class", barrier.energy_class, mend)
 
 
 def check_blocks(blocks: Sequence[Block]) -> None:
-    """Check that there is a free block and that blocks are apart.
+    """Check that at least one block is free, and that blocks do not overlap.
 
     Raises
     ------
     BadInput
-        If there is none, or two share too much.
+        If none is free, or two overlap by too much.
     """
     if not any(not b.fixed for b in blocks):
         raise BadInput("blocks", f"{len(blocks)} blocks", "give at least one free block")
@@ -156,7 +156,7 @@ def check_blocks(blocks: Sequence[Block]) -> None:
 
 
 def check_clear(scene: Scene, ground: Terrain) -> None:
-    """Check that no free block starts deep in the ground or in what stands on it.
+    """Check that no free block starts deep in the ground or in a barrier that is a body.
 
     Raises
     ------
@@ -167,18 +167,18 @@ def check_clear(scene: Scene, ground: Terrain) -> None:
     found = in_ground(ground, list(free.values()))
     if found is not None:
         i = list(free)[found.block]
-        mend = f"raise it: {found.shared:.3g} m2 of it are in the ground"
+        mend = f"raise it: it overlaps the ground by {found.shared:.3g} m2"
         raise BadInput(f"blocks[{i}]", scene.blocks[i].vertices.tolist(), mend)
     for j in scene.bodies:
         found = deepest(scene.outline(j), list(free.values()))
         if found is not None:
             i = list(free)[found.block]
-            mend = f"move it: {found.shared:.3g} m2 of block {i} are in it"
+            mend = f"move it: it overlaps block {i} by {found.shared:.3g} m2"
             raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, mend)
 
 
 def check_order(scene: Scene) -> None:
-    """Check that every barrier which is a body stands downhill of where the one before it ends.
+    """Check that every barrier that is a body starts downhill of the end of the one before.
 
     Raises
     ------
@@ -205,39 +205,40 @@ class Scene:
     terrain : Terrain or None
         The natural ground; None: free space.
     blocks : sequence of Block
-        The rock, at least one block of it free to move. Gravity walls are not among them.
+        The rock blocks, at least one of them free to move. They do not include gravity walls.
     surfaces : mapping of str to Surface
-        Every surface that a block or the terrain names. Two surfaces that meet take the smaller
-        of each property.
+        All surfaces to which blocks and the terrain refer. A contact of two surfaces has the
+        smaller value of each property.
     barriers : sequence of Wall, GravityWall, Fence, Ditch or Embankment
-        Protective structures; their surface is "concrete" where the scene defines it, else "rock".
-        That of embankments is "soil" where the scene defines it.
+        Protective structures. Their surface is "concrete" if the scene defines it, otherwise
+        "rock"; that of embankments is "soil" if the scene defines it.
     interfaces : mapping of (str, str) to Surface
-        Properties for pairs of surfaces, instead of the smaller of each.
+        Properties of pairs of surfaces, which replace the smaller values.
     loads : sequence of PointLoad, LineLoad or BodyForce
         Dead loads.
     supports : sequence of FixedPoint or Bolt
         Supports.
     gravity : float or (gx, gy)
-        Gravity [m/s2], a number acts downwards.
+        Gravity [m/s2]; a number acts downwards.
     damping : float
         Mass-proportional damping coefficient alpha [1/s] (Koo and Chern 1998, damping force) of
-        contacts whose surfaces state none, and in flight if `damping_when` is "always".
+        contacts whose surfaces do not specify one, and in flight if `damping_when` is "always".
     damping_when : {"always", "contact"}
-        "always" is the paper's: a fall is capped at g/alpha, 16 m/s for 0.6 1/s, so energies at a
-        barrier stay low. "contact" damps only blocks that touch something, or did within 0.1 s.
+        "always" is the method of the paper. It limits the speed of a fall to g/alpha, 16 m/s for
+        0.6 1/s, so that energies at a barrier are too low. "contact" damps only blocks that touch
+        something, or did so within the last 0.1 s.
     base_motion : (m, 3) array_like, optional
-        Time [s] and acceleration of the ground, x and y [m/s2]; linear in between, a repeated time
-        makes a jump; before and after it the ground does not accelerate. Motion is computed
-        relative to the ground.
+        Time [s] and acceleration of the ground, x and y [m/s2], with linear interpolation; a
+        repeated time makes a jump. Before the first and after the last time the acceleration is
+        zero. The motion of blocks is computed relative to the ground.
     roughness : Roughness, optional
-        Pits in the ground, where no barrier stands.
+        Pits in the ground, except under barriers.
 
     Raises
     ------
     BadInput
-        If a name has no surface, an index no block, a value is outside its range, a block starts
-        deep in another one, in the ground or in a barrier, or a barrier stands in another one.
+        If a name has no surface, an index has no block, a value is outside its range, a block
+        overlaps another one, the ground or a barrier by too much, or barriers overlap.
     """
 
     terrain: Terrain | None
@@ -294,18 +295,20 @@ class Scene:
         barriers: Sequence[Built],
         roughness: Roughness | None = None,
     ) -> Scene:
-        """Return the scene with other blocks, surfaces of the same names and pits in the ground.
+        """Return the scene with other blocks, surface properties and pits in the ground.
 
-        The ground and what stands on it are not built and checked again; `barriers` are those of
-        the scene but for what they resist.
+        The ground and the barriers are not built and checked again. `surfaces` must have the same
+        names, and `barriers` may differ from those of the scene only in their resistance.
 
         Raises
         ------
         BadInput
-            As the scene does, for the blocks; if it has loads or supports.
+            If the blocks are not valid, as in the constructor, or the scene has loads or supports.
         """
         if self.loads or self.supports:
-            raise BadInput("scene", self, "give one without loads and supports: they are on blocks")
+            raise BadInput(
+                "scene", self, "give one without loads and supports, which refer to blocks"
+            )
         other = object.__new__(Scene)
         for name in Scene.__slots__:
             object.__setattr__(other, name, getattr(self, name))
@@ -333,7 +336,7 @@ class Scene:
         return other
 
     def _build(self) -> None:
-        """Set the smooth ground with its earthworks; check that every barrier stands on it."""
+        """Set the smooth ground with its earthworks, and check that every barrier stands on it."""
         if self.terrain is None:
             raise BadInput("barriers", self.barriers, "give the scene a terrain to stand on")
         check_known(self.surfaces, "barrier surface", self.barrier_surface)
@@ -347,7 +350,7 @@ class Scene:
         check_order(self)
 
     def _with_pits(self, ground: Terrain | None, barriers: Iterable[Barrier]) -> Terrain | None:
-        """Return a smooth ground with pits where none of the barriers stands."""
+        """Return a smooth ground with pits, except under the barriers."""
         if ground is None or self.roughness is None:
             return ground
         even = []
@@ -361,13 +364,13 @@ class Scene:
 
     @property
     def smooth_ground(self) -> Terrain | None:
-        """The ground with its earthworks and without pits."""
+        """The ground with its earthworks, without pits."""
         return self._smooth
 
     def outline(self, barrier: int) -> NDArray[np.float64]:
-        """Return the (n, 2) corners of a barrier at the start [m].
+        """Return the (n, 2) initial corners of a barrier [m].
 
-        Those of a ditch or an embankment enclose what is dug out or filled in.
+        For a ditch or an embankment they enclose the cut or the fill.
 
         Raises
         ------
@@ -386,15 +389,15 @@ class Scene:
 
     @property
     def barrier_poses(self) -> NDArray[np.float64]:
-        """x, y, theta of the centroid of each barrier's outline at the start, (B, 3) [m, rad]."""
+        """Initial x, y, theta of the centroid of each barrier's outline, (B, 3) [m, rad]."""
         centres = [polygon_properties(self.outline(i))[1] for i in range(len(self.barriers))]
         return np.array([[*centre, 0.0] for centre in centres]).reshape(-1, 3)
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Barriers that are bodies, in the order in which they follow the blocks.
+        """Indices of barriers that are bodies, in the order in which they follow the blocks.
 
-        Gravity walls first, which are free to move, then fences, which give way, then walls.
+        Gravity walls, which can move, come first; then fences, which can deflect; then walls.
         """
         upright = [i for i, b in enumerate(self.barriers) if not isinstance(b, Earthwork)]
         order = (GravityWall, Fence)
@@ -407,7 +410,7 @@ class Scene:
         return self.gravity if isinstance(self.gravity, tuple) else (0.0, -self.gravity)
 
     def ground_without(self, gone: Collection[int]) -> Terrain | None:
-        """Return the ground after some of the barriers were pushed away: embankments change it."""
+        """Return the ground after embankments among the barriers `gone` were pushed away."""
         if self.terrain is None or len(gone) == 0:
             return self.ground
         left = [
@@ -422,22 +425,22 @@ class Scene:
 
     @property
     def barrier_surface(self) -> str:
-        """Name of the surface of every barrier."""
+        """Name of the surface of barriers other than embankments."""
         return "concrete" if "concrete" in self.surfaces else "rock"
 
     def friction_deg(self, first: str, second: str) -> float:
-        """Return the friction angle between two named surfaces [deg], that of `interface`."""
+        """Return the friction angle between two named surfaces [deg], as in `interface`."""
         pair = self.interfaces.get((first, second)) or self.interfaces.get((second, first))
         if pair is not None:
             return pair.friction_deg
         return min(self.surfaces[first].friction_deg, self.surfaces[second].friction_deg)
 
     def resistance(self, index: int) -> float:
-        """Return the thrust that a barrier bears [N/m], inf for one that none can move."""
+        """Return the thrust that a barrier resists [N/m]; inf if it cannot move."""
         return self.barriers[index].resistance(self, self.outline(index))
 
     def interface(self, first: str, second: str) -> Surface:
-        """Return the properties of the contact between two named surfaces."""
+        """Return the contact properties of two named surfaces."""
         pair = self.interfaces.get((first, second)) or self.interfaces.get((second, first))
         if pair is not None:
             return pair
@@ -449,7 +452,7 @@ SUPPORTS = {kind.__name__: kind for kind in (FixedPoint, Bolt)}
 
 
 def scene_to_json(scene: Scene) -> bytes:
-    """Return a scene as JSON; numbers survive exactly."""
+    """Return a scene as JSON, in which numbers are exact."""
     return msgspec.json.encode(
         {
             "terrain": scene.terrain
@@ -482,12 +485,12 @@ def scene_to_json(scene: Scene) -> bytes:
 
 
 def scene_from_json(text: bytes) -> Scene:
-    """Return the scene that `scene_to_json` wrote.
+    """Return the scene written by `scene_to_json`.
 
     Raises
     ------
     BadInput
-        If a value in it is not sound.
+        If a value is invalid.
     """
     data = msgspec.json.decode(text)
     terrain, roughness = data.pop("terrain"), data.pop("roughness", None)

@@ -1,4 +1,4 @@
-"""How a scene is computed."""
+"""Numerical settings of simulations, and limits of their time steps."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from numpy.typing import NDArray
 from rigdda import check
 
 USUAL_DT = 5e-3
-"""Step of a simulation, and of a site that does not say [s]: the outcome of a rockfall is within
-the scatter of its releases, and a block of 20 m/s moves by 0.1 m."""
+"""Default time step [s]. The error of the outcome of a rockfall is below the scatter between
+releases, and a block at 20 m/s moves by 0.1 m per step."""
 
 LARGEST_DT = 0.1
-"""Largest step [s]: in it a block at rest falls by 5 cm; more was hardly meant in seconds."""
+"""Maximum time step [s]; a block falls by 5 cm from rest in it. Larger values are probably not in
+seconds."""
 
 SHORTEST_DT = 1e-6
-"""Shortest step [s]: a thousandth of what the accuracy of an outcome needs, days of computing."""
+"""Minimum time step [s]: a thousandth of what accurate outcomes need; runs would take days."""
 
 LONGEST_STEP = 0.08
-"""Longest step over the time in which a block falls by half its size, sqrt(size / g) [-], with the
-mean size of the blocks: 25 ms for blocks of 1 m. Contacts sink in in longer ones: with steps of 25
-to 100 ms 20 of 141 hard cases did too deep."""
+"""Maximum time step relative to sqrt(size / g), where size is the mean block size [-]; 25 ms for
+blocks of 1 m. A block falls by half its size in a time of sqrt(size / g). Contacts penetrate in
+longer steps: with steps of 25 to 100 ms, 20 of 141 difficult cases penetrated too deeply."""
 
 SMALLEST = 0.5
-"""The same for the smallest block [-], which falls by an eighth of its size in it. With 0.56 thin
-blocks sink into one another, with 0.7 they go through the ground."""
+"""Maximum time step relative to sqrt(size / g) of the smallest block [-], which falls by an eighth
+of its size in it. At 0.56 thin blocks penetrate each other; at 0.7 they pass through the ground."""
 
 EARTH = 9.81
-"""Gravity that gives scenes without any their scale [m/s2]."""
+"""Gravity used for the time scale of scenes without gravity [m/s2]."""
 
 SOLVERS = ("pcg", "block-pcg", "sor", "direct")
 
@@ -42,41 +43,45 @@ class Settings:
     Parameters
     ----------
     dt : float
-        Time step [s], 1e-6 to 0.1. 5 ms keeps a 20 m/s block within 0.1 m a step and the outcome
-        of a rockfall within the scatter of its releases. A scene is refused whose blocks are too
-        small for it: a step is at most 0.08 sqrt(size / g) of the mean block, 25 ms for 1 m, and
-        0.5 sqrt(size / g) of the smallest. What flies a good part of its size in a step may strike
-        what was not foreseen, and pass what is thin.
+        Time step [s], 1e-6 to 0.1. With 5 ms a block at 20 m/s moves by 0.1 m per step, and the
+        error of the outcome of a rockfall is below the scatter between releases. The step must not
+        exceed 0.08 sqrt(size / g) of the mean block (25 ms for 1 m) or 0.5 sqrt(size / g) of the
+        smallest block; otherwise the scene is rejected. A block that moves by a large part of its
+        size in a step may hit objects that were not detected and pass through thin ones.
     penetration : float or None
-        Wanted penetration of a contact under the load it carries [m]; the penalty stiffness
-        follows from it. None: 1e-4 of the mean block size (the root of its area), small enough
-        for tall stacks and large enough for conjugate gradients to converge in few iterations.
+        Target penetration of a contact under its load [m], which determines the penalty stiffness.
+        None: 1e-4 of the mean block size (square root of the area), small enough for tall stacks
+        and large enough for fast convergence of conjugate gradients.
     tolerance : float
-        Relative residual at which conjugate gradients stop. 1e-7: looser, and the small forces at
-        the top of a tall stack drown in the error of the large ones at its base.
+        Relative residual at which conjugate gradients stop. With values above 1e-7 the errors of
+        large forces at the base of a tall stack exceed the small forces at its top.
     sweep_tolerance : float
-        Islands of several blocks in motion take a step in eight substeps. In each their contacts
-        are swept over until no velocity changes by more than this times the number of blocks but
-        one [m/s], nor by more than 2 % of the greatest speed, up to 100 times.
+        Convergence tolerance for islands of several moving blocks, which take a step in eight
+        substeps. In each substep the contacts are swept until no velocity changes by more than this
+        value times the number of blocks minus one [m/s], nor by more than 2 % of the greatest
+        speed, or for at most 100 sweeps.
     open_close_iterations : int
-        Most open-close iterations in a step; nearly all steps need 1 to 3. What has not settled
-        then is relaxed.
+        Maximum number of open-close iterations per step; nearly all steps need 1 to 3. If they have
+        not converged, relaxation is used.
     mode : {"dynamic", "static"}
-        "static" starts every step at rest: steps are then increments of load, not of time.
+        "static" starts every step at rest: steps are then increments of load instead of time.
     solver : {"pcg", "block-pcg", "sor", "direct"}
-        Of islands of more than two blocks at rest; one or two are solved directly, with their
-        friction. "pcg": conjugate gradients with the inverse diagonal, the paper's;
-        "block-pcg": with the inverse 3x3 blocks; "sor": the original successive over-relaxation;
-        "direct": Cholesky factors within the profile, a third of the time for a stack of 100.
+        Solver for islands of more than two blocks at rest; smaller ones are solved directly,
+        including friction. "pcg": conjugate gradients preconditioned by the diagonal, as in the
+        paper; "block-pcg": preconditioned by the 3x3 blocks; "sor": the original successive
+        over-relaxation; "direct": Cholesky factorisation within the profile, which takes a third of
+        the time for a stack of 100.
     relaxation : float
         Over-relaxation factor of "sor" [-], above 0 and below 2.
     post_correction : bool
-        Turn blocks exactly after each step. False moves their corners by the linear displacement
-        function of the solve, so that blocks expand as they turn (Figs 1 to 3).
+        Whether blocks are rotated exactly after each step. If False, their corners move by the
+        linear displacement function of the solution, so that blocks expand as they rotate (Figs 1
+        to 3).
     islands : bool
-        Solve each cluster of blocks that touch on its own. False: all blocks in one system.
+        Whether each cluster of touching blocks is solved separately; otherwise all blocks form one
+        system.
     sleeping : bool
-        Let blocks at rest sleep until they are disturbed. They cost nothing then.
+        Whether blocks at rest sleep, at no cost, until they are disturbed.
 
     Raises
     ------
@@ -111,18 +116,16 @@ class Settings:
 
 
 def longest_step(areas: NDArray[np.float64], gravity: float) -> float:
-    """Return the longest step [s] that suits free blocks of these areas [m2].
+    """Return the maximum time step [s] for free blocks of these areas [m2].
 
-    A scene with a longer one is refused (`rigdda.dynamics.packing.check_step`), a site
-    divides its step (`Site.settings`).
-
-    Without gravity as under that of the earth.
+    A scene with a longer step is rejected (`rigdda.dynamics.packing.check_step`); a site divides
+    its step (`Site.settings`). Without gravity, that of the Earth is used.
     """
     return _longest_step(np.add.reduce(areas) / len(areas), areas.min(), gravity)
 
 
 def longest_step_of_single(area: float, gravity: float) -> float:
-    """Return the longest step [s] that suits a single block of this area [m2]."""
+    """Return the maximum time step [s] for a single block of this area [m2]."""
     return _longest_step(area, area, gravity)
 
 

@@ -1,4 +1,4 @@
-"""A site: what an engineer knows about it, its file, its releases and its prices."""
+"""Site: the description of a slope and a road, its releases, its prices and its file format."""
 
 from __future__ import annotations
 
@@ -46,27 +46,28 @@ from rigdda.model.terrain import Roughness
 Value = TypeVar("Value")
 
 ROUNDING = 1e-9
-"""Length by which a barrier may reach into loose rock [m]: vectors lose last digits of its edge."""
+"""Tolerance for the overlap of barriers and loose rock [m]; encoded layouts lose their last
+digits."""
 
 STRENGTHS, PITS = 1, 2
-"""Ends of the seeds of what is drawn of the ground beside the blocks."""
+"""Last numbers of the seeds for the random properties of the ground."""
 
 FARTHEST = 2.5
-"""Standard deviations at which normal numbers of the ground are cut off."""
+"""Standard deviations at which random normal numbers of the ground are truncated."""
 
 STEEPEST_DEG = 85.0
-"""Friction angle up to which scatter may raise that of a surface [deg]."""
+"""Upper limit of friction angles after random variation [deg]."""
 
 
 class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What an engineer knows about a site: the tables of its file, sound together.
+    """Description of a site: the tables of its file, checked for consistency.
 
-    Its parameters are those of `SiteTables`.
+    The parameters are those of `SiteTables`.
 
     Raises
     ------
     BadInput
-        If a field is unknown, of the wrong type or at odds with another; the message names it.
+        If a field is unknown, of the wrong type or inconsistent with another; the message names it.
     """
 
     def __post_init__(self) -> None:
@@ -74,24 +75,24 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if not self.events:
             usual = tuple(Event(s.name, 1.0, s.name) for s in self.sources if s.band is None)
             if not usual:
-                raise BadInput("events", (), "give at least one: what comes down, and how often")
+                raise BadInput("events", (), "give at least one event with its rate")
             msgspec.structs.force_setattr(self, "events", usual)
         if self.motion.damping is None:
             check_damping(self.motion)
             msgspec.structs.force_setattr(self, "surfaces", _with_damping(self.surfaces))
         check_site(self)
         if not self.rooms:
-            mend = "leave room for barriers: bands of loose rock take all of the zone"
+            mend = "leave room for barriers: bands of loose rock cover the whole zone"
             raise BadInput("barrier_zone.end", self.barrier_zone.end, mend)
 
     @classmethod
     def load(cls, source: str | os.PathLike[str]) -> Site:
-        """Read a site from a TOML file, or a built-in or generated one by its name.
+        """Read a site from a TOML file, or return a built-in or generated site by its name.
 
         Raises
         ------
         BadInput
-            If there is no such file or name, or the file is not a sound site.
+            If there is no such file or name, or the file is not a valid site.
         """
         if not isinstance(source, str | os.PathLike):
             raise BadInput("site", source, "name a TOML file or a built-in site")
@@ -104,30 +105,30 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     @classmethod
     def parse(cls, text: str, name: str) -> Site:
-        """Return the site of a TOML text; errors call the file `name`.
+        """Return the site of a TOML text; `name` identifies the file in error messages.
 
         Raises
         ------
         BadInput
-            If it is not a sound site.
+            If it is not a valid site.
         """
         return cls(**fields.checked(cls, fields.parse("site file", name, text)))
 
     @classmethod
     def named(cls, name: str) -> Site:
-        """Return a built-in site, or a generated one, by its name, see `rigdda.sites.load`."""
+        """Return a built-in or generated site by its name, see `rigdda.sites.load`."""
         if name in site_names.names():
             return cls.parse(site_names.text(name), name)
         family, number = site_names.instance(name)
         return generate(cls.named(site_names.built_in(family, number)), name, number)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the site as TOML; `load` gives it back.
+        """Write the site as TOML; the inverse of `load`.
 
         Raises
         ------
         BadInput
-            If a surface has the plain contact of restitution None, for which TOML has no word.
+            If a surface has restitution None (plain penalty contact), which TOML cannot represent.
         """
         data = msgspec.to_builtins(self)
         for table in (*data["sources"], *data["events"], data["motion"]):  # TOML has no null
@@ -143,13 +144,13 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                     if table.get(name) == value:
                         del table[name]
             if table.get("restitution", 0.0) is None:
-                mend = "give a number: a site file has no plain contact, only Python has"
+                mend = "give a number: None (plain contact) is possible in Python only"
                 raise BadInput(f"{where}.restitution", None, mend)
         with atomic(path) as part:
             part.write_text(tomli_w.dumps(data), encoding="utf-8")
 
     def pick(self, seed: int) -> str:
-        """Return the name of the event that a seed draws by rate."""
+        """Return the name of the event that a seed selects at random in proportion to the rates."""
         rates = np.array([event.rate for event in self.events])
         rng = np.random.default_rng([check.integer("seed", seed, 0), len(rates)])
         return self.events[rng.choice(len(rates), p=rates / rates.sum())].name
@@ -158,7 +159,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def rooms(self) -> tuple[tuple[float, float], ...]:
         """Intervals of the zone in which barriers may stand [m]: those without loose rock.
 
-        Around a band so much is left out as its largest block reaches beyond it.
+        Around each band, a margin as wide as the reach of its largest block is excluded.
         """
         start, end = self.barrier_zone.start, self.barrier_zone.end
         found = []
@@ -169,17 +170,25 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return (*found, (start, end)) if start < end else tuple(found)
 
     def settings(self, scene: Scene) -> Settings:
-        """Return the numerical settings of the scene of a release.
+        """Return the numerical settings for the scene of a release.
 
-        The step is that of the site, or the longest whole part of it that is not too long for the
-        blocks.
+        The time step is that of the site, divided by the least whole number that makes it short
+        enough for the blocks.
         """
         areas = [polygon_properties(b.vertices)[0] for b in scene.blocks if not b.fixed]
         most = longest_step(np.array(areas), math.hypot(*scene.gravity_vector))
         return Settings(dt=self.motion.dt / max(1, math.ceil(self.motion.dt / most)))
 
     def draw(self, seed: int = 0, event: str | None = None) -> Drawn:
-        """Return what a seed draws of an event, or of one that it draws by rate.
+        """Return the random properties of a release of an event.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the release.
+        event : str, optional
+            Name of the event; by default the seed selects one, with probabilities proportional to
+            rates.
 
         Raises
         ------
@@ -203,12 +212,12 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return Drawn(name, blocks, what.width_of(areas), shift, *_ground(self, seed, index))
 
     def built(self, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
-        """Return what stands of a layout, as it resists an event of this width [m].
+        """Return the barriers of a layout in a scene, adapted to the width of an event [m].
 
         Raises
         ------
         BadInput
-            If a barrier stands where loose rock lies, or a mesh is not one of the options.
+            If a barrier overlaps loose rock, or a mesh is not one of the options.
         """
         found: list[Built] = []
         taken = _taken(self)
@@ -219,13 +228,13 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                 continue
             for low, high in taken:
                 if barrier.x < high - ROUNDING and barrier.x + barrier.extent > low + ROUNDING:
-                    mend = f"put it outside x = {low:.2f} to {high:.2f}, where loose rock lies"
+                    mend = f"put it outside the loose rock at x = {low:.2f} to {high:.2f}"
                     raise BadInput(f"barriers[{i}].x", barrier.x, mend)
             found.append(barrier.for_width(width))
         return tuple(found)
 
     def scene(self, drawn: Drawn, barriers: Sequence[Built] = ()) -> Scene:
-        """Return the scene of what was drawn, with barriers as `built` gives them."""
+        """Return the scene of a drawn release, with barriers as returned by `built`."""
         surfaces, interfaces = self.strength(drawn)
         return Scene(
             terrain=self.profile,
@@ -241,21 +250,32 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def realise(
         self, layout: Sequence[Barrier] = (), seed: int = 0, event: str | None = None
     ) -> Scene:
-        """Return the scene of one release of an event, or of one that the seed draws by rate.
+        """Return the scene of one release.
 
-        Blocks and friction are the same for every layout. Mesh is not part of a scene.
+        Blocks and friction depend on seed and event only, not on the layout. Mesh is not part of a
+        scene.
+
+        Parameters
+        ----------
+        layout : sequence of Barrier
+            The barriers.
+        seed : int
+            Seed of the release.
+        event : str, optional
+            Name of the event; by default the seed selects one, with probabilities proportional to
+            rates.
 
         Raises
         ------
         BadInput
-            If a barrier does not stand on the slope or stands where loose rock lies, there is no
-            such event, or the seed is not a whole number >= 0.
+            If a barrier does not stand on the slope or overlaps loose rock, there is no such event,
+            or the seed is not a whole number >= 0.
         """
         drawn = self.draw(seed, event)
         return self.scene(drawn, self.built(layout, drawn.width))
 
     def strength(self, drawn: Drawn) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
-        """Return the surfaces and how pairs meet in a release, with what was drawn of them."""
+        """Return the surfaces and the interfaces of a release, with its random variation."""
         surfaces, normals = self.surfaces, drawn.strengths
         if normals:
             each = zip(surfaces.items(), normals, strict=True)
@@ -275,29 +295,32 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return surfaces, found
 
     def access(self, x: float) -> float:
-        """Return the factor on prices at a chainage: dearer the higher above the road [-]."""
+        """Return the price factor for access at a chainage [-].
+
+        It grows linearly with the height above the road.
+        """
         rise = self.profile.height(x) - self.profile.height(self.road.start)
         return 1.0 + self.prices.access * max(rise, 0.0) / ACCESS_HEIGHT
 
     def rate(self, event: str, layout: Sequence[Barrier] = ()) -> float:
-        """Return how often an event happens with the mesh of a layout [1/year per metre of slope].
+        """Return the rate of an event with the mesh of a layout [1/year per metre of slope].
 
         Raises
         ------
         BadInput
-            If there is no such event or mesh option, or an option is there twice.
+            If there is no such event or mesh option, or the layout has an option twice.
         """
         often, used = self.event(event).rate / 100.0, set()
         for barrier in layout:
             if isinstance(barrier, Mesh):
                 if barrier.option in used:
-                    raise BadInput("mesh option", barrier.option, "hang each option once")
+                    raise BadInput("mesh option", barrier.option, "use each option at most once")
                 used.add(barrier.option)
                 often *= self.mesh(barrier.option).factors.get(event, 1.0)
         return often
 
     def capitals(self, layout: Sequence[Barrier]) -> list[float]:
-        """Return the price of each barrier of a layout, to build [EUR per metre of road].
+        """Return the capital cost of each barrier of a layout [EUR per metre of road].
 
         Raises
         ------
@@ -309,7 +332,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return [b.price(self, moved.get(b)) * self.access(b.x) for b in barriers]
 
     def capital(self, layout: Sequence[Barrier]) -> float:
-        """Return what a layout costs to build [EUR per metre of road].
+        """Return the capital cost of a layout [EUR per metre of road].
 
         Raises
         ------
@@ -319,20 +342,23 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return float(sum(self.capitals(layout)))
 
     def annual(self, layout: Sequence[Barrier]) -> float:
-        """Return what a layout costs a year, upkeep included [EUR per metre of road and year].
+        """Return the annual cost of a layout, including upkeep [EUR per metre of road and year].
 
-        Raises as `capital` does.
+        Raises
+        ------
+        BadInput
+            As `capital` does.
         """
         barriers = as_layout(layout)
         each = zip(barriers, self.capitals(barriers), strict=True)
         return float(sum(price * self.prices.annual(b.kind, b.upkeep) for b, price in each))
 
     def bill(self, layout: Sequence[Barrier], outcome: Outcome) -> Bill:
-        """Return what a release with a layout costs [EUR per occurrence of its event].
+        """Return the cost of a release with a layout [EUR per occurrence of its event].
 
-        Of what failed, the length that the event was wide is built anew, but at least a panel or
-        an element; what the barriers hold is carried off. What of a gravity wall came onto the
-        road blocks it as rock does.
+        Failed barriers are rebuilt over the width of the event, but at least over one panel or
+        element. Rock held by barriers is removed. Parts of a gravity wall on the road block it like
+        rock.
         """
         layout = as_layout(layout)
         volume, reached = outcome.road_volume, outcome.reached
@@ -350,19 +376,19 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return Bill(self.consequences.harm(volume, reached), repair)
 
     def shed(self) -> float:
-        """Return what a rock shed over the road costs a year [EUR per metre of road and year].
+        """Return the annual cost of a rock shed over the road [EUR per metre of road and year].
 
-        A reference: nothing reaches the road below it.
+        It serves as a reference: no rock reaches the road under a shed.
         """
         return self.prices.shed * self.prices.annual("shed")
 
     def section(self, layout: Sequence[Barrier] = ()) -> display.Section:
-        """Return what a picture of the slope shows, with the barriers of a layout.
+        """Return the section of the slope, with the barriers of a layout, for an image.
 
         Raises
         ------
         BadInput
-            If a barrier does not stand on the slope or stands where loose rock lies.
+            If a barrier does not stand on the slope or overlaps loose rock.
         """
         scene = self.realise(layout)
         barriers = [
@@ -381,17 +407,17 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return display.Section(ground, road, zone, sources, barriers=barriers)
 
     def _repr_png_(self) -> bytes:
-        """Return a picture of the slope, for notebooks."""
+        """Return an image of the slope for notebooks."""
         return display.png(self.section(), self.name)
 
 
 def _with_damping(surfaces: dict[str, Surface]) -> dict[str, Surface]:
-    """Return surfaces of which those without a damping have that of their usual ground.
+    """Return surfaces in which a missing damping is replaced by that of their usual ground.
 
     Warns
     -----
     DoubtfulInput
-        For each of these.
+        For each surface without damping.
     """
     found = dict(surfaces)
     for name, surface in surfaces.items():
@@ -400,7 +426,7 @@ def _with_damping(surfaces: dict[str, Surface]) -> dict[str, Surface]:
             value = GROUNDS[ground].damping.typical
             warnings.warn(
                 f"neither surfaces.{name}.damping nor motion.damping is given: {value:g} 1/s is "
-                f"used, typical of {ground!r}; set surfaces.{name}.ground or .damping",
+                f"used, which is typical of {ground!r}; set surfaces.{name}.ground or .damping",
                 DoubtfulInput,
                 stacklevel=4,
             )
@@ -410,10 +436,10 @@ def _with_damping(surfaces: dict[str, Surface]) -> dict[str, Surface]:
 
 @lru_cache(maxsize=4096)
 def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]]:
-    """Return what a seed draws of a mass, as JSON: a standard normal number and its blocks.
+    """Return the random properties of a jointed mass: a standard normal number and its blocks.
 
-    Cutting takes as long as simulating a small release, and a search asks for the same releases
-    again and again; one takes about 10 kB.
+    `source` is JSON. Results are cached (about 10 kB each), because cutting takes as long as
+    simulating a small release and searches repeat the same releases.
     """
     rng, rock = np.random.default_rng([seed, event]), msgspec.json.decode(source, type=Source)
     normal = rng.standard_normal()
@@ -428,9 +454,9 @@ def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]
 def _ground(
     site: Site, seed: int, index: int
 ) -> tuple[tuple[tuple[float, float, float], ...], Roughness | None]:
-    """Return what a seed draws of the ground: see `Drawn.strengths` and `Drawn.roughness`.
+    """Return the random properties of the ground: `Drawn.strengths` and `Drawn.roughness`.
 
-    By random numbers of their own, so that blocks do not depend on how the ground varies.
+    They have their own random streams, so that blocks do not depend on variations of the ground.
     """
     strengths: tuple[tuple[float, float, float], ...] = ()
     if any(surface.varies for surface in site.surfaces.values()):
@@ -446,21 +472,21 @@ def _ground(
 
 
 def _cut_off(normal: float) -> float:
-    """Return a normal number, or the nearest one that is not farther than `FARTHEST` from 0."""
+    """Return a normal number, clipped to the range from -`FARTHEST` to `FARTHEST`."""
     return min(max(normal, -FARTHEST), FARTHEST)
 
 
 def pairs(site: Site, surfaces: Mapping[str, Value]) -> dict[tuple[str, str], Value]:
-    """Return what counts in contacts of rock with the ground: of the two surfaces the ground's."""
+    """Return the value for each pair of a rock and a ground surface: that of the ground."""
     grounds = {site.slope.surface, *(s.surface for s in site.slope.surfaces)}
     if "soil" in site.surfaces:
-        grounds.add("soil")  # embankments are ground
+        grounds.add("soil")  # embankments count as ground
     rocks = {source.surface for source in site.sources}
     return {(r, g): surfaces[g] for r in sorted(rocks) for g in sorted(grounds) if r != g}
 
 
 def _taken(site: Site) -> list[tuple[float, float]]:
-    """Return the intervals that loose blocks of bands may take up [m]."""
+    """Return the intervals that loose blocks of bands may occupy [m]."""
     found = []
     for source in site.sources:
         if source.band is not None:
@@ -473,7 +499,7 @@ def _taken(site: Site) -> list[tuple[float, float]]:
 def _varied(
     surface: Surface, fallback: float | None, friction: float, restitution: float, damping: float
 ) -> Surface:
-    """Return a surface whose values are off by so many of their standard deviations.
+    """Return a surface whose values deviate by the given numbers of standard deviations.
 
     `fallback` is the damping of the site [1/s].
     """
@@ -495,7 +521,7 @@ def _varied(
 
 
 def _shifted(surface: Surface, shift: float) -> Surface:
-    """Return a surface whose friction angle is shifted [deg]."""
+    """Return a surface with its friction angle shifted [deg]."""
     if shift == 0.0:
         return surface
     angle = min(surface.friction_deg + shift, max(surface.friction_deg, STEEPEST_DEG))
@@ -506,9 +532,10 @@ _last: tuple[Site, Layout, dict[Barrier, float]] | None = None
 
 
 def _capital_of(site: Site, layout: Layout) -> dict[Barrier, float]:
-    """Return the price of each barrier [EUR/m], kept until another layout is asked for.
+    """Return the capital cost of each barrier [EUR/m], cached for the last layout.
 
-    A layout has thousands of releases, and earthworks take longer to price than a block to fall.
+    A layout is evaluated with thousands of releases, and pricing earthworks takes longer than
+    simulating one block.
     """
     global _last
     known = _last

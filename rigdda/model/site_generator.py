@@ -1,10 +1,10 @@
-"""Sites around the built-in ones: each family has as many instances as there are numbers.
+"""Generator of sites: random variations of the built-in site of each family.
 
-An instance is the family's built-in site with its ground stretched: heights and lengths by common
-factors and each piece of the ground by one of its own; all chainages go along, so that bands, zone
-and surfaces stay where they belong. Sizes, rates, strength, closure and prices vary beside. The
-ranges are chosen, not measured: wide enough that the best layout of one is not that of another,
-narrow enough that a family keeps its character.
+The ground of the built-in site is stretched: heights and lengths by common factors and each segment
+by its own factors. All chainages move with the ground, so that bands, zone and surfaces keep their
+places on it. Block sizes, rates, friction, closure costs and prices vary as well. The ranges are
+assumptions: wide enough that the best layouts of two instances differ, and narrow enough that a
+family keeps its character.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ S = TypeVar("S", bound=SiteTables)
 replace = msgspec.structs.replace
 
 FALLEN, SHARE = 10.0, 1.0 / 3.0
-"""Barriers may stand where rock has fallen this far [m], or this share of its way to the road."""
+"""Barriers may stand where rock has fallen by this height [m], or by this share of the height to
+the toe."""
 
 MARGIN = 0.05
-"""Distance by which a zone begins further downhill than that [m]."""
+"""Distance downhill of that point at which a zone begins [m]."""
 
 
 class StretchedGround:
-    """A built-in site's ground, stretched.
+    """The stretched ground of a built-in site.
 
     Parameters
     ----------
     site : Site
         The built-in site.
     rng : numpy.random.Generator
-        Draws the factors.
+        Generator for the factors.
     """
 
     def __init__(self, site: SiteTables, rng: np.random.Generator):
@@ -58,7 +59,7 @@ class StretchedGround:
         self.y_factor = high_of * rng.uniform(0.96, 1.04, len(runs))
         road = (points[:-1, 0] >= site.road.start) & (points[1:, 0] <= site.road.end)
         self.x_factor[road] = rng.uniform(7.0, 11.0) / (site.road.end - site.road.start)
-        # beyond the road nothing is stretched: the ground must go on far enough
+        # the ground beyond the road is not stretched because it must remain long enough
         self.x_factor[points[:-1, 0] >= site.road.end] = 1.0
         x = points[0, 0] + np.concatenate([[0.0], np.cumsum(runs * self.x_factor)])
         y = np.concatenate([[0.0], np.cumsum(drops * self.y_factor)])
@@ -67,7 +68,7 @@ class StretchedGround:
         self.new = np.column_stack([x, y - y[foot]])
 
     def x(self, at: float) -> float:
-        """Return where a chainage of the built-in site has come to [m]."""
+        """Return the new position of a chainage of the built-in site [m]."""
         return millimetres(np.interp(at, self.old[:, 0], self.new[:, 0]))
 
     def points(self) -> tuple[Point, ...]:
@@ -75,9 +76,9 @@ class StretchedGround:
         return tuple((millimetres(x), millimetres(y)) for x, y in self.new)
 
     def mass(self, source: Source) -> Source:
-        """Return a jointed mass, stretched as the face that its middle lies on.
+        """Return a jointed mass, stretched like the ground segment under its middle.
 
-        So its base stays on the face, and its joints keep their place in it.
+        Its base therefore remains on the face, and its joints keep their relative positions.
         """
         corners = np.array(source.polygon)
         piece = int(np.searchsorted(self.old[:, 0], corners[:, 0].mean())) - 1
@@ -91,13 +92,13 @@ class StretchedGround:
             )
             for joint in source.joints
         )
-        moved[:, 1] += 2e-3  # clear of the face whatever the rounding to millimetres
+        moved[:, 1] += 2e-3  # clear of the face despite rounding to millimetres
         polygon = tuple((millimetres(x), millimetres(y)) for x, y in moved)
         return replace(source, polygon=polygon, joints=joints)
 
 
 def generate(base: S, name: str, number: int) -> S:
-    """Return an instance of the family of a built-in site, always the same."""
+    """Return an instance of the family of a built-in site; it depends on `number` only."""
     rng = np.random.default_rng([FAMILIES.index(base.name), number])
     ground = StretchedGround(base, rng)
     size = float(np.exp(rng.uniform(-0.35, 0.35)))
@@ -123,9 +124,9 @@ def generate(base: S, name: str, number: int) -> S:
 
 
 def fallen(slope: Slope, sources: tuple[Source, ...]) -> float:
-    """Return the chainage from which on rock has fallen at least 10 m or a third of its way [m].
+    """Return the chainage from which rock has fallen by at least 10 m or a third of the height [m].
 
-    From the top of the highest source; the way ends at the toe.
+    The height is measured from the top of the highest source to the toe.
     """
     x, y = np.array(slope.points).T
     tops = [float(np.interp(s.band[0], x, y)) for s in sources if s.band is not None]
@@ -145,7 +146,7 @@ def _source(source: Source, ground: StretchedGround) -> Source:
 
 
 def _event(event: Event, size: float, rng: np.random.Generator) -> Event:
-    """Return an event with another rate, and another size of blocks."""
+    """Return an event with another rate and another block size."""
     rate = round(event.rate * float(np.exp(rng.uniform(-0.5, 0.5))), 4)
     if event.area is None:
         return replace(event, rate=rate)
@@ -156,7 +157,7 @@ def _event(event: Event, size: float, rng: np.random.Generator) -> Event:
 def _zone(
     base: SiteTables, slope: Slope, sources: tuple[Source, ...], ground: StretchedGround
 ) -> BarrierZone:
-    """Return the zone: moved along, and no higher up than rock has fallen far enough."""
+    """Return the zone, moved with the ground and limited to where rock has fallen far enough."""
     zone = base.barrier_zone
     start = max(ground.x(zone.start), fallen(slope, sources) + MARGIN)
     return replace(zone, start=millimetres(start), end=ground.x(zone.end))
@@ -176,7 +177,7 @@ def _surfaces(base: SiteTables, rng: np.random.Generator) -> dict[str, Surface]:
 
 
 def _prices(prices: Prices, rng: np.random.Generator) -> Prices:
-    """Return prices that vary kind by kind."""
+    """Return prices that vary independently by kind of barrier."""
     fence, ditch, fill, concrete = np.exp(rng.uniform(-0.25, 0.25, 4)).tolist()
     return replace(
         prices,
@@ -189,12 +190,12 @@ def _prices(prices: Prices, rng: np.random.Generator) -> Prices:
 
 
 def _consequences(what: Consequences, rng: np.random.Generator) -> Consequences:
-    """Return another road: the more traffic, the dearer a day of closure."""
+    """Return consequences with another cost per day of closure, as for another traffic volume."""
     return replace(what, closure=round(what.closure * float(np.exp(rng.uniform(-0.4, 0.4))), -2))
 
 
 def _mesh(option: MeshOption, ground: StretchedGround, rng: np.random.Generator) -> MeshOption:
-    """Return a mesh over a face that is so much higher or lower, at another price."""
+    """Return a mesh option scaled to the height of the face, with another price."""
     high = float(ground.new[:, 1].max() / (ground.old[:, 1].max() or 1.0))
     price = check.number("mesh price", option.price * rng.uniform(0.85, 1.2), 0.0)
     return replace(option, area=round(option.area * high, 2), price=round(price, 1))

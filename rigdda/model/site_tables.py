@@ -1,4 +1,4 @@
-"""The tables of a site file: slope, events, road, zone, motion, scatter; what they say."""
+"""Tables of a site file: slope, events, road, barrier zone, motion and scatter."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rigdda.model.terrain import Roughness, Terrain
 
 @documented
 class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A stretch of the slope with a surface of its own.
+    """A stretch of the slope with its own surface.
 
     Raises
     ------
@@ -42,19 +42,19 @@ class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @documented
 class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The ground.
+    """The ground profile and its surfaces.
 
     Raises
     ------
     BadInput
-        If a value is of the wrong type, a stretch ends before it starts, or two overlap.
+        If a value is of the wrong type, a stretch ends before it starts, or two stretches overlap.
     """
 
     points: Annotated[
         tuple[Point, ...],
         about(
             "Corners [x, y] of the ground, from the crest downhill to at least 30 m beyond the "
-            "road. The ground may overhang, but not where there are earthworks or a band of loose "
+            "road. The ground may overhang, except at earthworks and if there is a band of loose "
             "rock.",
             "m",
             least=2,
@@ -65,7 +65,7 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         str, about("Name of the surface of the ground outside the stretches in `surfaces`.")
     ] = "rock"
     surfaces: Annotated[
-        tuple[Stretch, ...], about("Stretches of the ground that have another surface.")
+        tuple[Stretch, ...], about("Stretches of the ground with a different surface.")
     ] = ()
 
     def __post_init__(self) -> None:
@@ -82,9 +82,9 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return next(found, self.surface)
 
     def chain(self) -> tuple[tuple[Point, ...], tuple[str, ...]]:
-        """Return the corners with those where a surface changes, and the surface of each segment.
+        """Return the corners, including those of changes of surface, and the segments' surfaces.
 
-        A vertical face has the surface of what is just beyond it.
+        A vertical face has the surface of the ground just beyond it.
         """
         cuts = {x for stretch in self.surfaces for x in (stretch.start, stretch.end)}
         points, names = [self.points[0]], []
@@ -99,13 +99,13 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 MASS_WIDTH = 10.0
-"""Width of an event of a jointed mass or of given blocks that names none [m]."""
+"""Default width of an event of a jointed mass or of given blocks [m]."""
 
 MOST_OFTEN = 1000.0
-"""Greatest rate [1/year per 100 m]: three blocks a day are no rare event but a talus at work."""
+"""Maximum rate [1/year per 100 m]. Three blocks per day are an active talus, not a rare event."""
 
 LARGEST_AREA, WIDEST = 1000.0, 1000.0
-"""Greatest area of a block [m2] and width of an event [m]."""
+"""Maximum area of a block [m2] and maximum width of an event [m]."""
 
 
 Area = Annotated[float, about(ge=1e-4, le=LARGEST_AREA)]
@@ -115,7 +115,7 @@ Count = Annotated[int, about(ge=1, le=1000)]
 
 @documented
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What comes down, and how often.
+    """A type of rockfall event and its rate.
 
     Raises
     ------
@@ -127,13 +127,13 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rate: Annotated[
         float,
         about(
-            "How often the event happens on 100 m of slope.",
+            "Mean number of occurrences per year on 100 m of slope.",
             "1/year per 100 m of slope",
             ge=0.0,
             le=MOST_OFTEN,
         ),
     ]
-    source: Annotated[str, about("Name of the source that the rock comes from.")] = "rock"
+    source: Annotated[str, about("Name of the source of the rock.")] = "rock"
     area: Annotated[
         tuple[Area, Area] | None,
         about(
@@ -147,7 +147,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         float,
         about(
             "Exponent b of the distribution of block volumes within `area`: the number of blocks "
-            "larger than V falls as V to the power of -b. Usual values are 0.4 to 0.8.",
+            "larger than V is proportional to V to the power of -b. Usual values are 0.4 to 0.8.",
             "-",
             ge=0.0,
             le=5.0,
@@ -156,7 +156,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     number: Annotated[
         tuple[Count, Count],
         about(
-            "Least and greatest number of blocks that come from a band at once. All numbers "
+            "Least and greatest number of blocks that a band releases at once. All numbers "
             "between them are equally likely.",
             "-",
             rising=True,
@@ -166,7 +166,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Width | None,
         about(
             "Width of the event along the road. Needed if several blocks come from a band. "
-            "The default for a single block is the root of its area, for a mass 10 m.",
+            "The default is the square root of its area for a single block and 10 m for a mass.",
             "m",
         ),
     ] = None
@@ -179,25 +179,26 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def words(self) -> str:
-        """What errors call it."""
+        """Path of the event in error messages."""
         return f"events.{self.name}"
 
     def check_source(self, source: Source) -> None:
-        """Check that it says of its source what that needs, and nothing else.
+        """Check that the event specifies exactly what its source requires.
 
         Raises
         ------
         BadInput
-            If a band has no area of blocks, or a group no width, or a mass has either.
+            If blocks of a band lack an area or a group lacks a width, or the area or number of
+            blocks is given although the source determines it.
         """
         if source.band is None:
             if self.area is not None or self.number != (1, 1):
                 what = "number" if self.area is None else "area"
-                mend = f"leave it out: source {source.name} is no band, its blocks are given"
+                mend = f"leave it out: source {source.name} is not a band and defines its blocks"
                 raise BadInput(f"{self.words}.{what}", getattr(self, what), mend)
         elif source.edges is not None:
             if self.area is not None:
-                mend = f"leave it out: source {source.name} says it by its edges"
+                mend = f"leave it out: the edges of source {source.name} determine it"
                 raise BadInput(f"{self.words}.area", self.area, mend)
         elif self.area is None:
             mend = f"give the least and the greatest area of a block of band {source.name} [m2]"
@@ -207,7 +208,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise BadInput(f"{self.words}.width", None, mend)
 
     def block_size(self, source: Source) -> float:
-        """Return the typical size of its blocks, which come from `source` [m]."""
+        """Return the typical size of its blocks from `source` [m]."""
         if source.edges is not None:
             return math.prod(source.edges) ** (1.0 / 3.0)
         if self.area is not None:
@@ -222,24 +223,25 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Drawn(NamedTuple):
-    """What a seed draws of an event, the same for every layout."""
+    """Random properties of a release, which do not depend on the layout."""
 
     event: str
-    """Its name."""
+    """Name of the event."""
     blocks: tuple[Block, ...]
     width: float
-    """Along the road [m]."""
+    """Width along the road [m]."""
     friction_deg: float
     """Shift of all friction angles [deg]."""
     strengths: tuple[tuple[float, float, float], ...] = ()
-    """Standard normal numbers of friction, restitution and damping, for each surface of the site in
-    turn; empty where no surface varies."""
+    """Standard normal numbers for friction, restitution and damping of each surface of the site in
+    order; empty if no surface varies."""
     roughness: Roughness | None = None
-    """Pits in the ground; None where it is smooth."""
+    """Pits in the ground; None if it is smooth."""
 
 
 DURATION = (1.0, 3600.0)
-"""Least and greatest `motion.duration` [s]: in less than a second hardly a block reaches a road."""
+"""Least and greatest `motion.duration` [s]; in less than one second hardly any block reaches a
+road."""
 
 
 @documented
@@ -261,7 +263,7 @@ class Road(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @documented
 class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How releases are computed.
+    """Numerical and damping parameters of the simulation of releases.
 
     Raises
     ------
@@ -272,28 +274,28 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping: Annotated[
         Damping | None,
         about(
-            "Mass-proportional damping on surfaces that give none of their own. The default "
-            "is the damping of the ground that the name of the surface suggests, with a "
-            "warning.",
+            "Mass-proportional damping on surfaces without their own damping. By default, they "
+            "have the damping of the library ground that matches the name of the surface, and a "
+            "warning is given.",
             "1/s",
         ),
     ] = None
     damping_when: Annotated[
         str,
         about(
-            'When blocks are damped. With "contact", while they touch something and for 0.1 s '
-            'after. With "always", in flight, too, as in the paper: energies at a barrier are then '
-            "four to ten times too low.",
+            'When blocks are damped. With "contact", they are damped while they touch something '
+            'and for 0.1 s afterwards. With "always", they are also damped in flight, as in the '
+            "paper; energies at a barrier are then too low by a factor of four to ten.",
             choices=("always", "contact"),
         ),
     ] = "contact"
     duration: Annotated[
-        float, about("Longest simulated time.", "s", ge=DURATION[0], le=DURATION[1])
+        float, about("Maximum simulated time.", "s", ge=DURATION[0], le=DURATION[1])
     ] = 25.0
     dt: Annotated[
         float,
         about(
-            "Time step. For small blocks it is divided by the least whole number that makes it "
+            "Time step. For small blocks it is divided by the smallest whole number that makes it "
             "short enough for their size.",
             "s",
             ge=SHORTEST_DT,
@@ -307,7 +309,7 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @documented
 class Rebound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How a point of the lumped-mass model rebounds from a surface, see `rigdda.lumped`.
+    """Rebound parameters of a surface in the lumped-mass model, see `rigdda.lumped`.
 
     Raises
     ------
@@ -321,8 +323,8 @@ class Rebound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tangential: Annotated[
         float,
         about(
-            "Tangential coefficient of restitution: the share of its speed along the ground that a "
-            "point keeps in an impact.",
+            "Tangential coefficient of restitution: the share of the speed along the ground that a "
+            "point retains in an impact.",
             "-",
             ge=0.0,
             le=1.0,
@@ -331,7 +333,7 @@ class Rebound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     friction_deg: Annotated[
         float,
         about(
-            "Angle of friction of a point that slides or rolls after its last bounce.",
+            "Friction angle of a point that slides or rolls after its last bounce.",
             "deg",
             ge=0.0,
             le=80.0,
@@ -344,7 +346,7 @@ class Rebound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @documented
 class Scatter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What varies at random from release to release, beside the blocks.
+    """Random variation between releases, in addition to that of the blocks.
 
     Raises
     ------
@@ -367,27 +369,27 @@ class Scatter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 STEEP_SIDES, FLAT_SIDE = {"rock": 0.25}, 0.67
-"""Side slope of a ditch, run over rise [-], by the surface that it is cut in: 4:1 stands in rock;
-all else is taken for soil."""
+"""Side slope of a ditch, run over rise [-], by ground surface: 4:1 is stable in rock; all other
+surfaces count as soil."""
 
 
 @documented
 class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A slope, its loose rock and how often it falls, the road below, and what protection costs."""
+    """A slope, its loose rock and event rates, the road below, and the costs of protection."""
 
     name: Annotated[str, about("Name of the site.")]
-    description: Annotated[str, about("What the site is, and what about it is assumed.")]
+    description: Annotated[str, about("Description of the site and of the assumptions.")]
     family: Annotated[
         str,
-        about('Family of sites that it belongs to. "paper" is for scenes of publications.'),
+        about('Family to which the site belongs. "paper" is for scenes from publications.'),
     ] = ""
-    slope: Annotated[Slope, about("The ground.")]
-    sources: Annotated[tuple[Source, ...], about("Where rock starts.")]
+    slope: Annotated[Slope, about("The ground profile.")]
+    sources: Annotated[tuple[Source, ...], about("The sources of rock.")]
     events: Annotated[
         tuple[Event, ...],
         about(
-            "What comes down, and how often. By default each source that is not a band releases "
-            "its rock once a year on 100 m of slope."
+            "The types of rockfall event and their rates. By default, each source that is not a "
+            "band releases its rock once a year on 100 m of slope."
         ),
     ] = ()
     road: Annotated[Road, about("The road.")]
@@ -397,26 +399,24 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     surfaces: Annotated[
         dict[str, Surface],
         about(
-            'The surfaces by name. "concrete" is that of walls and fences, "soil" that of '
-            'embankments; where "soil" is missing, embankments have "concrete", and where that is '
-            'missing, too, all barriers have "rock".'
+            'The surfaces by name. Walls and fences have the surface "concrete", embankments have '
+            '"soil". Without "soil", embankments have "concrete"; without "concrete", "rock" is '
+            "used instead."
         ),
     ]
     interfaces: Annotated[
-        tuple[Interface, ...], about("How two surfaces meet, where it is known.")
+        tuple[Interface, ...], about("Contact properties of pairs of surfaces, if known.")
     ] = ()
-    prices: Annotated[Prices, about("What barriers cost.")] = msgspec.field(default_factory=Prices)
-    consequences: Annotated[Consequences, about("What rock on the road costs.")] = Consequences()
-    meshes: Annotated[
-        tuple[MeshOption, ...], about("Kinds of mesh that may be hung over the face.")
-    ] = ()
-    motion: Annotated[Motion, about("How releases are computed.")] = Motion()
+    prices: Annotated[Prices, about("Prices of barriers.")] = msgspec.field(default_factory=Prices)
+    consequences: Annotated[Consequences, about("Costs of rock on the road.")] = Consequences()
+    meshes: Annotated[tuple[MeshOption, ...], about("Mesh options for the rock face.")] = ()
+    motion: Annotated[Motion, about("Parameters of the simulation of releases.")] = Motion()
     scatter: Annotated[
-        Scatter, about("What varies at random from release to release, beside the blocks.")
+        Scatter, about("Random variation between releases, in addition to that of the blocks.")
     ] = Scatter()
     lumped: Annotated[
         dict[str, Rebound],
-        about("How points of the lumped-mass model rebound, by the name of the surface."),
+        about("Rebound parameters of the lumped-mass model by name of the surface."),
     ] = {}
 
     @property
@@ -426,13 +426,13 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     @property
     def friction_varies(self) -> bool:
-        """Whether friction is drawn for each release."""
+        """Whether friction varies from release to release."""
         own = any(surface.friction_sd_deg > 0.0 for surface in self.surfaces.values())
         return own or self.scatter.friction_deg > 0.0
 
     @property
     def pit_spacing(self) -> float:
-        """Greatest spacing of pits in the ground in any event [m], 0 where the ground is smooth."""
+        """Greatest spacing of pits in the ground over all events [m]; 0 if the ground is smooth."""
         if all(surface.roughness == 0.0 for surface in self.surfaces.values()):
             return 0.0
         return max(event.block_size(self.source(event.source)) for event in self.events)
@@ -448,12 +448,18 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         Raises
         ------
         BadInput
-            If there is none.
+            If there is no such event.
         """
         return self.events[self.index(name)]
 
     def index(self, name: str) -> int:
-        """Return the place of an event among the events. Raises as `event` does."""
+        """Return the index of an event.
+
+        Raises
+        ------
+        BadInput
+            If there is no such event.
+        """
         names = self.event_names
         if not isinstance(name, str) or name not in names:
             raise BadInput("event", name, "choose one of " + ", ".join(names))
@@ -465,7 +471,7 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         Raises
         ------
         BadInput
-            If there is none.
+            If there is no such source.
         """
         for source in self.sources:
             if source.name == name:
@@ -473,11 +479,11 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         raise BadInput("source", name, "choose one of " + ", ".join(s.name for s in self.sources))
 
     def events_of(self, source: Source) -> list[Event]:
-        """Return the events that come from a source."""
+        """Return the events of a source."""
         return [event for event in self.events if event.source == source.name]
 
     def surface_at(self, x: float) -> str:
-        """Return the surface of the ground at a chainage."""
+        """Return the name of the ground surface at a chainage."""
         return self.slope.surface_at(x)
 
     @property
@@ -487,14 +493,14 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         return "soil" if "soil" in self.surfaces else usual
 
     def ditch_side(self, x: float, width: float) -> float:
-        """Return the side slope of a ditch [-], the flattest of the ground that it is cut in."""
+        """Return the side slope of a ditch [-], the flattest that the ground it cuts requires."""
         points, names = self.slope.chain()
         ends = zip(points, points[1:], names, strict=False)
         spanned = {name for (a, _), (b, _), name in ends if a < x + width and b > x}
         return max((STEEP_SIDES.get(name, FLAT_SIDE) for name in spanned), default=FLAT_SIDE)
 
     def mesh(self, name: str) -> MeshOption:
-        """Return an option of mesh by its name.
+        """Return a mesh option by its name.
 
         Raises
         ------
@@ -504,11 +510,14 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         for option in self.meshes:
             if option.name == name:
                 return option
-        known = ", ".join(option.name for option in self.meshes) or "none: this site has no mesh"
+        known = (
+            ", ".join(option.name for option in self.meshes)
+            or "none: this site has no mesh options"
+        )
         raise BadInput("mesh option", name, f"choose one of {known}")
 
 
 @lru_cache(maxsize=256)
 def _ground(points: tuple[Point, ...], surface: str, stretches: tuple[Stretch, ...]) -> Terrain:
-    """Return the terrain of a slope; it is asked for several times in every episode."""
+    """Return the terrain of a slope; cached because every episode needs it several times."""
     return Terrain(*Slope(points, 0.0, surface, stretches).chain())

@@ -1,4 +1,4 @@
-"""Whether the tables of a site agree with one another; told before anything is computed."""
+"""Consistency checks of the tables of a site, made before any computation."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from rigdda.model.source import NEAR, Point, Source
 from rigdda.model.surface import check_surface
 
 BEYOND = 30.0
-"""Least length of the ground beyond the road [m]: blocks that run past it shall not fall off the
-end of the ground before they count as beyond."""
+"""Minimum length of the ground beyond the road [m], so that blocks that cross the road count as
+beyond before they reach the end of the ground."""
 
 HIGHEST, LONGEST = 5_000.0, 20_000.0
-"""Height and length of a slope [m] above which millimetres were meant."""
+"""Height and length of a slope [m] above which the unit is probably wrong (millimetres)."""
 
 MANY_STEPS, MANY_BLOCKS = 2e5, 3e3
-"""Steps and blocks of a release above which they may not be meant: those of built-in sites take
+"""Numbers of steps and blocks of a release that cause a warning. Releases of built-in sites take
 some thousand steps and have up to some hundred blocks."""
 
 CHEAPEST = 100.0
-"""Closure of a day [EUR] below which thousands of EUR may have been meant."""
+"""Cost of a day of closure [EUR] below which it may have been given in thousands of EUR."""
 
 
 def check_site(site: SiteTables) -> None:
-    """Check a site.
+    """Check the consistency of a site.
 
     Raises
     ------
     BadInput
-        If a field is at odds with another; the message names it.
+        If a field is inconsistent with another; the message names it.
     """
     _check_surfaces(site)
     _check_slope(site)
@@ -52,30 +52,31 @@ def check_site(site: SiteTables) -> None:
     if motion.damping and motion.damping_when == "always" and site.family != "paper":
         _doubt(
             "motion.damping_when",
-            "put 'contact': with 'always' energies at a barrier are four to ten times too low",
+            "give 'contact': with 'always', energies at a barrier are too low by a factor of 4 to "
+            "10",
         )
     steps = motion.duration / motion.dt
     if steps > MANY_STEPS:
-        _doubt("motion.dt", f"give more, or a shorter duration: a release takes {steps:g} steps")
+        _doubt("motion.dt", f"increase it or shorten the duration: a release takes {steps:g} steps")
     for source in site.sources:
         blocks = source.area / source.mean_block_area if source.band is None else 0.0
         if blocks > MANY_BLOCKS:
-            _doubt(f"{source.words}.block_area", f"give more: releases are of {blocks:.0f} blocks")
+            _doubt(f"{source.words}.block_area", f"increase it: a release has {blocks:.0f} blocks")
     if 0.0 < site.consequences.closure < CHEAPEST:
-        _doubt("consequences.closure", "give EUR a day, not thousands")
+        _doubt("consequences.closure", "give EUR per day, not thousands of EUR")
     Settings(dt=motion.dt)
 
 
 def check_damping(motion: Motion) -> None:
-    """Check that damping in flight is given where it is asked for.
+    """Check that the damping in flight is given if it is required.
 
     Raises
     ------
     BadInput
-        If `motion.damping_when` is "always" and there is no `motion.damping`.
+        If `motion.damping_when` is "always" and `motion.damping` is missing.
     """
     if motion.damping is None and motion.damping_when == "always":
-        mend = "give motion.damping, too: flight is damped by it"
+        mend = "also give motion.damping, which acts in flight"
         raise BadInput("motion.damping_when", motion.damping_when, mend)
 
 
@@ -84,19 +85,19 @@ def _doubt(field: str, mend: str) -> None:
 
 
 def check_names(field: str, names: Iterable[str]) -> None:
-    """Check that names are texts, each only once.
+    """Check that names are non-empty and unique.
 
     Raises
     ------
     BadInput
-        If one is empty or comes twice.
+        If a name is empty or occurs twice.
     """
     seen: set[str] = set()
     for i, name in enumerate(names):
         if not isinstance(name, str) or not name:
             raise BadInput(f"{field}[{i}].name", name, "give it a name")
         if name in seen:
-            raise BadInput(f"{field}[{i}].name", name, "give each a name of its own")
+            raise BadInput(f"{field}[{i}].name", name, "give each a unique name")
         seen.add(name)
 
 
@@ -114,7 +115,7 @@ def _check_surfaces(site: SiteTables) -> None:
     pairs = [frozenset((pair.first, pair.second)) for pair in site.interfaces]
     for i, names in enumerate(pairs):
         if names in pairs[:i]:
-            mend = "say only once how two surfaces meet, in either order"
+            mend = "give each pair of surfaces only once, in either order"
             raise BadInput(f"interfaces[{i}]", " and ".join(sorted(names)), mend)
     for name in site.lumped:
         check.one_of("lumped", name, site.surfaces)
@@ -132,7 +133,7 @@ def _check_slope(site: SiteTables) -> None:
         raise BadInput(
             "slope.points",
             f"{len(points)} points",
-            "list them downhill, the one of least x first, the one of greatest x last",
+            "list them downhill, from the least x to the greatest x",
         )
     tall, long = np.ptp(points[:, 1]), high - low
     if tall > HIGHEST or long > LONGEST:
@@ -150,8 +151,8 @@ def _check_slope(site: SiteTables) -> None:
         raise BadInput(
             f"slope.points[{len(points) - 1}]",
             points[-1].tolist(),
-            f"let the ground go on to x = {road.end + BEYOND:g} at least, {BEYOND:g} m beyond the "
-            "road, for the rock that runs past it",
+            f"extend the ground to at least x = {road.end + BEYOND:g}, {BEYOND:g} m beyond the "
+            "road, for rock that crosses it",
         )
 
 
@@ -165,7 +166,7 @@ def _check_events(site: SiteTables) -> None:
         check.one_of(f"{event.words}.source", event.source, known)
         event.check_source(known[event.source])
     if not any(event.rate > 0.0 for event in site.events):
-        raise BadInput("events", [e.rate for e in site.events], "give a rate above 0 to one")
+        raise BadInput("events", [e.rate for e in site.events], "give at least one a rate above 0")
 
 
 def _check_source(site: SiteTables, source: Source) -> None:
@@ -180,7 +181,7 @@ def _check_source(site: SiteTables, source: Source) -> None:
         low, high = source.band
         if low - room < chain[0, 0] or high + room >= site.road.start:
             first, last = chain[0, 0] + room, site.road.start - room
-            mend = f"put it between {first:g} and {last:g}, where its blocks are clear of the road"
+            mend = f"keep it between {first:g} and {last:g}, so that its blocks clear the road"
             raise BadInput(f"{source.words}.band", source.band, mend)
     for where, piece in source.pieces():
         _check_piece(site, where, piece, ground)
@@ -201,7 +202,7 @@ def _check_piece(
         corners = shapely.points(piece)
         depth = shapely.distance(ground.exterior, corners) * ground.contains(corners)
         corner = int(depth.argmax())
-        mend = f"raise it out of the ground, in which {sunk:g} m2 of the rock are"
+        mend = f"raise it: the rock overlaps the ground by {sunk:g} m2"
         raise BadInput(f"{where}[{corner}]", piece[corner], mend)
 
 
@@ -218,7 +219,7 @@ def _check_zone(site: SiteTables) -> None:
         for where, piece in source.pieces():
             taken = shapely.intersection(room, shapely.Polygon(piece))
             if taken.area > NEAR * taken.length:
-                mend = f"put it beyond {taken.bounds[2]:g}: {where} is where barriers may stand"
+                mend = f"put it beyond {taken.bounds[2]:g}: {where} lies in the zone"
                 raise BadInput("barrier_zone.start", zone.start, mend)
 
 

@@ -1,4 +1,4 @@
-"""The loose rock of a site: blocks of a band, a mass cut by joint sets, or blocks as they are."""
+"""Sources of loose rock: a band of blocks, a mass cut by joint sets, or surveyed blocks."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ Point = tuple[float, float]
 Floats = NDArray[np.float64]
 
 NEAR = 1e-6
-"""Depth to which rock may reach into other rock or the ground at the start [m]: rounding."""
+"""Depth to which rock may overlap other rock or the ground at the start [m]; allows for
+rounding."""
 
 LIGHTEST, DENSEST = 500.0, 1e5
-"""Least and greatest density [kg/m3]: pumice weighs 600, and 2.65 is in t/m3."""
+"""Least and greatest density [kg/m3]. Pumice has 600; a value such as 2.65 is in t/m3."""
 
 MOST_BLOCKS = 1e5
-"""Most blocks that a mass may be cut into: more would take days to simulate."""
+"""Maximum number of blocks of a mass; more would take days to simulate."""
 
 
 Edge = Annotated[float, about(ge=0.01, le=30.0)]
@@ -38,13 +39,13 @@ Speed = Annotated[float, about(ge=0.0, le=50.0)]
 
 @documented
 class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where rock starts: a band of loose blocks, a jointed mass, or blocks as they are.
+    """A source of rock: a band of loose blocks, a jointed mass, or surveyed blocks.
 
     Raises
     ------
     BadInput
-        If a value is of the wrong type or outside its range, blocks overlap, or there is not one of
-        `band`, `polygon` and `blocks`.
+        If a value is of the wrong type or outside its range, blocks overlap, or not exactly one of
+        `band`, `polygon` and `blocks` is given.
     """
 
     name: Annotated[str, about("Name of the source, to which `events` refer.")] = "rock"
@@ -52,7 +53,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         tuple[float, float] | None,
         about(
             "Chainages between which loose blocks lie at random places on the ground. The "
-            "events give their number and size.",
+            "events specify their number and size.",
             "m",
         ),
     ] = None
@@ -66,7 +67,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = ()
     joints: Annotated[
         tuple[JointSet, ...],
-        about("Joint sets of a mass, at least two of different dip."),
+        about("Joint sets of a mass, at least two with different dips."),
     ] = ()
     blocks: Annotated[
         tuple[tuple[Point, ...], ...],
@@ -75,9 +76,9 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     disturbance: Annotated[
         float,
         about(
-            "Greatest speed of surveyed blocks at the start, in a random direction. Jointed rock "
-            "is chaotic, so that even a small speed makes each release differ. With 0, all "
-            "releases are the same.",
+            "Greatest initial speed of surveyed blocks, in a random direction. The motion of "
+            "jointed rock is chaotic, so that even a small speed makes releases differ. With 0, "
+            "all releases are identical.",
             "m/s",
             ge=0.0,
             le=1.0,
@@ -91,8 +92,8 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     surface: Annotated[
         str,
         about(
-            "Name of the surface of the rock, which counts between blocks. Between a block and the "
-            "ground, the surface of the ground counts."
+            "Name of the surface of the rock. It applies to contacts between blocks; contacts of a "
+            "block with the ground have the surface of the ground."
         ),
     ] = "rock"
     corners: Annotated[
@@ -107,14 +108,14 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         tuple[Edge, Edge, Edge] | None,
         about(
             "Edges of the box around a measured block of a band, instead of `aspect` and the "
-            "`area` of events. Each release sees one of the three faces of the box at random.",
+            "`area` of events. Each release uses one of the three faces of the box at random.",
             "m",
         ),
     ] = None
     spin: Annotated[
         float,
         about(
-            "Greatest rate of rotation of a block of a band at the start, in either direction.",
+            "Greatest initial rate of rotation of a block of a band, in either direction.",
             "rad/s",
             ge=0.0,
             le=20.0,
@@ -123,8 +124,8 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     speed: Annotated[
         tuple[Speed, Speed],
         about(
-            "Least and greatest speed of a block of a band at the start, which is horizontal and "
-            "off the face.",
+            "Least and greatest initial speed of a block of a band. Its direction is horizontal, "
+            "away from the face.",
             "m/s",
             rising=True,
         ),
@@ -138,7 +139,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 mend = "leave it out: only blocks of a band have edges"
                 raise BadInput(f"{where}.edges", self.edges, mend)
         given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
-        mend = "give one of band, polygon with joints, blocks"
+        mend = "give exactly one of band, polygon with joints, blocks"
         if not given:
             raise BadInput(f"{where}.polygon", self.polygon, mend)
         if len(given) > 1 or (self.joints and not self.polygon):
@@ -158,8 +159,8 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not least <= self.block_area <= rock:
             mend = f"give {least:g} to {rock:g} m2: the mass has {rock:g} m2"
             raise BadInput(f"{self.words}.block_area", self.block_area, mend)
-        if len({j.dip_deg % 180.0 for j in self.joints}) < 2:  # -90 and 90 are one
-            mend = "give at least two sets of different dip"
+        if len({j.dip_deg % 180.0 for j in self.joints}) < 2:  # -90 and 90 are the same
+            mend = "give at least two sets with different dips"
             raise BadInput(f"{self.words}.joints", self.joints, mend)
 
     def _check_blocks(self) -> None:
@@ -175,11 +176,14 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def words(self) -> str:
-        """What errors call it."""
+        """Path of the source in error messages."""
         return f"sources.{self.name}"
 
     def pieces(self) -> list[tuple[str, tuple[Point, ...]]]:
-        """Return what errors call it and the corners [m] of each polygon, none of a band."""
+        """Return the path in error messages and the corners [m] of each polygon.
+
+        It is empty for a band.
+        """
         if self.blocks:
             return [(f"{self.words}.blocks[{i}]", block) for i, block in enumerate(self.blocks)]
         return [(f"{self.words}.polygon", self.polygon)] if self.polygon else []
@@ -192,7 +196,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def area(self) -> float:
-        """Area of a mass or of given blocks [m2], 0 of a band."""
+        """Area of a mass or of given blocks [m2]; 0 for a band."""
         return float(sum(shapely.Polygon(piece).area for _, piece in self.pieces()))
 
     @property
@@ -201,19 +205,19 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.area / len(self.blocks) if self.blocks else self.block_area
 
     def cut(self, rng: np.random.Generator) -> list[Floats]:
-        """Return the corners of the blocks of a mass [m], or those given; `rng` draws the joints.
+        """Return the corners of the blocks of a mass, cut by random joints, or of given blocks [m].
 
-        Corners that lie within an edge, as surveys have them, are left out.
-        Not of a band, whose blocks lie on the ground of a site: see `rigdda.model.loose_blocks`.
+        Corners within a straight edge, as in surveys, are removed. Bands have no such blocks:
+        theirs lie on the ground of a site, see `rigdda.model.loose_blocks`.
         """
         if self.blocks:
             return [without_straight_corners(np.array(block)) for block in self.blocks]
         return cut(shapely.Polygon(self.polygon), self.joints, self.block_area, rng)
 
     def disturbed(self, rng: np.random.Generator, count: int) -> list[tuple[float, float, float]]:
-        """Return the velocities at which so many blocks start [m/s, m/s, rad/s].
+        """Return the initial velocities of `count` blocks [m/s, m/s, rad/s].
 
-        Of blocks that are given: they are disturbed, so that no release is as another.
+        Given blocks have a random velocity, so that releases differ; blocks of a mass have none.
         """
         if not self.blocks or self.disturbance == 0.0:
             return [(0.0, 0.0, 0.0)] * count

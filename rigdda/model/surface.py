@@ -1,4 +1,4 @@
-"""Surfaces: their strength, rebound and loss, and what counts where two of them meet."""
+"""Surfaces and interfaces: friction, strength, restitution and damping of contacts."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from rigdda.fields import about, documented
 from rigdda.model.grounds import GROUNDS
 
 MOST_DAMPING = 100.0
-"""Greatest damping that can be meant [1/s]."""
+"""Maximum plausible damping [1/s]."""
 
 
 _OPEN: Any = msgspec.UNSET
-"""Default of what a surface takes from its ground."""
+"""Default of the fields that a surface takes from its ground."""
 
 PLAIN = {
     "friction_deg": 30.0,
@@ -27,7 +27,7 @@ PLAIN = {
     "damping_sd": 0.0,
     "roughness": 0.0,
 }
-"""Values of a surface that names no ground."""
+"""Values of a surface without a ground."""
 
 
 Damping = Annotated[float, about(ge=0.0, le=MOST_DAMPING)]
@@ -36,13 +36,14 @@ Share = Annotated[float, about(ge=0.0, le=1.0)]
 
 @documented
 class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Strength, rebound and loss of a surface.
+    """Friction, strength, restitution and damping of a surface.
 
-    A surface that names a `ground` of the library takes from it what it does not give itself.
-    `Site.realise` draws the values that have a standard deviation, and the pits of the ground, for
-    each release. A scene that is built by hand uses the values as they are. In Python `restitution`
-    may be None: the plain penalty contact of the paper, whose rebound follows from step and
-    stiffness. Damping None is the damping of the scene or of the site.
+    A surface with a `ground` of the library takes from it all values that it does not specify
+    itself. `Site.realise` varies the values that have a standard deviation, and the pits of the
+    ground, for each release; scenes built directly use the values unchanged. In Python
+    `restitution` may be None, which gives the plain penalty contact of the paper, whose rebound
+    follows from time step and stiffness. With `damping` None, the damping of the scene or of the
+    site is used.
 
     Raises
     ------
@@ -51,13 +52,13 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     friction_deg: Annotated[
-        float, about("Angle of Coulomb friction. Without a ground 30.", "deg", ge=0.0, le=89.9)
+        float, about("Coulomb friction angle. Without a ground 30.", "deg", ge=0.0, le=89.9)
     ] = _OPEN
     cohesion: Annotated[
         float,
         about(
-            "Shear strength, beside friction, of a joint that is closed at the start. The joint "
-            "breaks as a whole, once and for all.",
+            "Shear strength, in addition to friction, of a joint that is closed at the start. The "
+            "joint breaks as a whole and permanently.",
             "Pa",
             ge=0.0,
         ),
@@ -69,7 +70,7 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     restitution: Annotated[
         Share | None,
         about(
-            "Coefficient of restitution of a central impact; 0 is plastic. Without a ground 0.",
+            "Coefficient of restitution of a central impact; 0: plastic. Without a ground 0.",
             "-",
         ),
     ] = _OPEN
@@ -77,8 +78,8 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Damping | None,
         about(
             "Mass-proportional damping of a block while it touches the surface, and for 0.1 s "
-            "after. If a block touches several surfaces, the greatest damping counts. Without "
-            "a ground, the damping of the site.",
+            "afterwards. If a block touches several surfaces, the greatest damping applies. "
+            "Without a ground, the damping of the site.",
             "1/s",
         ),
     ] = _OPEN
@@ -109,9 +110,8 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     roughness: Annotated[
         float,
         about(
-            "Root-mean-square depth of pits in the ground, which are as far apart as blocks are "
-            "long. Ground that overhangs or is steeper than 79 degrees has none. Without a "
-            "ground 0.",
+            "Root-mean-square depth of pits in the ground, which are about one block size apart. "
+            "Ground that overhangs or is steeper than 79 degrees has none. Without a ground 0.",
             "m",
             ge=0.0,
             le=2.0,
@@ -120,7 +120,7 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ground: Annotated[
         str,
         about(
-            "Name of a ground in the library, whose typical values count where no others are "
+            "Name of a ground in the library, whose typical values are used if no others are "
             "given. In Python, a copy of a surface with another ground keeps its values.",
             choices=(*GROUNDS, ""),
         ),
@@ -135,14 +135,14 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def varies(self) -> bool:
-        """Whether releases draw its friction, restitution or damping."""
+        """Whether its friction, restitution or damping vary from release to release."""
         return self.friction_sd_deg > 0.0 or self.restitution_sd > 0.0 or self.damping_sd > 0.0
 
 
 def smaller(a: Surface, b: Surface) -> Surface:
-    """Return the properties of the contact between two surfaces: the smaller of each.
+    """Return the contact properties of two surfaces: the smaller value of each.
 
-    Damping is that of the one that states it, where the other leaves it to the scene.
+    If only one of the surfaces specifies a damping, that one is used.
     """
     stated = [x.damping for x in (a, b) if x.damping is not None]
     return Surface(
@@ -158,20 +158,18 @@ def smaller(a: Surface, b: Surface) -> Surface:
 
 @documented
 class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How two surfaces meet.
+    """Contact properties of a pair of surfaces.
 
-    Without such a table, rock on the ground has the surface of the ground, and any other pair has
-    the smaller of each property. The values are checked with the site.
+    Without such a table, rock on the ground has the properties of the ground, and any other pair
+    has the smaller value of each property. The values are checked with the site.
     """
 
     first: Annotated[str, about("Name of one of the surfaces.")]
     second: Annotated[str, about("Name of the other surface.")]
-    friction_deg: Annotated[float, about("Angle of Coulomb friction.", "deg", ge=0.0, le=89.9)] = (
-        30.0
-    )
+    friction_deg: Annotated[float, about("Coulomb friction angle.", "deg", ge=0.0, le=89.9)] = 30.0
     cohesion: Annotated[
         float,
-        about("Shear strength, beside friction, of a joint closed at the start.", "Pa", ge=0.0),
+        about("Shear strength, besides friction, of a joint closed at the start.", "Pa", ge=0.0),
     ] = 0.0
     tension: Annotated[
         float, about("Tensile strength of a joint that is closed at the start.", "Pa", ge=0.0)
@@ -182,15 +180,15 @@ class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping: Annotated[
         Damping | None,
         about(
-            "Mass-proportional damping of blocks that touch. The default is the damping that "
-            "the two surfaces have without this table.",
+            "Mass-proportional damping of blocks in contact. The default is the damping that the "
+            "two surfaces have without this table.",
             "1/s",
         ),
     ] = None
 
     @property
     def surface(self) -> Surface:
-        """Its properties."""
+        """Its contact properties as a `Surface`."""
         return Surface(
             friction_deg=self.friction_deg,
             cohesion=self.cohesion,
@@ -201,7 +199,7 @@ class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def check_surface(where: str, surface: Surface) -> None:
-    """Check that the friction of a surface can be meant.
+    """Check that the friction angle of a surface is plausible.
 
     Raises
     ------

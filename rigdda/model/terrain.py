@@ -1,4 +1,4 @@
-"""The natural ground, and its roughness: pits at random, one in each length of a block."""
+"""Natural ground, and its roughness: random pits, spaced about one block size apart."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rigdda.errors import BadInput
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terrain:
-    """The ground, a chain of segments walked with the ground on its right.
+    """Ground surface as a chain of segments with the ground on its right-hand side.
 
-    A slope that is walked from left to right has the ground below. Overhangs are allowed, the
-    chain must not cross itself.
+    A slope whose points run from left to right has the ground below. Overhangs are permitted, but
+    the chain must not cross itself.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Terrain:
     Raises
     ------
     BadInput
-        If the chain crosses itself, a segment has no length or the number of names is wrong.
+        If the chain crosses itself, a segment has zero length or the number of names is wrong.
     """
 
     points: NDArray[np.float64]
@@ -64,7 +64,7 @@ class Terrain:
 
     @classmethod
     def sound(cls, points: NDArray[np.float64], surfaces: tuple[str, ...]) -> Terrain:
-        """Return a terrain of sound points and surfaces, which are not checked."""
+        """Return a terrain of valid points and surfaces without checking them."""
         terrain = object.__new__(cls)
         object.__setattr__(terrain, "points", points)
         object.__setattr__(terrain, "surfaces", surfaces)
@@ -72,9 +72,10 @@ class Terrain:
 
     @property
     def solid(self) -> shapely.Polygon:
-        """The ground as a polygon, as far out as the chain is long; empty where it has no inside.
+        """The ground as a polygon, extended outwards and downwards by about the size of the chain.
 
-        That is where a chain that does not end at its outermost points would cross its own frame.
+        It is empty if the chain does not end at its outermost points, so that the extension would
+        cross it.
         """
         first, last = self.points[0], self.points[-1]
         if np.hypot(*(last - first)) < 1e-9:
@@ -82,7 +83,7 @@ class Terrain:
             return closed if not closed.exterior.is_ccw else shapely.Polygon()
         (left, low), (right, high) = self.points.min(axis=0), self.points.max(axis=0)
         far = 1.0 + right - left + high - low
-        # the ground is on the right: below a chain from left to right, above one from right to left
+        # the ground is below a chain from left to right and above one from right to left
         down = last[0] > first[0]
         near, away = (right + far, left - far) if down else (left - far, right + far)
         deep = low - far if down else high + far
@@ -116,36 +117,38 @@ class Terrain:
 
 
 STEEPEST = 5.0
-"""Rise over run beyond which a piece of the ground stays as it is [-]: pits go straight down, which
-on a face of 80 degrees would hardly change it."""
+"""Slope, rise over run, above which the ground has no pits [-]. Pits are vertical, so that they
+would hardly change a face of 80 degrees."""
 
 CLEAR = 0.25
-"""Least distance of a pit from an even interval, over the spacing [-]: no step at its ends."""
+"""Minimum distance of a pit from an interval without pits, relative to the spacing [-], which
+avoids steps at its ends."""
 
 SAME = 1e-3
-"""Distance over the spacing within which a corner of the ground stands for a pit [-]."""
+"""Distance within which a corner of the ground replaces a pit, relative to the spacing [-]."""
 
 REACH = 1.0 + CLEAR
-"""Distance from an even interval within which it changes the ground, over the spacing [-]."""
+"""Distance from an interval without pits within which that interval affects the ground, relative to
+the spacing [-]."""
 
 
 class Roughness(msgspec.Struct, frozen=True):
-    """Pits in the ground of a scene.
+    """Random pits in the ground of a scene.
 
     At each multiple of `spacing` the ground lies below the smooth surface by the absolute value of
-    a normal number times the `amplitude` of its surface, and in between by what is linear in x. So
-    pits do not depend on how finely the ground was surveyed, what starts clear of the smooth ground
-    stays clear of it, and pits are the same with every layout but within 1.25 spacings of a
-    barrier: where barriers stand the ground is even.
+    a standard normal number times the `amplitude` of its surface; between them the depth is linear
+    in x. Pits therefore do not depend on the resolution of the survey, and objects clear of the
+    smooth ground remain clear of the rough ground. The ground is smooth under barriers; beyond 1.25
+    spacings of a barrier the pits are the same for every layout.
 
     Parameters
     ----------
     spacing : float
-        Distance of the pits [m], about the size of a block.
+        Distance between pits [m], about the size of a block.
     amplitude : mapping of str to float
-        Root-mean-square depth of the pits by the name of the surface [m].
+        Root-mean-square depth of the pits by name of the surface [m].
     seed : sequence of int
-        Of the random numbers.
+        Seed of the random numbers.
 
     Raises
     ------
@@ -173,9 +176,9 @@ class Roughness(msgspec.Struct, frozen=True):
             msgspec.structs.force_setattr(self, name, value)
 
     def applied(self, ground: Terrain, even: Sequence[tuple[float, float]] = ()) -> Terrain:
-        """Return a ground with pits, but for the intervals of x that are to stay even [m].
+        """Return the ground with pits, except in the intervals `even` of x [m].
 
-        Ground that overhangs stays as it is.
+        Ground with overhangs is returned unchanged.
         """
         x, y = ground.points.T
         if (np.diff(x) < 0.0).any():
@@ -193,7 +196,7 @@ class Roughness(msgspec.Struct, frozen=True):
             at = np.concatenate([x[i : i + 1], inner])
             level = np.concatenate([y[i : i + 1], np.interp(inner, x[i : i + 2], y[i : i + 2])])
             deep = np.full(len(at), amplitude[i])
-            deep[0] = min(amplitude[max(i - 1, 0)], amplitude[i])  # surfaces meet without a step
+            deep[0] = min(amplitude[max(i - 1, 0)], amplitude[i])  # no step between two surfaces
             points.append(np.column_stack([at, level - deep * np.interp(at, nodes, depths)]))
             names += [name] * len(at)
         points.append(ground.points[-1:])
@@ -202,7 +205,7 @@ class Roughness(msgspec.Struct, frozen=True):
     def _nodes(
         self, left: float, right: float, even: Sequence[tuple[float, float]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return where the depth of pits is given, ascending [m], and that depth over amplitude."""
+        """Return the nodes of the pit depth, ascending [m], and the depth over amplitude."""
         first, last = math.floor(left / self.spacing), math.ceil(right / self.spacing)
         nodes: NDArray[np.float64] = self.spacing * np.arange(first, last + 1, dtype=np.float64)
         rng = np.random.Generator(np.random.PCG64(self.seed))

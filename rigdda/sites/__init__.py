@@ -1,4 +1,4 @@
-"""Sites by their names: the built-in ones, one TOML file each here, and generated ones."""
+"""Sites by name: built-in ones, each a TOML file in this folder, and generated ones."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ __all__ = ["FAMILIES", "SPLITS", "design_names", "load", "names", "split", "text
 
 
 def design_names() -> list[str]:
-    """Return the names of the six built-in sites to design on, one a family."""
+    """Return the names of the six built-in design sites, one per family."""
     return list(FAMILIES)
 
 
 def load(name: str) -> Site:
-    """Return a built-in site, or a generated one: "bench-17" of a family, "random-17" of any.
+    """Return a built-in or generated site by its name.
 
-    A generated site is always the same.
+    Names of generated sites are such as "bench-17" (of a family) or "random-17" (of any family).
+    The same name always gives the same site.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""The reference of site files, written from the classes that read them.
+"""Generator of the reference of site files from the classes that read them.
 
-`python -m rigdda.sites.document` writes docs/site.md; a test tells when it is out of date.
+`python -m rigdda.sites.document` writes docs/site.md; a test fails if that file is out of date.
 """
 
 from __future__ import annotations
@@ -51,27 +51,27 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[scatter]`", Scatter),
     ("`[lumped.NAME]`", Rebound),
 )
-"""Every table of a site file and the class that reads it."""
+"""Tables of a site file, and the class that reads each."""
 
 GROUND_TEXT = """\
 ## Grounds
 
-The library that `ground` of a surface refers to: typical values and, in brackets, plausible ranges.
-A surface takes the typical values and overrides what is known of it. The values are those of rigid
-blocks with corners, not those of a point mass, whose normal restitution also depends on how the
-block turns. Damping acts while a block touches the ground, and for 0.1 s after; it is the loss that
-friction and restitution leave out, and it is the least known of the four. Where nothing is known,
-design with both ends of its range.
+The key `ground` of a surface refers to this library of typical values and, in brackets, plausible
+ranges. A surface takes the typical values except those that it specifies itself. The values are
+those of rigid blocks with corners, not those of a point mass, whose normal restitution also depends
+on the rotation of the block. Damping acts while a block touches the ground and for 0.1 s
+afterwards; it represents the losses that friction and restitution do not cover, and is the least
+certain of the four properties. If you have no measurements, design for both ends of its range.
 """
 
 LAYOUT = """\
 ## Layout files
 
 A layout file lists barriers, in TOML with a table `[[barriers]]` for each or in JSON with a list
-`barriers`. Each has its `kind`, by default "wall", and the keys below. The option `--layout` takes
-such a file, and the `barriers` of a study have the same keys. `rigdda design` writes its result as
-`layout.toml`. A layout that breaks a rule of the site is computed nevertheless; `simulate`, `study`
-and the notes of a replay then say which rule.
+`barriers`. Each has a `kind`, by default "wall", and the keys below. The option `--layout` reads
+such a file, and the `barriers` of a study have the same keys. `rigdda design` writes its result to
+`layout.toml`. A layout that breaks a siting rule is simulated nevertheless; `simulate`, `study` and
+the notes of a replay then report the rule.
 
 ```toml
 [[barriers]]
@@ -87,39 +87,40 @@ HEAD = """\
 
 <!-- Written by `python -m rigdda.sites.document` from the classes that read the files. -->
 
-This page is for looking up the keys of site files and of layout files. To write your first site
+This page is the reference of the keys of site files and layout files. To write your first site
 file, [begin here](howto/site_file.md).
 
 A site file describes a slope in TOML. `rigdda design my-site.toml` designs its protection, and
-`rigdda.Site.load("my-site.toml")` reads it in Python. Chainages grow downhill. Units are those of
-the tables below.
+`rigdda.Site.load("my-site.toml")` reads it in Python. Chainages increase downhill. Units are given
+in the tables below.
 
-A file must have the keys that are marked "needed"; all others have a default. Keys that are not
-listed here and values outside their range are refused: the message names the key and its value, and
-says what to write instead. `str` is a text in quotes, and a whole number may stand for a float.
-A list of tables is written with double brackets, such as `[[events]]`, once for each table. Tables
-may come in any order, but TOML requires plain keys to come before the first table.
+A file must have the keys that are marked "needed"; all others have a default. Unknown keys and
+values outside their range are rejected: the message names the key and its value, and says what to
+write instead. `str` is a text in quotes, and a whole number may be given for a float. A list of
+tables is written with double brackets, such as `[[events]]`, once for each table. Tables may come
+in any order, but TOML requires plain keys to come before the first table.
 
-The easiest start is a copy of a built-in site. They are files in `rigdda/sites/`: {names}.
+The easiest way to start is to copy a built-in site from `rigdda/sites/`: {names}.
 
 ## Help from your editor
 
-Editors with support for TOML, such as VS Code with the extension Even Better TOML, show what a key
-means and mark mistakes while you type, if they know the schema of the file. Write it next to your
-site file:
+Editors with support for TOML, such as VS Code with the extension Even Better TOML, explain keys and
+mark errors while you type if they know the schema of the file. Write the schema next to your site
+file:
 
 ```
 rigdda schema > site.schema.json
 ```
 
-and begin the site file with this line:
+and start the site file with this line:
 
 ```toml
 #:schema ./site.schema.json
 ```
 
-`rigdda schema layout` does the same for layout files. A schema cannot tell whether values fit
-together, for example whether the barrier zone lies uphill of the road; reading the file does.
+`rigdda schema layout` does the same for layout files. A schema cannot check whether values are
+consistent, for example whether the barrier zone lies uphill of the road; this is checked when the
+file is read.
 """
 
 
@@ -138,7 +139,7 @@ def document() -> str:
 
 
 def grounds() -> str:
-    """Return the library of grounds as a Markdown table and a list of its sources."""
+    """Return the library of grounds as a Markdown table, followed by a list of its sources."""
     rows = [
         "| ground | friction_deg | restitution | damping [1/s] | roughness [m] | "
         "friction_sd_deg, restitution_sd, damping_sd |",
@@ -157,7 +158,7 @@ def grounds() -> str:
 
 
 def summary(docstring: str | None) -> str:
-    """Return what a docstring says before its sections, as one paragraph."""
+    """Return the part of a docstring before its sections, as one paragraph."""
     text = re.split(r"\n\s*(?:Parameters|Raises)\n", docstring or "")[0]
     return re.sub(r"\s*\n\s*", " ", text).strip()
 
@@ -172,7 +173,7 @@ def _fields(table: type[msgspec.Struct]) -> str:
 
 
 def _default(field: Described) -> str:
-    """Return the default of a field as it would be in a file."""
+    """Return the default of a field as it would be written in a file."""
     value = field.default
     if field.needed:
         return "needed"
@@ -192,7 +193,7 @@ def _default(field: Described) -> str:
 
 
 def main() -> None:
-    """Write the reference."""
+    """Write the reference to docs/site.md."""
     with atomic(PATH) as part:
         part.write_text(document(), encoding="utf-8")
 

@@ -1,7 +1,7 @@
-"""JSON Schema of site and layout files, with which editors show what keys mean and mark mistakes.
+"""JSON Schema of site and layout files, which editors use to explain keys and to mark errors.
 
-It follows from the declarations of the fields (`rigdda.fields`), and is written in the features of
-draft 7, which the TOML plug-ins of editors understand.
+It is generated from the declarations of the fields (`rigdda.fields`) and restricted to the features
+of draft 7, which the TOML extensions of editors support.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def schema(name: str) -> dict[str, Any]:
     else:
         tables["Wall"]["required"].remove("kind")  # a barrier without a kind is a wall
         whole = {
-            "description": "A layout of barriers, of which there may be none.",
+            "description": "A layout of barriers, possibly empty.",
             "type": "object",
             "properties": {"barriers": whole},
             "required": ["barriers"],
@@ -41,13 +41,13 @@ def schema(name: str) -> dict[str, Any]:
 
 
 def _plain(part: Any) -> Any:
-    """Return a part of a schema without null, which TOML lacks, and in the features of draft 7."""
+    """Return part of a schema without null, which TOML lacks, restricted to draft 7."""
     if isinstance(part, list):
         return [_plain(one) for one in part]
     if not isinstance(part, dict):
         return part
     found = {key: _plain(one) for key, one in part.items() if one is not None}
-    if isinstance(found.get("description"), str):  # of a table it is its docstring
+    if isinstance(found.get("description"), str):  # that of a table is its docstring
         found["description"] = summary(found["description"])
     kinds = [one for one in found.get("anyOf", ()) if one != {"type": "null"}]
     if len(kinds) == 1:
@@ -55,6 +55,6 @@ def _plain(part: Any) -> Any:
         found = kinds[0] | found
     if "prefixItems" in found:  # all members are of one type
         found["items"] = found.pop("prefixItems")[0]
-    if "$ref" in found and len(found) > 1:  # draft 7 ignores what stands beside a reference
+    if "$ref" in found and len(found) > 1:  # draft 7 ignores the siblings of a reference
         found["allOf"] = [{"$ref": found.pop("$ref")}]
     return found

@@ -141,7 +141,7 @@ def test_malformed_layouts_are_refused_by_both(table, field, tmp_path):
 def test_a_layout_file_holds_a_table(tmp_path):
     (tmp_path / "layout.json").write_text("[]")
     assert list(LAYOUT.iter_errors([]))
-    with pytest.raises(BadInput, match=r"layout\.json': put what it holds into a table"):
+    with pytest.raises(BadInput, match=r"layout\.json': give a table"):
         load_layout(tmp_path / "layout.json")
 
 

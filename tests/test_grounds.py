@@ -74,7 +74,7 @@ def test_a_site_that_states_no_damping_takes_that_of_its_ground_and_says_so():
     stated = replace(BENCH, surfaces=bare, motion=Motion(damping=0.4))  # warnings are errors here
     assert all(surface.damping is None for surface in stated.surfaces.values())
     assert stated.realise((), 1, "block").damping == 0.4
-    with pytest.raises(BadInput, match=r"damping_when = 'always': give motion\.damping"):
+    with pytest.raises(BadInput, match=r"damping_when = 'always': also give motion\.damping"):
         replace(BENCH, motion=Motion(damping_when="always"))
 
 

@@ -106,7 +106,7 @@ def test_mesh_costs_its_area_and_makes_events_rarer():
     assert FLAT.rate("block") == pytest.approx(0.006)
     assert FLAT.rate("block", mesh) == pytest.approx(0.2 * 0.006)
     assert FLAT.rate("group", mesh) == pytest.approx(0.7 * 0.001)
-    with pytest.raises(BadInput, match="hang each option once"):
+    with pytest.raises(BadInput, match="use each option at most once"):
         FLAT.rate("block", mesh * 2)
 
 

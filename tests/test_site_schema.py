@@ -70,7 +70,7 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
         ("rate = 2.8", "rate = -1.0", "events.small, face.rate", "at least 0"),
         ("rate = 2.8", "rate = 36500.0", "events.small, face.rate", "at most 1000"),
         ("friction_deg = 30.0", "friction_deg = 0.577", "surfaces.rock.friction_deg", "degrees"),
-        ("band = [1.0, 2.8]", "band = [2.8, 1.0]", "sources.face.band", "lesser number first"),
+        ("band = [1.0, 2.8]", "band = [2.8, 1.0]", "sources.face.band", "smaller number first"),
         (
             "band = [1.0, 2.8]",
             "band = [1.0, 2.8]\ndensity = 2.65",
@@ -81,7 +81,7 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
         ("area = [0.05, 0.3]", "", "events.small, face.area", "band face"),
         ("width = 4.0", "", "events.group.width", "several blocks"),
         ('source = "face"', 'source = "fall"', "events.small, face.source", "crest, face"),
-        ('name = "crest"', 'name = "face"', "sources[1].name", "of its own"),
+        ('name = "crest"', 'name = "face"', "sources[1].name", "unique name"),
         ("block = 0.7", "blocks = 0.7", "meshes.face.factors", "block, group"),
         ("embankment = 110.0", "interest = 3.0", "prices.interest", "at most 0.5"),
         ("embankment = 110.0", "fence = { 750 = 300.0 }", "prices.fence", "1000"),
@@ -96,8 +96,8 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
             "only once",
         ),
         ("toe = 5.0", "toe = 15.0", "slope.toe", "at most 12"),
-        ("band = [1.0, 2.8]", "", "sources.face.polygon", "give one of band"),
-        ("band = [1.0, 2.8]", "band = [1.0, 11.5]", "sources.face.band", "clear of the road"),
+        ("band = [1.0, 2.8]", "", "sources.face.polygon", "give exactly one of band"),
+        ("band = [1.0, 2.8]", "band = [1.0, 11.5]", "sources.face.band", "clear the road"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(old, new, field, mend, tmp_path):
@@ -109,7 +109,7 @@ def test_what_cannot_be_meant_is_refused(old, new, field, mend, tmp_path):
 def test_ground_that_ends_too_early_is_told(tmp_path):
     error = refused(tmp_path, "quick", "[80.0, -2.0]", "[60.0, -2.0]")
     assert error.field == "slope.points[10]"
-    assert "to x = 74.8 at least, 30 m beyond the road" in error.mend
+    assert "at least x = 74.8, 30 m beyond the road" in error.mend
 
 
 @pytest.mark.parametrize("value", [True, np.True_, np.array(5.0), np.array([5.0])])
@@ -243,7 +243,7 @@ def test_barriers_do_not_stand_where_loose_rock_lies():
     assert low < 18.5 and high > 21.5
     bench.realise((Wall(low - 1.0, 1.0), Wall(high, 1.0)), 0, "small")
     for x in (low - 0.5, 20.0, high - 0.1):
-        with pytest.raises(BadInput, match="where loose rock lies"):
+        with pytest.raises(BadInput, match="outside the loose rock"):
             bench.realise((Wall(x, 1.0),), 0, "small")
     with pytest.raises(BadInput, match="leave room"):
         replace(bench, barrier_zone=replace(bench.barrier_zone, start=18.5, end=21.5))
@@ -258,9 +258,9 @@ def test_a_band_needs_ground_without_overhangs():
 
 
 def test_a_source_is_one_of_three():
-    with pytest.raises(BadInput, match="give one of band"):
+    with pytest.raises(BadInput, match="give exactly one of band"):
         Source(band=(0.0, 1.0), polygon=((0, 0), (1, 0), (0, 1)))
-    with pytest.raises(BadInput, match="its blocks are given"):
+    with pytest.raises(BadInput, match="defines its blocks"):
         replace(QUICK, events=(Event("mass", 1.0, "mass", number=(2, 3)),))
 
 
@@ -272,7 +272,9 @@ def test_mesh_is_no_part_of_a_scene():
 
 def test_releases_that_take_minutes_are_doubted() -> None:
     text = sites.text("quick")
-    with pytest.warns(DoubtfulInput, match=r"motion\.dt: give more.* 2e\+06 steps"):
+    with pytest.warns(DoubtfulInput, match=r"motion\.dt: increase it.* 2e\+06 steps"):
         Site.parse(text.replace("duration = 20.0", "duration = 20.0\ndt = 1e-5"), "site")
-    with pytest.warns(DoubtfulInput, match=r"sources\.mass\.block_area: give more.* 4\d{3} blocks"):
+    with pytest.warns(
+        DoubtfulInput, match=r"sources\.mass\.block_area: increase it.* 4\d{3} blocks"
+    ):
         Site.parse(text.replace("block_area = ", "block_area = 0.01 # "), "site")

@@ -52,8 +52,7 @@ def check_site(site: SiteTables) -> None:
     if motion.damping and motion.damping_when == "always" and site.family != "paper":
         _doubt(
             "motion.damping_when",
-            "give 'contact': with 'always', energies at a barrier are too low by a factor of 4 to "
-            "10",
+            "give 'contact': with 'always', energies at a barrier are four to ten times too low",
         )
     steps = motion.duration / motion.dt
     if steps > MANY_STEPS:

@@ -153,7 +153,7 @@ def test_a_reset_may_name_the_site(env: BarrierDesign) -> None:
         assert env.problem.kinds == ("fence",)
     env.reset(seed=1, options={"site": "test"})
     assert env.problem.site.name in sites.split("test")
-    with pytest.raises(BadInput, match=r"options = .*weather.*: give nothing but site"):
+    with pytest.raises(BadInput, match=r"options = .*weather.*: the only option is site"):
         env.reset(options={"weather": 1})
     with pytest.raises(BadInput, match="site = 'nowhere'"):
         env.reset(options={"site": "nowhere"})
@@ -279,8 +279,8 @@ def test_bad_actions_are_refused_and_the_episode_goes_on(
         ({"releases": 10**6}, "releases = 1000000: give a whole number"),
         ({"render_mode": "human"}, "render_mode = 'human': choose one of rgb_array"),
         ({"record": 3}, "record = 3: name a folder"),
-        ({"record": __file__}, "record = .*: name a folder that can be made"),
-        ({"record_trigger": bool}, "record_trigger = .*: name a folder"),
+        ({"record": __file__}, "record = .*: name a folder that can be created"),
+        ({"record_trigger": bool}, "record_trigger = .*: also give a folder"),
         ({"record": Path("here"), "record_trigger": 2}, "record_trigger = 2: give a function"),
         ({"site": "nowhere"}, "site = 'nowhere'"),
         ({"max_barriers": -1}, "max_barriers = -1"),
@@ -303,6 +303,6 @@ def test_a_barrier_that_is_asked_for_and_not_built_is_told() -> None:
     widest = np.tile(np.array([1.0, 0.0, 1.0, 1.0], dtype=np.float32), 4)
     _, _, _, _, info = env.step(widest)
     assert len(info["layout"]) + len(info["dropped"]) == 4 and info["dropped"]
-    assert all(words.endswith("no place in the zone has room for it") for words in info["dropped"])
+    assert all(words.endswith("no feasible place for it in the zone") for words in info["dropped"])
     vector = env.problem.encode(info["layout"])
     assert env.problem.dropped(vector) == ()

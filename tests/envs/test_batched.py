@@ -80,7 +80,7 @@ def test_a_reset_may_name_the_site_of_all_copies() -> None:
     env = batch("rigdda/BarrierDesign-v0", CUT)
     _, info = env.reset(seed=0, options={"site": "quick"})
     assert info["site"].tolist() == ["quick"] * COPIES
-    with pytest.raises(BadInput, match="give nothing but site"):
+    with pytest.raises(BadInput, match="the only option is site"):
         env.reset(options={"weather": 1})
     for mask in (np.zeros(COPIES, bool), np.ones(2, bool), [1, 0, 0]):
         with pytest.raises(BadInput, match=r"reset_mask = .*: give 3 booleans"):

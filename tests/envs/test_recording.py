@@ -53,7 +53,7 @@ def test_an_episode_is_recorded(tmp_path: Path) -> None:
     assert {"/world/barriers/0", "/world/road", "/world/terrain"} <= there
     (wall,) = info["layout"]
     ((notes,),) = rows(path, "/notes", "TextDocument:text", static=True)
-    assert f"**seed**: {seed}, event {event}, which stands for the 3 scored" in notes
+    assert f"**seed**: {seed}, event {event}, representative of the 3 scored" in notes
     assert f"**layout**: {describe(wall, 2)}" in notes
     assert f"**reward**: {reward:+.4f}" in notes
     assert f"**objective**: {info['objective']:.4f}" in notes
@@ -185,7 +185,7 @@ def test_every_placement_is_recorded(tmp_path: Path) -> None:
         sim_time = chunk.to_record_batch().column("sim_time").cast("int64").to_numpy()
         np.testing.assert_allclose(1e-9 * sim_time, run.times, atol=1e-8)
     ((notes,),) = rows(path, "/notes", "TextDocument:text", static=True)
-    assert f"**seed**: {seed}, event {event}, which stands for the 2 scored" in notes
+    assert f"**seed**: {seed}, event {event}, representative of the 2 scored" in notes
     for info, reward in zip(said, rewards, strict=True):
         words = "; ".join(describe(b, 2) for b in info["layout"]) or "no barrier"
         numbers = f"| {reward:+.4f} | {info['objective']:.4f} | "

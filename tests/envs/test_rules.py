@@ -67,7 +67,10 @@ def test_sound_layouts_may_be_built(problem: DesignProblem, layout: Layout) -> N
         ([Wall(17.5, 1.0)], r"layout\[0\]\.x = 17\.5: keep all of it, up to 18\.5 m, within"),
         ([Embankment(15.5, 2.0)], r"layout\[0\]\.x = 15\.5: keep all of it"),
         # road at 18
-        ([Fence(15.4, 3.0, energy_class=250)], r"x = 15\.4: put it at 15\.3 or uphill"),
+        (
+            [Fence(15.4, 3.0, energy_class=250)],
+            r"x = 15\.4: give at most 15\.3: it deflects by up to",
+        ),
         ([Fence(14.5, 4.0, energy_class=500)], r"x = 14\.5: .* the road begins at 18"),
         # sizes
         ([Wall(14.0, 5.5)], r"layout\[0\]\.height = 5\.5: .* at most 5$"),
@@ -78,10 +81,13 @@ def test_sound_layouts_may_be_built(problem: DesignProblem, layout: Layout) -> N
         ([Ditch(11.0, 1.0, 1.2, 0.67)], r"layout\[0\]: ditch width = 1\.2"),
         ([Fence(12.0, 2.0, 1e6)], r"layout\[0\]\.capacity = .*give its energy class"),
         # one another
-        ([Wall(12.0, 1.0), Wall(13.4, 1.0)], r"layout\[1\]\.x = 13\.4: put it 0\.5 m beyond 13"),
+        (
+            [Wall(12.0, 1.0), Wall(13.4, 1.0)],
+            r"layout\[1\]\.x = 13\.4: give at least 13\.5: 0\.5 m clear of the wall",
+        ),
         (
             [Fence(11.0, 2.0, energy_class=100), Wall(13.5, 1.0)],
-            r"layout\[1\]\.x = 13\.5: .* beyond 13\.2, up to where the fence needs",
+            r"layout\[1\]\.x = 13\.5: give at least 13\.7: 0\.5 m clear of the fence",
         ),
         # mesh
         ([Mesh(1.5, "golden")], r"layout\[0\]\.option = 'golden': choose one of heavy, light"),
@@ -163,7 +169,7 @@ def test_a_machine_needs_room_beside_works() -> None:
     bench = DesignProblem("bench")
     assert bench.fits((Fence(14.5, 3.0, energy_class=1000),))
     for works in (GravityWall(14.2, 1.0, 0.5), Embankment(14.2, 0.5, 0.5)):
-        with pytest.raises(BadInput, match="3 m beside it are left to a machine"):
+        with pytest.raises(BadInput, match="3 m beside it are free for a machine"):
             bench.check((works,))
     assert bench.fits((GravityWall(31.0, 1.0, 0.5),))
 

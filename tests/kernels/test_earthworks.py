@@ -109,7 +109,7 @@ def test_a_ditch_and_the_embankment_of_its_earth():
     [
         (Ditch(38.0, 1.0, 4.0), "ditch x", "stay on the terrain"),
         (Ditch(10.0, 4.0, 1.0), "ditch width", "give more than"),
-        (Embankment(10.0, 1.0, 1.0, 2.5), "embankment x", "flatter than its side"),
+        (Embankment(10.0, 1.0, 1.0, 2.5), "embankment x", "flatter than its downhill side"),
         (Embankment(39.0, 1.0, 1.0), "embankment x", "stay on the terrain"),
     ],
 )

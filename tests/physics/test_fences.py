@@ -498,8 +498,8 @@ def test_classes():
 @pytest.mark.parametrize(
     ("fields", "mend"),
     [
-        ({}, "give one of them"),
-        ({"capacity": 1e5, "energy_class": 500}, "give one of them"),
+        ({}, "give exactly one of them"),
+        ({"capacity": 1e5, "energy_class": 500}, "give exactly one of them"),
         ({"energy_class": 700}, "give one of 100, 250"),
         ({"energy_class": 100}, "at most 2.5 m, or a higher class"),
         ({"energy_class": 500, "elongation": 1.0}, "leave it out"),

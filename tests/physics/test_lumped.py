@@ -167,7 +167,7 @@ def test_it_says_what_it_does_not_know():
         lumped(Site.load("verge"), (GravityWall(9.0, 2.0),))
     with pytest.raises(BadInput, match="overhangs"):
         lumped(Site.load("toppling"))
-    with pytest.raises(BadInput, match="where loose rock lies"):
+    with pytest.raises(BadInput, match="outside the loose rock"):
         lumped(Site.load("quick"), (Embankment(7.0, 2.0),))
     for seeds in ([], 3):
         with pytest.raises(BadInput, match="seeds"):

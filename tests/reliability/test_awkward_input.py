@@ -125,5 +125,5 @@ def test_the_ground_is_on_the_right_of_its_chain(chain, inside, outside):
     ground = Terrain(chain)
     Scene(ground, [Block(square + outside)])
     if inside is not None:
-        with pytest.raises(BadInput, match="in the ground"):
+        with pytest.raises(BadInput, match="overlaps the ground"):
             Scene(ground, [Block(square + inside)])

@@ -96,7 +96,7 @@ def test_what_takes_a_scene_is_left_to_one():
     assert single.ending(drawn._replace(blocks=(sunk,))) is None
     batch = Batch(BENCH, ())
     batch.ending(drawn)
-    with pytest.raises(BadInput, match="in the ground"):
+    with pytest.raises(BadInput, match="overlaps the ground"):
         batch.ending(drawn._replace(blocks=(sunk,)))
     corners = [(0.0, 30.0), (2.0, 30.0), (1.0, 30.5), (1.0, 32.0)]
     bent = Block(corners, block.density, block.surface)

@@ -415,9 +415,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
     with kept(folder), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
-    click.echo(
-        "Z, capital, harm and repair in EUR per metre of road and year; to build in EUR per metre"
-    )
+    click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
     show(studies.table(asked, folder / "study.csv"))
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):

@@ -1,6 +1,6 @@
 """Designers of barrier layouts, the command line, studies, fits and reports.
 
-`rigdda.agents.NAME` imports the designer of that name when it is first used.
+The attribute `rigdda.agents.NAME` imports the designer NAME when it is first used.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rigdda.agents.designers import DESIGNERS, module
 
-if TYPE_CHECKING:  # `as`: type checkers take these for names of this package
+if TYPE_CHECKING:  # `as` declares these names as exports of this package
     from rigdda.agents.designers import cma as cma
     from rigdda.agents.designers import constant as constant
     from rigdda.agents.designers import convex as convex

@@ -1,4 +1,4 @@
-"""The accuracy suite on the command line: which cases, their tables, their files."""
+"""The accuracy suite for the command line: choice of cases, tables and files."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def choose(only: Sequence[str], slow: bool) -> tuple[Case, ...]:
     Parameters
     ----------
     only : sequence of str
-        Beginnings of names; without any, all cases.
+        Beginnings of the names of cases. If it is empty, all cases are chosen.
     slow : bool
-        With slow ones; those that `only` names are run at any rate.
+        Whether slow cases are included. Cases that `only` selects are always included.
 
     Raises
     ------
     BadInput
-        If no name begins so.
+        If no name begins with one of the given texts.
     """
     for start in only:
         if not start or not any(case.name.startswith(start) for case in CASES):
@@ -43,15 +43,15 @@ def choose(only: Sequence[str], slow: bool) -> tuple[Case, ...]:
 
 
 def runs(cases: Sequence[Case]) -> int:
-    """Return how often `validate` says that it goes on: once a case, again for a smooth one."""
+    """Return the number of progress reports: one per case and another per smooth case."""
     return len(cases) + sum(case.smooth for case in cases)
 
 
 def validate(
     cases: Sequence[Case], seed: int, out: Path, tick: Callable[[int, str], None]
 ) -> tuple[list[Result], list[Convergence]]:
-    """Run cases, then the convergence of the smooth ones; write each table as it grows."""
-    evaluate(FLIGHT[0])  # compiles, or loads what is compiled: no case is to pay for that
+    """Run cases and the convergence of smooth cases, and write the tables after each of them."""
+    evaluate(FLIGHT[0])  # compile the kernels first, so that no case is charged for it
     results: list[Result] = []
     studies: list[Convergence] = []
     for done, case in enumerate(cases):
@@ -66,7 +66,7 @@ def validate(
 
 
 def write_results(path: Path, results: Iterable[Result]) -> None:
-    """Write a CSV file with one row a figure."""
+    """Write a CSV file with one row per computed quantity."""
     rows = [
         {
             "case": r.case,
@@ -87,7 +87,7 @@ def write_results(path: Path, results: Iterable[Result]) -> None:
 
 
 def write_studies(path: Path, studies: Iterable[Convergence]) -> None:
-    """Write a CSV file with one row a smooth figure: its error at each step, and the order."""
+    """Write a CSV file with one row per smooth quantity: its error at each step and the order."""
     rows = [
         {"case": s.case, "quantity": s.quantity}
         | {f"error_at_{dt:g}_s": error for dt, error in zip(STEPS, s.errors, strict=True)}
@@ -98,7 +98,10 @@ def write_studies(path: Path, studies: Iterable[Convergence]) -> None:
 
 
 def table(results: Iterable[Result]) -> Table:
-    """Return the table of figures, at most 80 wide; an error that misses its bar has a mark."""
+    """Return the table of quantities, at most 80 characters wide.
+
+    Errors above their tolerance are marked with an exclamation mark.
+    """
     out = empty_table(("case", "closed form", "computed", "error", "bar", "us/s"))
     for name, figures in groupby(results, lambda result: result.case):
         for i, r in enumerate(figures):
@@ -116,7 +119,7 @@ def table(results: Iterable[Result]) -> Table:
 
 
 def convergence_table(studies: Iterable[Convergence]) -> Table:
-    """Return the table of errors by step and of observed orders."""
+    """Return the table of the errors at each time step and of the observed orders."""
     out = empty_table(("case", *(f"{1e3 * dt:g} ms" for dt in STEPS), "order"))
     for name, figures in groupby(studies, lambda study: study.case):
         out.add_row(name)

@@ -1,6 +1,6 @@
 """The command line: `rigdda sites | simulate | design | study | train | evaluate | ...`.
 
-A command imports what it needs when it runs, so that help is there at once.
+Each command imports its modules when it runs, so that `--help` is fast.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ if TYPE_CHECKING:
 BAD_PATH = (
     FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError, PermissionError,
 )  # fmt: skip
-"""Errors of the system that come of a path that was given."""
+"""Errors of the operating system that are caused by a path which the user gave."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
-    0: done. 2: bad input. 1: it failed on the way. 130: interrupted. Each but 0 comes with one
-    line on standard error.
+    The codes are 0 for success, 2 for bad input, 1 for a failure during the run and 130 for an
+    interruption. With every code except 0, one line is written on standard error.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # names may have letters that the locale lacks
+        sys.stdout.reconfigure(errors="replace")  # the locale may lack letters of a name
     try:
         with warnings.catch_warnings():
             warnings.showwarning = once()
@@ -93,7 +93,7 @@ def cli(context: click.Context) -> None:
 
 @cli.command()
 def sites() -> None:
-    """List the built-in sites with their events and the zone for barriers."""
+    """List the built-in sites, their events and barrier zones."""
     import rigdda
     from rigdda.agents.reports import tables
 
@@ -105,8 +105,9 @@ def sites() -> None:
 def schema(file: str) -> None:
     """Print the JSON Schema of site files, or of layout files.
 
-    With it an editor shows what the keys of a file mean and marks mistakes. Write it to a file, for
-    example site.schema.json, and begin your site file with the line "#:schema ./site.schema.json".
+    With the schema, an editor explains the keys of a file and marks mistakes. Write it to a file,
+    for example site.schema.json, and begin your site file with the line
+    "#:schema ./site.schema.json".
     """
     import json
 
@@ -121,12 +122,12 @@ def schema(file: str) -> None:
 @click.option(
     "--event",
     metavar="NAME",
-    help="Simulate this event only.  [default: draw events by their rates]",
+    help="Simulate only this event.  [default: draw events by their rates]",
 )
 @count_option("--releases", 1, 100, "Number of releases.")
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
-              show_default=True, help="How rock is simulated. 'lumped' treats each block as a "
-              "point: quick, but without barriers that stand on the ground.")  # fmt: skip
+              show_default=True, help="Mechanical model. 'lumped' treats each block as a point; "
+              "it is fast but cannot simulate barriers that stand on the ground.")  # fmt: skip
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("simulate-SITE")
 def simulate(
@@ -143,7 +144,7 @@ def simulate(
     SITE is the name of a built-in site or a TOML file. Writes outcomes.csv, run.npz (the first
     release) and section.png, or points.csv with --model lumped. The energy of a hit is the kinetic
     energy of the block just before it touches the barrier. The energy that a barrier absorbs is
-    the work that its forces take from all blocks.
+    the work that its forces do against all blocks.
     """
     import rigdda
     from rigdda.agents import jobs
@@ -160,7 +161,7 @@ def simulate(
         note(findings.of_layout(where, barriers, event))
         click.echo(f"{releases} releases of points; points.csv is in {folder}")
         return
-    where.realise(barriers, seed, event)  # what cannot be built is said before a folder is made
+    where.realise(barriers, seed, event)  # report an impossible layout before making a folder
     folder = folder_for(out, f"simulate-{where.name}", "outcomes.csv", "run.npz", "section.png")
     with kept(folder), progress(releases) as tick:
         run, outcomes = jobs.simulate(where, barriers, seeds, event, tick)
@@ -178,7 +179,7 @@ def simulate(
 @seed_option("Seed of the releases.")
 @out_option("fidelity-SITE")
 def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
-    """Measure the bias and the speed-up of the fidelity "fast" on SITE.
+    """Measure the bias and the speed-up of fidelity "fast".
 
     Compares Z and the processor time of a release without barriers, with the constant layout and
     with the layout of the engineering rule. Writes fidelity.csv.
@@ -199,15 +200,17 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
 @click.argument("target")
 @layout_option
 @click.option(
-    "--event", metavar="NAME", help="Replay a release of this event.  [default: drawn by rate]"
+    "--event",
+    metavar="NAME",
+    help="Replay a release of this event.  [default: draw an event by its rate]",
 )
 @seed_option("Seed of the release.")
 @out_option("replay-SITE")
 def replay(target: str, layout: str | None, event: str | None, seed: int, out: Path | None) -> None:
-    """Open the replay TARGET, or record one of a release of the site TARGET.
+    """Open a replay, or record a release of a site as one.
 
-    A replay (FILE.rrd) is opened. A run (FILE.npz) is converted to FILE.rrd and opened. For a site,
-    a release is simulated and episode.rrd is written.
+    TARGET is a file or a site. A replay (FILE.rrd) is opened. A run (FILE.npz) is converted to
+    FILE.rrd and opened. For a site, one release is simulated and episode.rrd is written.
     """
     import rigdda
     from rigdda.agents.reports import findings
@@ -232,9 +235,9 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     with kept(folder):
         run, outcome = rigdda.release(where, barriers, seed, event)
     came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
-    notes = {"event": outcome.event, "seed": str(seed), "comes onto the road": came}
+    notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
     if words := findings.of_layout(where, barriers, event):
-        notes["doubt"] = words
+        notes["note"] = words
     road, labels = (where.road.start, where.road.end), tuple(b.label for b in standing(barriers))
     record = release_record(where, barriers, seed, event, outcome)
     run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels, record))
@@ -244,37 +247,40 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
 @cli.command()
 @click.argument("file", metavar="EPISODE.rrd", type=click.Path(path_type=Path))
 def repeat(file: Path) -> None:
-    """Compute the episode or release of a replay again and compare it bit for bit.
+    """Repeat the computation of a replay and compare results.
 
-    The file is a replay that an environment, `rigdda design` or `rigdda replay SITE` recorded; it
-    holds the site, the actions and the seeds. The exit code is 1 if anything differs. Other
-    versions than those of the recording are listed.
+    The episode or release is computed again, and its results are compared bit for bit.
+
+    EPISODE.rrd is a replay that an environment, `rigdda design` or `rigdda replay SITE` recorded.
+    It contains the site, the actions and the seeds. The exit code is 1 if a result differs.
+    Programs whose versions differ from those of the recording are listed.
     """
     from rigdda.envs import repetition, replay_record
 
     found = repetition.repeat(replay_record.load(file))
     click.echo(found.what)
     for words in found.other_versions:
-        note(f"other version: {words}")
+        note(f"version differs: {words}")
     if not found.same:
-        raise Stopped(f"it differs: recorded {found.recorded}, computed {found.computed}", 1)
-    click.echo(f"the same to the last bit: {found.computed}")
+        raise Stopped(f"results differ: recorded {found.recorded}, computed {found.computed}", 1)
+    click.echo(f"identical bit for bit: {found.computed}")
 
 
 BUDGET = 20_000
-"""Default budget of a search: about a minute for a built-in site on two cores."""
+"""Default budget of a search; it takes about a minute for a built-in site on two cores."""
 
 RELEASES = 3_000
-"""Default number of releases that each layout is verified on: Z to some per cent."""
+"""Default number of releases for the verification of a layout; Z is then known to a few per
+cent."""
 
 CASES = 4
-"""Layouts that are verified: nothing, the rule's, the constant, the found one."""
+"""Number of layouts that are verified: no barrier, the rule, the constant and the result."""
 
 Kinds = tuple[str, ...] | None
 
 
 def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
-    """Return the names in a list with commas or spaces between them."""
+    """Return the names in a list that is separated by commas or spaces."""
     return None if value is None else tuple(value.replace(",", " ").split())
 
 
@@ -295,7 +301,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               help="Place barriers between the chainages A and B [m].  [default: the zone of "
               "the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
-@count_option("--verify", 10, RELEASES, "Number of new releases on which each layout is verified.")
+@count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the search and of its releases.", SEED)
 @out_option("design-SITE")
 def design(
@@ -310,13 +316,14 @@ def design(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Search for the best layout of barriers on SITE and verify it on new releases.
+    """Find the best layout of barriers on SITE and verify it.
 
-    SITE is the name of a built-in site or a TOML file. The best layout has the least cost Z:
-    capital and upkeep, expected harm on the road and expected repair, in EUR per metre of road and
-    year.
-    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. A run that was
-    interrupted continues from evaluations.jsonl. A folder with the design of another problem
+    SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
+    search did not use. The best layout has the least cost Z. Z is the sum of capital and upkeep,
+    expected harm on the road and expected repair, in EUR per metre of road and year.
+
+    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. An interrupted run
+    continues from evaluations.jsonl. A folder that contains the design of another problem
     (problem.json) is refused.
     """
     from rigdda.agents import jobs
@@ -341,7 +348,7 @@ def _pose(
     failure: float | None,
     zone: tuple[float, float] | None,
 ) -> DesignProblem:
-    """Return the problem that was asked."""
+    """Return the design problem that the options describe."""
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
@@ -352,23 +359,23 @@ def _pose(
 
 
 def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
-    """Print the tables, the layout to order, what limits it, and what it took."""
+    """Print the tables, the layout to order, its limits and the computing effort."""
     from rigdda.agents.reports import findings, tables
     from rigdda.agents.reports.folder import FILES
     from rigdda.agents.reports.wording import order
 
     chosen, result = done.chosen.evaluation, done.result
     click.echo(
-        "Z and its parts in EUR per metre of road and year, cost to build in EUR per metre;\n"
-        "rule: UNI 11211-4; debris: rock on the road, relative to no barriers"
+        "Z, capital, harm and repair in EUR per metre of road and year; to build in EUR per\n"
+        "metre; rule: UNI 11211-4; debris: rock on the road, relative to no barriers"
     )
     show(tables.costs(done))
     chances = tables.chances(done)
     if chances is not None:
-        click.echo("probabilities in each design event, with 95 % upper bounds")
+        click.echo("probabilities in each design event, with 95 % upper bounds in brackets")
         show(chances)
     else:
-        click.echo("no design events: the site names none (design = true)")
+        click.echo("the site has no design events (design = true)")
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
     click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
     for barrier in chosen.layout:
@@ -397,9 +404,9 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
 def study(file: str, seed: int, out: Path | None) -> None:
     """Compare the layouts of STUDY.toml on the same releases.
 
-    The file gives a `site`, the number of `releases` of each event, and `layouts`: tables with a
-    `name` and either `barriers`, as in a layout file, or a `file` that contains them. Writes one
-    row for each layout to study.csv. A study that was interrupted continues from study.csv.
+    The file gives a `site`, the number of `releases` of each event, and `layouts`. Each layout has
+    a `name` and either `barriers`, as in a layout file, or the name of a layout `file`. Writes one
+    row for each release to study.csv. An interrupted study continues from study.csv.
     """
     from rigdda.agents import studies
     from rigdda.agents.reports import findings
@@ -408,7 +415,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
     with kept(folder), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
-    click.echo("Z and its parts in EUR per metre of road and year; to build in EUR per metre")
+    click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
     show(studies.table(asked, folder / "study.csv"))
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):
@@ -425,8 +432,8 @@ def study(file: str, seed: int, out: Path | None) -> None:
               "repeated; more than four are rarely identified.")  # fmt: skip
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
               show_default=True, help="Model that computes the run-outs.")  # fmt: skip
-@count_option("--budget", 8, 160, "Number of sets of values to try.")
-@count_option("--releases", 10, 150, "Number of releases of each event for each set.")
+@count_option("--budget", 8, 160, "Largest number of parameter sets to try.")
+@count_option("--releases", 10, 150, "Number of releases of each event for each parameter set.")
 @seed_option("Seed of the search and of the first release.", SEED)
 @out_option("fit-SITE")
 def fit(
@@ -442,8 +449,8 @@ def fit(
     """Fit numbers of SITE to the run-outs in OBSERVED, a CSV file.
 
     The columns of the file are event and run_out_m, the chainage at which the block stopped. Prints
-    the fitted numbers with 95 % intervals, or "not identified" where the interval is nearly as long
-    as the range that was given, and how well they predict runs that were left out of the fit.
+    the fitted numbers with 95 % intervals, or "not identified" if the interval is nearly as long
+    as the given range. Also prints how well the fit predicts runs that were left out of it.
     Writes site.toml (SITE with the fitted numbers), fit.csv and fit.png.
     """
     import rigdda
@@ -459,7 +466,7 @@ def fit(
         job.write(folder / "fit.csv", found, seen)
         job.draw(folder / "fit.png", found, seen)
     show(tables.fit(job.rows(found, seen)))
-    click.echo(f"up to {budget} sets of values; site.toml, fit.csv and fit.png are in {folder}")
+    click.echo(f"up to {budget} parameter sets; site.toml, fit.csv and fit.png are in {folder}")
 
 
 @cli.command()
@@ -468,12 +475,12 @@ def fit(
 @seed_option("Seed of all random numbers.", SEED)
 @out_option("train")
 def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
-    """Train a policy that designs a layout for a site without a search.
+    """Train a policy that designs layouts without a search.
 
-    The policy sees what comes down the site without barriers. Writes policy.safetensors, for
-    `rigdda evaluate --policy`, and logs for TensorBoard. A training that was interrupted continues
-    where it stopped, with the same result. One that is complete continues if --episodes is larger
-    than before. Requires the extra `rl`.
+    The policy observes the ground, the prices and the rockfall without barriers. Writes
+    policy.safetensors, for `rigdda evaluate --policy`, and logs for TensorBoard. An interrupted
+    training continues where it stopped and gives the same result. A complete training continues if
+    --episodes is larger than before. Requires the extra `rl`.
     """
     from rigdda.agents import training
 
@@ -482,25 +489,27 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
     with kept(folder), progress(terms.episodes) as tick:
         trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
     click.echo(
-        f"share that layouts take off Z on {terms.beside} sites beside the training sites: before "
-        f"{trained.before:.3f}, after {trained.after:.3f}; policy.safetensors is in {folder}"
+        f"mean relative reduction of Z on {terms.beside} sites not used in training: "
+        f"{trained.before:.3f} before the training, {trained.after:.3f} after it; "
+        f"policy.safetensors is in {folder}"
     )
 
 
 @cli.command()
 @click.option("--designer", "names", type=click.Choice(DESIGNERS), multiple=True,
               default=("rule", "race"), show_default=True,
-              help="Designer to compare with constant and random. May be repeated.")  # fmt: skip
+              help="Designer to compare with 'constant' and 'random'. May be "
+              "repeated.")  # fmt: skip
 @click.option(
     "--policy",
     type=click.Path(),
-    help="Trained policy to compare as well, a file that `rigdda train` wrote.",
+    help="Trained policy to compare as well: a file that `rigdda train` wrote.",
 )
 @click.option("--split", type=click.Choice(("train", "validation", "test")), default="test",
-              show_default=True, help="Which of the generated sites to use.")  # fmt: skip
+              show_default=True, help="Split of the generated sites to use.")  # fmt: skip
 @count_option("--budget", 2, 3_000, "Number of releases that each designer may simulate on a site.")
-@count_option("--sites", 1, 6, "Number of sites; six are one of each family.")
-@count_option("--verify", 10, 2_000, "Number of new releases on which each layout is verified.")
+@count_option("--sites", 1, 6, "Number of sites. With six, each family is used once.")
+@count_option("--verify", 10, 2_000, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("evaluate")
 def evaluate(
@@ -515,9 +524,9 @@ def evaluate(
 ) -> None:
     """Compare designers on generated sites.
 
-    Prints by how much the layouts of each designer cost more than the best one, as means over the
-    sites with 95 % intervals, and writes scores.csv. A run that was interrupted continues from its
-    evaluations.
+    Prints how much more the layouts of each designer cost than the best layout of each site, as
+    means over the sites with 95 % intervals. Writes scores.csv. An interrupted run continues from
+    evaluations.jsonl.
     """
     from rigdda.agents import contest, designers
     from rigdda.agents.designers.store import Store
@@ -534,7 +543,7 @@ def evaluate(
     with kept(folder), progress(len(posed) * len(entrants)) as tick:
         scores = contest.hold(posed, entrants, budget, verify, seed, store, tick)
     tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
-    click.echo("EUR per metre of road and year; best: of these designers on each site")
+    click.echo("EUR per metre of road and year; best: the best of these designers on each site")
     show(contest.table(scores))
     resumed = f", {store.resumed:,} releases from an earlier run" if store.resumed else ""
     click.echo(f"{len(posed)} sites of {split}, verified on {verify:,} releases each{resumed}; "
@@ -543,16 +552,16 @@ def evaluate(
 
 @cli.command()
 @click.option("--only", multiple=True, metavar="NAME",
-              help="Run only cases whose names start with NAME. May be repeated.")  # fmt: skip
-@click.option("--slow", is_flag=True, help="Run the slow cases, too.")
+              help="Run only cases whose names begin with NAME. May be repeated.")  # fmt: skip
+@click.option("--slow", is_flag=True, help="Run the slow cases as well.")
 @seed_option("Seed of the random shapes, speeds and offsets.")
 @out_option("validate")
 def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path | None) -> None:
-    """Compare computed motions with closed forms.
+    """Compare computed motions with closed-form solutions.
 
-    Writes validate.csv, and convergence.csv with the observed order of convergence in the time
-    step. The exit code is 1 if an error exceeds its bar. The last column of the table is processor
-    time per simulated time, in microseconds per second.
+    Writes validate.csv and, with the observed order of convergence in the time step,
+    convergence.csv. The exit code is 1 if an error exceeds its tolerance (column "bar"). The last
+    column of the table is the processor time in microseconds per simulated second.
     """
     from rigdda.agents import accuracy
 
@@ -565,8 +574,10 @@ def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path | None) -> 
         show(accuracy.convergence_table(studies))
     missed = [f"{r.case} ({r.check.quantity})" for r in results if not r.passed]
     if missed:
-        raise Stopped(f"{len(missed)} of {len(results)} miss their bars: {', '.join(missed)}", 1)
-    click.echo(f"{len(results)} figures within their bars; the tables are in {folder}")
+        raise Stopped(
+            f"{len(missed)} of {len(results)} exceed their tolerances: {', '.join(missed)}", 1
+        )
+    click.echo(f"{len(results)} figures are within their tolerances; the tables are in {folder}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Designers on many sites, what each found verified on releases that none of them has seen."""
+"""Comparison of designers on many sites, with layouts verified on releases that no search used."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ Tick = Callable[[int, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """What a designer found for a site.
+    """The result of a designer on a site.
 
     Parameters
     ----------
     site, designer : str
-        Names.
+        Their names.
     simulations : int
-        Releases that the designer used.
+        Number of releases that the designer used.
     nothing, built : Evaluation
-        No barrier and the found layout, verified on the same unseen releases.
+        Evaluations of no barrier and of the layout found, verified on the same new releases.
     """
 
     site: str
@@ -44,7 +44,7 @@ class Score:
 
     @property
     def gain(self) -> float:
-        """What the layout takes off Z [EUR per metre of road and year]."""
+        """Reduction of Z by the layout [EUR per metre of road and year]."""
         return self.nothing.objective - self.built.objective
 
     def row(self) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def pose(split: str, count: int) -> list[str]:
     Raises
     ------
     BadInput
-        If there is no such split, or it has fewer sites.
+        If there is no such split, or if it has fewer sites.
     """
     names = sites.split(split)
     return names[: check.integer("sites", count, 1, len(names))]
@@ -89,12 +89,29 @@ def hold(
     store: Store,
     tick: Tick,
 ) -> list[Score]:
-    """Return the score of every designer on every site, each with so many releases.
+    """Return the score of every designer on every site.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the sites.
+    designers : mapping of str to Designer
+        The designers by name.
+    simulations : int
+        Number of releases that each designer may simulate on a site.
+    releases : int
+        Number of releases for the verification of each layout.
+    seed : int
+        Seed of the searches and of the verification.
+    store : Store
+        Store of evaluations, from which an interrupted run continues.
+    tick : callable
+        Called with the number of completed searches and a description.
 
     Raises
     ------
     BadInput, Diverged
-        As the designers do.
+        The same errors as the designers.
     """
     scores: list[Score] = []
     for site in names:
@@ -109,9 +126,10 @@ def hold(
 
 
 def table(scores: Sequence[Score]) -> Table:
-    """Return the table of designers: means over sites [EUR per metre of road and year].
+    """Return the table of designers with means over sites [EUR per metre of road and year].
 
-    Behind: of the best of them on each site. Share: of the gain of these best, all sites together.
+    "behind the best" is the difference of Z from the best designer of each site. "share" is the
+    total gain of a designer divided by the total gain of the best designers.
     """
     head = ("designer", "releases", "Z", "fall of Z (95 %)", "behind the best (95 %)", "share")
     out = empty_table(head)
@@ -131,7 +149,7 @@ def table(scores: Sequence[Score]) -> Table:
 
 
 def _behind(values: np.ndarray) -> tuple[str]:
-    """Return a mean over sites and its interval in words."""
+    """Return the mean over sites and its interval as text."""
     interval = student_interval(values)
     words = f" ({span(interval)})" if np.isfinite(interval).all() else ""
     return (f"{euros(float(values.mean()))}{words}",)

@@ -1,4 +1,4 @@
-"""A designed layout beside those that it is compared with, each verified on unseen releases."""
+"""A designed layout and the layouts for comparison, each verified on new releases."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ NOTHING, RULE, CONSTANT, SHED = "nothing", "rule", "constant", "rock shed"
 
 @dataclass(frozen=True, slots=True)
 class VerifiedLayout:
-    """A layout that was verified on releases that no search has seen.
+    """A layout that was verified on releases that no search used.
 
     Parameters
     ----------
     name : str
-        What it is.
+        Name of the layout.
     evaluation : Evaluation
-        What it is worth.
+        Its evaluation on these releases.
     """
 
     name: str
@@ -29,18 +29,18 @@ class VerifiedLayout:
 
 @dataclass(frozen=True, slots=True)
 class DesignStudy:
-    """A designed layout beside what it is compared with.
+    """A designed layout and the layouts with which it is compared.
 
     Parameters
     ----------
     problem : DesignProblem
-        What was to be designed.
+        The design problem.
     result : DesignResult
-        What the designer found.
+        Result of the designer.
     cases : tuple of VerifiedLayout
-        Nothing, the rule, the constant, what was found: the last.
+        No barrier, the rule, the constant and, as the last, the layout found.
     left : str
-        What is left of the risk with what was found, in words.
+        Text on the risk that remains with the layout found.
     """
 
     problem: DesignProblem
@@ -50,12 +50,12 @@ class DesignStudy:
 
     @property
     def nothing(self) -> VerifiedLayout:
-        """No barrier."""
+        """The case without barriers."""
         return self.cases[0]
 
     @property
     def chosen(self) -> VerifiedLayout:
-        """What was found."""
+        """The case with the layout found."""
         return self.cases[-1]
 
 

@@ -1,4 +1,4 @@
-"""What fidelity "fast" costs and gains on a site: its bias against "full" and its speed-up."""
+"""Bias and speed-up of the fidelity "fast" relative to "full" on a site."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 LOOKED = 512
-"""Releases that the rule may look at."""
+"""Number of releases that the rule may simulate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +30,9 @@ class Bias:
     Parameters
     ----------
     name : str
-        What it is.
+        Name of the layout.
     full, fast : Evaluation
-        What it is worth at each, on releases of the same seeds.
+        Its evaluation at each fidelity, on releases with the same seeds.
     """
 
     name: str
@@ -41,12 +41,12 @@ class Bias:
 
     @property
     def bias(self) -> float:
-        """Z at "fast" less that at "full" [EUR per metre of road and year]."""
+        """Z at "fast" minus Z at "full" [EUR per metre of road and year]."""
         return self.fast.objective - self.full.objective
 
     @property
     def bias_ci(self) -> Interval:
-        """95 % interval of the bias, by the ends of both intervals (Zou and Donner 2008)."""
+        """95 % interval of the bias from the ends of both intervals (Zou and Donner 2008)."""
         full, fast = self.full, self.fast
         below = math.hypot(fast.objective - fast.ci[0], full.ci[1] - full.objective)
         above = math.hypot(fast.ci[1] - fast.objective, full.objective - full.ci[0])
@@ -54,17 +54,17 @@ class Bias:
 
     @property
     def gain(self) -> float:
-        """How many times less processor time a release takes at "fast"."""
+        """Processor time of a release at "full" divided by that at "fast" [-]."""
         return _each(self.full) / _each(self.fast)
 
 
 def _each(evaluation: Evaluation) -> float:
-    """Return the processor time of a simulated release [s], not a number if none was."""
+    """Return the processor time of a simulated release [s], or NaN if none was simulated."""
     return evaluation.seconds / evaluation.simulated if evaluation.simulated else math.nan
 
 
 def layouts(site: Site, seed: int) -> dict[str, Layout]:
-    """Return the layouts that are compared: nothing, the constant and what the rule builds."""
+    """Return the layouts for the comparison: no barrier, the constant and the rule."""
     problem = DesignProblem(site)
     return {
         "nothing": (),
@@ -94,7 +94,7 @@ def compare(site: Site, releases: int, seed: int, tick: Callable[[int, str], Non
 
 
 def write(path: Path, site: Site, found: Sequence[Bias]) -> None:
-    """Write a CSV file with one row a layout; money is in EUR per metre of road and year."""
+    """Write a CSV file with one row per layout; costs are in EUR per metre of road and year."""
     rows = []
     for c in found:
         row: dict[str, Any] = {"site": site.name, "case": c.name, "releases": c.full.releases}

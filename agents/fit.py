@@ -1,4 +1,4 @@
-"""Fit a site to observed run-outs: which numbers of its file explain them best."""
+"""Fit of numbers in a site file to observed run-outs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ RANGES = {
     "normal": (0.0, 0.8),
     "tangential": (0.4, 1.0),
 }
-"""Limits of a parameter that comes without, by its path or by the last name of that."""
+"""Default limits of a parameter, by its path or by the last name of its path."""
 
 
 class Parameter(NamedTuple):
@@ -51,7 +51,7 @@ def parse(text: str) -> Parameter:
     Raises
     ------
     BadInput
-        If it is written otherwise, or has no limits and no usual ones.
+        If it has another form, or if it has no limits and there are no default limits for it.
     """
     path, given, limits = text.partition("=")
     if not given:
@@ -70,33 +70,33 @@ def parse(text: str) -> Parameter:
 
 
 TELLING = {"blocks": ("surfaces", "motion", "scatter"), "lumped": ("lumped", "scatter")}
-"""Tables of a site file whose numbers the run-outs of a model depend on."""
+"""Tables of a site file that affect the run-outs of a model."""
 
 
 def check_parameters(parameters: Sequence[Parameter], model: str) -> None:
-    """Check that the run-outs of a model can tell parameters, each named once.
+    """Check that the run-outs of a model depend on the parameters and that each is named once.
 
     Raises
     ------
     BadInput
-        If not.
+        If a parameter is repeated or if the run-outs do not depend on it.
     """
     for i, parameter in enumerate(parameters):
         if parameter.path in (other.path for other in parameters[:i]):
             raise BadInput("--parameters", parameter.path, "name each number once")
         if parameter.path.partition(".")[0] not in TELLING[model]:
             known = ", ".join(f"{name}.*" for name in TELLING[model])
-            mend = f"run-outs of the model {model} tell nothing of it: choose from {known}"
+            mend = f"run-outs of the model {model} do not depend on it: choose from {known}"
             raise BadInput("--parameters", parameter.path, mend)
 
 
 def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[float]) -> Site:
-    """Return a site with other values of some numbers.
+    """Return a copy of a site with other values of some numbers.
 
     Raises
     ------
     BadInput
-        If there is no such number, or the site is not sound with the value.
+        If there is no such number, or if the site is invalid with the value.
     """
     tables = msgspec.to_builtins(site)
     for parameter, value in zip(parameters, values, strict=True):
@@ -120,13 +120,13 @@ Model = Literal["blocks", "lumped"]
 
 
 def read(path: Path, site: Site) -> dict[str, Floats]:
-    """Return the observed run-outs [m], as chainages of the site, of each event.
+    """Return the observed run-outs of each event, as chainages of the site [m].
 
     Raises
     ------
     BadInput
-        If the file is no table with `run_out_m` and, where the site has several, `event`, or a
-        run-out is beyond the road, where computed ones are cut.
+        If the file is not a table with the columns `run_out_m` and, for a site with several
+        events, `event`, or if a run-out is beyond the road, where computed run-outs are cut off.
     """
     if not path.is_file():
         raise BadInput("observed", str(path), "name a CSV file with event and run_out_m")
@@ -143,20 +143,23 @@ def read(path: Path, site: Site) -> dict[str, Floats]:
 
 
 def _rows(path: Path, only: str) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield what to call each row of a table, and its cells; `only` is the only event, if so."""
+    """Yield a name for each row of a table and its cells by column.
+
+    `only` is the event of a site with a single event, otherwise an empty text.
+    """
     table = csv.reader(io.StringIO(read_text("observed", path), newline=""))
     try:
         names, *rows = [row for row in table if any(row)] or [[]]
     except csv.Error as error:
-        raise BadInput("observed", str(path), f"mend its line {table.line_num}: {error}") from None
+        raise BadInput("observed", str(path), f"repair line {table.line_num}: {error}") from None
     if "run_out_m" not in names or not ("event" in names or only):
-        mend = "head its columns event and run_out_m"
+        mend = "name its columns event and run_out_m in the first row"
         raise BadInput("observed", ", ".join(names), mend)
     if len(set(names)) < len(names):
-        raise BadInput("observed", ", ".join(names), "head each column with a name of its own")
+        raise BadInput("observed", ", ".join(names), "give each column a different name")
     for i, row in enumerate(rows):
         if len(row) != len(names):
-            mend = f"give {len(names)} cells, one a heading; a number has a decimal point"
+            mend = f"give {len(names)} cells, one per column; use a decimal point in numbers"
             raise BadInput(f"observed row {i + 1}", ",".join(row), mend)
         yield f"observed row {i + 1}", dict(zip(names, row, strict=True))
 
@@ -164,18 +167,18 @@ def _rows(path: Path, only: str) -> Iterator[tuple[str, dict[str, str]]]:
 def _run_out(field: str, text: str, site: Site) -> float:
     """Return the run-out of a row of observations [m]."""
     try:
-        value = float(text if "_" not in text else "")  # Python takes 4_0 for 40
+        value = float(text if "_" not in text else "")  # Python would read 4_0 as 40
     except ValueError:
         raise BadInput(field, text, "give a number") from None
     check.number(field, value, site.slope.points[0][0], site.slope.points[-1][0])
     if value > site.road.end:
-        mend = f"put road.end beyond it: computed run-outs are cut there, at {site.road.end:g} m"
+        mend = f"move road.end beyond it: computed run-outs are cut off at {site.road.end:g} m"
         raise BadInput(field, value, mend)
     return value
 
 
 def run_outs(site: Site, model: Model, events: Sequence[str], seeds: range) -> dict[str, Floats]:
-    """Return the computed run-outs of each event [m]: of a group, of its last block."""
+    """Return the computed run-outs of each event [m]; of a group, that of the farthest block."""
     if model == "lumped":
         found = {event: lumped(site, (), seeds, event) for event in events}
         return {e: np.array([p.run_out[p.release == k].max() for k in range(len(seeds))])
@@ -189,14 +192,14 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 
 class Quality(NamedTuple):
-    """How a prediction meets what was observed; run-outs in m."""
+    """Statistics of predicted run-outs and their agreement with the observations [m]."""
 
     score: float
     mean: float
     quantiles: tuple[float, ...]
     means: Mapping[str, float]
     stopped: float
-    """Share that stops uphill of the toe of the slope [-]."""
+    """Share of runs that stop uphill of the toe of the slope [-]."""
 
 
 def scores(computed: Floats, observed: Floats) -> Floats:
@@ -210,7 +213,7 @@ def scores(computed: Floats, observed: Floats) -> Floats:
 def quality(
     observed: Mapping[str, Floats], predicted: Sequence[Floats], score: float, toe: float
 ) -> Quality:
-    """Return the figures of a prediction: the computed run-outs for each observed run."""
+    """Return the statistics of a prediction, given as computed run-outs for each observed run."""
     events = [event for event in observed for _ in observed[event]]
     every = np.concatenate(predicted)
     weight = np.concatenate([np.full(len(p), 1.0 / len(p)) for p in predicted]) / len(predicted)
@@ -224,7 +227,7 @@ def quality(
 
 
 def seen(observed: Mapping[str, Floats], toe: float) -> Quality:
-    """Return the figures of what was observed."""
+    """Return the statistics of the observed run-outs."""
     every = np.concatenate(list(observed.values()))
     quantiles = tuple(float(q) for q in np.quantile(every, QUANTILES))
     means = {event: float(values.mean()) for event, values in observed.items()}
@@ -235,14 +238,14 @@ Compute = Callable[[Floats, range], Mapping[str, Floats]]
 
 
 class Candidate(NamedTuple):
-    """Values of the parameters, and the computed run-outs of each event [m]."""
+    """A set of values of the parameters with the computed run-outs of each event [m]."""
 
     values: Floats
     run_outs: Mapping[str, Floats]
 
 
 class Trials:
-    """Sets of values that were tried, with the scores that they give each observed run.
+    """Parameter sets that were tried, with the score of each observed run.
 
     Parameters
     ----------
@@ -252,9 +255,9 @@ class Trials:
     Attributes
     ----------
     tried : list of Candidate
-        In the order in which they were computed.
+        The parameter sets in the order in which they were computed.
     table : list of (runs,) array
-        Scores of each [m].
+        Scores of the observed runs for each parameter set [m].
     """
 
     def __init__(
@@ -267,37 +270,37 @@ class Trials:
         self.table: list[Floats] = []
 
     def values(self, place: Floats) -> Floats:
-        """Return the values at a place of the unit cube, (P,)."""
+        """Return the values of the parameters at a point of the unit cube, (P,)."""
         return self._low + self._range * np.clip(place, 0.0, 1.0)
 
     def compute(self, values: Floats, seeds: range) -> tuple[Candidate, Floats]:
-        """Return what values give, and the scores of the observed runs."""
+        """Compute the run-outs for a parameter set and the scores of the observed runs."""
         found = self._compute(values, seeds)
         each = [scores(found[event], self._observed[event]) for event in self._observed]
         return Candidate(values, found), np.concatenate(each)
 
     def add(self, place: Floats, seeds: range) -> float:
-        """Try a place of the unit cube; return its mean score [m]."""
+        """Try a point of the unit cube and return its mean score [m]."""
         candidate, each = self.compute(self.values(place), seeds)
         self.tried.append(candidate)
         self.table.append(each)
         return float(each.mean())
 
     def best(self, count: int) -> list[Candidate]:
-        """Return the candidates of the least mean scores, the best first."""
+        """Return the candidates with the lowest mean scores, the best first."""
         order = np.argsort([each.mean() for each in self.table])[:count]
         return [self.tried[i] for i in order]
 
 
 def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed: int) -> None:
-    """Score places of the unit cube, (dimensions,): spread over it, then about the best of them.
+    """Minimise a score over the unit cube: first on a Sobol sequence, then by CMA-ES from its best.
 
-    `score` takes a place and returns what is to be least; places come by Sobol, then by CMA-ES.
+    `score` takes a point, (dimensions,), and returns the value to minimise.
     """
     spread = 1 << max(2, round(math.log2(budget / 2)))
     places = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(spread)
     best = places[int(np.argmin([score(place) for place in places]))]
-    own = seed % (2**32 - 1) + 1  # of 0 cma would take the time
+    own = seed % (2**32 - 1) + 1  # cma replaces a seed of 0 by the current time
     options = {"bounds": [0, 1], "seed": own, "verbose": -9, "maxfevals": budget - spread}
     evolution = cma.CMAEvolutionStrategy(best, 0.15, options)
     done = spread
@@ -310,17 +313,18 @@ def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed
 Tick = Callable[[int, str], None]
 
 FINALISTS, MORE = 8, 4
-"""How many of the best are computed again, on how many times the releases."""
+"""Number of the best candidates that are computed again, and the factor by which their number of
+releases is larger."""
 
 FOLDS = 11
-"""Parts of the observed runs that are left out in turn."""
+"""Number of folds of the cross-validation."""
 
 RESAMPLES = 1000
-"""Of the observed runs, for intervals."""
+"""Number of bootstrap samples of the observed runs for the intervals."""
 
 
 class Fit(NamedTuple):
-    """What was found."""
+    """Result of a fit."""
 
     site: Site
     parameters: tuple[Parameter, ...]
@@ -330,9 +334,9 @@ class Fit(NamedTuple):
     """Ends of the 95 % interval of each parameter."""
     fitted: Quality
     validated: Quality
-    """Each observed run predicted by what fits the others best."""
+    """Statistics of the cross-validation, which predicts each run by a fit to other runs."""
     left_out: Floats
-    """Score of each observed run by that, (runs,) [m]."""
+    """Score of each observed run in the cross-validation, (runs,) [m]."""
 
 
 def fit(
@@ -350,27 +354,27 @@ def fit(
     Parameters
     ----------
     site : Site
-        The others keep the values that it has.
+        The site, which provides the values of all other numbers.
     observed : mapping of event to (n,) array
-        See `run_outs.read`.
+        Observed run-outs [m], see `read`.
     parameters : sequence of Parameter
-        What is fitted.
+        The parameters to fit.
     budget : int
-        Most sets of values that are computed.
+        Largest number of parameter sets that are computed.
     releases : int
-        Releases of each event with each.
+        Number of releases of each event for each parameter set.
     seed : int
-        Of the first release, and of the search.
+        Seed of the first release and of the search.
     tick : callable
-        Told how many sets are done.
+        Called with the number of completed parameter sets and a description.
     model : {"blocks", "lumped"}
-        What computes.
+        Model that computes the run-outs.
 
     Raises
     ------
     BadInput
-        If a parameter is unknown, comes twice or has no influence on the run-outs of the model, or
-        the site is unsound at a limit.
+        If a parameter is unknown, is repeated or has no influence on the run-outs of the model, or
+        if the site is invalid at a limit.
     Diverged
         If a simulation diverges.
     """
@@ -400,21 +404,22 @@ def search(
     seed: int,
     tick: Tick,
 ) -> Fit:
-    """Fit the numbers of whatever computes run-outs to observed ones.
+    """Fit the parameters of any model of run-outs to observations.
 
     Parameters
     ----------
     site : Site
-        Where; the fit keeps it as it is.
+        The site, which the fit does not change.
     observed, parameters, budget, releases, seed, tick
-        As those of `fit`.
+        See `fit`.
     compute : callable
-        Takes values of the parameters, (P,), and seeds; returns the run-outs of each event [m].
+        Function of the values of the parameters, (P,), and of seeds that returns the run-outs of
+        each event [m].
 
     Returns
     -------
     Fit
-        What was found.
+        Result of the fit.
     """
     trials, seeds = Trials(observed, parameters, compute), range(seed, seed + releases)
 
@@ -444,9 +449,9 @@ def search(
 
 
 def _intervals(table: Floats, values: Floats, seed: int) -> tuple[Floats, Floats]:
-    """Return the 95 % interval of each parameter, by resampling the observed runs.
+    """Return the 95 % interval of each parameter by bootstrap of the observed runs.
 
-    All that was tried, where the runs tell nothing.
+    If all parameter sets have the same scores, the interval is the range of all values tried.
     """
     if (table == table[0]).all():
         return values.min(axis=0), values.max(axis=0)
@@ -460,9 +465,10 @@ def _intervals(table: Floats, values: Floats, seed: int) -> tuple[Floats, Floats
 def _validate(
     trials: Trials, observed: Mapping[str, Floats], seed: int, fresh: range
 ) -> tuple[list[Floats], Floats]:
-    """Return the run-outs that predict each observed run, left out of the fit, and its score.
+    """Cross-validate: return the predicted run-outs of each observed run and its score.
 
-    By the set of values that fits the others best, computed on fresh seeds.
+    Each run is predicted by the parameter set that fits the runs of the other folds best, with
+    run-outs computed on new seeds.
     """
     events = [event for event in observed for _ in observed[event]]
     table = np.array(trials.table)
@@ -484,18 +490,18 @@ def _validate(
 
 
 NOT_IDENTIFIED = 0.7
-"""Length of a 95 % interval over the range that was given, from which on the observed run-outs tell
-nothing of a parameter [-]. An interval that they do not narrow is .95 of the range."""
+"""Length of a 95 % interval, divided by the given range, from which a parameter counts as not
+identified [-]. The interval of a parameter without influence is 0.95 of the range."""
 
 
 def identified(fitted: Fit) -> list[bool]:
-    """Return whether the observed run-outs tell each parameter from the others of its range."""
+    """Return for each parameter whether the observed run-outs identify its value."""
     ends = zip(fitted.parameters, fitted.low, fitted.high, strict=True)
     return [high - low < NOT_IDENTIFIED * (p.high - p.low) for p, low, high in ends]
 
 
 def rows(fitted: Fit, observed: Mapping[str, Floats]) -> list[dict[str, Any]]:
-    """Return the parameters and what they give beside what was observed, a row each."""
+    """Return rows with the fitted parameters and with the computed and observed statistics."""
     ends = (fitted.parameters, fitted.best.values, fitted.low, fitted.high, identified(fitted))
     out: list[dict[str, Any]] = [
         {
@@ -527,12 +533,12 @@ def rows(fitted: Fit, observed: Mapping[str, Floats]) -> list[dict[str, Any]]:
 
 
 def write(path: Path, fitted: Fit, observed: Mapping[str, Floats]) -> None:
-    """Write `rows` as CSV."""
+    """Write the rows of a fit as a CSV file."""
     write_rows(path, rows(fitted, observed))
 
 
 def draw(path: Path, fitted: Fit, observed: Mapping[str, Floats]) -> None:
-    """Write a PNG: cumulative run-out observed and computed, all runs and each event."""
+    """Write a PNG of the cumulative distribution of observed and computed run-outs."""
     from matplotlib.figure import Figure
 
     from rigdda.agents.reports.pictures import save
@@ -549,7 +555,7 @@ def draw(path: Path, fitted: Fit, observed: Mapping[str, Floats]) -> None:
         half = 1.96 * np.sqrt(share * (1.0 - share) / len(real))
         axes.fill_between(grid, np.clip(share - half, 0, 1), np.clip(share + half, 0, 1),
                           color="#1c5aa0", alpha=0.2, lw=0)  # fmt: skip
-        axes.plot(grid, share, color="#1c5aa0", label="computed, 95 % of samples as small")
+        axes.plot(grid, share, color="#1c5aa0", label="computed, 95 % band of samples of this size")
         axes.step(np.sort(real), np.arange(1, len(real) + 1) / len(real), where="post",
                   color="#c0392b", label=f"observed, {len(real)}")  # fmt: skip
         axes.set(xlabel="run-out [m]", title=name, ylim=(0, 1))

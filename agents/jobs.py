@@ -1,4 +1,4 @@
-"""The jobs of the command line, without a terminal: simulate a layout, design and verify one."""
+"""Jobs of the command line that need no terminal: simulate a layout, design and verify a layout."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from rigdda.envs import DesignProblem, Evaluation
 from rigdda.geometry import polygon_properties
 
 Tick = Callable[[int, str], None]
-"""Called as a job goes on: releases done so far, and what is being done."""
+"""Called during a job with the number of releases so far and a description of the activity."""
 
 
 CHUNK = 256
-"""Releases that are simulated between two words about progress."""
+"""Number of releases between two reports of progress."""
 
 
 def simulate(
     site: Site, layout: Layout, seeds: range, event: str | None, tick: Tick
 ) -> tuple[Run, list[Outcome]]:
-    """Return the first run and all outcomes of releases, simulated over all cores.
+    """Simulate releases on all cores and return the first run and all outcomes.
 
     Raises
     ------
     BadInput
-        If the layout does not stand on the slope, or there is no such event.
+        If the layout cannot be placed on the slope, or if there is no such event.
     Diverged
         If a simulation diverges.
     """
@@ -57,18 +57,18 @@ def study(
     out: Path,
     tick: Tick,
 ) -> tuple[DesignStudy, Store]:
-    """Design a layout, then verify it and what it is compared with on `releases` fresh releases.
+    """Design a layout, then verify it and the layouts for comparison on `releases` new releases.
 
-    Writes `evaluations.csv` and the store `evaluations.jsonl` into `out` as it goes; a study that
-    was killed takes up from the store what it asks for again.
+    `evaluations.csv` and the store `evaluations.jsonl` are written into `out` during the search.
+    A study that was interrupted reads the evaluations that it needs again from the store.
 
     Raises
     ------
     BadInput, Diverged
-        As the designer does.
+        The same errors as the designer.
     """
     store = Store(out / "evaluations.jsonl")
-    tick(0, "looking at releases without barriers")
+    tick(0, "simulating releases without barriers")
     with EvaluationsFile(out / "evaluations.csv") as file:
 
         def progress(entry: Entry) -> None:
@@ -82,7 +82,7 @@ def study(
             evaluation = verify(problem, layout, releases, seed, store)
             file.add(Entry(result.simulations, "verification", evaluation))
             cases.append(VerifiedLayout(case, evaluation))
-    tick(simulations + releases * len(cases), "what is left")
+    tick(simulations + releases * len(cases), "analysing the remaining risk")
     left = _left(problem, [case.evaluation for case in cases], seed)
     return DesignStudy(problem, result, tuple(cases), left), store
 
@@ -95,7 +95,7 @@ def _compared(
     seed: int,
     store: Store,
 ) -> list[tuple[str, Layout]]:
-    """Return what is verified: nothing, the rule, the constant, and the designer's layout."""
+    """Return the layouts to verify: no barrier, the rule, the constant and the designer's."""
     out: list[tuple[str, Layout]] = [(NOTHING, ())]
     for words, module in ((RULE, "rule"), (CONSTANT, "constant")):
         if module != name:
@@ -106,9 +106,9 @@ def _compared(
 
 
 def _left(problem: DesignProblem, verified: Sequence[Evaluation], seed: int) -> str:
-    """Return what is left of the risk with the last of what was verified.
+    """Return a text on the risk that remains with the last of the verified layouts.
 
-    And whether anything holds the event that makes most of it.
+    The text also says if no barrier stops the event that causes most of this risk.
     """
     words, most = findings.left_over(verified[-1]), findings.worst(verified[-1])
     if most is None or any(e.reach[most].probability <= HOLDS for e in verified):
@@ -118,25 +118,25 @@ def _left(problem: DesignProblem, verified: Sequence[Evaluation], seed: int) -> 
 
 
 STATIONS = 3
-"""Places across the zone where each kind is tried, the last one near the road."""
+"""Number of places in the zone where each kind is tried; the last one is near the road."""
 
 
 LARGE = 0.9
-"""Least size of what is tried over the largest that may be built of its kind [-]."""
+"""Least size of a barrier that is tried, divided by the largest size of its kind [-]."""
 
 
 RELEASES = 4
-"""Releases of the event with each."""
+"""Number of releases of the event with each barrier that is tried."""
 
 
 HOLDS = 0.5
-"""An event is held if at most this share of its releases reaches the road."""
+"""An event counts as stopped if at most this share of its releases reaches the road [-]."""
 
 
 def tried(problem: DesignProblem) -> tuple[Layout, ...]:
-    """Return layouts of one barrier, of each kind the largest that may be built, at most places.
+    """Return layouts with one of the largest barriers of each kind, at `STATIONS` places each.
 
-    Mesh is none of them: it makes an event rarer, and holds no part of it.
+    Mesh is left out because it makes an event rarer but does not stop it.
     """
     menu, found = Menu(problem), list[Barrier]()
     for kind in problem.kinds:
@@ -153,9 +153,9 @@ def tried(problem: DesignProblem) -> tuple[Layout, ...]:
 
 
 def unheld(problem: DesignProblem, event: str, seed: int) -> str:
-    """Return in words that no barrier holds an event, if none of the largest does; else nothing.
+    """Return a text that says that no single barrier stops an event.
 
-    Nothing, too, where none may be built.
+    The text is empty if one of the largest barriers stops the event, or if none may be built.
 
     Raises
     ------
@@ -178,6 +178,6 @@ def unheld(problem: DesignProblem, event: str, seed: int) -> str:
 
 
 def _volume(problem: DesignProblem, event: str, seed: int) -> float:
-    """Return the rock that comes down in a release of an event [m3 per metre]."""
+    """Return the volume of rock in a release of an event [m3 per metre]."""
     blocks = problem.site.draw(seed, event).blocks
     return float(sum(polygon_properties(block.vertices)[0] for block in blocks))

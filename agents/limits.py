@@ -1,16 +1,18 @@
-"""Largest numbers that may be asked for; a larger one is taken for a slip of the pen."""
+"""Largest numbers that are accepted; larger ones are probably typing errors."""
 
 from __future__ import annotations
 
 RELEASES = 1_000_000
-"""Releases, layouts times releases or episodes of one job: a million take hours, and give
-means to a thousandth of the spread. Jobs and their outcomes fill some GB of memory then."""
+"""Largest number of releases, of layouts times releases, or of episodes of one job. A million
+take hours, determine a mean to a thousandth of the standard deviation, and need a few GB of
+memory."""
 
 
 SITES = 10_000
-"""Random sites to try designers on: all are posed before the first is tried, at 1 ms each."""
+"""Largest number of random sites in a comparison. All of them are generated before the first
+search, which takes 1 ms each."""
 
 
 SEED = 2**32 - 1
-"""Seed of a search or a training: numpy's and torch's generators, in other packages, take no more.
+"""Largest seed of a search or a training, which is the limit of the generators in numpy and torch.
 Seeds of single releases may be larger."""

@@ -1,6 +1,7 @@
-"""A trained policy: from what is seen of a site without barriers to its layout, with no search.
+"""A trained policy, which maps the observation of a site without barriers to a layout.
 
-It is a small network in numpy, kept in a safetensors file.
+The policy is a small neural network, evaluated with numpy and stored in a safetensors file. It
+designs a layout without a search.
 """
 
 from __future__ import annotations
@@ -31,16 +32,16 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Network:
-    """Layers with tanh between them, on features that are scaled first.
+    """A network of linear layers with tanh between them and scaled features as input.
 
     Parameters
     ----------
     mean, scale : (F,) arrays
-        What is subtracted from the features, and what they are then divided by.
+        The mean is subtracted from the features, which are then divided by the scale.
     layers : sequence of ((out, in) array, (out,) array)
-        Weights and biases.
+        Weights and biases of the layers.
     notes : mapping of str to str
-        Who made it and how.
+        Notes on how the network was trained.
     """
 
     mean: Floats
@@ -50,7 +51,7 @@ class Network:
 
     @property
     def sizes(self) -> list[int]:
-        """Numbers that go into the first layer and that come out of each; [] if they do not fit."""
+        """Number of features and of outputs of each layer, or [] if the shapes do not match."""
         sizes = [self.mean.size]
         for weight, bias in self.layers:
             if bias.shape != (bias.size,) or weight.shape != (bias.size, sizes[-1]):
@@ -60,12 +61,12 @@ class Network:
 
     @property
     def finite(self) -> bool:
-        """Whether all numbers are finite and every feature has a scale above 0."""
+        """Whether all numbers are finite and all scales are positive."""
         arrays = [self.mean, self.scale, *(array for layer in self.layers for array in layer)]
         return all(np.isfinite(array).all() for array in arrays) and bool((self.scale > 0).all())
 
     def __call__(self, features: Floats) -> NDArray[np.float64]:
-        """Return the outputs for (F,) features."""
+        """Return the outputs of the network for (F,) features."""
         values = scaled(features, self.mean, self.scale).astype(np.float64)
         for weight, bias in self.layers[:-1]:
             values = np.tanh(weight @ values + bias)
@@ -73,7 +74,7 @@ class Network:
         return weight @ values + bias
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the network with its notes as safetensors."""
+        """Write the network and its notes to a safetensors file."""
         tensors = {"mean": self.mean, "scale": self.scale}
         for i, (weight, bias) in enumerate(self.layers):
             tensors |= {f"weight {i}": weight, f"bias {i}": bias}
@@ -83,12 +84,12 @@ class Network:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Network:
-        """Read a network.
+        """Read a network from a file.
 
         Raises
         ------
         BadInput
-            If there is no such file or it is not a network.
+            If there is no such file or if it does not contain a valid network.
         """
         try:
             with safe_open(path, framework="numpy") as file:
@@ -100,18 +101,18 @@ class Network:
             mend = f"name a file that `rigdda train` wrote ({error})"
             raise BadInput("policy", str(path), mend) from None
         if not network.finite:
-            mend = "name a file of finite numbers with scales above 0, as `rigdda train` writes"
+            mend = "name a file with finite numbers and positive scales, as `rigdda train` writes"
             raise BadInput("policy", str(path), mend)
         return network
 
 
 def scaled(features: Floats, mean: Floats, scale: Floats) -> Floats:
-    """Return features of mean 0 and deviation 1 on the training sites, at most 3 in size."""
+    """Return features with mean 0 and deviation 1 on the training sites, clipped to [-3, 3]."""
     return np.clip((features - mean) / scale, np.float32(-3.0), np.float32(3.0))
 
 
 def _in_order(raw: bytes) -> bytes:
-    """Return a safetensors file with its header in alphabetical order: else notes come in any."""
+    """Return a safetensors file with a sorted header, so that the bytes are reproducible."""
     size = int.from_bytes(raw[:8], "little")
     header = json.dumps(json.loads(raw[8 : 8 + size]), sort_keys=True).encode()
     header += b" " * (-len(header) % 8)
@@ -119,7 +120,7 @@ def _in_order(raw: bytes) -> bytes:
 
 
 NAMES = tuple(FIELDS)
-"""Arrays of an observation, in the order in which they are put together."""
+"""Arrays of an observation, in the order in which they are concatenated."""
 
 WIDTH = sum(FIELDS[name].size for name in NAMES)
 """Number of features."""
@@ -131,14 +132,17 @@ def features(seen: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
 
 
 SLOTS = Slots(KINDS, 3)
-"""Barriers that a policy decides on, of any kind that a problem allows."""
+"""Slots for the barriers that a policy decides on."""
 
 FINAL = 64
-"""Releases on which the designer tells what its layout is worth, if it has so many."""
+"""Largest number of releases on which the designer evaluates its layout."""
 
 
 def _anchor() -> np.ndarray:
-    """Return one barrier near the zone's lower end; two more a little short of being built."""
+    """Return numbers for one barrier near the lower end of the zone and two that are nearly built.
+
+    A barrier is built if its first number, the presence, is positive.
+    """
     numbers = np.zeros((SLOTS.count, SLOTS.width))
     numbers[:, 0] = 0.4, -0.4, -0.4
     numbers[:, 1] = 0.6, -0.2, 0.2
@@ -146,13 +150,13 @@ def _anchor() -> np.ndarray:
 
 
 ANCHOR = _anchor()
-"""What a network's outputs are added to, (SLOTS.size,): from here all is tried in a training."""
+"""Decision to which the outputs of a network are added, (SLOTS.size,); trainings start from it."""
 
 
 def using(network: Network) -> Designer:
-    """Return the designer that builds what a network decides.
+    """Return a designer that builds the layout which a network decides.
 
-    It needs 2 releases at least; all it has, up to 64, tell what the layout is worth.
+    The designer needs at least 2 releases and evaluates the layout on up to 64 of its releases.
     """
 
     def design(
@@ -170,18 +174,20 @@ def using(network: Network) -> Designer:
 
 
 def decide(network: Network, problem: DesignProblem) -> Layout:
-    """Return what a network builds, as far as a problem has slots for it and allows its kinds.
+    """Return the layout of a network, within the slots and the kinds that a problem allows.
 
     Raises
     ------
-    BadInput, Diverged
-        If a problem allows no kind that policies build; if a simulation of what is seen diverges.
+    BadInput
+        If the problem allows no kind of barrier that policies build.
+    Diverged
+        If a simulation for the observation diverges.
     """
     kinds = [kind for kind in problem.kinds if kind in SLOTS.kinds]
     if not kinds:
         mend = "allow a kind that policies build: " + ", ".join(SLOTS.kinds)
         raise BadInput("kinds", problem.kinds, mend)
-    site = replace(problem.site, barrier_zone=problem.zone)  # what is seen is seen across it
+    site = replace(problem.site, barrier_zone=problem.zone)  # the observation covers this zone
     posed = DesignProblem(site, min(problem.max_barriers, SLOTS.count), kinds)
     seen = features(observe(posed))
     numbers = np.clip(ANCHOR + network(seen), -1.0, 1.0)
@@ -190,16 +196,17 @@ def decide(network: Network, problem: DesignProblem) -> Layout:
 
 @lru_cache(maxsize=4)
 def load(path: str | os.PathLike[str]) -> Network:
-    """Return the network of a file, read once.
+    """Return the network in a file; the file is read once.
 
     Raises
     ------
     BadInput
-        If there is no such file, it is not a network or not one from these features to layouts.
+        If there is no such file, or if it does not contain a network from the features of an
+        observation to a layout.
     """
     network = Network.load(path)
     sizes, wanted = network.sizes, (WIDTH, SLOTS.size)
     if not sizes or (sizes[0], sizes[-1]) != wanted:
-        mend = f"name a network of {wanted[0]} features and {wanted[1]} outputs"
+        mend = f"name a network with {wanted[0]} features and {wanted[1]} outputs"
         raise BadInput("policy", str(path), mend)
     return network

@@ -1,4 +1,4 @@
-"""Scripted studies: every layout of a file in the same releases, one row each in a CSV file."""
+"""Studies: comparison of the layouts in a file on the same releases, with one CSV row a release."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class Study:
     Parameters
     ----------
     site : Site
-        Where.
+        The site.
     releases : int
-        Releases of each event with each layout.
+        Number of releases of each event with each layout.
     layouts : dict of str to Layout
-        What stands, by its name.
+        The layouts by name.
     """
 
     site: Site
@@ -51,24 +51,24 @@ class Study:
 
     @property
     def size(self) -> int:
-        """Releases in all."""
+        """Total number of releases."""
         return self.releases * len(self.layouts) * len(self.site.events)
 
 
 class _LayoutTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: Annotated[str, about("Name of the layout.")]
     barriers: Annotated[tuple[dict[str, Any], ...], about("The barriers.")] = ()
-    file: Annotated[str | None, about("Instead of them, a layout file.")] = None
+    file: Annotated[str | None, about("A layout file, instead of barriers.")] = None
 
 
 class _StudyFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     site: Annotated[str, about("Name of a site, or a site file.")]
     layouts: Annotated[tuple[_LayoutTable, ...], about("The layouts, each with a name.")]
-    releases: Annotated[int, about("Releases of each event with each layout.", ge=1)] = 16
+    releases: Annotated[int, about("Number of releases of each event with each layout.", ge=1)] = 16
 
 
 def load(path: str | os.PathLike[str]) -> Study:
-    """Read a study from a TOML file; files that it names lie relative to it.
+    """Read a study from a TOML file; file names in it are relative to its folder.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def load(path: str | os.PathLike[str]) -> Study:
             raise BadInput(f"layouts[{i}].name", table.name, "give each layout a name of its own")
         try:
             layouts[table.name] = _layout(table, file.parent)
-            site.realise(layouts[table.name])  # what cannot be built is said before all
+            site.realise(layouts[table.name])  # report an impossible layout at once
             check.number("capital", site.capital(layouts[table.name]))
         except BadInput as bad:
             raise BadInput(f"layouts.{table.name}.{bad.field}", bad.value, bad.mend) from None
@@ -109,31 +109,36 @@ def _layout(table: _LayoutTable, folder: Path) -> Layout:
 
 Tick = Callable[[int, str], None]
 Job = tuple[str, str, int]
-"""Name of a layout, event and seed of one release."""
+"""Name of the layout, name of the event and seed of one release."""
 
 CHUNK = 64
-"""Releases that are simulated together, before their rows are written."""
+"""Number of releases that are simulated together before their rows are written."""
 
 _NUMBERS = (
     "width", "released_volume", "reached", *OUTCOME, "run_out_50", "run_out_95", "run_out_100",
 )  # fmt: skip
-"""Columns of an outcome that hold numbers, without what each barrier took."""
+"""Columns with numbers of an outcome, without those of the barriers."""
 
 _MONEY = ("harm", "repair")
-"""What a release costs [EUR per occurrence of its event]."""
+"""Columns with the costs of a release [EUR per occurrence of its event]."""
 
 
 def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
-    """Simulate what a CSV file does not hold yet; return how many rows it held.
+    """Simulate the releases that a CSV file does not contain yet and append them to it.
 
-    Every row is appended as soon as it and those before it are done; at the end the rows lie in the
-    order of the study, and rows of other layouts and seeds are gone. A row is known again by its
-    key: a hash of all that its release depends on.
+    Rows are appended in groups as they are computed. At the end, the rows are sorted in the order
+    of the study, and rows of other layouts and seeds are removed. Each row has a key, which is a
+    hash of everything that its release depends on.
+
+    Returns
+    -------
+    int
+        Number of rows that the file contained before.
 
     Raises
     ------
     BadInput
-        If the file is not that of a study.
+        If the file is not the table of a study.
     Diverged
         If a simulation diverges.
     """
@@ -176,42 +181,45 @@ def _row(study: Study, job: Job, outcome: Outcome) -> dict[str, Any]:
 
 
 def _key(study: Study, name: str, event: str, seed: int) -> str:
-    """Return a hash of all that a row depends on."""
+    """Return a hash of everything that a row depends on."""
     built = list(study.layouts[name])
     asked = [rigdda.__version__, mechanics(), study.site, name, built, event, seed]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:16]
 
 
 def _fields(study: Study) -> list[str]:
-    """Return the columns: those of the layout with most barriers."""
+    """Return the columns, with those of as many barriers as the largest layout has."""
     most = max(len(standing(layout)) for layout in study.layouts.values())
     barriers = [f"barrier_{i}_{name}" for i in range(most) for name in HIT]
     return ["layout", "event", "seed", "capital", *_MONEY, *_NUMBERS, *barriers, "key"]
 
 
 def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
-    """Return the whole rows of a file, those of more or fewer barriers too.
+    """Return the complete rows of a file, which may be of layouts with more or fewer barriers.
 
     Raises
     ------
     BadInput
-        If the file is not that of a study.
+        If the file is not the table of a study.
     """
     text = path.read_bytes().decode(errors="replace") if path.is_file() else ""
     if not text:
         return []
     head, *rows = [*_lines(text)] or [[]]
     if not {name for name in fields if not name.startswith("barrier_")} <= set(head):
-        mend = "this is no study of this version: move it away or name another folder with --out"
+        mend = (
+            "this is not a study table of this version: move it away or name another folder with "
+            "--out"
+        )
         raise BadInput("study table", str(path), mend)
-    if not text.endswith("\n"):  # a kill has left the last row unfinished
+    if not text.endswith("\n"):  # the last row is incomplete because the process was killed
         rows = rows[:-1]
     found = (dict(zip(head, row, strict=False)) for row in rows)
     return [{name: row.get(name, "") for name in fields} for row in found]
 
 
 def _lines(text: str) -> Iterator[list[str]]:
-    """Yield the rows of a CSV file; one that cannot be read is passed over."""
+    """Yield the rows of a CSV file and skip those that cannot be read."""
     rows = csv.reader(io.StringIO(text, newline=""))
     while True:
         try:
@@ -223,7 +231,7 @@ def _lines(text: str) -> Iterator[list[str]]:
 
 
 def _sound(row: dict[str, Any], study: Study, job: Job) -> bool:
-    """Return whether a row is of this release, with a number wherever one belongs."""
+    """Return whether a row belongs to this release and contains all its numbers."""
     name, event, seed = job
     layout = study.layouts[name]
     if (row["layout"], row["event"], row["seed"]) != (name, event, str(seed)):
@@ -237,7 +245,7 @@ def _sound(row: dict[str, Any], study: Study, job: Job) -> bool:
 
 
 def _number(text: str) -> float:
-    """Return the number that stands in a cell, 1 and 0 for True and False; NaN if there is none."""
+    """Return the number in a cell: 1 for True, 0 for False and NaN if it is not a number."""
     try:
         return float({"True": "1", "False": "0"}.get(text, text))
     except ValueError:
@@ -245,7 +253,7 @@ def _number(text: str) -> float:
 
 
 def table(study: Study, path: Path) -> Table:
-    """Return the table of what each layout costs [EUR per metre of road and year]."""
+    """Return the table of the costs of each layout [EUR per metre of road and year]."""
     out = empty_table(("layout", "Z (95 %)", "capital", "harm", "repair", "to build"))
     rows, site = _read(path, _fields(study)), study.site
     facts = _facts(site, rows)
@@ -260,7 +268,7 @@ def table(study: Study, path: Path) -> Table:
 
 
 def _account(rows: Sequence[dict[str, str]]) -> Account:
-    """Return what the releases of some rows cost."""
+    """Return the account of the releases in some rows."""
 
     def column(name: str) -> NDArray[np.float64]:
         return np.array([_number(row[name]) for row in rows])
@@ -281,7 +289,7 @@ def _tells_failure(field: str) -> bool:
 
 
 def _facts(site: Site, rows: Sequence[dict[str, str]]) -> dict[str, Facts]:
-    """Return what the releases with any of the layouts tell of each event."""
+    """Return the facts about each event that the releases with all layouts provide."""
     found, out = _account(rows), {}
     released = np.array([_number(row["released_volume"]) for row in rows])
     for name in site.event_names:

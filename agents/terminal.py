@@ -1,4 +1,4 @@
-"""What the command line shares: options, output folder, progress bar, tables and error lines."""
+"""Parts that all commands share: options, output folder, progress bar, tables and error lines."""
 
 from __future__ import annotations
 
@@ -22,12 +22,15 @@ if TYPE_CHECKING:
 layout_option = click.option(
     "--layout",
     type=click.Path(),
-    help="Layout of barriers: a TOML or JSON file such as `rigdda design` writes.",
+    help="Layout of barriers, a TOML or JSON file as `rigdda design` writes it.",
 )
 
 
 class Folder(click.Path):
-    """A folder, whose name is not empty: an unset variable of the shell would give this one."""
+    """Option type for a folder that refuses the empty name.
+
+    An unset shell variable would otherwise select the current folder.
+    """
 
     def convert(
         self, value: Any, param: click.Parameter | None, context: click.Context | None
@@ -39,7 +42,7 @@ class Folder(click.Path):
 
 
 def out_option(default: str) -> Callable[..., Any]:
-    """Return the option --out, into runs/ by default."""
+    """Return the option --out; the default is a folder in runs/."""
     return click.option(
         "--out",
         type=Folder(file_okay=False, path_type=Path),
@@ -48,24 +51,24 @@ def out_option(default: str) -> Callable[..., Any]:
 
 
 def seed_option(words: str, most: int | None = None) -> Callable[..., Any]:
-    """Return the option --seed with its help; searches and trainings take at most `limits.SEED`."""
+    """Return the option --seed with a help text; `most` is the largest seed that is accepted."""
     kind = click.IntRange(0, most)
     return click.option("--seed", type=kind, default=0, show_default=True, help=words)
 
 
 def count_option(name: str, least: int, default: int, words: str) -> Callable[..., Any]:
-    """Return an option that counts, releases for example."""
+    """Return an option that takes a count, for example of releases."""
     kind = click.IntRange(least, RELEASES)
     return click.option(name, type=kind, default=default, show_default=True, help=words)
 
 
 def read_layout(path: str | None) -> Layout:
-    """Return the layout of a file, no barriers without one.
+    """Return the layout in a file, or no barriers if `path` is None.
 
     Raises
     ------
     BadInput
-        If the file is missing or not sound.
+        If the file is missing or invalid.
     """
     from rigdda import load_layout
 
@@ -76,17 +79,20 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
-"""What cannot be in the name of a folder on some system."""
+"""Characters that some operating system does not allow in the name of a folder."""
 
 LONGEST = 200
-"""Bytes of the name of a folder; systems take 255."""
+"""Greatest length of the name of a folder [bytes]; operating systems allow 255."""
 
 PAUSE = 15.0
-"""Least time between two lines about progress where there is no terminal [s]."""
+"""Least time between two progress lines if standard error is not a terminal [s]."""
 
 
 class Stopped(Exception):
-    """A job ended before its end; the message says what was kept, the code is for the shell."""
+    """A job stopped early.
+
+    The message says which files were kept; `code` is the exit code of the process.
+    """
 
     def __init__(self, message: str, code: int):
         super().__init__(message)
@@ -100,7 +106,7 @@ def fail(message: str, code: int) -> int:
 
 
 def note(words: str) -> None:
-    """Write one line beside the results, if there is anything to say."""
+    """Print a note as one line, or nothing if the text is empty."""
     if words:
         click.echo("note: " + " ".join(words.split()))
 
@@ -113,13 +119,13 @@ def warn(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Write a warning as one line on standard error; takes what `warnings.showwarning` does."""
+    """Write a warning as one line on standard error, with the signature of `showwarning`."""
     words = str(message) if issubclass(category, UserWarning) else f"{category.__name__}: {message}"
     click.echo("rigdda: " + " ".join(words.split()), err=True)
 
 
 def once() -> Callable[..., None]:
-    """Return `warn`, which says nothing twice."""
+    """Return a version of `warn` that writes each message only once."""
     told: set[str] = set()
 
     def tell(message: Warning | str, *others: Any, **named: Any) -> None:
@@ -131,12 +137,12 @@ def once() -> Callable[..., None]:
 
 
 def folder_for(out: Path | None, name: str, *files: str) -> Path:
-    """Return the folder to write files into, which exists: `out`, or the one in runs/ of a name.
+    """Create the output folder if needed and return it: `out`, or `name` in runs/.
 
     Raises
     ------
     BadInput
-        If it cannot be made or written into, or something is in the way of a file.
+        If the folder cannot be created or written into, or one of the files cannot be written.
     """
     from rigdda import BadInput
 
@@ -145,17 +151,17 @@ def folder_for(out: Path | None, name: str, *files: str) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
-        mend = f"name a folder that can be made and written into ({error.strerror})"
+        mend = f"name a folder that can be created and written into ({error.strerror})"
         raise BadInput("--out", str(folder), mend) from None
     for file in (folder / name for name in files):
         if file.exists() and not (file.is_file() and os.access(file, os.W_OK)):
-            mend = "no file can be written there: move it away or name another folder"
+            mend = "this file cannot be overwritten: move it away or name another folder"
             raise BadInput("--out", str(file), mend)
     return folder
 
 
 def _part(name: str) -> str:
-    """Return a name, of a site for example, as one part of a path: no separators, not too long."""
+    """Return a name, for example of a site, as a valid part of a path."""
     coding = sys.getfilesystemencoding()
     known = name.encode(coding, "replace").decode(coding)
     return FORBIDDEN.sub("-", known).encode(coding)[:LONGEST].decode(coding, "ignore")
@@ -163,12 +169,12 @@ def _part(name: str) -> str:
 
 @contextmanager
 def kept(folder: Path) -> Iterator[None]:
-    """Say what this run leaves in the folder if a simulation diverges or the user interrupts.
+    """Report the files that a run has written if a simulation diverges or the user interrupts it.
 
     Raises
     ------
     BadInput
-        If another process writes into the folder.
+        If another process is writing into the folder.
     """
     from rigdda import Diverged
 
@@ -186,12 +192,12 @@ def kept(folder: Path) -> Iterator[None]:
 
 
 LOCK = ".lock"
-"""File in a folder of results that the process which writes into it has locked."""
+"""File in an output folder that is locked by the process which writes into the folder."""
 
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Keep other processes of this package out of a folder, where its drive can lock files."""
+    """Lock a folder against other processes of this package if its drive supports file locks."""
     from filelock import FileLock, Timeout
 
     from rigdda import BadInput
@@ -200,30 +206,30 @@ def _alone(folder: Path) -> Iterator[None]:
     try:
         lock.acquire(timeout=0.0)
     except Timeout:
-        mend = "another run writes into it: wait for its end or name another folder"
+        mend = "another run is writing into it: wait until it has ended or name another folder"
         raise BadInput("--out", str(folder), mend) from None
-    except (OSError, NotImplementedError):  # some network drives lock nothing
+    except (OSError, NotImplementedError):  # some network drives cannot lock files
         pass
     try:
         yield
     finally:
         if lock.is_locked:
-            with suppress(OSError):  # Windows removes no file that is open
+            with suppress(OSError):  # Windows does not remove open files
                 (folder / LOCK).unlink()
         lock.release()
 
 
 def _stamps(folder: Path) -> set[tuple[str, tuple[int, int, int]]]:
-    """Return the names in a folder, each with what changes when it is written."""
+    """Return the names in a folder, each with its inode, size and time of modification."""
     found = ((file.name, file.lstat()) for file in folder.iterdir() if file.name != LOCK)
     return {(name, (s.st_ino, s.st_size, s.st_mtime_ns)) for name, s in found}
 
 
 @contextmanager
 def progress(total: int) -> Iterator[Callable[[int, str], None]]:
-    """Yield how to tell on standard error how far a job is.
+    """Yield a function that reports the progress of a job on standard error.
 
-    A bar where that is a terminal, else a line now and then.
+    On a terminal it is a progress bar, otherwise an occasional line.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -240,7 +246,7 @@ def progress(total: int) -> Iterator[Callable[[int, str], None]]:
 
 
 def _lines(total: int) -> Callable[[int, str], None]:
-    """Return how to write a line on standard error, at most one in `PAUSE` seconds."""
+    """Return a function that writes at most one progress line every `PAUSE` seconds."""
     told = time.monotonic()
 
     def tell(done: int, words: str) -> None:

@@ -1,7 +1,7 @@
-"""Training of a policy: PPO on a pool of generated sites, from one barrier of any kind on.
+"""Training of a policy with PPO on a pool of generated sites.
 
-What is made lands in one folder and is taken up again from there: `training.json` (the terms),
-`checkpoint.zip` (the trainer), `ppo_0/` (TensorBoard), `policy.safetensors`.
+A training writes its files into one folder and continues from them: `training.json` (the terms),
+`checkpoint.zip` (the trainer), `ppo_0/` (TensorBoard) and `policy.safetensors`.
 """
 
 from __future__ import annotations
@@ -32,33 +32,33 @@ from rigdda.files import atomic
 Tick = Callable[[int], None]
 
 RELEASES = 64
-"""Releases of each site on which the policy is compared with the one that it started from."""
+"""Number of releases of each site for comparing the trained policy with the initial one."""
 
 FIDELITY = "fast"
-"""Fidelity of the releases that are learnt from."""
+"""Fidelity of the releases for training."""
 
 SPLIT = "train"
-"""Sites that are learnt from, and those beside them."""
+"""Split with the sites for training and for the comparison."""
 
 FILES = ("training.json", "checkpoint.zip", "policy.safetensors")
-"""What a training leaves in its folder, beside the logs."""
+"""Files that a training writes into its folder besides the logs."""
 
 ANEW = "this is damaged: remove the training in its folder, or name another folder with --out"
-"""What to do with a training that cannot go on."""
+"""Remedy for a training that cannot be continued."""
 
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What a training is asked for.
+    """Terms of a training.
 
     Parameters
     ----------
     sites : int
-        Training sites, at least 2.
+        Number of training sites, at least 2.
     episodes : int
-        Episodes of PPO.
+        Number of episodes of PPO.
     seed : int
-        Seed of all that is random.
+        Seed of all random numbers.
     """
 
     sites: int
@@ -72,15 +72,15 @@ class Terms:
 
     @property
     def beside(self) -> int:
-        """Sites beside those to train on, on which the policy is tried before and after."""
+        """Number of further sites on which the policy is evaluated before and after training."""
         return max(2, self.sites // 8)
 
 
 @dataclass(frozen=True, slots=True)
 class Trained:
-    """A policy and what its layouts took off before and after its training, over Z of nothing.
+    """A trained policy and the relative reduction of Z by its layouts before and after training.
 
-    Means over sites beside the training sites.
+    The reductions are means over sites that were not used in the training.
     """
 
     network: Network
@@ -89,16 +89,17 @@ class Trained:
 
 
 def train(terms: Terms, out: Path, tick: Tick) -> Trained:
-    """Train a policy, or go on with a training that was stopped, or was of fewer episodes.
+    """Train a policy, or continue a training that was interrupted or had fewer episodes.
 
-    One that was stopped ends as if it had not been. Steps shrink to nothing over the episodes asked
-    for, so that one that was given more ends elsewhere than one that was asked for all at once.
+    An interrupted training gives the same result as an uninterrupted one. The learning rate
+    decreases to zero over the requested episodes. Therefore a training that is extended later ends
+    with another policy than one that was started with all the episodes.
 
     Raises
     ------
     BadInput
-        If the folder holds a damaged training, one on other terms or of more episodes, or torch is
-        not installed.
+        If the folder contains a damaged training, a training on other terms or one with more
+        episodes, or if torch is not installed.
     Diverged
         If a simulation diverges.
     """
@@ -135,20 +136,23 @@ def see(posed: DesignProblem) -> NDArray[np.float32]:
 def scaling(
     seen: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return mean and standard deviation of (n, F) features; 1 for those that do not vary."""
+    """Return the mean and the standard deviation of (n, F) features.
+
+    The standard deviation of a feature that does not vary is replaced by 1.
+    """
     scale = seen.std(axis=0)
     return seen.mean(axis=0), np.where(scale > 1e-6, scale, 1.0).astype(np.float32)
 
 
 def examine(network: Network, problems: list[DesignProblem]) -> float:
-    """Return the share of Z of nothing that a policy takes off, the mean over problems."""
+    """Return the relative reduction of Z by the layouts of a policy, as a mean over problems."""
     seeds = release_seeds("final", 0, RELEASES)
     built = [posed.evaluate(decide(network, posed), seeds) for posed in problems]
     return float(np.mean([p.reward(e) for p, e in zip(problems, built, strict=True)]))
 
 
 def _notes(terms: Terms, stages: list[int]) -> dict[str, str]:
-    """Return what a policy's file says of its making: a command for each number of episodes."""
+    """Return the notes in the file of a policy, with the command for each number of episodes."""
     commands = [
         f"rigdda train --sites {terms.sites} --episodes {episodes} --seed {terms.seed}"
         for episodes in stages
@@ -159,9 +163,10 @@ def _notes(terms: Terms, stages: list[int]) -> dict[str, str]:
 
 
 def _stages(terms: Terms, out: Path) -> list[int]:
-    """Return the numbers of episodes that a training was asked for, one after the other.
+    """Return the successive numbers of episodes that were requested for a training.
 
-    Writes the terms into the folder, or checks that a sound training on them is in it.
+    The terms are written into the folder. If it contains a training already, check first that it
+    is undamaged and has the same terms.
     """
     file = out / "training.json"
     asked: dict[str, Any] = asdict(terms) | {"version": __version__, "mechanics": mechanics()}
@@ -174,10 +179,10 @@ def _stages(terms: Terms, out: Path) -> list[int]:
         except (msgspec.MsgspecError, KeyError, RecursionError) as error:
             raise BadInput("terms", str(file), f"{ANEW} ({error})") from None
         if found != asked:
-            mend = f"give the terms of the training in {out} ({found}), or another folder"
+            mend = f"use the terms of the training in {out} ({found}) or name another folder"
             raise BadInput("terms", asked, mend)
         if terms.episodes < before[-1]:
-            mend = f"give at least the {before[-1]} of the training in {out}, or another folder"
+            mend = f"give at least {before[-1]}, as for the training in {out}, or another folder"
             raise BadInput("episodes", terms.episodes, mend)
         stages = sorted({*before, *stages})
     elif (out / "checkpoint.zip").is_file():
@@ -188,7 +193,7 @@ def _stages(terms: Terms, out: Path) -> list[int]:
 
 
 def _whole(checkpoint: Path) -> None:
-    """Check that a trainer's file, if there is one, is not damaged."""
+    """Check that the checkpoint of a training is undamaged, if there is one."""
     try:
         with zipfile.ZipFile(checkpoint) as archive:
             lost = archive.testzip() or min(

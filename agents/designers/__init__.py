@@ -1,7 +1,7 @@
-"""Designers of barrier layouts, a module each, by name.
+"""Designers of barrier layouts, with one module for each designer.
 
-Each has `design(problem, simulations, seed=0, progress=None, store=None)`, which returns a
-`DesignResult`, see `rigdda.agents.designers.protocol`.
+Each module has a function `design(problem, simulations, seed=0, progress=None, store=None)`, which
+returns a `DesignResult` (see `rigdda.agents.designers.protocol`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from types import ModuleType
 from rigdda import BadInput, check
 
 DEFAULT = "race"
-"""The designer that is used if none is named."""
+"""Name of the default designer."""
 
 DESIGNERS = ("cma", "constant", "convex", "pareto", "ppo", "race", "random", "rule", "tpe")
 
@@ -23,7 +23,7 @@ def module(name: str) -> ModuleType:
     Raises
     ------
     BadInput
-        If there is none of that name, or it needs what is not installed.
+        If there is no designer of this name, or if it needs a package that is not installed.
     """
     try:
         return import_module(f"{__name__}.{check.one_of('designer', name, DESIGNERS)}")

@@ -1,6 +1,6 @@
-"""What every barrier of the menu is estimated to be worth, from one barrier-free ensemble.
+"""Estimates of the effect of every barrier of the menu from releases without barriers.
 
-The ensemble is what passes each chainage of the site without barriers; several designers use it.
+The ensemble of these releases records all blocks that pass each station. Several designers use it.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ Floats = NDArray[np.float64]
 
 
 RELEASES = 60
-"""Releases of an event in an ensemble: three of them are beyond the 95 % quantile."""
+"""Number of releases of an event in an ensemble; three of them exceed the 95 % quantile."""
 SHARE = 16
-"""The ensemble takes at most one part in so many of a budget."""
+"""The ensemble uses at most this fraction (1 / SHARE) of a budget."""
 
 CROSSING = np.dtype(
     [
@@ -54,23 +54,24 @@ CROSSING = np.dtype(
         ("volume", "f8"),
     ]
 )
-"""The first crossing of a station by a block. time: since the release [s]; height: of the centroid
-above the ground [m]; radius: circumscribed, about the centroid [m]; speed [m/s]; energy of
-translation and rotation [J], mass [kg] and volume [m3]: of the block over its width."""
+"""Record of the first crossing of a station by a block. time: since the release [s]; height: of the
+centroid above the ground [m]; radius: circumscribed about the centroid [m]; speed [m/s]; energy: of
+translation and rotation [J]; mass [kg]; volume [m3]. Energy, mass and volume are those of the block
+over the width of its release."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CrossingEnsemble:
-    """Crossings of R barrier-free releases.
+    """Crossings of R releases without barriers.
 
     Parameters
     ----------
     stations : (K,) array
-        Chainages across the barrier zone [m].
+        Chainages of the stations in the barrier zone [m].
     crossings : (E,) structured array
-        Those at stations, see `CROSSING`; station K is the road's uphill edge.
+        Crossings of the stations, see `CROSSING`. Station K is the uphill edge of the road.
     event : (R,) array of int
-        Which event of the site a release is of.
+        Index of the event of each release.
     width : (R,) array
         Width of each release [m].
     """
@@ -95,13 +96,13 @@ class CrossingEnsemble:
         return np.isin(block, block[road])
 
     def weights(self, rates: Sequence[float]) -> Floats:
-        """Return how often each release stands for, (R,) [1/year per m], from rates of events."""
+        """Return the rate that each release represents, (R,) [1/year per m], from event rates."""
         count = np.bincount(self.event, minlength=len(rates))
         return np.array(rates)[self.event] / np.maximum(count, 1)[self.event]
 
 
 def ensemble_seeds(site: Site, seed: int, simulations: int) -> dict[str, tuple[int, ...]]:
-    """Return the release seeds by event of the ensemble for a search of so many simulations."""
+    """Return the release seeds of an ensemble by event for a search with a given budget."""
     names = site.event_names
     each = min(RELEASES, max(1, simulations // (SHARE * len(names))))
     few = names[: max(1, simulations // SHARE)]
@@ -109,23 +110,25 @@ def ensemble_seeds(site: Site, seed: int, simulations: int) -> dict[str, tuple[i
 
 
 def ensemble_for(ledger: Ledger, stations: Floats) -> CrossingEnsemble:
-    """Return the ensemble that a designer looks at, charged to its budget."""
+    """Return the ensemble of a designer and charge its releases to the budget."""
     seeds = ensemble_seeds(ledger.problem.site, ledger.seed, ledger.budget)
     ledger.used += sum(map(len, seeds.values()))
     return ensemble(ledger.problem.site, seeds, stations)
 
 
 def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -> CrossingEnsemble:
-    """Return the crossings of barrier-free releases, simulated over all cores in threads.
+    """Simulate releases without barriers in threads on all cores and return their crossings.
 
-    The last few ensembles are kept in memory.
+    The last four ensembles are kept in memory.
 
     Parameters
     ----------
+    site : Site
+        The site.
     seeds : mapping of str to sequence of int
         Release seeds by name of event.
     stations : (K,) array
-        Chainages to watch, ascending [m].
+        Chainages of the stations, ascending [m].
 
     Raises
     ------
@@ -171,7 +174,7 @@ def _ensemble(
 
 
 def _area_and_radius(vertices: NDArray[np.float64]) -> tuple[float, float]:
-    """Return area [m2] and circumscribed radius about the centroid [m] of an (n, 2) polygon."""
+    """Return the area [m2] and the circumscribed radius [m] of an (n, 2) polygon."""
     area, centre, _ = polygon_properties(vertices)
     return area, float(np.hypot(*(vertices - centre).T).max())
 
@@ -179,29 +182,29 @@ def _area_and_radius(vertices: NDArray[np.float64]) -> tuple[float, float]:
 GRAVITY = 9.81
 """Acceleration of free fall [m/s2]."""
 BASE = 0.6
-"""Friction of its base [-]."""
+"""Coefficient of friction at the base of a gravity wall [-]."""
 BOUNCE = 0.2
-"""Share of the energy that a block keeps when it lands in a ditch: assumed."""
+"""Fraction of its energy that a block keeps when it lands in a ditch [-]; an assumption."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Catalogue:
-    """Numbers of what may be built: R releases, J barriers.
+    """Estimated effects of J barriers in R releases.
 
     Parameters
     ----------
     barriers : list of J barriers
-        Those that may be built.
+        Barriers that may be built.
     weight : (R,) array
-        How often what a release stands for happens [1/year per m].
+        Rate that each release represents [1/year per m].
     base : (R,) array
-        Harm of a release without barriers [EUR].
+        Harm of each release without barriers [EUR].
     relief : (R, J) array
-        What a barrier takes off it [EUR].
+        Reduction of the harm of each release by each barrier [EUR].
     annual : (J,) array
-        What a barrier costs a year, its expected repair included [EUR per m].
+        Annual cost of each barrier including its expected repair [EUR per m].
     span : (J, 2) array
-        Chainages between which it stands [m].
+        Chainages of the start and the end of each barrier [m].
     """
 
     barriers: list[Barrier]
@@ -217,7 +220,7 @@ class Catalogue:
         return self.annual + self.weight @ (self.base[:, None] - self.relief)
 
     def take(self, chosen: Sequence[int] | NDArray[np.int64]) -> Catalogue:
-        """Return the catalogue of some barriers."""
+        """Return the catalogue of the barriers with the given indices."""
         i = np.asarray(chosen, dtype=np.int64)
         barriers = [self.barriers[j] for j in i.tolist()]
         relief, annual = self.relief[:, i], self.annual[i]
@@ -227,7 +230,7 @@ class Catalogue:
 def tabulate(
     problem: DesignProblem, ensemble: CrossingEnsemble, barriers: list[Barrier]
 ) -> Catalogue:
-    """Return the catalogue of barriers that a problem allows."""
+    """Return the catalogue of some barriers of a problem."""
     site = problem.site
     weight = ensemble.weights([site.rate(name, ()) for name in site.event_names])
     effects = Effects(site, ensemble)
@@ -243,13 +246,13 @@ def tabulate(
 
 
 def whole(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Catalogue:
-    """Return the catalogue of everything on a menu."""
+    """Return the catalogue of all barriers of a menu."""
     barriers = [b for kind in problem.kinds for b in menu.lone(kind)]
     return tabulate(problem, ensemble, barriers)
 
 
 class Effects:
-    """What single barriers do to the releases of an ensemble."""
+    """Estimates of the effects of single barriers on the releases of an ensemble."""
 
     def __init__(self, site: Site, ensemble: CrossingEnsemble):
         self.site, self.ensemble = site, ensemble
@@ -265,7 +268,7 @@ class Effects:
         self.base = self._harm(self._volume)
 
     def of(self, barrier: Barrier) -> tuple[Floats, Floats]:
-        """Return harm [EUR] and length of barrier to be mended [m] of every release, each (R,)."""
+        """Return the harm [EUR] and the length of barrier to repair [m] of each release, (R,)."""
         if isinstance(barrier, Mesh):
             site = self.site
             factor = [site.rate(name, (barrier,)) / max(site.rate(name, ()), 1e-300)
@@ -284,7 +287,7 @@ class Effects:
         return harm, mended
 
     def _stopped(self, barrier: Barrier, table: NDArray[np.void]) -> tuple[Any, Any]:
-        """Return which crossings a barrier stops, and which break it, each (E,) of bool."""
+        """Return which crossings a barrier stops and which break it, two (E,) arrays of bool."""
         none = np.zeros(len(table), dtype=bool)
         if isinstance(barrier, Ditch):
             return self._lands(barrier, table), none
@@ -303,20 +306,20 @@ class Effects:
         return low, none
 
     def _lands(self, ditch: Ditch, table: NDArray[np.void]) -> Any:
-        """Return which crossings end in a ditch: they fall into it, and do not leap out."""
+        """Return which crossings end in a ditch: the block lands in it and does not bounce out."""
         fall = np.maximum(table["height"] - table["radius"], 0.0) + ditch.depth
         lands = table["speed"] * np.sqrt(2.0 * fall / GRAVITY) <= ditch.width
         leap = BOUNCE * table["speed"] ** 2 / (2.0 * GRAVITY)
         return lands & (leap <= ditch.depth)
 
     def _harm(self, volume: Floats) -> Floats:
-        """Return the harm of volumes on the road, 0 of none [EUR]."""
+        """Return the harm of volumes on the road [EUR], which is 0 for a volume of 0."""
         harms = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
         return np.where(volume > 0.0, harms, 0.0)
 
 
 def _sums(release: NDArray[np.int32], values: Floats) -> Floats:
-    """Return the running sum of values within each release; they are in order."""
+    """Return the running sum of values within each release; the releases are sorted."""
     total = np.cumsum(values)
     first = np.searchsorted(release, release)
     return total - total[first] + values[first]

@@ -1,7 +1,7 @@
-"""CMA-ES (Hansen 2016, arXiv:1604.00772; pycma) on the decision vector, ask and tell.
+"""CMA-ES (Hansen 2016, arXiv:1604.00772; pycma) on the decision vector.
 
-It starts from the best in simulation of what one barrier-free ensemble suggests, see
-`rigdda.agents.designers.convex`.
+The search simulates the layouts that an ensemble of releases without barriers suggests (see
+`rigdda.agents.designers.convex`) and starts from the best of them.
 """
 
 from __future__ import annotations
@@ -28,11 +28,12 @@ from rigdda.envs.encoding import NUMBERS, slot_size
 Floats = NDArray[np.float64]
 
 SIGMA = 0.25
-"""Step at the start, an eighth of the decision box: stations are searched across a bench."""
+"""Initial standard deviation: an eighth of the decision box, about the width of a bench."""
 POPULATION = 8
-"""Layouts a generation: few, for budgets of a hundred layouts."""
+"""Layouts per generation; small, because a budget allows about a hundred layouts."""
 VERGE, PRESENT = -0.25, 0.5
-"""Presence of an empty slot and of a built one at the start: a barrier more or less is tried."""
+"""Initial presence of an empty slot and of a slot with a barrier. Both are near enough to 0 that
+layouts with one barrier more or less are tried."""
 
 
 def design(
@@ -54,7 +55,7 @@ def design(
 
 
 def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generator) -> Proposals:
-    """Yield the starts, then the generations of CMA-ES around the best; restart when it stops."""
+    """Yield the starting layouts, then generations of CMA-ES, restarted when it converges."""
     import cma
 
     best: tuple[float, Layout] = (math.inf, ())
@@ -66,7 +67,7 @@ def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generat
         "bounds": [low.tolist(), high.tolist()],
         "popsize": POPULATION,
         "randn": lambda *shape: rng.standard_normal(shape),
-        "seed": math.nan,  # numpy's global generator is left alone
+        "seed": math.nan,  # do not seed the global generator of numpy
         "verbose": -10,  # quiet, no files read or written
         "verb_log": 0,
     }
@@ -83,9 +84,9 @@ def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generat
 
 
 def _centre(problem: DesignProblem, layout: Layout, rng: np.random.Generator) -> Floats:
-    """Return the vector of a layout, (size,), its empty slots on the verge of a barrier.
+    """Return the vector of a layout, (size,), with empty slots that nearly hold a barrier.
 
-    Their stations, sizes and kinds are drawn at random, so that every restart tries others.
+    Their stations, sizes and kinds are drawn at random, so that every restart tries other ones.
     """
     vector = problem.encode(layout)
     slots = vector.reshape(-1, slot_size(problem.kinds))
@@ -93,5 +94,5 @@ def _centre(problem: DesignProblem, layout: Layout, rng: np.random.Generator) ->
     empty[:, 0] = VERGE
     empty[:, 1:] = rng.uniform(-1.0, 1.0, empty[:, 1:].shape)
     slots[: len(layout), 0] = PRESENT
-    slots[:, NUMBERS:] *= 0.5  # scores of kinds: another may win
+    slots[:, NUMBERS:] *= 0.5  # smaller scores, so that other kinds are tried as well
     return vector

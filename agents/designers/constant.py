@@ -1,6 +1,7 @@
-"""The best constant: one barrier, the same for every site, where it stood best on the mean.
+"""The best constant layout: one barrier of the same type and relative place on every site.
 
-What a designer must beat to be worth its releases: it knows nothing of the site but its zone.
+It uses no information on a site except the barrier zone. It is the baseline that a designer has to
+improve on.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ CONSTANTS: tuple[tuple[Barrier, float], ...] = (
     (Fence(0.0, 2.0, energy_class=250), 0.5),
     (Wall(0.0, 2.0, 1.0), 1.0),
 )
-"""Barriers, wherever they stand, and their stations as shares of the zone, best first.
+"""Barriers and their stations as fractions of the zone, the best first.
 
-The mean distance (Z - Z_reference) / (Z_nothing - Z_reference) over the six design sites, 1,000
-releases each: ditch .54 (verge .14, bench .35, talus .74, narrow 1, cliff .98, shu-hwa .04), .61
-if 2 m deep and 4 m wide, .72 if 1.5 and 3 m; embankment .57, .63 if 4 m high; gravity wall .79 if
-1.5 m high; fence .81 if of 500 kJ and 3 m high. What does not fit is nothing. The rigid wall was
-not tried.
+They were chosen by the mean relative distance (Z - Z_reference) / (Z_nothing - Z_reference) over
+the six design sites with 1,000 releases each. A barrier that does not fit counts as no barrier.
+Ditch: 0.54 (verge 0.14, bench 0.35, talus 0.74, narrow 1, cliff 0.98, shu-hwa 0.04), or 0.61 if it
+is 2 m deep and 4 m wide, and 0.72 if it is 1.5 m deep and 3 m wide. Embankment: 0.57, or 0.63 if
+it is 4 m high. Gravity wall: 0.79 if it is 1.5 m high. Fence: 0.81 with 500 kJ and a height of
+3 m. The rigid wall was not tried.
 """
 
 
@@ -50,7 +52,7 @@ def design(
 
 
 def constant(problem: DesignProblem, menu: Menu) -> Layout:
-    """Return the first of `CONSTANTS` that may be built; mesh, where nothing else is allowed."""
+    """Return the first of `CONSTANTS` that may be built, or mesh if nothing else is allowed."""
     for barrier, share in CONSTANTS:
         found = place(menu, barrier, share) if barrier.kind in problem.kinds else ()
         if found:
@@ -60,7 +62,7 @@ def constant(problem: DesignProblem, menu: Menu) -> Layout:
 
 
 def place(menu: Menu, barrier: Barrier, share: float) -> Layout:
-    """Return a barrier at a share of the zone, or as near as it may stand; none where nowhere."""
+    """Return a barrier as near as possible to a fraction of the zone; empty if it does not fit."""
     zone = menu.zone
     found = menu.nearest(barrier, zone.start + share * (zone.end - zone.start))
     return () if found is None else (found,)

@@ -1,19 +1,19 @@
-"""Barriers by mixed-integer linear programming on one barrier-free ensemble.
+"""Mixed-integer linear programming on an ensemble of releases without barriers.
 
-The best choices of one, two and three barriers are sought, as a catalogue estimates them
-(`rigdda.agents.designers.catalogue`). With z[j] = 1 for barrier j, and h_r the harm that release r
-still does,
+The programme chooses one, two or three barriers from a catalogue that estimates their effects
+(`rigdda.agents.designers.catalogue`). With z[j] = 1 if barrier j is built, and h_r the remaining
+harm of release r,
 
     minimise    annual.z + weight.h
     subject to  h_r >= base_r - sum_j relief[r, j] z[j],  h_r >= 0
-                sum z <= max_barriers, and none where another stands
+                sum z <= max_barriers, and barriers do not overlap
 
-The sum of reliefs is more than two barriers take off together, so a second programme scales them
-down; its layouts are the more careful ones. The estimate does not know what a barrier does to the
-flow further down, so the simulation has the last word.
+The sum of the reliefs overestimates the joint effect of two barriers. Therefore further programmes
+scale the reliefs down. The estimate also neglects the effect of a barrier on the motion farther
+downhill, so the resulting layouts are compared by simulation.
 
-These optima, the engineering rule, its fence lower and weaker (the rule does not know what it
-costs), the best constant and no barrier at all are the layouts that every search tries first.
+These optima, the engineering rule, lower and weaker variants of its fence (the rule does not
+consider costs), the best constant and no barrier are the starting layouts of every search.
 """
 
 from __future__ import annotations
@@ -51,11 +51,12 @@ class Choice:
     Parameters
     ----------
     layout : tuple of Barrier
-        What is built, downhill.
+        The barriers, going downhill.
     objective : float
-        Its Z as the programme sees it [EUR per m and year].
+        Z as estimated by the programme [EUR per m and year].
     bound : float
-        That of the programme's linear relaxation: none is better.
+        Objective of the linear relaxation, which is a lower bound of Z in the programme [EUR per m
+        and year].
     """
 
     layout: Layout
@@ -64,12 +65,16 @@ class Choice:
 
 
 def choose(catalogue: Catalogue, slots: int, share: float = 1.0) -> Choice:
-    """Return the best choice of at most `slots` barriers.
+    """Return the best choice of at most `slots` barriers from a catalogue.
 
     Parameters
     ----------
+    catalogue : Catalogue
+        The barriers.
+    slots : int
+        Largest number of barriers.
     share : float
-        Share of each relief that counts.
+        Factor on all reliefs [-].
     """
     if not catalogue.barriers:
         nothing = float(catalogue.weight @ catalogue.base)
@@ -81,13 +86,13 @@ def choose(catalogue: Catalogue, slots: int, share: float = 1.0) -> Choice:
 
 
 def _solve(catalogue: Catalogue, slots: int, share: float, boolean: bool) -> tuple[float, Floats]:
-    """Return the least objective and its z (J,), whole numbers or between 0 and 1."""
+    """Return the least objective and its z (J,), with integers or values between 0 and 1."""
     import cvxpy as cp
 
     useful = np.flatnonzero(catalogue.weight * catalogue.base > 0.0)
     scale = max(float(catalogue.weight @ catalogue.base), 1e-12)
     z = cp.Variable(len(catalogue.barriers), boolean=boolean)
-    left = cp.Variable(len(useful), nonneg=True)  # of a release's share of the harm [-]
+    left = cp.Variable(len(useful), nonneg=True)  # remaining share of the harm of a release [-]
     weigh = (catalogue.weight * catalogue.base)[useful] / scale
     part = share * catalogue.relief[useful] / catalogue.base[useful, None]
     goal = (catalogue.annual / scale) @ z + weigh @ left
@@ -98,41 +103,41 @@ def _solve(catalogue: Catalogue, slots: int, share: float, boolean: bool) -> tup
     problem = cp.Problem(cp.Minimize(goal), rules)
     with suppress(ValueError, cp.SolverError):
         problem.solve(solver=cp.HIGHS, mip_rel_gap=GAP)
-    if z.value is None:  # nothing built is always a solution
+    if z.value is None:  # no barrier is always a solution
         return scale, np.zeros(len(catalogue.barriers))
     return scale * float(problem.value), np.asarray(z.value, dtype=np.float64)
 
 
 GAP = 0.01
-"""Relative gap at which an optimum is good enough: the estimates are worse."""
+"""Relative optimality gap, which is smaller than the error of the estimates [-]."""
 
 
 def _clashes(catalogue: Catalogue) -> Floats:
-    """Return which barriers stand at, or just beyond, the start of each other one, (n, J)."""
+    """Return for each start of a barrier which barriers occupy or nearly touch it, (n, J)."""
     start, end = catalogue.span.T
     starts = np.unique(start)
     over = (start <= starts[:, None]) & (starts[:, None] < end + MIN_GAP)
     kinds = np.array([b.kind == "mesh" for b in catalogue.barriers])
     over &= ~kinds
-    rows = np.concatenate([over, kinds[None]])  # one mesh at most
+    rows = np.concatenate([over, kinds[None]])  # at most one mesh
     return np.unique(rows[rows.sum(axis=1) > 1], axis=0).astype(np.float64)
 
 
 CAREFUL = (1.0, 0.8, 0.5)
-"""Shares of the estimated reliefs that count."""
+"""Factors on the estimated reliefs [-]."""
 TABLE = 120
-"""Barriers of the catalogue that the programme chooses from: the best of every kind at every place,
-by what they are worth alone."""
+"""Number of barriers from which the programme chooses: the best of every kind at every station,
+ranked by their effect alone."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConvexResult(DesignResult):
-    """The layout that does best in simulation, and all optima that were simulated.
+    """Result with the best layout in simulation and all optima that were simulated.
 
     Parameters
     ----------
     choices : tuple of Choice
-        Optima of the programme, each with the bound of its relaxation.
+        Optima of the programmes, each with the bound of its relaxation.
     """
 
     choices: tuple[Choice, ...]
@@ -145,7 +150,7 @@ def design(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> ConvexResult:
-    """Return the programme's layout that does best in simulation.
+    """Return the layout of the programmes that is best in simulation.
 
     Raises
     ------
@@ -163,7 +168,7 @@ def design(
 
 
 def _propose(layouts: list[Layout]) -> Proposals:
-    """Yield the layouts and, so that the result is never worse, no barrier."""
+    """Yield the layouts and no barrier, so that the result is never worse than no barrier."""
     for layout in dict.fromkeys([*layouts, ()]):  # noqa: UP028, a list cannot be sent values
         yield layout
 
@@ -171,7 +176,7 @@ def _propose(layouts: list[Layout]) -> Proposals:
 def best_choices(
     problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu
 ) -> tuple[Choice, ...]:
-    """Return the optima of different layouts, of few barriers first."""
+    """Return the optima with different layouts, those with few barriers first."""
     catalogue = promising(whole(problem, ensemble, menu))
     found: dict[Layout, Choice] = {}
     for slots, share in _ladder(problem):
@@ -182,16 +187,16 @@ def best_choices(
 
 
 def _ladder(problem: DesignProblem) -> Iterator[tuple[int, float]]:
-    """Yield how many barriers may be built and what share of reliefs counts."""
+    """Yield the largest number of barriers and the factor on the reliefs of each programme."""
     for slots in range(1, min(problem.max_barriers, 3) + 1):
         for share in CAREFUL:
             yield slots, share
 
 
 def promising(catalogue: Catalogue) -> Catalogue:
-    """Return the barriers of a catalogue that come into question.
+    """Return the most promising barriers of a catalogue.
 
-    Of every kind, the best at every station, as many of the best of these as of another kind.
+    These are the best barriers of every kind at every station, up to the same number for each kind.
     """
     best: dict[tuple[str, float], int] = {}
     order = np.argsort(catalogue.objective, kind="stable").tolist()
@@ -207,11 +212,11 @@ def promising(catalogue: Catalogue) -> Catalogue:
 
 
 CHEAPER = ((0, 1), (1, 0), (1, 1), (0, 2))
-"""Steps of height and of class by which the rule's fence is tried smaller."""
+"""Steps of height and of class by which the fence of the rule is reduced in its variants."""
 
 
 def starts(ledger: Ledger) -> list[Layout]:
-    """Return the different layouts that an ensemble suggests, the most promising first."""
+    """Return the starting layouts of a search, the most promising first."""
     menu = Menu(ledger.problem)
     ensemble = ensemble_for(ledger, menu.stations)
     ledger.known = tuple(unsearched(ledger.problem, ensemble, menu))
@@ -222,13 +227,13 @@ def starts(ledger: Ledger) -> list[Layout]:
 
 
 def unsearched(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> list[Layout]:
-    """Return the layouts that every search must beat: the rule's and the best constant."""
+    """Return the baseline layouts of every search: the rule and the best constant."""
     layouts = rule(problem, ensemble, menu), constant(problem, menu)
     return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]
 
 
 def known(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> list[Layout]:
-    """Return the layouts that need no search: the rule's, it smaller, and the best constant."""
+    """Return the layouts that need no search: the rule, its variants and the best constant."""
     one = rule(problem, ensemble, menu)
     smaller = [_smaller(one, *steps) for steps in CHEAPER]
     layouts = [one, constant(problem, menu), *smaller]
@@ -236,13 +241,13 @@ def known(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> lis
 
 
 def offered(ledger: Ledger) -> Proposals:
-    """Yield what `starts` suggests."""
+    """Yield the layouts of `starts`."""
     for layout in starts(ledger):  # noqa: UP028, a list cannot be sent values
         yield layout
 
 
 def _smaller(layout: Layout, lower: int, weaker: int) -> Layout:
-    """Return a layout whose fences are lower and of a lower class by some steps."""
+    """Return a layout with its fences reduced by some steps of height and of class."""
     out = []
     for b in layout:
         if isinstance(b, Fence) and b.energy_class is not None:

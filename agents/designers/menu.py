@@ -1,6 +1,7 @@
-"""What may be built on a site: barriers of every allowed kind over stations and sizes.
+"""Barriers that may be built on a site: all allowed kinds at a grid of stations and sizes.
 
-With their neighbours, for searches by steps, and the bounds on which a layout lies.
+The module also provides the neighbours of a layout, for local searches, and the bounds on which a
+layout lies.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from rigdda.envs import DesignProblem
 Floats = NDArray[np.float64]
 
 STATIONS = 32
-"""Stations across the zone."""
+"""Number of evenly spaced stations in the zone."""
 
 
 FINEST = 0.1
-"""Least step of a station in a search [m]; places in it are rounded to it."""
+"""Least step of a station in a search [m]; chainages are rounded to it."""
 
 
 class Menu:
@@ -33,7 +34,7 @@ class Menu:
     Parameters
     ----------
     problem : DesignProblem
-        Its site, zone and kinds.
+        The problem with its site, zone and kinds.
     """
 
     def __init__(self, problem: DesignProblem):
@@ -42,7 +43,7 @@ class Menu:
 
     @cached_property
     def stations(self) -> Floats:
-        """Chainages where barriers are tried: evenly, and at the corners of the ground [m]."""
+        """Chainages at which barriers are tried: evenly spaced and at corners of the ground [m]."""
         zone = self.zone
         corners = [x for x, _ in self.problem.site.slope.points if zone.start < x < zone.end]
         even = np.linspace(zone.start, zone.end, STATIONS)
@@ -50,7 +51,7 @@ class Menu:
         return np.unique(np.round([*apart, *corners], 2))
 
     def lone(self, kind: str) -> list[Barrier]:
-        """Return every barrier of a kind that may be built, over stations and sizes."""
+        """Return all barriers of a kind that may be built, at all stations and of all sizes."""
         if kind == "mesh":
             return [self.room.mesh(i) for i in range(len(self.problem.site.meshes))]
         found = []
@@ -61,18 +62,18 @@ class Menu:
         return list(dict.fromkeys(found))
 
     def put(self, barrier: Barrier, x: float) -> Barrier | None:
-        """Return a barrier moved to a chainage, None if it may not be built there."""
+        """Return a barrier moved to a chainage, or None if it may not be built there."""
         moved = self.room.put(barrier, x)
         return moved if moved is not None and self.problem.fits((moved,)) else None
 
     def nearest(self, barrier: Barrier, x: float) -> Barrier | None:
-        """Return a barrier where it may be built, as near to a chainage as there is a place."""
+        """Return a barrier at the nearest place to a chainage where it may be built, or None."""
         places = [x, *self.stations.tolist(), *self._ends(barrier)]
         found = (self.put(barrier, at) for at in sorted(places, key=lambda at: abs(at - x)))
         return next((b for b in found if b is not None), None)
 
     def _ends(self, barrier: Barrier) -> list[float]:
-        """Return the last chainages where a barrier may stand, as far as is told without trying."""
+        """Return the estimated last chainage in the zone at which a barrier may be built [m]."""
         last = self.zone.end - barrier.extent
         if barrier.elongation_path > 0.0:
             road = self.problem.site.road.start
@@ -80,14 +81,16 @@ class Menu:
         return [math.floor(10.0 * last + 1e-6) / 10.0]
 
     def neighbours(self, layout: Layout, step: float, level: int) -> Iterator[Layout]:
-        """Yield layouts that differ from one in one station or one size of one barrier.
+        """Yield layouts that differ from a layout in one station or one size of one barrier.
 
         Parameters
         ----------
+        layout : Layout
+            The layout.
         step : float
-            By how much stations differ [m].
+            Difference of stations [m].
         level : int
-            By how many steps sizes and classes differ.
+            Number of steps by which sizes and classes differ.
         """
         for i, barrier in enumerate(layout):
             for other in self._moved(barrier, step, level):
@@ -96,7 +99,7 @@ class Menu:
                     yield changed
 
     def _moved(self, barrier: Barrier, step: float, level: int) -> Iterator[Barrier]:
-        """Yield a barrier at other stations and of other sizes, whether they fit or not."""
+        """Yield a barrier at other stations and of other sizes, including some that do not fit."""
         if isinstance(barrier, Mesh):
             yield from (b for b in self.lone("mesh") if b != barrier)
             return
@@ -112,10 +115,10 @@ class Menu:
 
 
 def spread(barriers: Sequence[Barrier], n: int) -> list[Barrier]:
-    """Return at most `n` barriers of one kind that stand for all of them, the middle one first.
+    """Return at most `n` barriers that represent all barriers of one kind, the middle one first.
 
-    They are nearest to the centres of k-means, in units of the range of each number; the station
-    counts twice.
+    They are the barriers nearest to the centres of k-means. Distances are in units of the range of
+    each number, and the station has twice the weight.
     """
     if len(barriers) <= n:
         return list(barriers)
@@ -133,11 +136,11 @@ def spread(barriers: Sequence[Barrier], n: int) -> list[Barrier]:
 
 
 MEANS = 5
-"""Steps of k-means."""
+"""Number of iterations of k-means."""
 
 
 def _far_apart(table: Floats, n: int) -> list[int]:
-    """Return `n` rows of a table, each the farthest from those before it."""
+    """Return the indices of `n` rows of a table, each the farthest from the rows before it."""
     chosen = [int(np.argmin(np.linalg.norm(table - np.median(table, axis=0), axis=1)))]
     away = np.linalg.norm(table - table[chosen[0]], axis=1)
     while len(chosen) < n:
@@ -153,10 +156,10 @@ def _distances(table: Floats, centres: Floats) -> Floats:
 
 
 def on_bound(problem: DesignProblem, layout: Layout) -> tuple[str, ...]:
-    """Return what lies on a bound of the zone, of its kind or of the list of classes, in words.
+    """Return descriptions of the bounds of the zone, kind or class list on which a layout lies.
 
-    The bounds of mesh, and those by what stands next to a barrier, do not count; nor does the
-    greatest height of a class of fence, as the next class is higher and dearer.
+    Bounds of mesh and bounds due to a neighbouring barrier are left out. The greatest height of a
+    class of fence is also left out, because the next class is higher and more expensive.
     """
     names = []
     for barrier in layout:
@@ -167,7 +170,7 @@ def on_bound(problem: DesignProblem, layout: Layout) -> tuple[str, ...]:
 
 
 def _place(problem: DesignProblem, barrier: Barrier) -> list[str]:
-    """Return which ends of the zone a barrier stands at."""
+    """Return descriptions of the ends of the zone at which a barrier lies."""
     zone, road = problem.zone, problem.site.road.start
     start, end = problem.place.works(barrier)
     found = []

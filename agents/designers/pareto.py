@@ -1,11 +1,12 @@
-"""The front of what barriers cost against what is left, by NSGA-II.
+"""Pareto front of the cost of barriers against the remaining risk by NSGA-II.
 
-Deb et al. (2002, IEEE TEC 6, 182-197), as Optuna has it.
+The algorithm is that of Deb et al. (2002, IEEE TEC 6, 182-197), as implemented in Optuna.
 
-It starts from what one barrier-free ensemble suggests, see `rigdda.agents.designers.convex`, or
-from layouts that other designers found. What nothing dominates in the search is evaluated again on
-other releases, and what nothing dominates there is the front: so no layout is in it because it was
-lucky in the search.
+The search starts from the layouts that an ensemble of releases without barriers suggests (see
+`rigdda.agents.designers.convex`) or from layouts that other designers found. Layouts that are
+non-dominated in the search are evaluated again on other releases. Those that are non-dominated in
+these releases form the front. Thus no layout is in the front because of favourable releases in the
+search.
 """
 
 from __future__ import annotations
@@ -31,21 +32,21 @@ from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem, Evaluation
 
 FINALISTS = 12
-"""Layouts of the search's front that are evaluated again, at most."""
+"""Largest number of layouts of the front of the search that are evaluated again."""
 POPULATION = 16
-"""Layouts a generation."""
+"""Layouts per generation."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParetoResult(DesignResult):
-    """What the search found: the layout of least objective, and the front it was chosen from.
+    """Result of the search: the layout with the least objective and the Pareto front.
 
     Parameters
     ----------
     front : tuple of Evaluation
-        Layouts of which none is both cheaper and safer than another, the cheapest first, evaluated
-        on releases that the search did not see; by the search's own with a budget that does not pay
-        for finals, see `searching.Plan`: then some are in it by luck.
+        Evaluations of the non-dominated layouts, the cheapest first, on releases that the search
+        did not use. If the budget is too small for finals (see `protocol.Plan`), the evaluations of
+        the search are used; then some layouts may be in the front by chance.
     """
 
     front: tuple[Evaluation, ...]
@@ -58,7 +59,7 @@ def design(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> ParetoResult:
-    """Return the layout of least objective and the front that NSGA-II finds within the budget.
+    """Return the layout with the least objective and the front that NSGA-II finds in the budget.
 
     Raises
     ------
@@ -77,15 +78,18 @@ def warm_started(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> ParetoResult:
-    """Return the same from layouts that other designers found, instead of an ensemble.
+    """Return the result of a search that starts from layouts which other designers found.
 
-    They are evaluated again on other releases whatever the few of the search say of them.
+    These layouts are always evaluated again on other releases, whatever their evaluations in the
+    search are.
 
     Raises
     ------
-    BadInput, Diverged
-        If the budget is below 2 or the seed out of range; if there are no layouts, or half as many
-        as `FINALISTS` or more; if a simulation diverges.
+    BadInput
+        If the budget is below 2, the seed is out of range, or the number of different layouts is
+        not between 1 and `FINALISTS` / 2 - 1.
+    Diverged
+        If a simulation diverges.
     """
     different = list(dict.fromkeys(layouts))
     check.integer("number of different layouts", len(different), 1, FINALISTS // 2 - 1)
@@ -95,7 +99,7 @@ def warm_started(
 
 
 def _search(ledger: Ledger, first: list[Layout], known: int) -> ParetoResult:
-    """Return what the search from some layouts finds, of which the first few are in the finals."""
+    """Search from some starting layouts, of which the first `known` always reach the finals."""
     choose = partial(finalists, known=known)
     found = search(ledger, _propose(ledger.problem, first, ledger.seed), choose, FINALISTS)
     ends = found.history.stage("final") or found.history.stage("search")
@@ -104,12 +108,12 @@ def _search(ledger: Ledger, first: list[Layout], known: int) -> ParetoResult:
 
 
 def residual(evaluation: Evaluation) -> float:
-    """Return harm and repair, what Z has beside the cost of barriers [EUR per m and year]."""
+    """Return the sum of harm and repair, which is Z without capital [EUR per m and year]."""
     return evaluation.harm + evaluation.repair
 
 
 def front(evaluations: Iterable[Evaluation]) -> tuple[Evaluation, ...]:
-    """Return those of which none other is as cheap and as safe, the cheapest first."""
+    """Return the non-dominated evaluations, the cheapest first."""
     kept: list[Evaluation] = []
     for e in sorted(evaluations, key=lambda e: (e.capital, residual(e))):
         if not kept or residual(e) < residual(kept[-1]):
@@ -120,7 +124,10 @@ def front(evaluations: Iterable[Evaluation]) -> tuple[Evaluation, ...]:
 def finalists(
     problem: DesignProblem, evaluations: Sequence[Evaluation], n: int, known: int = 0
 ) -> list[Evaluation]:
-    """Return at most `n`: the first `known`, of the front the best objective and an even spread."""
+    """Return at most `n` finalists.
+
+    These are the first `known` evaluations, the best of the front and others spread evenly over it.
+    """
     kept = list(evaluations[: min(known, n)])
     seen, room = {e.layout for e in kept}, n - len(kept)
     found = [e for e in front(evaluations) if e.layout not in seen]
@@ -132,7 +139,7 @@ def finalists(
 
 
 def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:
-    """Yield the starts, then the generations of NSGA-II, without end."""
+    """Yield the starting layouts, then an endless sequence of generations of NSGA-II."""
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)

@@ -1,8 +1,7 @@
 """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347; Stable-Baselines3).
 
-`design` lets it search on one problem. `learn` is what `rigdda train` does: a policy on a pool of
-sites, one release an episode.
-The only module of the designers that knows torch.
+`design` searches on one problem. `learn`, which `rigdda train` uses, trains a policy on a pool of
+sites with one release per episode. This is the only module of the designers that imports torch.
 """
 
 from __future__ import annotations
@@ -30,12 +29,12 @@ from rigdda.files import atomic
 Floats = NDArray[np.float32]
 
 HIDDEN = [64, 64]
-"""Neurons of the hidden layers; few, since sites are few."""
+"""Number of neurons of the hidden layers; small, because the number of sites is small."""
 EXPLORATION = -0.7
-"""Logarithm of the standard deviation of actions at the start: half of the way from the middle of
-the decision box to its edge, so that every kind and class is tried."""
+"""Initial logarithm of the standard deviation of actions. The standard deviation is half the
+distance from the middle of the decision box to its edge, so that every kind and class is tried."""
 RECENT = 0.1
-"""Share of the last episode in what is usual at a site."""
+"""Weight of the last episode in the moving average of the reward of a site [-]."""
 COMMON: dict[str, Any] = {"gamma": 1.0, "device": "cpu", "verbose": 0}
 
 
@@ -46,10 +45,11 @@ def design(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> DesignResult:
-    """Return the best layout that PPO tries within the budget, all of it on this problem.
+    """Return the best layout that PPO tries on this problem within the budget.
 
-    A policy learned for one problem is a point of the decision box with a spread, so this is a
-    search as the others are; what pays is a policy for many sites, see `rigdda.agents.policy`.
+    A policy for a single problem is a normal distribution in the decision box. This is therefore a
+    search like that of the other designers. For a policy for many sites, see
+    `rigdda.agents.policy`.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def design(
 
 
 class _Bandit(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """One problem as an environment without anything to see; a ledger pays for its steps."""
+    """A problem as an environment with a constant observation; a ledger counts the releases."""
 
     def __init__(self, ledger: Ledger, plan: Plan):
         self.ledger, self.plan = ledger, plan
@@ -78,27 +78,27 @@ class _Bandit(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.action_space = spaces.Box(-1.0, 1.0, (ledger.problem.size,), np.float32)
 
     def paid(self) -> bool:
-        """Return whether the budget has another layout of the search."""
+        """Return whether the budget suffices for another layout of the search."""
         return self.ledger.left >= self.plan.reserve + self.plan.releases
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Show nothing."""
+        """Return the constant observation."""
         super().reset(seed=seed)
         return np.zeros(1, dtype=np.float32), {}
 
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Evaluate what the action stands for."""
+        """Evaluate the layout of an action."""
         problem = self.ledger.problem
         evaluation = self.ledger.evaluate(problem.decode(action), "search", self.plan.releases)
         return np.zeros(1, dtype=np.float32), problem.reward(evaluation), True, False, {}
 
 
 class _WhilePaid(BaseCallback):
-    """Goes on while the budget has another layout."""
+    """Callback that ends the training when the budget is used up."""
 
     def __init__(self, bandit: _Bandit):
         super().__init__()
@@ -109,11 +109,11 @@ class _WhilePaid(BaseCallback):
 
 
 class Featured(VecEnvWrapper):
-    """`BarrierDesign` as the policy's network sees it and acts on it.
+    """Wrapper of `BarrierDesign` with the observations and actions of the policy network.
 
-    Scaled features are seen; actions are added to `rigdda.agents.policy.ANCHOR`. A reward is what
-    is better than usual at its site: sites differ in what can be gained, and copies keep their
-    site.
+    Observations are scaled features, and actions are added to `rigdda.agents.policy.ANCHOR`. The
+    moving average of the reward of each site is subtracted from the reward, because sites differ
+    in the possible gain. Each copy of the environment keeps its site.
     """
 
     def __init__(self, venv: VecEnv, mean: Floats, scale: Floats):
@@ -145,7 +145,7 @@ class Featured(VecEnvWrapper):
 
     @property
     def state(self) -> dict[str, Any]:
-        """All that the next steps depend on, between episodes."""
+        """The state between episodes that determines all further steps."""
         return {
             "usual": self.usual.copy(),
             "random": [rng.bit_generator.state for rng in self.get_attr("np_random")],
@@ -153,7 +153,7 @@ class Featured(VecEnvWrapper):
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Start every copy where `state` was taken."""
+        """Reset all copies to a state that was read from `state`."""
         self.reset()
         self.usual = state["usual"].copy()
         for i, rng in enumerate(self.get_attr("np_random")):
@@ -166,10 +166,10 @@ class Featured(VecEnvWrapper):
 
 
 def pool(names: Sequence[str], fidelity: str) -> VecEnv:
-    """Return one copy of `BarrierDesign` for each site, of one release an episode.
+    """Return one copy of `BarrierDesign` for each site, with one release per episode.
 
-    Every copy keeps its site, so that what is seen of it is simulated once. Releases are simulated
-    in threads over all cores.
+    Each copy keeps its site, so that the releases for its observation are simulated only once.
+    Releases are simulated in threads on all cores.
     """
     copies = sb3_vec_env(
         "rigdda/BarrierDesign-v0", len(names), site=names[0], kinds=SLOTS.kinds,
@@ -181,7 +181,7 @@ def pool(names: Sequence[str], fidelity: str) -> VecEnv:
 
 
 def learner(copies: VecEnv, seed: int, logs: Path) -> PPO:
-    """Return an untrained policy and its trainer, with steps that shrink to nothing."""
+    """Return the trainer of a new policy, with a learning rate that decreases to zero."""
     torch.set_num_threads(1)
     return PPO(
         "MlpPolicy", copies, n_steps=2, batch_size=max(2, copies.num_envs // 4), n_epochs=4,
@@ -191,7 +191,7 @@ def learner(copies: VecEnv, seed: int, logs: Path) -> PPO:
 
 
 def _shrinking(left: float) -> float:
-    """Return the learning rate when such a share of the episodes is left."""
+    """Return the learning rate for the remaining fraction of the episodes."""
     return 4e-4 * left
 
 
@@ -201,7 +201,7 @@ def _net(model: PPO) -> ActorCriticPolicy:
 
 
 def learn(model: PPO, episodes: int, checkpoint: Path, tick: Callable[[int], None]) -> None:
-    """Go on training up to so many episodes in all; the trainer is kept after every rollout."""
+    """Train up to a total number of episodes and save the trainer after every rollout."""
     if model.num_timesteps < episodes:
         kept = _Keep(checkpoint, tick)
         model.learn(
@@ -210,9 +210,10 @@ def learn(model: PPO, episodes: int, checkpoint: Path, tick: Callable[[int], Non
 
 
 class _Moment:
-    """What a training's next rollout depends on beside its networks and their optimiser.
+    """State of a training besides the networks and the optimiser.
 
-    Stable-Baselines3 draws from the generators of torch and, for its batches, of numpy.
+    It contains the state of the environments and of the random generators of torch and numpy. The
+    latter is used by Stable-Baselines3 for its batches.
     """
 
     def __init__(self, model: PPO):
@@ -221,7 +222,7 @@ class _Moment:
         self.copies = env.state if isinstance(env, Featured) else None
 
     def restore(self, copies: VecEnv) -> None:
-        """Go back to it."""
+        """Restore the state."""
         if isinstance(copies, Featured) and self.copies is not None:
             copies.restore(self.copies)
         torch.set_rng_state(self.torch)
@@ -229,10 +230,11 @@ class _Moment:
 
 
 def resume(checkpoint: Path, copies: VecEnv) -> PPO:
-    """Return the trainer that was kept in a file; it goes on as if it had not been stopped.
+    """Return the trainer that was saved in a file, which continues as if it had not been stopped.
 
-    With the same number of episodes it ends where an uninterrupted training ends, to the last bit.
-    With more, its steps begin anew with the size that the share of episodes left asks for.
+    With the same number of episodes, the result is identical bit for bit to that of an
+    uninterrupted training. With more episodes, the learning rate is that for the new fraction of
+    remaining episodes.
     """
     torch.set_num_threads(1)
     model = PPO.load(checkpoint, copies, device="cpu", force_reset=False)
@@ -241,7 +243,7 @@ def resume(checkpoint: Path, copies: VecEnv) -> PPO:
 
 
 class _Keep(BaseCallback):
-    """Keeps the trainer in a file after every rollout and says how many episodes were seen."""
+    """Callback that saves the trainer before every rollout and reports the number of episodes."""
 
     def __init__(self, checkpoint: Path, tick: Callable[[int], None]):
         super().__init__()
@@ -265,7 +267,7 @@ class _Keep(BaseCallback):
 
 
 def export(model: PPO, mean: Floats, scale: Floats, notes: dict[str, str]) -> Network:
-    """Return the policy of a trainer as a network that needs no torch."""
+    """Return the policy of a trainer as a network that does not need torch."""
     policy = _net(model)
     hidden = policy.mlp_extractor.policy_net.children()
     linear = [module for module in hidden if isinstance(module, torch.nn.Linear)]

@@ -1,7 +1,7 @@
-"""What every designer is and returns, how its releases are counted, and the search that most share.
+"""Interface and results of designers, the budget of releases, and the search that most of them use.
 
-Seeds of releases come in disjoint streams for searching, choosing, reporting and verifying. Of two
-layouts the better is that of lower Z, behind all others if a target is missed.
+Seeds of releases are taken from disjoint streams for the search, the choice, the report and the
+verification. Layouts are ranked by Z. Layouts that miss a target rank behind all others.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from rigdda.agents.limits import RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
 
 STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
-"""search: all layouts of a search; semifinal, final: the best of them again, to choose; report: the
-chosen one, whose value it tells without having chosen anything; ensemble: barrier-free releases
-that a designer looks at; verification: seen by no search."""
+"""Streams of release seeds. search: all layouts of a search; semifinal, final: the best layouts
+again, to choose one of them; report: the chosen layout, for an unbiased evaluation; ensemble:
+releases without barriers that a designer analyses; verification: releases that no search uses."""
 
 
 def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, ...]:
-    """Return `n` release seeds of a stream, by default the first.
+    """Return `n` release seeds of a stream.
 
-    A seed's remainder by the number of streams is its stream, so that no two streams share one,
-    whatever the seeds of the searches.
+    The remainder of a seed modulo the number of streams is the index of its stream. Therefore two
+    streams never share a seed, whatever the seeds of the searches are.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, 
     seed : int
         Seed of the search, at least 0.
     n : int
-        How many.
+        Number of seeds.
     start : int
-        How many of the stream are passed over.
+        Number of seeds at the beginning of the stream that are skipped.
 
     Raises
     ------
     BadInput
-        If the stream is unknown or a number is not whole or outside its range.
+        If the stream is unknown, or if a number is not an integer or is outside its range.
     """
     tag = STREAMS.index(check.one_of("stream", stream, STREAMS))
     entropy = [check.integer("seed", seed, 0), tag]
@@ -62,14 +62,15 @@ def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, 
 
 
 MISSED = 1e6
-"""What ranks layouts that miss a target behind all others [EUR per m and year]."""
+"""Penalty of layouts that miss a target, which ranks them behind all others [EUR per m and
+year]."""
 
 
 def score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, float]:
-    """Return what layouts are ranked by: how far a target is missed, then the objective.
+    """Return the sort key of a layout: the amount by which it misses a target, then its objective.
 
-    A target is missed by what the upper bound of its probability exceeds it; one that is met, or of
-    which the releases do not tell, by nothing.
+    The amount is the excess of the upper bound of the probability over the target. It is 0 if the
+    targets are met or undecided.
     """
     if evaluation.targets != "missed":
         return 0.0, evaluation.objective
@@ -77,12 +78,12 @@ def score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, float]
 
 
 def final_score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, float]:
-    """Return the same for finals, where what is undecided is not taken for met."""
+    """Return the sort key of a layout in finals, where an undecided target counts as missed."""
     return shortfall(problem, evaluation), evaluation.objective
 
 
 def shortfall(problem: DesignProblem, evaluation: Evaluation) -> float:
-    """Return the most by which an upper bound of a design event exceeds its target [-]."""
+    """Return the largest excess of an upper bound over its target in all design events [-]."""
     design = [event.name for event in problem.site.events if event.design]
     over = [0.0]
     for wanted, found in (
@@ -95,7 +96,7 @@ def shortfall(problem: DesignProblem, evaluation: Evaluation) -> float:
 
 
 def value(problem: DesignProblem, evaluation: Evaluation) -> float:
-    """Return one number for searches that rank by one: those that miss a target come last."""
+    """Return a single number to minimise; layouts that miss a target have the largest values."""
     missed, objective = score(problem, evaluation)
     if missed <= 0.0:
         return objective
@@ -118,13 +119,13 @@ class Entry:
     Parameters
     ----------
     simulations : int
-        Releases that the designer has used so far, those of this layout included.
+        Number of releases that the designer has used so far, including those of this layout.
     stage : {"search", "semifinal", "final", "report", "verification", "front"}
-        "semifinal", "final": one of the best, evaluated again on other releases; "report": the
-        chosen one, on releases that chose nothing; "verification", "front": on releases that no
-        search has seen.
+        Stage of the evaluation. "semifinal", "final": one of the best layouts, evaluated again on
+        other releases; "report": the chosen layout, on releases that did not affect the choice;
+        "verification", "front": on releases that no search used.
     evaluation : Evaluation
-        What the layout was worth on these releases, without their outcomes.
+        Evaluation of the layout on these releases, without their outcomes.
     """
 
     simulations: int
@@ -134,7 +135,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """Every layout that a designer evaluated, in order; n of them in the search."""
+    """All evaluations of a designer in order, of which n are in the search."""
 
     entries: tuple[Entry, ...]
 
@@ -143,7 +144,7 @@ class History:
         return tuple(entry for entry in self.entries if entry.stage == name)
 
     def best_so_far(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return simulations (n,) and the least objective up to then (n,) during the search."""
+        """Return simulations used (n,) and the least objective so far (n,) in the search."""
         searched = self.stage("search")
         objective = [entry.evaluation.objective for entry in searched]
         best = np.minimum.accumulate(np.array(objective, dtype=np.float64))
@@ -152,27 +153,28 @@ class History:
 
 @dataclass(frozen=True, slots=True)
 class DesignResult:
-    """What a designer found.
+    """Result of a designer.
 
     Parameters
     ----------
     site : Site
-        The site that it designed for; not compared.
+        The site; it is ignored when results are compared.
     layout : Layout
         The chosen layout.
     evaluation : Evaluation
-        Its evaluation on releases that chose nothing, so it does not flatter; with a budget of less
-        than about ten releases on those that chose it.
+        Its evaluation on releases that did not affect the choice, which is therefore unbiased.
+        With a budget of less than about ten releases, the releases of the choice are used.
     history : History
-        All evaluated layouts.
+        All evaluations.
     simulations : int
-        Releases that the designer used, its barrier-free ensemble included.
+        Number of releases that the designer used, including its ensemble without barriers.
     origin : {"start", "search"}
-        Whether the layout is one that the designer began with, or one that its search came to.
+        Whether the layout is one of the starting layouts or a result of the search.
     on_bound : tuple of str
-        What of the layout lies on a bound of the zone, of its kind or of the list of classes.
+        Descriptions of the properties of the layout that lie on a bound of the zone, of the kind of
+        barrier or of the list of energy classes.
     seconds : float
-        Processor time, all cores together; not compared.
+        Processor time on all cores [s]; it is ignored when results are compared.
     """
 
     site: Site = field(compare=False, repr=False)
@@ -185,7 +187,7 @@ class DesignResult:
     seconds: float = field(compare=False)
 
     def _repr_html_(self) -> str:
-        """Return a picture of the layout and the table of its evaluation, for notebooks."""
+        """Return a picture of the layout and the table of its evaluation for notebooks."""
         title = f"{self.site.name}: layout found with {self.simulations:,} releases"
         picture = display.png(self.site.section(self.layout), title)
         return display.image(picture, title) + self.evaluation._repr_html_()
@@ -195,7 +197,7 @@ Progress = Callable[[Entry], None]
 """Called after each evaluated layout."""
 
 Proposals = Generator[Layout, Evaluation, None]
-"""Yields layouts and is sent the evaluation of each."""
+"""Generator that yields layouts and receives the evaluation of each."""
 
 
 class Designer(Protocol):
@@ -214,14 +216,14 @@ class Designer(Protocol):
 
 
 class Ledger:
-    """Counts a designer's releases against its budget and keeps every evaluation.
+    """Counts the releases of a designer against its budget and records all evaluations.
 
     Attributes
     ----------
     starts : set of Layout
-        Layouts that the designer begins with.
+        Starting layouts of the designer.
     known : tuple of Layout
-        Layouts that need no search: whatever it finds must beat them in the final.
+        Layouts that need no search. They take part in the final.
     """
 
     def __init__(
@@ -247,11 +249,11 @@ class Ledger:
 
     @property
     def left(self) -> int:
-        """Releases that may still be used."""
+        """Number of releases that may still be used."""
         return self.budget - self.used
 
     def evaluate(self, layout: Layout, stage: str, releases: int) -> Evaluation:
-        """Evaluate a layout on the first releases of the stream of a stage and enter it."""
+        """Evaluate a layout on the first releases of the stream of a stage and record it."""
         seeds = release_seeds(stage, self.seed, releases)
         evaluation = self._store.evaluate(self.problem, layout, seeds)
         self.used += releases
@@ -261,14 +263,17 @@ class Ledger:
     def sample(
         self, layout: Layout, stage: str, start: Mapping[str, int], counts: Mapping[str, int]
     ) -> StoredEvaluation:
-        """Sample some releases of each event with a layout and enter what they say together.
+        """Simulate some releases of each event with a layout and record their joint evaluation.
 
         Parameters
         ----------
+        layout : Layout
+            The layout.
         stage : str
             Stream of the releases.
         start, counts : mapping of str to int
-            By name of event: how many releases of the stream are passed over, how many are drawn.
+            By name of event, the number of releases of the stream that are skipped and the number
+            that is simulated.
         """
         drawn = {name: n for name, n in counts.items() if n > 0}
         seeds = {
@@ -286,7 +291,10 @@ class Ledger:
             self._progress(self.entries[-1])
 
     def result(self, evaluation: Evaluation, origin: Origin | None = None) -> DesignResult:
-        """Return the result whose layout has this evaluation, by default from where it is known."""
+        """Return the result for the layout of an evaluation.
+
+        The default of `origin` is "start" for layouts in `starts` and "search" for all others.
+        """
         layout = evaluation.layout
         return DesignResult(
             site=self.problem.site,
@@ -301,20 +309,20 @@ class Ledger:
 
 
 Choose = Callable[[DesignProblem, Sequence[Evaluation], int], list[Evaluation]]
-"""Returns at most so many of some evaluations."""
+"""Function that chooses at most a given number of evaluations."""
 
 MOST = 100
-"""Releases of a layout in a search at most: layouts that differ by 5 % of the gain differ by less
-than their spread then, and the semifinals tell them apart."""
+"""Largest number of releases of a layout in a search. With this number, the standard error is
+larger than a difference of 5 % of the gain; the semifinals distinguish such layouts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How a budget is spent: half for the search, half for who was best in it.
+    """Division of a budget: half for the search and half for the best layouts of the search.
 
-    A budget sees 80 layouts in the search, more once each has `MOST` releases. An eighth is for
-    semifinals, a quarter for finals; an eighth reports what was chosen. Finals below 16 releases
-    each choose nothing: then the best of the search is reported.
+    The search evaluates 80 layouts, or more if each of them has `MOST` releases. An eighth of the
+    budget is for semifinals, a quarter for finals and an eighth for the report. There are no finals
+    if a finalist would have fewer than 16 releases. Then the best layout of the search is reported.
     """
 
     releases: int
@@ -326,7 +334,7 @@ class Plan:
 
     @classmethod
     def of(cls, simulations: int, most: int = 5) -> Plan:
-        """Return the plan for a budget, with at most so many finalists."""
+        """Return the plan for a budget with at most `most` finalists."""
         report = max(1, simulations // 8)
         final = simulations // 4
         finalists = min(most, final // 16) if final >= 32 else 0
@@ -343,36 +351,36 @@ class Plan:
 
     @property
     def reserve(self) -> int:
-        """Releases that are kept for the semifinals, the finals and the report."""
+        """Number of releases that are reserved for the semifinals, the finals and the report."""
         semifinal = self.semifinalists * self.semifinal_releases
         return semifinal + self.finalists * self.final_releases + self.report
 
 
 def best(problem: DesignProblem, evaluations: Sequence[Evaluation], n: int) -> list[Evaluation]:
-    """Return those of the best `n` different layouts, the best first."""
+    """Return the evaluations of the best `n` different layouts, the best first."""
     return ranked(problem, evaluations)[:n]
 
 
 def search(
     ledger: Ledger, proposals: Proposals, choose: Choose = best, most: int = 5
 ) -> DesignResult:
-    """Evaluate what is proposed as far as the budget goes, then the best on other releases.
+    """Evaluate proposed layouts within the budget, then evaluate the best on other releases.
 
     Parameters
     ----------
     ledger : Ledger
-        Counts the releases.
+        The ledger that counts the releases.
     proposals : Proposals
-        What is evaluated in the search.
+        Generator of the layouts.
     choose : callable
-        Chooses who is in the finals, by default the best.
+        Function that chooses the finalists, by default the best layouts.
     most : int
-        Finalists at most.
+        Largest number of finalists.
 
     Raises
     ------
     BadInput, Diverged
-        As `DesignProblem.evaluate` does.
+        The same errors as `DesignProblem.evaluate`.
     """
     plan = Plan.of(ledger.left, most)
     first = layout = next(proposals)
@@ -382,21 +390,22 @@ def search(
             layout = proposals.send(evaluation)
         except StopIteration:
             break
-    if not ledger.entries:  # too small a budget to compare anything
+    if not ledger.entries:  # the budget is too small for a comparison
         return ledger.result(ledger.evaluate(first, "report", ledger.left))
     return finish(ledger, plan, choose)
 
 
 def finish(ledger: Ledger, plan: Plan, choose: Choose = best) -> DesignResult:
-    """Evaluate the best of a search on other releases, choose one, report it on yet others.
+    """Evaluate the best of a search on other releases, choose one, and report it on new releases.
 
-    No barrier at all and what needs no search, `Ledger.known`, are among the finalists, so that the
-    choice is not worse: of a few releases in the search the luckiest layouts come out best.
+    The finalists include no barrier and the layouts that need no search (`Ledger.known`), so that
+    the choice is not worse than these. The evaluations of the best layouts in a search are biased,
+    because layouts with favourable releases are selected.
 
     Raises
     ------
     BadInput, Diverged
-        As `DesignProblem.evaluate` does.
+        The same errors as `DesignProblem.evaluate`.
     """
     problem = ledger.problem
     left = [entry.evaluation for entry in ledger.entries if entry.stage == "search"]
@@ -423,15 +432,15 @@ def verify(
     seed: int = 0,
     store: Store | None = None,
 ) -> Evaluation:
-    """Return the evaluation of a layout on `releases` fresh releases.
+    """Return the evaluation of a layout on `releases` new releases.
 
-    The seeds come from a stream of their own, so that the evaluation is unbiased whatever search
-    found the layout. Layouts verified with the same `seed` meet the same releases.
+    The seeds are from a separate stream, so that the evaluation is unbiased for the result of any
+    search. Layouts that are verified with the same `seed` are evaluated on the same releases.
 
     Raises
     ------
     BadInput, Diverged
-        As `DesignProblem.evaluate` does.
+        The same errors as `DesignProblem.evaluate`.
     """
     seeds = release_seeds("verification", seed, releases)
     return (store or Store()).evaluate(problem, layout, seeds)

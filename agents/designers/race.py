@@ -1,16 +1,18 @@
-"""The default designer: a catalogue of all kinds, raced; pairs of the best; their neighbours.
+"""The default designer, which races single barriers, pairs of barriers and their neighbours.
 
-Singles of every allowed kind are looked at where they promise most. At first these are barriers of
-every kind as different as can be, then in batches those that may be the best: of least mean less
-one standard deviation of a Gaussian process for each kind, which learns from their neighbours and
-starts from a barrier-free ensemble.
+First, single barriers of every allowed kind are evaluated. The first of them are as different as
+possible. The next ones are chosen in batches by a Gaussian process for each kind, which has the
+estimates from an ensemble without barriers as its prior mean. The barriers with the lowest mean
+minus one standard deviation are evaluated next.
 
-Pairs of the best of each kind are foretold from them: of what one lets past, the other lets past
-its share. The promising ones race on common releases (`rigdda.agents.designers.racing`), and then
-neighbours of the best: other stations and sizes, with ever smaller steps, a barrier more or less.
-Each race meets fresh releases. The best few, and no barrier at all, are chosen from on releases of
-their own, and the chosen one is reported on others again, which chose nothing: so its value does
-not flatter.
+Then the costs of pairs of the best barriers of each kind are predicted, assuming that each barrier
+lets pass the same share of the rock as it does alone. The most promising pairs race on common
+releases (`rigdda.agents.designers.racing`). After them, the neighbours of the best layouts race:
+layouts with other stations and sizes, with decreasing steps, and with one barrier more or less.
+
+Each race uses new releases. The final among the best few layouts and no barrier has separate
+releases. The chosen layout is evaluated on further releases that did not affect the choice, so that
+its evaluation is unbiased.
 """
 
 from __future__ import annotations
@@ -35,25 +37,25 @@ from rigdda.envs import DesignProblem
 Floats = NDArray[np.float64]
 
 NEAR, SHARE = 2.0, 0.06
-"""Distance of stations over which what they are worth is alike [m], and the same as a share of the
-zone: the greater counts. Benches are a few metres long."""
+"""Correlation length of the Gaussian process over stations [m], and the same as a share of the zone
+[-]. The greater of the two is used. Benches are a few metres long."""
 SIZES = 0.35
-"""The same of sizes, as a share of the range of each."""
+"""Correlation length over sizes, as a share of the range of each size [-]."""
 SPREAD = 0.3
-"""Standard deviation of what is left of Z about what is expected, over Z of nothing [-]."""
+"""Prior standard deviation of the remaining risk, over Z without barriers [-]."""
 
 
 class KindSurrogate:
-    """What is left of Z behind each of some barriers of one kind.
+    """Gaussian process for the remaining risk (Z without capital) with barriers of one kind.
 
     Parameters
     ----------
     barriers : sequence of n barriers
-        All of one kind.
+        Barriers of one kind.
     expected : (n,) array
-        What they are expected to leave of Z, their own cost not included [EUR per m and year].
+        Prior mean of the remaining risk with each barrier [EUR per m and year].
     nothing : float
-        Z of nothing [EUR per m and year].
+        Z without barriers [EUR per m and year].
     length : float
         Length of the zone [m].
     """
@@ -63,7 +65,7 @@ class KindSurrogate:
     ):
         table = np.array([b.numbers for b in barriers])
         scale = SIZES * np.maximum(np.ptp(table, axis=0), 1e-9)
-        mesh = isinstance(barriers[0], Mesh)  # options have nothing to do with each other
+        mesh = isinstance(barriers[0], Mesh)  # options of mesh are not correlated
         scale[0] = 1e-6 if mesh else max(NEAR, SHARE * length)
         self._table = table / scale
         self._prior, self._variance = expected, (SPREAD * nothing) ** 2
@@ -71,11 +73,11 @@ class KindSurrogate:
         self.mean, self.deviation = expected, np.full(len(barriers), SPREAD * nothing)
 
     def knows(self, barrier: Barrier) -> bool:
-        """Tell whether a barrier is one of them."""
+        """Return whether a barrier is one of those of the process."""
         return barrier in self._index
 
     def learn(self, seen: Sequence[tuple[Barrier, float, float]]) -> None:
-        """Learn from barriers, what each left of Z, and the variance of that; all over again."""
+        """Compute mean and deviation anew from barriers, their remaining risks and variances."""
         rows = np.array([self._index[barrier] for barrier, _, _ in seen], dtype=np.int64)
         if not len(rows):
             return
@@ -87,27 +89,27 @@ class KindSurrogate:
         self.deviation = np.sqrt(np.maximum(self._variance - explained, 0.0))
 
     def _alike(self, rows: NDArray[np.int64]) -> Floats:
-        """Return the covariance of some barriers with all, (m, n)."""
+        """Return the covariance of some barriers with all barriers, (m, n)."""
         apart = self._table[rows][:, None] - self._table
         alike: Floats = self._variance * np.exp(-0.5 * np.square(apart).sum(axis=2))
         return alike
 
 
 SPREAD_OUT = 0.5
-"""Share of the budget that goes to barriers as different as can be."""
+"""Share of the budget for the first barriers, which are as different as possible [-]."""
 BATCHES = 4
-"""In how many batches the rest goes to those that promise most."""
+"""Number of batches in which the rest of this budget is spent on the most promising barriers."""
 TRUST = {"fence": 0.7, "mesh": 1.0}
-"""How far what the ensemble says of a kind is believed beforehand; of all others by half."""
+"""Weight of the estimate from the ensemble in the prior mean of a kind [-]; 0.5 for other kinds."""
 NEIGHBOURHOOD = 0.05
-"""Distance within which a ditch is dug at the toe [m]."""
+"""Distance from the toe within which a ditch counts as a ditch at the toe [m]."""
 BOLD = 1.0
-"""Standard deviations below its mean that a barrier is hoped to be."""
+"""Number of standard deviations below the mean by which barriers are ranked for evaluation [-]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Kind:
-    """All barriers of a kind: what they cost a year, and what is known of the rest of Z."""
+    """All barriers of a kind with their annual costs and the surrogate of their remaining risk."""
 
     barriers: list[Barrier]
     annual: list[float]
@@ -115,7 +117,7 @@ class Kind:
     order: list[int]
 
     def believed(self, hope: float) -> list[tuple[float, Barrier]]:
-        """Return Z of every barrier, `hope` standard deviations below its mean."""
+        """Return Z of every barrier at `hope` standard deviations below its mean."""
         left = self.surface.mean - hope * self.surface.deviation
         return list(zip((np.array(self.annual) + left).tolist(), self.barriers, strict=True))
 
@@ -128,7 +130,7 @@ def scout(
     budget: int,
     first: int,
 ) -> list[Arm]:
-    """Return what was looked at, singles and the `known`, what is believed to be the best first."""
+    """Evaluate single barriers and the `known` layouts; return them by estimate, the best first."""
     problem = track.problem
     lists = {kind: menu.lone(kind) for kind in problem.kinds}
     kinds = [_kind(track, menu, ensemble, barriers) for barriers in lists.values() if barriers]
@@ -151,7 +153,7 @@ def scout(
 
 
 def _kind(track: Track, menu: Menu, ensemble: CrossingEnsemble, barriers: list[Barrier]) -> Kind:
-    """Return a kind with what the ensemble says of its barriers."""
+    """Return a kind with the estimates of its barriers from the ensemble."""
     problem, nothing = track.problem, track.problem.nothing.objective
     annual = np.array([problem.site.annual((b,)) for b in barriers])
     barriers = [b for b, cost in zip(barriers, annual, strict=True) if cost < nothing] or barriers
@@ -169,7 +171,7 @@ def _kind(track: Track, menu: Menu, ensemble: CrossingEnsemble, barriers: list[B
 
 
 def _apart(track: Track, kinds: Sequence[Kind], n: int) -> list[Layout]:
-    """Return different barriers of every kind."""
+    """Return layouts with one barrier each, about `n` in all, which differ as much as possible."""
     each = max(2, n // max(1, len(kinds)))
     toe = track.problem.site.slope.toe
     lists = [_different(kind, each, toe) for kind in kinds]
@@ -178,10 +180,10 @@ def _apart(track: Track, kinds: Sequence[Kind], n: int) -> list[Layout]:
 
 
 def _different(kind: Kind, n: int, toe: float) -> list[Barrier]:
-    """Return about `n` barriers of a kind as different as can be, half of them where they belong.
+    """Return about `n` barriers of a kind that differ as much as possible.
 
-    Of fences that half are those of the best size at their station, as the ensemble sees it; of
-    ditches those that are dug at the toe, the deepest of each width.
+    For fences, half of them have the best size at their station according to the ensemble. For
+    ditches, half of them are at the toe and have the greatest depth for their width.
     """
     own: dict[float, Barrier] = {}
     if kind.barriers[0].kind == "fence":
@@ -196,7 +198,7 @@ def _different(kind: Kind, n: int, toe: float) -> list[Barrier]:
 
 
 def _learn(kinds: Sequence[Kind], arms: Sequence[Arm], nothing: Arm) -> None:
-    """Let every kind learn from what was seen of its barriers."""
+    """Update the surrogate of every kind with the evaluations of its barriers."""
     for kind in kinds:
         kind.surface.learn(_seen(kind, arms, nothing))
 
@@ -210,7 +212,10 @@ def _seen(kind: Kind, arms: Sequence[Arm], nothing: Arm) -> list[tuple[Barrier, 
 
 
 def _promising(kinds: Sequence[Kind], arms: Sequence[Arm], n: int, nothing: Arm) -> list[Layout]:
-    """Return the `n` barriers that may be the best, each as if the ones before were as expected."""
+    """Return the `n` most promising barriers.
+
+    After each choice, the surrogate is updated as if the barrier had its expected value.
+    """
     seen = {id(kind): _seen(kind, arms, nothing) for kind in kinds}
     taken = {arm.layout for arm in arms}
     noise = float(np.median([error(arm, nothing) for arm in arms])) if arms else 1.0
@@ -235,31 +240,31 @@ def _promising(kinds: Sequence[Kind], arms: Sequence[Arm], n: int, nothing: Arm)
 
 
 SINGLES, PAIRS, NEARBY, FINAL = 0.36, 0.14, 0.30, 0.10
-"""Shares of the budget: singles, races of pairs and of neighbours, and the choice among the best;
-the rest is for the ensemble and the report."""
+"""Shares of the budget for single barriers, for the race of pairs, for the races of neighbours and
+for the final [-]. The rest is for the ensemble and the report."""
 
 RELEASES = 30
-"""Releases an event, on average, before anything is dropped."""
+"""Mean number of releases per event before a candidate may be dropped."""
 FEWEST = 8
-"""The same with a small budget."""
+"""The same number for a small budget."""
 FIELD = 150
-"""A budget that is this many times as large affords `RELEASES`."""
+"""Least budget per event for `RELEASES`, as a multiple of `RELEASES`."""
 
 FINALISTS = 7
-"""Layouts of the final: nothing, the rule's and the constant among them."""
+"""Number of layouts in the final, including no barrier, the rule and the constant."""
 LEADERS = 5
-"""Layouts that a race of pairs keeps."""
+"""Number of layouts that the race of pairs keeps."""
 ROUNDS = 6
-"""Rounds of neighbours: at each at which none is better the step is halved."""
+"""Largest number of rounds of neighbours. The step is halved after a round without improvement."""
 LEAST = 8
-"""Candidates that a round of neighbours should have."""
+"""Desired number of candidates in a round of neighbours."""
 ADDED = 3
-"""Barriers that are tried beside the best layout in every round."""
+"""Number of additional barriers that are tried with the best layout in every round."""
 AS_GOOD = 0.02
-"""Share of Z of nothing within which of the best a layout with fewer barriers is built instead:
-a final cannot tell less apart."""
+"""Largest excess of Z over the best, divided by Z without barriers, with which a layout with fewer
+barriers is preferred [-]. A final cannot resolve smaller differences."""
 BEST_OF = 8
-"""Singles of a kind of which pairs are made."""
+"""Number of single barriers of each kind from which pairs are formed."""
 
 
 def design(
@@ -271,7 +276,7 @@ def design(
 ) -> DesignResult:
     """Return the best layout that racing finds within the budget.
 
-    With a budget that is too small for races, it is the best of the layouts that need no search.
+    If the budget is too small for races, the best of the starting layouts is returned.
 
     Raises
     ------
@@ -281,7 +286,7 @@ def design(
     ledger = Ledger(problem, simulations, seed, progress, store)
     events = len(problem.site.events)
     first = min(RELEASES, max(FEWEST, simulations // (FIELD * events))) * events
-    if simulations < 27 * first:  # or it would not pay for the final
+    if simulations < 27 * first:  # the budget would not suffice for the final
         return search(ledger, offered(ledger))
     menu, track = Menu(problem), Track(ledger)
     ensemble = ensemble_for(ledger, menu.stations)
@@ -304,7 +309,7 @@ def design(
 
 
 def simplest(ends: Sequence[Arm], nothing: Arm) -> Layout:
-    """Return the layout of the best, or of one as good with fewer barriers (but not none)."""
+    """Return the best layout, or one that is nearly as good and has fewer barriers (at least 1)."""
     if not ends:
         return ()
     most = ends[0].objective() + AS_GOOD * nothing.objective()
@@ -319,10 +324,10 @@ def simplest(ends: Sequence[Arm], nothing: Arm) -> Layout:
 def foretold(
     problem: DesignProblem, arms: Sequence[Arm], others: Sequence[Arm], nothing: Arm, n: int
 ) -> list[Layout]:
-    """Return at most `n` layouts of one arm and another together, the most promising first.
+    """Return at most `n` combinations of two arms, with the lowest predicted Z first.
 
-    Of an event the mean bill of both is foretold as the product of theirs over that of nothing. At
-    most a third are of the same kinds.
+    The mean bill of an event with both is predicted as the product of their mean bills divided by
+    the bill without barriers. At most a third of the combinations have the same kinds of barriers.
     """
     firsts, seconds = _first_of_kinds(arms, BEST_OF), _first_of_kinds(others, BEST_OF)
     found: dict[Layout, float] = {}
@@ -348,7 +353,7 @@ def foretold(
 
 
 def _first_of_kinds(arms: Sequence[Arm], n: int) -> list[Arm]:
-    """Return the first `n` arms of every kind, nothing left out; the best come first."""
+    """Return the first `n` arms of every combination of kinds, without the arm of no barrier."""
     kept: dict[tuple[str, ...], list[Arm]] = {}
     for arm in arms:
         if arm.layout and len(kept.setdefault(arm.kinds, [])) < n:
@@ -359,7 +364,7 @@ def _first_of_kinds(arms: Sequence[Arm], n: int) -> list[Arm]:
 def nearby(
     track: Track, menu: Menu, best: list[Arm], lone: list[Arm], budget: int, first: int
 ) -> list[Arm]:
-    """Return the best of rounds of neighbours around the best, the best first."""
+    """Return the best candidates of several rounds of neighbours of the best, the best first."""
     zone = menu.zone
     step, level = max(FINEST, (zone.end - zone.start) / 16.0), 2
     centres, raced, tried = _leaders(best), best, set(track.seen)
@@ -384,19 +389,19 @@ def nearby(
 
 
 def _leaders(arms: Sequence[Arm]) -> list[Arm]:
-    """Return the best arm, and the best one of other kinds; the best come first."""
+    """Return the best arm and then the best arm with other kinds of barriers."""
     return _first_of_kinds(arms, 1)[:2]
 
 
 def _fewer(layout: Layout) -> list[Layout]:
-    """Return a layout without each of its barriers."""
+    """Return the layouts that result if one barrier of a layout is removed."""
     return [(*layout[:i], *layout[i + 1 :]) for i in range(len(layout))]
 
 
 def _around(
     track: Track, menu: Menu, centres: list[Arm], lone: list[Arm], step: float, level: int
 ) -> Iterator[Iterable[Layout]]:
-    """Yield what may be tried: a barrier more, one less, neighbours of the best and of the next."""
+    """Yield groups of candidates: one barrier more, one less, and neighbours of the centres."""
     layout = centres[0].layout
     yield foretold(menu.problem, centres[:1], lone, track.nothing, ADDED)
     if len(layout) > 1:

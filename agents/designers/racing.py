@@ -1,8 +1,8 @@
 """Sequential halving of candidates on common releases (Karnin et al. 2013, ICML 28, 1238-1246).
 
-All candidates of a race meet the same fresh releases; what each cost in them is kept event by
-event. After each round the better part goes on, with more releases each; who is far behind goes at
-once.
+All candidates of a race are evaluated on the same new releases, and their costs are kept by event.
+After each round, the better candidates continue with more releases each. Candidates that are far
+behind the best are dropped at once.
 """
 
 from __future__ import annotations
@@ -22,26 +22,29 @@ from rigdda.envs.intervals import CONFIDENCE, upper_bound
 Floats = NDArray[np.float64]
 
 PLANNED = 1000
-"""Releases of the plan whose shares are taken: of few, every event has two."""
+"""Number of releases of the plan from which the shares of events are taken. In a plan with few
+releases, every event would have two."""
 LEFT = 0.3
-"""Least share of the releases that an event has without leaders that leaders leave to it [-]: else
-what they stop would not tell them from what does not stop it."""
+"""Least factor by which the leaders may reduce the releases of an event [-]. Without this limit, no
+releases would remain to distinguish candidates that stop the event from those that do not."""
 TRUSTED = 8
-"""Releases of an event below which a candidate borrows from the mean without barriers."""
+"""Number of releases of an event below which the mean of a candidate is combined with the mean
+without barriers."""
 
 
 class Arm:
-    """A layout and its releases of this race.
+    """A candidate: a layout and its releases in a race.
 
-    Z is estimated as in `DesignProblem`: what the barriers cost a year, and for each event its rate
-    times the mean bill.
+    Z is estimated as in `DesignProblem`. It is the annual cost of the barriers plus the sum over
+    all events of the rate times the mean bill.
 
     Attributes
     ----------
     releases : dict of str to list of Release
-        By name of event, in the order of the seeds, the same for all candidates of a race.
+        Releases by name of event, in the order of the seeds, which are the same for all candidates
+        of a race.
     scale : float
-        What its mean bills are believed to be, over what they were.
+        Expected mean bill divided by the observed mean bill [-].
     """
 
     def __init__(self, problem: DesignProblem, layout: Layout, strict: bool = False):
@@ -56,17 +59,17 @@ class Arm:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kinds of its barriers, downhill."""
+        """Kinds of its barriers, going downhill."""
         return tuple(barrier.kind for barrier in self.layout)
 
     def add(self, releases: Mapping[str, Iterable[Release]]) -> None:
-        """Take more releases."""
+        """Add releases."""
         for name, more in releases.items():
             self.releases[name] += more
         self._arrays = {}
 
     def bills(self, event: str) -> Floats:
-        """Return what each release of an event cost, (n,) [EUR]; without prices its debris [m3]."""
+        """Return the bill of each release of an event, (n,) [EUR], or its debris without prices."""
         if event not in self._arrays:
             own = self.releases[event]
             found = [r.bill if self.priced else r.volume for r in own]
@@ -74,33 +77,37 @@ class Arm:
         return self._arrays[event]
 
     def mean(self, event: str) -> float:
-        """Return the mean bill of an event [EUR]; of few releases drawn towards that of nothing."""
+        """Return the mean bill of an event [EUR].
+
+        With few releases, it is a weighted mean with the bill without barriers.
+        """
         own = self.bills(event)
         if len(own) >= TRUSTED:
             return float(own.mean())
         return float((own.sum() + (TRUSTED - len(own)) * self._without(event)) / TRUSTED)
 
     def _without(self, event: str) -> float:
-        """Return the mean bill of an event without barriers, known of the problem [EUR]."""
+        """Return the mean bill of an event without barriers, as known from the problem [EUR]."""
         rate = self.problem.site.rate(event, ())
         if not self.priced or rate == 0.0:
             return 0.0
         return self.problem.nothing.by_event[event] / rate
 
     def objective(self) -> float:
-        """Return Z [EUR per m and year]."""
+        """Return the estimate of Z [EUR per m and year]."""
         events = self.rates.items()
         return self.annual + math.fsum(rate * self.mean(name) for name, rate in events)
 
     def spread(self, event: str) -> float:
-        """Return the standard deviation of the bill of an event [EUR], 0 of less than two."""
+        """Return the standard deviation of the bill of an event [EUR], 0 for fewer than two."""
         own = self.bills(event)
         return float(own.std(ddof=1)) if len(own) > 1 else 0.0
 
     def shortfall(self) -> float:
-        """Return the most by which a design event exceeds a target, 0 if none does.
+        """Return the largest excess of a design event over a target [-], 0 if there is none.
 
-        By its estimate or, if it is to be strict, by its upper bound: 1 without releases.
+        The excess is that of the estimate or, if `strict`, of its upper bound. The upper bound is 1
+        without releases.
         """
         targets = self.problem.targets
         over = [0.0]
@@ -115,12 +122,16 @@ class Arm:
         return max(over)
 
     def key(self) -> tuple[float, float]:
-        """Return what candidates are ranked by: how far a target is missed, then Z."""
+        """Return the sort key of candidates: the amount by which a target is missed, then Z."""
         return self.shortfall(), self.objective()
 
 
 def error(arm: Arm, nothing: Arm) -> float:
-    """Return the variance of the estimate of Z of an arm, as if nothing had happened once more."""
+    """Return the variance of the estimate of Z of an arm.
+
+    The sample of each event is extended by one release that deviates from the mean by the standard
+    deviation without barriers.
+    """
     total = 0.0
     for name, rate in arm.rates.items():
         own = arm.bills(name)
@@ -131,10 +142,11 @@ def error(arm: Arm, nothing: Arm) -> float:
 
 
 def behind(arm: Arm, other: Arm, nothing: Arm) -> float:
-    """Return by how many standard errors an arm is behind another of the same releases.
+    """Return by how many standard errors an arm is behind another arm with the same releases.
 
-    The variance of the difference of an event is that of a sample with one more release, which
-    differs by the spread of nothing: none of n is not never.
+    The sample of the difference in each event is extended by one release that deviates by the
+    standard deviation without barriers, because zero occurrences in n releases do not mean that the
+    probability is zero.
     """
     variance = 0.0
     for name, rate in arm.rates.items():
@@ -152,14 +164,15 @@ def behind(arm: Arm, other: Arm, nothing: Arm) -> float:
 def allocation(
     problem: DesignProblem, n: int, leaders: Sequence[Arm], nothing: Arm
 ) -> dict[str, int]:
-    """Return how many of `n` releases go to each event: fewer to what the leaders stop.
+    """Return the number of releases of each event, `n` in all, with fewer for stopped events.
 
-    Releases go where rate times spread is large, over the root of their time, see
-    `DesignProblem.allocation`. An event whose cost with the leaders spreads less than without them
-    has less: what the leaders stop tells them apart no more. An event that would have no more than
-    the two of every plan has none: a large mass takes as long as hundreds of blocks, and is the
-    same for all candidates until there are releases enough to tell. If something is asked of design
-    events, each has as many as can tell whether it is met, as far as half of all go.
+    The basis is `DesignProblem.allocation`, which is proportional to the rate of an event times the
+    standard deviation of its cost over the square root of its computing time. An event has fewer
+    releases if its cost has a smaller standard deviation with the leaders than without barriers,
+    because it then does not distinguish the candidates. An event with no more than the two releases
+    of every plan has none. The simulation of a large mass takes as long as that of hundreds of
+    blocks, and a few releases of it do not distinguish candidates. If there are targets, each
+    design event has enough releases to decide whether they are met, up to half of all releases.
     """
     shares = {name: float(count) for name, count in problem.allocation(max(n, PLANNED)).items()}
     for name in shares:
@@ -173,9 +186,10 @@ def allocation(
 
 
 def _floors(problem: DesignProblem, n: int) -> dict[str, int]:
-    """Return how many of `n` releases each design event has at least, if a target is set.
+    """Return the least number of releases of each design event if a target is set.
 
-    So many that a target counts as met if it happens in none, at most an equal share of half.
+    With this number, a target counts as met if the event occurs in none of the releases. The total
+    is at most half of `n`.
     """
     asked = [t for t in (problem.targets.reach, problem.targets.failure) if t is not None]
     design = [event.name for event in problem.site.events if event.design]
@@ -186,7 +200,7 @@ def _floors(problem: DesignProblem, n: int) -> dict[str, int]:
 
 
 def _with_floors(counts: Mapping[str, int], floors: Mapping[str, int], n: int) -> dict[str, int]:
-    """Return counts raised to their floors; the others have less, so that there are at most `n`."""
+    """Return counts raised to their floors, with the others reduced to a total of at most `n`."""
     raised = {name: max(count, floors.get(name, 0)) for name, count in counts.items()}
     spare = {name: count - floors.get(name, 0) for name, count in raised.items()}
     over = max(sum(raised.values()) - n, 0) / max(sum(spare.values()), 1)
@@ -194,26 +208,26 @@ def _with_floors(counts: Mapping[str, int], floors: Mapping[str, int], n: int) -
 
 
 KEPT = 0.4
-"""Share of the candidates that goes on to the next round, at most."""
+"""Largest share of the candidates that continue to the next round [-]."""
 
 HOPELESS = 4.0
-"""Standard errors behind the best with which a candidate goes at once. One that is as good is that
-far behind once in some hundred races of a hundred candidates."""
+"""Number of standard errors behind the best from which a candidate is dropped at once. A candidate
+that is as good as the best is dropped in about one of a hundred races of a hundred candidates."""
 
 PROTECTED = 2
-"""Candidates of every kind that the first round keeps, unless they are hopeless: pairs are made of
-the best of each."""
+"""Number of candidates of every kind that the first round keeps unless they are far behind, because
+pairs are formed from the best of each kind."""
 
 
 class Track:
-    """Where races run: a ledger, and how much of its streams of releases is used up.
+    """Runs races with the releases of a ledger and counts the releases that are used up.
 
     Attributes
     ----------
     nothing : Arm
-        No barriers, with the releases of the first race: what spreads are borrowed from.
+        The candidate without barriers, whose standard deviations are used for other candidates.
     seen : dict of Layout to Arm
-        Every candidate with its releases of the last race that it took part in.
+        Every candidate with its releases of the last race in which it took part.
     """
 
     def __init__(self, ledger: Ledger):
@@ -232,30 +246,30 @@ class Track:
         strict: bool = False,
         leaders: Sequence[Arm] = (),
     ) -> list[Arm]:
-        """Return the best `keep` candidates of a race, the best first; none if none can be paid.
+        """Return the best `keep` candidates of a race, or none if the budget is too small.
 
         Parameters
         ----------
         layouts : iterable of Layout
-            The candidates. If the budget does not pay for the first round of all, the last ones are
-            left out.
+            The candidates. If the budget is too small for a first round of all of them, the last
+            ones are left out.
         budget : int
-            Releases at most.
+            Largest number of releases.
         first : int
-            Releases of each in the first round.
+            Number of releases of each candidate in the first round.
         keep : int
-            How many are wanted.
+            Number of candidates to return, the best first.
         stage : str
             Stream of the releases.
         strict : bool
             Whether a target counts as missed unless its upper bound meets it.
         leaders : sequence of Arm
-            Who led the races before: they tell which events are left.
+            The best candidates of earlier races, which determine the releases of each event.
         """
         budget = min(budget, self.ledger.left)
         end = self.ledger.left - budget
         alive = [Arm(self.problem, layout, strict) for layout in dict.fromkeys(layouts)]
-        if len(alive) > keep:  # a first round of all, and a second one of those it keeps
+        if len(alive) > keep:  # the budget must suffice for a first and a second round
             alive = alive[: max(keep, int(budget / (first * (1.0 + KEPT))))]
         rounds = max(1, math.ceil(math.log(max(1.0, len(alive) / keep)) / -math.log(KEPT)))
         for done in range(rounds):
@@ -269,7 +283,7 @@ class Track:
         return sorted(alive, key=lambda arm: arm.key())[:keep]
 
     def look(self, layouts: Iterable[Layout], each: int, budget: int) -> list[Arm]:
-        """Return candidates that were given as many releases each, as far as a budget goes."""
+        """Return candidates with `each` releases, as many as the budget allows."""
         budget = min(budget, self.ledger.left)
         arms = [Arm(self.problem, layout) for layout in dict.fromkeys(layouts)]
         arms = arms[: budget // max(1, each)]
@@ -278,9 +292,9 @@ class Track:
     def _round(
         self, alive: list[Arm], each: int, end: int, stage: str, leaders: Sequence[Arm]
     ) -> bool:
-        """Give every candidate the same releases; False if they cannot be paid.
+        """Evaluate all candidates on the same releases; return False if the budget is too small.
 
-        Of fences the strongest come first: what they hold serves the weaker ones.
+        Layouts with the strongest fences come first, because weaker fences may reuse their results.
         """
         least = 2 * len(self.problem.site.events)
         room = (self.ledger.left - end) // max(1, len(alive))
@@ -299,7 +313,7 @@ class Track:
         return True
 
     def _survivors(self, alive: list[Arm], keep: int, final: bool, protect: bool) -> list[Arm]:
-        """Return who goes on, the best first."""
+        """Return the candidates that continue, the best first."""
         nothing = self.nothing
         order = sorted(alive, key=lambda arm: arm.key())
         if final:
@@ -317,7 +331,7 @@ class Track:
 
 
 def _strength(arm: Arm) -> float:
-    """Return the class of a candidate's strongest fence [kJ], infinite of nothing."""
+    """Return the class of a candidate's strongest fence [kJ]; infinite without barriers."""
     if not arm.layout:
         return math.inf
     return max((b.energy_class or 0.0 for b in arm.layout if isinstance(b, Fence)), default=0.0)

@@ -1,4 +1,4 @@
-"""Random search: layouts drawn evenly over the decision box. The yardstick of every search."""
+"""Random search with layouts drawn uniformly from the decision box, a baseline for all searches."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def design(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> DesignResult:
-    """Return the best of the random layouts that the budget pays for.
+    """Return the best of as many random layouts as the budget allows.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def design(
 
 
 def _propose(problem: DesignProblem, rng: np.random.Generator) -> Proposals:
-    """Yield random layouts without end."""
+    """Yield an endless sequence of random layouts."""
     low, high = problem.bounds
     while True:
         yield problem.decode(rng.uniform(low, high))

@@ -1,13 +1,15 @@
-"""The engineering rule: the cheapest fence that a code of practice asks for.
+"""The engineering rule: the cheapest fence that a code of practice requires.
 
-UNI 11211-4:2012 (Peila and Ronco 2009, Nat. Hazards Earth Syst. Sci. 9, 1291-1298), values of the
-partial factors from memory: of the blocks of the design events that cross a station, speed and
-height at the 95 % quantile are raised by `SPEED`, the mass by `MASS`. A fence takes
+The rule follows UNI 11211-4:2012 (Peila and Ronco 2009, Nat. Hazards Earth Syst. Sci. 9,
+1291-1298), with values of the partial factors from memory. The design values at a station are the
+95 % quantiles of the blocks of the design events that cross it. Speed and height are multiplied by
+`SPEED` and the mass by `MASS`. A fence must satisfy
 
     E_d = 1/2 m_d v_d^2 < MEL / 1.2,   height >= h_d + freeboard
 
-with a freeboard of the blocks' mean radius, at least 0.5 m. Where none fits, the ditch of Ritchie
-(1963, Highway Research Record 17), else an embankment or a wall as high as the fence.
+with a freeboard equal to the mean radius of the blocks, but at least 0.5 m. If no fence fits, the
+rule uses the ditch of Ritchie (1963, Highway Research Record 17), or else an embankment or a wall
+as high as the fence.
 """
 
 from __future__ import annotations
@@ -30,20 +32,21 @@ from rigdda.envs import DesignProblem
 QUANTILE = 0.95
 
 SPEED = 1.10 * 1.02
-"""Factor on speeds and heights: trajectories that were not calibrated, times good topography."""
+"""Factor on speeds and heights [-]: 1.10 for trajectories without calibration, times 1.02 for good
+topographic data."""
 MASS = 1.02
-"""Factor on the mass: blocks surveyed in detail."""
+"""Factor on the mass, for blocks that were surveyed in detail [-]."""
 ENERGY = 1.2
-"""Factor on the energy that a class takes at its maximum energy level."""
+"""Safety factor on the energy of a class at its maximum energy level (MEL) [-]."""
 FREEBOARD = 0.5
 """Least freeboard [m]."""
 
 COVERED = 0.95
-"""Share of the design blocks that would reach the road which a fence must meet: it does not stand
-uphill of where they start."""
+"""Least share of the design blocks that reach the road which must cross the station of a fence [-].
+It prevents fences uphill of the sources."""
 
 RELEASES = 4000
-"""Releases that a layout which needs no search is evaluated on, at most."""
+"""Largest number of releases for the evaluation of a layout that needs no search."""
 
 RITCHIE = {
     85.0: ((3.7, 1.0), (4.6, 1.2), (6.1, 1.2), (6.1, 1.2)),
@@ -64,7 +67,7 @@ def design(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> DesignResult:
-    """Return the layout of the rule, from one barrier-free ensemble, and its evaluation.
+    """Return the layout of the rule for an ensemble without barriers, and its evaluation.
 
     Raises
     ------
@@ -78,7 +81,7 @@ def design(
 
 
 def rule(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Layout:
-    """Return the layout of the rule, none where no design block reaches the road."""
+    """Return the layout of the rule; it is empty if no design block reaches the road."""
     events = problem.site.events
     design = [i for i, event in enumerate(events) if event.design] or list(range(len(events)))
     asked = demands(ensemble, design)
@@ -91,9 +94,10 @@ def rule(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Layo
 
 
 def demands(ensemble: CrossingEnsemble, events: list[int]) -> list[tuple[float, float, float]]:
-    """Return station [m], energy E_d [J] and height [m] that are asked of a fence, downhill.
+    """Return the station [m], energy E_d [J] and height [m] that a fence needs, going downhill.
 
-    Only stations that enough of the blocks of some events cross which reach the road.
+    Only those stations are returned that are crossed by the share `COVERED` of the blocks of the
+    events which reach the road.
     """
     table = ensemble.crossings
     which = np.isin(ensemble.event[table["release"]], events)
@@ -108,14 +112,14 @@ def demands(ensemble: CrossingEnsemble, events: list[int]) -> list[tuple[float, 
 
 
 def _energy(crossings: NDArray[np.void]) -> float:
-    """Return E_d of some crossings [J]."""
+    """Return the design energy E_d of some crossings [J]."""
     speed = SPEED * np.quantile(crossings["speed"], QUANTILE)
     mass = MASS * np.quantile(crossings["mass"], QUANTILE)
     return float(0.5 * mass * speed**2)
 
 
 def _height(crossings: NDArray[np.void]) -> float:
-    """Return the height that some crossings ask for [m]."""
+    """Return the height of a fence that some crossings require [m]."""
     freeboard = max(FREEBOARD, float(crossings["radius"].mean()))
     return float(SPEED * np.quantile(crossings["height"], QUANTILE)) + freeboard
 
@@ -125,7 +129,7 @@ def _may(menu: Menu, kind: str) -> bool:
 
 
 def _fences(menu: Menu, x: float, energy: float, height: float) -> Iterator[Fence]:
-    """Yield the fences that may stand at a chainage and take an energy at a height."""
+    """Yield the fences that may be built at a chainage and have enough energy and height."""
     wanted = math.ceil(2.0 * height - 1e-9) / 2.0  # in steps of half a metre
     for name, row in FENCE_CLASSES.items():
         tall = max(row.lowest, wanted)
@@ -136,7 +140,7 @@ def _fences(menu: Menu, x: float, energy: float, height: float) -> Iterator[Fenc
 
 
 def instead(menu: Menu, x: float, height: float) -> Layout:
-    """Return what is built where no fence fits: a ditch at the toe, else what is as high."""
+    """Return the layout if no fence fits: a ditch at the toe, or else a barrier of the height."""
     zone, toe = menu.zone, menu.problem.site.slope.toe
     width, depth = ritchie(menu.problem.site)
     width = min(max(width, zone.min_width), zone.max_width)
@@ -155,12 +159,12 @@ def instead(menu: Menu, x: float, height: float) -> Layout:
 
 
 def ritchie(site: Site) -> tuple[float, float]:
-    """Return width and depth of the ditch of Ritchie's table for a site's slope [m]."""
+    """Return the width and depth of the ditch in Ritchie's table for the slope of a site [m]."""
     points = np.array(site.slope.points)
     toe = site.slope.toe
     above = points[points[:, 0] < toe]
     rock = max(above[:, 1].max() - np.interp(toe, *points.T), 0.1)
-    crest = above[above[:, 1] >= above[:, 1].max() - 0.1 * rock][-1]  # from which the cut falls
+    crest = above[above[:, 1] >= above[:, 1].max() - 0.1 * rock][-1]  # the crest of the cut
     steep = math.degrees(math.atan2(rock, max(toe - crest[0], 1e-3)))
     row = RITCHIE[min(RITCHIE, key=lambda angle: abs(angle - steep))]
     return row[int(np.searchsorted(HIGH, rock))]

@@ -1,6 +1,6 @@
-"""Evaluations on disk, so that a search that was killed goes on where it stopped.
+"""Storage of evaluations on disk, so that an interrupted search can continue.
 
-A folder of results belongs to one problem, which is written into it.
+A folder of results belongs to one problem, which is recorded in the folder.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ FILE = "problem.json"
 
 
 def claim(folder: Path, problem: DesignProblem, *files: str) -> None:
-    """Write `problem.json` into a folder, so that it is known again.
+    """Write `problem.json` into a folder to record the problem of its results.
 
     Parameters
     ----------
     folder : path
-        Where results are to be written.
+        The folder for the results.
     problem : DesignProblem
-        What they answer.
+        The problem.
     files : str
-        Names of results that would be written over.
+        Names of the files with results that would be overwritten.
 
     Raises
     ------
     BadInput
-        If the folder holds results of another problem, or of one that it does not tell.
+        If the folder contains results of another problem or of an unknown problem.
     """
     file, asked = folder / FILE, posed(problem)
     if file.exists():
@@ -47,17 +47,17 @@ def claim(folder: Path, problem: DesignProblem, *files: str) -> None:
         other = _differ(known, asked) if known else f"{FILE}, which is damaged"
     else:
         found = [name for name in files if (folder / name).exists()]
-        other = f"{found[0]} of a problem that it does not tell" if found else ""
+        other = f"{found[0]} of an unknown problem" if found else ""
     if other:
-        raise BadInput("--out", str(folder), f"it holds {other}: name another folder")
+        raise BadInput("--out", str(folder), f"it contains {other}: name another folder")
     with atomic(file) as part:
         part.write_text(json.dumps(asked, indent=2) + "\n", encoding="utf-8")
 
 
 def posed(problem: DesignProblem) -> dict[str, Any]:
-    """Return all that makes a problem another one, as plain values.
+    """Return the values that identify a problem.
 
-    `content` is a hash of the site with its prices and rates.
+    `content` is a hash of the site including its prices and rates.
     """
     return {
         "site": problem.site.name,
@@ -71,7 +71,7 @@ def posed(problem: DesignProblem) -> dict[str, Any]:
 
 
 def _read(file: Path) -> dict[str, Any]:
-    """Return what a folder says that it is of, nothing if that cannot be read."""
+    """Return the problem that is recorded in a file, or an empty mapping if it is unreadable."""
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
     except (ValueError, OSError):
@@ -80,7 +80,7 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 def _differ(known: dict[str, Any], asked: dict[str, Any]) -> str:
-    """Return in words what a folder holds instead of what is asked; nothing if it is the same."""
+    """Return a text on how a recorded problem differs from the requested one; empty if equal."""
     if known == asked:
         return ""
     for name, value in asked.items():
@@ -92,19 +92,19 @@ def _differ(known: dict[str, Any], asked: dict[str, Any]) -> str:
 
 
 CONSTANTS = {"Infinity": math.inf, "-Infinity": -math.inf, "NaN": math.nan}
-"""Constants of JSON lines: an interval may have no end, an event no release. One NaN for all, so
-that what is read equals what was written."""
+"""Non-finite constants in JSON lines, which occur for intervals without an end and events without
+releases. The same NaN object is used everywhere, so that the values read equal those written."""
 
 
 LENT = (0, 1)
-"""Seeds of the releases without barriers that stand for those of an event which has none."""
+"""Seeds of releases without barriers that are used for an event without releases."""
 
 
 class Release(NamedTuple):
-    """What is kept of a release.
+    """Stored values of a release.
 
-    Its bill [EUR per occurrence], the volume that came onto the road [m3], whether a block reached
-    the road, whether a barrier failed.
+    These are its bill [EUR per occurrence], the volume on the road [m3], whether a block reached
+    the road and whether a barrier failed.
     """
 
     bill: float
@@ -115,31 +115,31 @@ class Release(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class StoredEvaluation:
-    """Releases of a layout, by event, and what they say of it together."""
+    """Releases of a layout by event, and their joint evaluation."""
 
     evaluation: Evaluation
     releases: dict[str, tuple[Release, ...]]
 
 
 class Store:
-    """Evaluates layouts and keeps what they were worth, looked up by all that determines it.
+    """Evaluates layouts and stores the evaluations.
 
-    A search asks for the same layouts on the same seeds when it is run again; what the store has
-    is handed back instead of simulated. An entry of another site, problem, seed or version of the
-    mechanics is never handed back. Evaluations of a store have no outcomes, whether they were just
-    simulated or not.
+    When a search is run again, it requests the same layouts on the same seeds. Evaluations in the
+    store are then returned without a simulation. They are identified by everything that determines
+    them, so that an entry of another site, problem, seed or version of the mechanics is never
+    returned. Evaluations from a store never contain outcomes.
 
     Parameters
     ----------
     path : path, optional
-        A file of JSON lines, one an evaluation, appended to and flushed at once; a last line that
-        a kill left unfinished is cut off, and lines whose checksum does not fit are passed over.
-        None: memory only.
+        A file with one JSON line per evaluation, which is appended at once. An incomplete last
+        line, as an interruption leaves it, is cut off. Lines with a wrong checksum are skipped. If
+        None, evaluations are kept in memory only.
 
     Attributes
     ----------
     simulated, resumed : int
-        Releases evaluated so far, and releases taken from the file instead.
+        Number of releases simulated so far, and number of releases taken from the file.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None = None):
@@ -151,7 +151,7 @@ class Store:
             self._read(self.path)
 
     def _read(self, path: Path) -> None:
-        """Read the whole lines of the file and cut off a last one that is not whole."""
+        """Read the complete lines of the file and cut off an incomplete last line."""
         text = path.read_bytes()
         whole = text.rfind(b"\n") + 1
         for line in text[:whole].splitlines():
@@ -165,12 +165,12 @@ class Store:
         os.truncate(path, whole)
 
     def evaluate(self, problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> Evaluation:
-        """Return the evaluation of a layout on release seeds, simulated or as it was kept.
+        """Return the evaluation of a layout on release seeds from the store or a simulation.
 
         Raises
         ------
         BadInput, Diverged
-            As `DesignProblem.evaluate` does.
+            The same errors as `DesignProblem.evaluate`.
         """
         drawn = tuple(seeds)
 
@@ -183,18 +183,22 @@ class Store:
     def sample(
         self, problem: DesignProblem, layout: Layout, seeds: Mapping[str, Sequence[int]]
     ) -> StoredEvaluation:
-        """Return what releases of some events cost with a layout, simulated or as it was kept.
+        """Return releases of some events with a layout from the store or a simulation.
 
         Parameters
         ----------
+        problem : DesignProblem
+            The problem.
+        layout : Layout
+            The layout.
         seeds : mapping of str to sequence of int
-            Release seeds by name of event; of every event as many as are wanted. The evaluation
-            takes an event that has none as if nothing stood.
+            Release seeds by name of event, any number for each event. The evaluation uses releases
+            without barriers for an event that has no seeds.
 
         Raises
         ------
         BadInput, Diverged
-            As `DesignProblem.sample` does.
+            The same errors as `DesignProblem.sample`.
         """
         asked = {name: tuple(drawn) for name, drawn in seeds.items()}
 
@@ -215,7 +219,7 @@ class Store:
     def _recall(
         self, key: str, count: int, simulate: Callable[[], StoredEvaluation]
     ) -> StoredEvaluation:
-        """Return what is known by a key, or simulate it and keep it."""
+        """Return the stored evaluation with a key, or simulate and store it."""
         if key in self._known:
             self.resumed += count if key in self._kept else 0
             return self._known[key]
@@ -232,18 +236,18 @@ class Store:
 
 
 def _release(problem: DesignProblem, layout: Layout, outcome: Outcome) -> Release:
-    """Return what is kept of an outcome."""
+    """Return the stored values of an outcome."""
     bill = problem.site.bill(layout, outcome)
     failed = any(barrier.failed for barrier in outcome.barriers)
     return Release(bill.harm + bill.repair, outcome.road_volume, outcome.reached, failed)
 
 
 def _sum(key: str, data: Any) -> str:
-    """Return a checksum of a line, by which damage is noticed."""
+    """Return the checksum of a line, which detects damage."""
     return hashlib.sha256((key + json.dumps(data)).encode()).hexdigest()[:16]
 
 
 def _key(problem: DesignProblem, layout: Layout, seeds: Any) -> str:
-    """Return a hash of all that an evaluation depends on."""
+    """Return a hash of everything that an evaluation depends on."""
     asked = [__version__, mechanics(), problem.site, problem.targets, list(layout), seeds]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:32]

@@ -1,8 +1,8 @@
-"""Tree-structured Parzen estimator (Bergstra et al. 2011, NeurIPS 24; Optuna), ask and tell.
+"""Tree-structured Parzen estimator (Bergstra et al. 2011, NeurIPS 24; Optuna).
 
-The decision vector is given to Optuna as numbers in [-1, 1] and, of several kinds, a choice. The
-search is told first what one barrier-free ensemble suggests, see
-`rigdda.agents.designers.convex.starts`.
+The decision vector is passed to Optuna as numbers in [-1, 1] and, if there are several kinds of
+barrier, a categorical choice. The first layouts are those that an ensemble of releases without
+barriers suggests (see `rigdda.agents.designers.convex.starts`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ NAMES = ("presence", "station", "height", "size")
 
 
 def decision_space(problem: DesignProblem) -> dict[str, BaseDistribution]:
-    """Return the distributions of a problem's parameters, those of slot i named with its number."""
+    """Return the distributions of the parameters by name; names end with the number of the slot."""
     from optuna.distributions import CategoricalDistribution, FloatDistribution
 
     out: dict[str, BaseDistribution] = {}
@@ -47,7 +47,7 @@ def decision_space(problem: DesignProblem) -> dict[str, BaseDistribution]:
 
 
 def vector(problem: DesignProblem, parameters: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Return the (size,) vector that parameters stand for."""
+    """Return the decision vector (size,) for the given parameters."""
     slots = np.full((problem.max_barriers, slot_size(problem.kinds)), -1.0)
     for i, slot in enumerate(slots):
         slot[:NUMBERS] = [parameters[f"{name} {i}"] for name in NAMES]
@@ -57,7 +57,7 @@ def vector(problem: DesignProblem, parameters: Mapping[str, Any]) -> NDArray[np.
 
 
 def parameters(problem: DesignProblem, layout: Layout) -> dict[str, Any]:
-    """Return the parameters of a layout; `vector` and `decode` give it back."""
+    """Return the parameters of a layout; `vector` and `decode` are the inverse."""
     out: dict[str, Any] = {}
     slots = problem.encode(layout).reshape(problem.max_barriers, -1)
     for i, slot in enumerate(slots):
@@ -68,7 +68,8 @@ def parameters(problem: DesignProblem, layout: Layout) -> dict[str, Any]:
 
 
 DRAWN = 10
-"""Layouts, the starts among them, before the estimator is trusted: Optuna's default."""
+"""Number of layouts, including the starting layouts, before the estimator is used: the default of
+Optuna."""
 
 
 def design(
@@ -90,7 +91,7 @@ def design(
 
 
 def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:
-    """Yield the starts, then what the estimator samples, without end."""
+    """Yield the starting layouts, then an endless sequence of samples of the estimator."""
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)

@@ -1,1 +1,1 @@
-"""Reports of designs: tables, findings in words, pictures."""
+"""Reports of designs: tables, findings in words and pictures."""

@@ -1,4 +1,4 @@
-"""What a design says beyond its numbers: what limits it, what fails, what is undecided."""
+"""Findings of a design in words: its limits, failures of barriers and undecided targets."""
 
 from __future__ import annotations
 
@@ -14,62 +14,62 @@ from rigdda.envs.siting import Room
 
 
 def unbuildable(site: Site, layout: Layout) -> str:
-    """Return in words why `design` would refuse a layout, nothing if it would not."""
+    """Return a text that says why a layout may not be built, or an empty text if it may."""
     try:
         Room(site, site.barrier_zone).check_layout(layout, list(KINDS), len(layout))
     except BadInput as error:
-        return f"is simulated as given, but could not be built: {error}"
+        return f"is simulated as given but may not be built: {error}"
     return ""
 
 
 def of_layout(site: Site, layout: Layout, event: str | None) -> str:
-    """Return in words what is to be known of a layout in releases of an event, or by rate."""
+    """Return notes on the simulation of a layout; `event` is None if events are drawn by rate."""
     found = unbuildable(site, layout)
     words = [f"the layout {found}"] if found else []
     if event is None and any(isinstance(barrier, Mesh) for barrier in layout):
         words.append(
-            "mesh makes events rarer but does not change a release: here events are drawn by their "
-            "rates without mesh; `design` and `study` take mesh into account"
+            "mesh makes events rarer but does not change a release: this command draws events by "
+            "their rates without mesh; `design` and `study` take mesh into account"
         )
     return "; ".join(words)
 
 
 def unfitted(site: Site) -> str:
-    """Return in words which surfaces the lumped-mass model knows by its defaults only."""
+    """Return a text that names the surfaces with default coefficients of the lumped-mass model."""
     names = sorted({*site.slope.chain()[1]} - set(site.lumped))
     if not names:
         return ""
     return (
         f"the rebound from {', '.join(names)} uses default coefficients that were not fitted to "
-        "observations (see [lumped.NAME]): real blocks may run out much less or much farther"
+        "observations (see [lumped.NAME]); the actual run-outs may be much shorter or longer"
     )
 
 
 SURE = 0.05
-"""Share of its design events in which a barrier may fail without a word: its upper bound."""
+"""Upper bound of the probability of failure in a design event above which it is reported [-]."""
 
 PART = 1 / 3
-"""Share of what is left from which on an event is said to make it."""
+"""Least share of the remaining risk for which an event is named as its cause [-]."""
 
 
 def worst(evaluation: Evaluation) -> str | None:
-    """Return the event that makes most of what is left of the risk, None if nothing is left."""
+    """Return the event with the largest remaining harm and repair, or None if there is none."""
     left = evaluation.by_event
     most = max(left, key=lambda name: left[name], default=None)
     return most if most is not None and left[most] > 0.0 else None
 
 
 def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: str) -> str:
-    """Return one line that says what limits the answer.
+    """Return one line that says what limits the result.
 
     Parameters
     ----------
     result : DesignResult
-        What the designer found.
+        Result of the designer.
     cases : sequence of (str, Evaluation)
-        Verified layouts: nothing the first, the found one the last.
+        Verified layouts; the first is no barrier, and the last is the layout found.
     left : str
-        What is left of the risk, in words.
+        Text on the remaining risk.
     """
     chosen = cases[-1][1]
     cheap = [name for name, other in cases[1:-1] if other.ci[1] < chosen.ci[0]]
@@ -84,24 +84,24 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
 
 
 def _pays(nothing: Evaluation, chosen: Evaluation) -> str:
-    """Return in words that no layout pays, or that none is shown to pay; else nothing."""
+    """Return a text if no layout pays or if this is not shown; otherwise an empty text."""
     if not chosen.layout:
         return "no layout was found that saves more per year than it costs"
     if chosen.ci[1] < nothing.ci[0]:
         return ""
     return (
         f"{chosen.releases:,} releases do not show that the layout saves more than it costs: Z is "
-        f"{span(chosen.ci)} with it and {span(nothing.ci)} without"
+        f"{span(chosen.ci)} with the layout and {span(nothing.ci)} without barriers"
     )
 
 
 def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
-    """Return lines that name what costs as little a year, as far as is told, and less to build.
+    """Return lines on layouts that are cheaper to build and may have the same cost per year.
 
     Parameters
     ----------
     cases : sequence of (str, Evaluation)
-        Verified layouts: nothing the first, the found one the last.
+        Verified layouts; the first is no barrier, and the last is the layout found.
     """
     chosen = cases[-1][1]
     order = {None: 0, "met": 0, "undecided": 1, "missed": 2}
@@ -116,7 +116,7 @@ def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
 
 
 def left_over(evaluation: Evaluation) -> str:
-    """Return in words what is left of the risk, and which event makes most of it."""
+    """Return a text on the remaining risk and the event that causes most of it."""
     left, most = evaluation.by_event, worst(evaluation)
     if most is None:
         return "no harm or repair remains in these releases"
@@ -126,11 +126,11 @@ def left_over(evaluation: Evaluation) -> str:
         return words
     if left[most] < PART * total:
         return f"{words}; no event contributes more than {percent(left[most] / total)}"
-    return f"{words}, {euros(left[most])} of it from the event {most!r}"
+    return f"{words}; {euros(left[most])} of this is from the event {most!r}"
 
 
 def failing(site: Site, evaluation: Evaluation) -> list[str]:
-    """Return lines that say how often barriers fail in design events, if that may be above 5 %."""
+    """Return lines on the failure of barriers in design events, if it may be above 5 %."""
     lines = []
     for event in design_events(site) if evaluation.layout else ():
         chance = evaluation.failure[event]
@@ -143,7 +143,7 @@ def failing(site: Site, evaluation: Evaluation) -> list[str]:
 
 
 def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
-    """Return in words whether the targets are met; nothing without targets."""
+    """Return a text that says whether the targets are met; it is empty without targets."""
     asked = problem.targets
     if evaluation.targets is None:
         return ""

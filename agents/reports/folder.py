@@ -1,4 +1,4 @@
-"""What a design leaves in its folder beside its evaluations: layout, pictures, replay."""
+"""Files that a design writes besides its evaluations: layout, pictures and replay."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FILES = (
 
 
 SEEN = 50
-"""Releases among which one is looked for that reaches the road without barriers."""
+"""Number of releases among which one that reaches the road without barriers is sought."""
 
 
 def write(done: DesignStudy, out: Path, seed: int) -> None:
@@ -42,7 +42,7 @@ def write(done: DesignStudy, out: Path, seed: int) -> None:
 
 
 def _section(done: DesignStudy, path: Path, seed: int) -> None:
-    """Write the picture of the slope before and after."""
+    """Draw the slope without barriers and with the layout."""
     site, chosen = done.problem.site, done.chosen
     nothing = _all(site, (), seed)
     panels = [Panel(f"Without barriers: {_words(done.nothing)}", (), nothing)]
@@ -53,7 +53,7 @@ def _section(done: DesignStudy, path: Path, seed: int) -> None:
 
 
 def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:
-    """Return releases of every event of a site."""
+    """Simulate releases of every event of a site."""
     seeds, stations = release_seeds("ensemble", seed, BLOCKS), pictures.stations_of(site)
     return [fly(site, layout, event.name, seeds, stations) for event in site.events]
 
@@ -64,9 +64,9 @@ def _words(case: VerifiedLayout) -> str:
 
 
 def _replay(done: DesignStudy, path: Path, seed: int) -> None:
-    """Write the replay of the layout in a release that reaches the road without it.
+    """Write a replay of the layout in a release that would reach the road without barriers.
 
-    Of the event that makes most of the risk without barriers.
+    The release is of the event with the largest risk without barriers.
     """
     site, nothing, chosen = done.problem.site, done.nothing, done.chosen
     event = findings.worst(nothing.evaluation) or site.event_names[0]
@@ -80,7 +80,7 @@ def _replay(done: DesignStudy, path: Path, seed: int) -> None:
         "layout": "; ".join(b.label for b in layout) or "no barrier",
         "event": f"{event}, {euros(risk)} EUR per metre and year without barriers",
         "release": f"seed {drawn}, {outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3 "
-        "come onto the road",
+        "reach the road",
         "without barriers": _words(nothing),
         "with the layout": _words(chosen),
     }

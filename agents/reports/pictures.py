@@ -1,6 +1,7 @@
-"""Pictures of a slope for who must decide, and of cost against risk.
+"""Pictures of a slope in section and of cost against risk.
 
-The section shows what comes down, how high, how hard, and what stands.
+The section shows the trajectories of blocks, the barriers, and envelopes of the heights and the
+energies of the blocks.
 """
 
 from __future__ import annotations
@@ -42,19 +43,19 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 QUANTILE = 0.95
-"""Of the envelopes."""
+"""Quantile that the envelopes show [-]."""
 
 LEAST = 20
-"""Blocks that must come by for a 95 % quantile to say anything."""
+"""Least number of blocks that must pass a chainage for a meaningful 95 % quantile."""
 
 BLOCKS = 60
-"""Blocks of an event that are looked at, in whole releases."""
+"""Number of blocks of an event that are simulated, rounded up to whole releases."""
 
 STATIONS = 60
-"""Chainages of an envelope."""
+"""Number of chainages of an envelope."""
 
 EVERY = 0.05
-"""Interval of the points of a way [s]."""
+"""Time between two points of a trajectory [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,21 +65,22 @@ class Flights:
     Parameters
     ----------
     event : str
-        Its name.
+        Name of the event.
     releases : int
-        How many.
+        Number of releases.
     ways : tuple of (n, 2) array
-        Where the centroid of each block was [m].
+        Trajectory of the centroid of each block [m].
     run : Run
         The first release.
     stations : (K,) array
         Chainages of the envelopes [m], ascending.
     height : (K,) array
-        95 % quantile of how high above the ground the tops of blocks come by, as centroid and
-        circumscribed radius [m]; NaN where less than 20 come by.
+        95 % quantile of the height of the tops of passing blocks above the ground [m]. The top is
+        the height of the centroid plus the circumscribed radius. NaN where fewer than 20 blocks
+        pass.
     energy : (K,) array
-        The same of their energy, of translation and rotation [J], each as wide as the root of its
-        area.
+        95 % quantile of the energy of translation and rotation of passing blocks [J]. The width of
+        a block is taken as the square root of its area.
     """
 
     event: str
@@ -91,14 +93,14 @@ class Flights:
 
 
 def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int], stations: Floats) -> Flights:
-    """Simulate releases of an event, over all cores in threads.
+    """Simulate releases of an event in threads on all cores.
 
-    Of the seeds the first are taken, until `BLOCKS` blocks have come down.
+    The seeds are used in order until `BLOCKS` blocks have been released.
 
     Raises
     ------
     BadInput
-        If the layout does not stand on the slope.
+        If the layout cannot be placed on the slope.
     Diverged
         If a simulation diverges.
     """
@@ -126,7 +128,7 @@ def stations_of(site: Site) -> Floats:
 
 
 def sources(site: Site) -> list[Floats]:
-    """Return the corners of each source [m]: closed, or the ground in a band."""
+    """Return the corners of each source [m]: a closed polygon, or the ground line of a band."""
     ground, out = site.profile, []
     for source in site.sources:
         if source.band is None:
@@ -171,28 +173,29 @@ __all__ = ["BARRIER", "DPI", "FONT", "GROUND", "ROAD", "ZONE", "Point", "colours
 
 TRIED, EQUAL = "#9aa5b1", "#c8ccd0"
 EVENTS = ("#0072b2", "#d0312d", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b4fb0", "#6b4226")
-"""Colours of events, told apart by the colour-blind as far as eight can be."""
+"""Colours of events, chosen to be distinguishable with colour blindness as far as possible."""
 
 MARKERS = ("o", "^", "s", "D", "P", "X")
 FONT: dict[Any, Any] = {"font.size": 11, "axes.spines.top": False, "axes.spines.right": False}
 DPI = 120
 
 SHEDS = 1.6
-"""A reference dearer than this many times all else is told at the edge, not drawn to scale."""
+"""A layout whose capital exceeds all other costs by more than this factor is written as text at the
+edge of the diagram instead of being drawn to scale [-]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """What a named layout costs, in EUR per metre of road and year.
+    """Costs of a named layout in EUR per metre of road and year.
 
     Parameters
     ----------
     name : str
-        What it is.
+        Name of the layout.
     capital : float
-        What its capital costs a year.
+        Annual cost of its capital and upkeep.
     risk : float
-        Expected harm and repair of a year.
+        Expected annual harm and repair.
     interval : (float, float)
         95 % interval of `risk`.
     """
@@ -204,30 +207,32 @@ class Point:
 
     @classmethod
     def of(cls, name: str, evaluation: Evaluation) -> Point:
-        """Return the point of an evaluation; its capital is known, so all doubt is of the risk."""
+        """Return the point of an evaluation; its uncertainty is that of the risk alone."""
         risk, capital = evaluation.harm + evaluation.repair, evaluation.capital
         low, high = (max(end - capital, 0.0) for end in evaluation.ci)
         return cls(name, capital, risk, (min(low, risk), max(high, risk)))
 
 
 def colours(count: int) -> list[str]:
-    """Return the colours of so many events of a site, in its order."""
+    """Return the colours of the events of a site, in the order of the site."""
     return [EVENTS[i % len(EVENTS)] for i in range(count)]
 
 
 def cost(
     path: str | os.PathLike[str], tried: Sequence[Evaluation], points: Sequence[Point]
 ) -> None:
-    """Write a PNG of what layouts cost a year against the risk that they leave.
+    """Write a PNG diagram of the annual capital cost of layouts against their remaining risk.
+
+    Z is constant along the thin lines.
 
     Parameters
     ----------
     path : path
-        The PNG.
+        The PNG file.
     tried : sequence of Evaluation
-        What a search evaluated, each by few releases.
+        Evaluations of the search, each with few releases.
     points : sequence of Point
-        Verified layouts and references, with intervals; Z is the same along the thin lines.
+        Verified layouts and references, with intervals.
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -247,23 +252,23 @@ def cost(
         for point in points:
             if point not in near:
                 axes.annotate(
-                    f"{point.name}: {point.capital:,.0f} a year, {point.risk:,.0f} of risk",
+                    f"{point.name}: {point.capital:,.0f} for capital, {point.risk:,.0f} for risk",
                     (0.995, 0.01), xycoords="axes fraction", ha="right", va="bottom", fontsize=10,
                     bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8},
                 )  # fmt: skip
         axes.set(xlim=(-0.02 * right, right), ylim=(0.0, top))
         axes.set(xlabel="capital and upkeep [EUR per metre of road and year]",
-                 ylabel="harm and repair to expect [EUR per metre of road and year]")  # fmt: skip
+                 ylabel="expected harm and repair [EUR per metre of road and year]")  # fmt: skip
         figure.legend(loc="outside lower center", ncols=2, frameon=False)
         save(figure, path)
 
 
 def _searched(tried: Sequence[Evaluation]) -> str:
-    """Return what the points of a search are, and half their median 95 % interval.
+    """Return the label of the layouts of a search, with half the median 95 % interval.
 
-    The best of many is too good by about as much.
+    The estimate of the best of many layouts is too low by about this amount.
     """
-    words = f"{len(tried):,} layouts of the search, by few releases"
+    words = f"{len(tried):,} layouts of the search, few releases each"
     if not tried:
         return words
     half = float(np.median([0.5 * (e.ci[1] - e.ci[0]) for e in tried]))
@@ -271,13 +276,13 @@ def _searched(tried: Sequence[Evaluation]) -> str:
 
 
 def _reach(points: Sequence[Point]) -> float:
-    """Return the dearest capital that is drawn to scale [EUR per metre and year]."""
+    """Return the largest capital that is drawn to scale [EUR per metre and year]."""
     least = min(point.capital + point.risk for point in points)
     return SHEDS * max(least, *(p.risk for p in points), sorted(p.capital for p in points)[-2])
 
 
 def _equal(axes: Axes, right: float, top: float) -> None:
-    """Draw lines of equal Z, which is the sum of both axes, and write their value."""
+    """Draw lines of equal Z, which is the sum of both coordinates, and write their values."""
     from matplotlib.ticker import MaxNLocator
 
     levels = [z for z in MaxNLocator(9).tick_values(0.0, right + top) if 0.0 < z < right + top]
@@ -298,18 +303,18 @@ def _named(axes: Axes, point: Point, marker: str, colour: str) -> None:
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure as PNG, whole or not at all."""
+    """Write a figure as PNG atomically."""
     with atomic(path) as part:
         figure.savefig(part, format="png")
 
 
 DRAWN = 30
-"""Ways of an event that are drawn: with more the eye sees no less, and no more."""
+"""Largest number of trajectories of an event that are drawn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """One slope of the picture: its title, what stands, and releases of every event."""
+    """One slope of the picture with its title, its layout and releases of every event."""
 
     title: str
     layout: Layout
@@ -323,20 +328,20 @@ def section(
     panels: Sequence[Panel],
     envelopes: Sequence[Flights],
 ) -> None:
-    """Write the PNG of a slope.
+    """Write a PNG picture of a slope in section.
 
     Parameters
     ----------
     path : path
-        The PNG.
+        The PNG file.
     site : Site
-        Where.
+        The site.
     zone : BarrierZone
-        Where barriers may stand.
+        The zone in which barriers may be built.
     panels : sequence of Panel
-        Slopes, side by side or one above the other, to scale.
+        Slopes drawn to scale, side by side or one above the other.
     envelopes : sequence of Flights
-        Releases without barriers, of which heights and energies are shown.
+        Releases without barriers, whose heights and energies are shown.
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -375,12 +380,12 @@ def released(
     seeds: Sequence[int],
     event: str | None = None,
 ) -> None:
-    """Write the PNG of releases with a layout, of one event or of all.
+    """Write a PNG picture of releases with a layout, of one event or of all events.
 
     Raises
     ------
     BadInput, Diverged
-        As `rigdda.agents.reports.pictures.fly` does.
+        The same errors as `fly`.
     """
     names = site.event_names if event is None else (event,)
     stations = stations_of(site)
@@ -392,7 +397,7 @@ def released(
 
 
 def _window(site: Site) -> tuple[float, float, float, float]:
-    """Return left, right, bottom, top of what matters: from the source to beyond the road [m]."""
+    """Return left, right, bottom and top of the picture, from the sources to the road [m]."""
     x, y = np.array(site.slope.points).T
     pieces = sources(site)
     start = min(reach(piece)[0] for piece in pieces)
@@ -406,9 +411,9 @@ def _window(site: Site) -> tuple[float, float, float, float]:
 def _slope(
     axes: Axes, site: Site, zone: BarrierZone, panel: Panel, window: tuple[float, ...]
 ) -> list[Label]:
-    """Draw one slope: its ground, zone, road and sources, the ways of blocks, what stands.
+    """Draw the ground, zone, road, sources, trajectories and barriers of one slope.
 
-    Returns the labels of what stands, to be written when the size of the axes is final.
+    Return the labels of the barriers, which are written when the size of the axes is final.
     """
     built, moved = earthworks(site.profile, standing(panel.layout), site.slope.surface)
     x, y = built.points.T
@@ -431,7 +436,7 @@ def _slope(
 def _barriers(
     axes: Axes, site: Site, layout: Layout, moved: Mapping[Barrier, Floats], thickness: float
 ) -> list[Label]:
-    """Draw what stands, mesh as a band of this thickness [m]; return its labels."""
+    """Draw the barriers, with mesh as a band of this thickness [m], and return their labels."""
     labels = []
     for barrier in layout:
         if isinstance(barrier, Mesh):
@@ -446,7 +451,7 @@ def _barriers(
 def _envelopes(
     heights: Axes, energies: Axes, site: Site, layout: Layout, envelopes: Sequence[Flights]
 ) -> None:
-    """Draw how high and how hard blocks come by, and the barriers by height and class."""
+    """Draw the envelopes of height and energy, and the height and class of the barriers."""
     for flights, colour in zip(envelopes, colours(len(envelopes)), strict=True):
         heights.plot(flights.stations, flights.height, color=colour, linewidth=1.6)
         energies.plot(flights.stations, flights.energy / 1e3, color=colour, linewidth=1.6)
@@ -465,26 +470,26 @@ def _envelopes(
             energies.plot(barrier.x, barrier.energy_class, "D", color=BARRIER, markersize=8)
         else:
             energies.axvline(barrier.x, color=BARRIER, linewidth=1, linestyle=":")
-    if any((flights.energy > 0.0).any() for flights in envelopes):  # else there is nothing to see
+    if any((flights.energy > 0.0).any() for flights in envelopes):  # otherwise there are no curves
         energies.set_yscale("log")
     heights.set_ylim(bottom=0.0)
-    heights.set_title("Without barriers: 95 % of block tops pass below [m above ground]",
+    heights.set_title("Without barriers: 95 % quantile of block tops [m above ground]",
                       loc="left", fontsize=10)  # fmt: skip
-    energies.set_title("Without barriers: 95 % of blocks come with less energy [kJ]",
+    energies.set_title("Without barriers: 95 % quantile of the energy of blocks [kJ]",
                        loc="left", fontsize=10)  # fmt: skip
 
 
 def _key(figure: FigureBase, site: Site, envelopes: Sequence[Flights]) -> None:
-    """Say what colours mean, below the picture."""
+    """Draw the legend below the picture."""
     from matplotlib.lines import Line2D
 
     lines = []
     for flights, colour in zip(envelopes, colours(len(envelopes)), strict=True):
-        label = f"{flights.event}, {site.event(flights.event).rate:g} a year per 100 m"
+        label = f"{flights.event}, {site.event(flights.event).rate:g} per year and 100 m"
         lines.append(Line2D([], [], color=colour, linewidth=2, label=label))
     lines += [
-        Line2D([], [], color="black", linewidth=3, label="rock starts here"),
-        Line2D([], [], color=ZONE, linewidth=6, label="barriers may stand"),
+        Line2D([], [], color="black", linewidth=3, label="rock source"),
+        Line2D([], [], color=ZONE, linewidth=6, label="barrier zone"),
         Line2D([], [], color=ROAD, linewidth=6, label="road"),
         Line2D([], [], color=BARRIER, marker="D", linewidth=4, label="barrier: height, class"),
     ]

@@ -1,4 +1,4 @@
-"""Results as tables: rows of CSV files and what the command line prints."""
+"""Tables of results: rows of CSV files and tables that the command line prints."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ if TYPE_CHECKING:
 
 
 OUTCOME = {
-    "road_volume": ("volume that comes onto the road", "m3", 1.0),
-    "debris_fraction": ("share of the rock that comes onto it", "%", 100.0),
+    "road_volume": ("volume that reaches the road", "m3", 1.0),
+    "debris_fraction": ("share of the rock that reaches it", "%", 100.0),
     "debris_on_road": ("debris on the road at the end", "m2", 1.0),
     "max_energy_on_road": ("largest energy on the road", "kJ/m", 1e-3),
-    "slope_fraction": ("at the end on the slope", "%", 100.0),
-    "held_fraction": ("at the end behind barriers", "%", 100.0),
-    "road_fraction": ("at the end on the road", "%", 100.0),
-    "beyond_fraction": ("at the end beyond the road", "%", 100.0),
+    "slope_fraction": ("rock on the slope at the end", "%", 100.0),
+    "held_fraction": ("rock behind barriers at the end", "%", 100.0),
+    "road_fraction": ("rock on the road at the end", "%", 100.0),
+    "beyond_fraction": ("rock beyond the road at the end", "%", 100.0),
 }
-"""Field of an outcome: words, unit and factor for printing."""
+"""Description, unit and factor for printing of each field of an outcome."""
 
 HIT = {
     "hits": ("hits", "-", 1.0),
@@ -57,21 +57,21 @@ HIT = {
     "failed": ("failed", "%", 100.0),
     "displacement": ("displacement", "m", 1.0),
 }
-"""The same of a barrier."""
+"""Description, unit and factor for printing of each field of a barrier."""
 
 ONLY = {
     "failed": (Fence, GravityWall, Embankment),
     "thrust": (Fence, GravityWall, Embankment),
     "displacement": (GravityWall,),
 }
-"""Kinds of which alone a field of a barrier says anything."""
+"""Kinds of barrier for which a field is meaningful; other fields apply to all kinds."""
 
 
 class EvaluationsFile:
-    """A CSV file with one row an evaluated layout, written as they come.
+    """A CSV file with one row per evaluated layout, which is written during the search.
 
-    Money is in EUR per metre of road and year, `cost` in EUR per metre; `barriers` is a JSON list
-    of tables as in a layout file. Usable as a context manager.
+    Costs are in EUR per metre of road and year, except `cost`, which is in EUR per metre. The
+    column `barriers` is a JSON list of tables as in a layout file. The class is a context manager.
     """
 
     FIELDS = (
@@ -106,7 +106,7 @@ class EvaluationsFile:
 def write_outcomes(
     path: str | os.PathLike[str], seeds: Sequence[int], outcomes: Sequence[Outcome]
 ) -> None:
-    """Write a CSV file with one row a release: its seed, its outcome, what each barrier took."""
+    """Write a CSV file with one row per release: its seed, its outcome and its barriers."""
     rows = []
     for seed, outcome in zip(seeds, outcomes, strict=True):
         rows.append({"seed": seed} | outcome_row(outcome))
@@ -114,7 +114,7 @@ def write_outcomes(
 
 
 def outcome_row(outcome: Outcome) -> dict[str, Any]:
-    """Return an outcome, and what each barrier took, as columns of a CSV file."""
+    """Return an outcome, including that of each barrier, as columns of a CSV file."""
     row: dict[str, Any] = {"event": outcome.event, "width": outcome.width}
     row |= {"released_volume": outcome.released_volume, "reached": outcome.reached}
     row |= {name: getattr(outcome, name) for name in OUTCOME}
@@ -129,9 +129,9 @@ def write_rows(
     rows: Sequence[dict[str, Any]],
     fields: Sequence[str] | None = None,
 ) -> None:
-    """Write a CSV file with one row a dictionary.
+    """Write a CSV file with one row per dictionary.
 
-    `fields` are the columns, by default the keys of the first row; a row may lack some.
+    `fields` are the columns, by default the keys of the first row. A row may lack some of them.
     """
     with atomic(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, rows[0] if fields is None else fields, restval="")
@@ -140,12 +140,12 @@ def write_rows(
 
 
 def applies_not(value: Any) -> bool:
-    """Return whether a value is not a number: what does not apply is an empty cell."""
+    """Return whether a value is NaN, which is written as an empty cell."""
     return isinstance(value, float) and math.isnan(value)
 
 
 def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
-    """Return the table of means over releases."""
+    """Return the table of means over releases with 95 % intervals."""
     table = empty_table(("", "mean", "95 % interval"))
 
     def add(words: str, unit: str, factor: float, values: list[float], low: float = 0.0) -> None:
@@ -155,7 +155,7 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
 
     chance = estimate(sum(outcome.reached for outcome in results), len(results))
     ends = 100.0 * chance.low, 100.0 * chance.high
-    head = "a block comes onto the road [%]"
+    head = "a block reaches the road [%]"
     table.add_row(head, f"{100.0 * chance.probability:.4g}", _span(ends, ".4g"))
     for name, (words, unit, factor) in OUTCOME.items():
         add(words, unit, factor, [getattr(outcome, name) for outcome in results])
@@ -174,9 +174,9 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
 
 
 def _interval(sample: NDArray[np.float64], low: float, percent: bool) -> Sequence[float]:
-    """Return the 95 % interval of a mean that is at least `low`, and at most 100 if in percent.
+    """Return the 95 % interval of a mean, cut at `low` and, for a percentage, at 100.
 
-    A share that is none or all in every release is at most the chance that it is not none.
+    If every value is 0 or 100 %, the interval is that of a probability.
     """
     if percent and np.isin(sample, (0.0, 100.0)).all():
         return [100.0 * end for end in mid_p(int(np.count_nonzero(sample)), len(sample))]
@@ -185,7 +185,7 @@ def _interval(sample: NDArray[np.float64], low: float, percent: bool) -> Sequenc
 
 
 def sites(found: Iterable[Site]) -> Table:
-    """Return the table of sites: what they are, and the events that come down."""
+    """Return the table of sites with their families, heights, events and zones."""
     table = empty_table(("site", "family", "height [m]", "events (1/year per 100 m)", "zone [m]"))
     for site in found:
         heights = [y for _, y in site.slope.points]
@@ -202,7 +202,7 @@ def sites(found: Iterable[Site]) -> Table:
 
 
 def empty_table(head: Sequence[str]) -> Table:
-    """Return an empty table: words on the left, numbers to the right."""
+    """Return an empty table with text aligned on the left and numbers on the right."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -214,11 +214,11 @@ def empty_table(head: Sequence[str]) -> Table:
 
 
 WORDS = ("description", "family", "layout", "events (1/year per 100 m)")
-"""Columns of words."""
+"""Columns that contain text."""
 
 
 def _span(interval: Iterable[float], form: str) -> str:
-    """Return an interval in words; a single value has none."""
+    """Return an interval as text; it is "-" for a single value."""
     low, high = interval
     return f"{low:{form}} to {high:{form}}" if math.isfinite(high - low) else "-"
 
@@ -240,7 +240,7 @@ def fit(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def write_points(path: Path, seeds: Sequence[int], points: Points) -> None:
-    """Write a CSV file with a row a block of the lumped-mass model; where it stops in m."""
+    """Write a CSV file with one row per block of the lumped-mass model, in SI units."""
     each = zip(*(column.tolist() for column in (*points, points.energy)), strict=True)
     names = ("mass_kg", "run_out_m", "speed_m_s", "height_m", "energy_j")
     rows = [{"seed": seeds[k], **dict(zip(names, row, strict=True))} for k, *row in each]
@@ -248,7 +248,7 @@ def write_points(path: Path, seeds: Sequence[int], points: Points) -> None:
 
 
 def points(found: Points) -> Table:
-    """Return what releases of the lumped-mass model do, one figure a row."""
+    """Return the table of results of the lumped-mass model, with one quantity per row."""
     out = empty_table(("what", "mean", "95 % of blocks"))
     reached, weight = found.reached, found.mass / found.mass.sum()
     out.add_row("debris that reaches the road [-]", f"{float(weight @ reached):.3f}", "")
@@ -262,10 +262,10 @@ def points(found: Points) -> Table:
 
 
 def costs(study: DesignStudy) -> Table:
-    """Return the table of what each layout costs, at most 80 characters wide.
+    """Return the table of the costs of each layout, at most 80 characters wide.
 
-    Money is in EUR per metre of road and year, but for the last column but one: EUR per metre.
-    Debris is what comes onto the road, of what comes without barriers.
+    Costs are in EUR per metre of road and year, except "to build", which is in EUR per metre.
+    "debris" is the volume on the road, divided by the volume without barriers.
     """
     head = ("layout", "Z (95 %)", "capital", "harm", "repair", "to build", "debris")
     table = empty_table(head)
@@ -288,9 +288,9 @@ def costs(study: DesignStudy) -> Table:
 
 
 def chances(study: DesignStudy) -> Table | None:
-    """Return the table of what may happen in each design event; None if the site has none.
+    """Return the table of probabilities in each design event, or None if the site has none.
 
-    Each probability with its one-sided 95 % upper bound.
+    Each probability is followed by its one-sided 95 % upper bound.
     """
     events = design_events(study.problem.site)
     if not events:
@@ -308,7 +308,7 @@ def chances(study: DesignStudy) -> Table | None:
 
 
 def _chance(estimate: Estimate) -> str:
-    """Return a probability with its upper bound in words."""
+    """Return a probability with its upper bound as text."""
     if not estimate.releases:
         return "-"
     return f"{percent(estimate.probability)} (<= {percent(estimate.bound)})"

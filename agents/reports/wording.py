@@ -1,4 +1,4 @@
-"""Barriers and numbers in the words of an engineer who orders and signs."""
+"""Texts for barriers, costs and probabilities in reports."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rigdda import Barrier, Mesh, Site
 
 
 def order(barrier: Barrier, site: Site) -> str:
-    """Return what to order, where it stands, and what room it leaves, in words."""
+    """Return the type, sizes, place and clearance of a barrier as text."""
     if isinstance(barrier, Mesh):
         option = site.mesh(barrier.option)
         return f"mesh {option.name!r}: {option.area:g} m2 per metre, {option.price:g} EUR/m2"
@@ -22,17 +22,17 @@ def order(barrier: Barrier, site: Site) -> str:
 
 
 def euros(value: float) -> str:
-    """Return an amount of money: whole euros from 100 on, three figures below."""
+    """Return an amount of money: whole euros from 100, three significant figures below."""
     return f"{value:,.0f}" if abs(value) >= 99.95 else f"{value:.3g}"
 
 
 def span(interval: Sequence[float]) -> str:
-    """Return an interval of money."""
+    """Return an interval of amounts of money as text."""
     low, high = interval
     return f"{euros(low)} to {euros(high)}"
 
 
 def percent(share: float) -> str:
-    """Return a probability or a share in per cent: two figures below ten."""
+    """Return a probability or a share in per cent: two significant figures below 10 %."""
     value = 100.0 * share
     return f"{value:.0f} %" if value >= 9.95 or value == 0.0 else f"{value:.2g} %"

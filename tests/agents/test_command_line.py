@@ -216,7 +216,7 @@ def test_simulate_writes_what_it_says(toml: Path, tmp_path: Path) -> None:
     assert float(table[0]["barrier_1_max_energy"]) == outcome.barriers[1].max_energy
     assert first.scene.barriers == (rigdda.Wall(20.0, 2.0), rigdda.Wall(15.0, 1.0))
     assert png_size(tmp_path / "o/section.png")[0] > 900
-    for name in ("a block comes onto the road [%]", "95 % interval", "wall 1.0 m high, at 15.0 m"):
+    for name in ("a block reaches the road [%]", "95 % interval", "wall 1.0 m high, at 15.0 m"):
         assert name in words
 
 

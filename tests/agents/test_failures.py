@@ -157,7 +157,7 @@ def test_only_what_a_run_has_written_is_said_to_be_kept(tmp_path: Path) -> None:
 
 def test_a_folder_is_written_by_one_run_at_a_time(tmp_path: Path) -> None:
     with kept(tmp_path):
-        with pytest.raises(BadInput, match="another run writes into it"), kept(tmp_path):
+        with pytest.raises(BadInput, match="another run is writing into it"), kept(tmp_path):
             pass
     with kept(tmp_path):
         pass

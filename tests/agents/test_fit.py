@@ -102,17 +102,17 @@ def test_only_numbers_of_the_site_are_fitted(path):
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("run_out_m\n3\n", "head its columns"),
+        ("run_out_m\n3\n", "name its columns"),
         ("event,run_out_m\nrock,3\n", "rock"),
         ("event,run_out_m\nblock,far\n", "row 1"),
         ("event,run_out_m\nblock,10\n", "three observed runs"),
-        ("event,run_out_m\nblock,45\n", "put road.end beyond it"),
+        ("event,run_out_m\nblock,45\n", "move road.end beyond it"),
         ("event,run_out_m\nblock,3,1\n", "row 1 = 'block,3,1': give 2 cells"),
         ("event,run_out_m\n,3\n", "row 1 event = '': choose small, face or "),
-        ("event,run_out_m,run_out_m\nblock,3,4\n", "a name of its own"),
+        ("event,run_out_m,run_out_m\nblock,3,4\n", "a different name"),
         ("event,run_out_m\nblock,4_0\n", "row 1 run_out_m = '4_0': give a number"),
-        ("event,run_out_m\nblock," + 140_000 * "3" + "\n", "mend its line 2"),
-        ("", "head its columns"),
+        ("event,run_out_m\nblock," + 140_000 * "3" + "\n", "repair line 2"),
+        ("", "name its columns"),
     ],
 )
 def test_a_table_of_runs_is_checked(tmp_path, text, what):
@@ -141,7 +141,7 @@ def test_every_seed_may_be_given() -> None:
     ("paths", "model", "mend"),
     [
         (["motion.damping", "motion.damping"], "blocks", "name each number once"),
-        (["prices.concrete"], "blocks", "tell nothing of it"),
+        (["prices.concrete"], "blocks", "do not depend on it"),
         (["lumped.soil.normal"], "blocks", "choose from surfaces"),
         (["surfaces.soil.restitution"], "lumped", "choose from lumped"),
     ],

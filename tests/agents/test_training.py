@@ -55,7 +55,7 @@ def test_a_killed_training_goes_on(trained: tuple[Path, str], tmp_path: Path) ->
     killed.kill()
     killed.communicate()
     assert run("train", *more, "--out", "o", folder=tmp_path).startswith(
-        "share that layouts take off Z"
+        "mean relative reduction of Z"
     )
     assert ppo.PPO.load(checkpoint).num_timesteps == 64
     last = Network.load(tmp_path / "o/policy.safetensors").layers[-1][0]

@@ -104,8 +104,8 @@ def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> 
     run.to_rerun(tmp_path / "other.rrd", Marks(record=as_json(other)))
     code, out, err = command(tmp_path / "other.rrd")
     assert code == 1
-    assert f"it differs: recorded reward {wrong!r}, computed reward {reward!r}" in err
-    assert f"other version: kernels {'0' * 16}, now {record.versions.kernels}" in out
+    assert f"results differ: recorded reward {wrong!r}, computed reward {reward!r}" in err
+    assert f"version differs: kernels {'0' * 16}, now {record.versions.kernels}" in out
 
 
 @pytest.mark.parametrize("event", [None, "block"])

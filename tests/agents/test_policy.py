@@ -129,7 +129,7 @@ def test_a_network_of_another_shape_is_refused(tmp_path: Path) -> None:
         ({"bias": np.float32(0.0)}, SHAPE),
         ({"bias": np.full(SLOTS.size, np.nan)}, "finite numbers"),
         ({"weight": np.full((SLOTS.size, WIDTH), np.inf)}, "finite numbers"),
-        ({"scale": np.zeros(WIDTH)}, "scales above 0"),
+        ({"scale": np.zeros(WIDTH)}, "positive scales"),
     ],
 )
 def test_a_damaged_network_is_refused(

@@ -100,7 +100,7 @@ def test_a_training_goes_on_with_more_episodes(trained: tuple[Path, str], tmp_pa
     one = "rigdda train --sites 2 --episodes {} --seed 0"
     assert after.notes["command"] == f"{one.format(16)}; {one.format(32)}"
     line = refused("train", *SMALL, "--out", folder, folder=tmp_path)
-    assert "episodes = 16: give at least the 32" in line and "another folder" in line
+    assert "episodes = 16: give at least 32" in line and "another folder" in line
 
 
 def test_bad_terms_are_one_line(tmp_path: Path) -> None:

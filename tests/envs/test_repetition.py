@@ -94,7 +94,7 @@ def test_episodes_of_copies_are_repeated(name: str, tmp_path: Path) -> None:
 def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> None:
     path, (reward,) = played("rigdda/BarrierDesign-v0", tmp_path, site=CUT, releases=2)
     code, out, _ = command(path)
-    assert code == 0 and f"the same to the last bit: reward {reward!r}" in out
+    assert code == 0 and f"identical bit for bit: reward {reward!r}" in out
 
     record = replay_record.load(path)
     wrong = float(np.nextafter(reward, 1.0))

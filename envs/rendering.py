@@ -5,7 +5,6 @@ Matplotlib is imported on first use.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,6 +13,8 @@ from numpy.typing import NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Site
 from rigdda.barriers import standing
+from rigdda.barriers.base import STANDS
+from rigdda.display import BARRIER, GROUND, ROAD, ROCK, ZONE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +28,6 @@ SIZE = (8.0, 4.5)
 PROPORTION = 2.0
 """Aspect ratio of the plotted area: the image without its title and axis labels."""
 
-GROUND, ROCK, BARRIER, ROAD, ZONE = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04", "#9dc3e6"
 CUT, BROKEN = "#dbe7f3", "#d62846"
 """Colours of the inside of a ditch and of failed barriers."""
 
@@ -72,12 +72,12 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
     axes.plot(lane, [terrain.height(at) for at in lane], color=ROAD, linewidth=5,
               solid_capstyle="butt")  # fmt: skip
     for i, barrier in enumerate(run.scene.barriers):
-        colour = BARRIER if run.times[frame] < run.failure(i) else BROKEN
+        colour = BARRIER if run.state(i, frame) == STANDS else BROKEN
         start = run.outline(i, 0)
         foot = float(start[:, 0].mean()), float(start[:, 1].max()) - barrier.left_height(0.0)
         draw_barrier(axes, barrier, run.outline(i, frame), foot, colour)
     for i in range(len(run.scene.blocks)):
-        axes.fill(*_corners(run, frame, i).T, color=ROCK, edgecolor="white", linewidth=0.2,
+        axes.fill(*run.corners(i, frame).T, color=ROCK, edgecolor="white", linewidth=0.2,
                   zorder=4)  # fmt: skip
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
@@ -133,25 +133,15 @@ def draw_mesh(axes: Axes, site: Site, mesh: Mesh, thickness: float) -> tuple[flo
     thickness : float
         Thickness of the band [m].
     """
-    held = {event.source for event in site.events if event.name in site.mesh(mesh.option).factors}
-    bands = [source.band for source in site.sources if source.name in held and source.band]
-    start, end = min(band[0] for band in bands), max(band[1] for band in bands)
-    x, y = ground_between(site, start, end)
+    x, y = site.ground_between(*site.mesh_span(mesh.option)).T
     axes.fill_between(x, y, y + thickness, facecolor="white", edgecolor=BARRIER, hatch="xxxx",
                       linewidth=1.0, zorder=3.5)  # fmt: skip
     return float(x[-1]), float(y[-1] + thickness)
 
 
-def ground_between(site: Site, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return the ground profile between two chainages, x and y [m]."""
-    inner = [x for x, _ in site.slope.points if start < x < end]
-    at = np.array([start, *inner, end])
-    return at, np.array([site.profile.height(x) for x in at])
-
-
 def name_places(axes: Axes, site: Site, zone: tuple[float, float]) -> None:
     """Draw the barrier zone as a line on the ground, and label it and the road from below."""
-    x, y = ground_between(site, *zone)
+    x, y = site.ground_between(*zone).T
     axes.plot(x, y, color=ZONE, linewidth=5, solid_capstyle="butt", zorder=2.5)
     for words, (start, end), side in (
         ("barrier zone", zone, "right"),
@@ -242,17 +232,16 @@ def picture(run: Run, site: Site, layout: Layout, title: str) -> NDArray[np.uint
     axes.set_title(title)
     left, right, bottom, top = window(run, site)
     axes.set(xlim=(left, right), ylim=(bottom, top))
-    labels = [
-        Label(barrier.label, top_of(run.outline(i)))
-        if math.isinf(run.failure(i))
-        else Label(f"{barrier.label}: {barrier.fails}", top_of(run.outline(i)), BROKEN)
-        for i, barrier in enumerate(standing(layout))
-    ]
-    for barrier in layout:
-        if isinstance(barrier, Mesh):
-            labels.append(
-                Label(barrier.label, draw_mesh(axes, site, barrier, BAND * (top - bottom)))
-            )
+    labels = []
+    for i, barrier in enumerate(standing(layout)):
+        state, top_point = run.state(i), top_of(run.outline(i))
+        if state == STANDS:
+            labels.append(Label(barrier.label, top_point))
+        else:
+            labels.append(Label(f"{barrier.label}: {state}", top_point, BROKEN))
+    for mesh in layout:
+        if isinstance(mesh, Mesh):
+            labels.append(Label(mesh.label, draw_mesh(axes, site, mesh, BAND * (top - bottom))))
     write_labels(axes, labels)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
@@ -269,25 +258,17 @@ def window(run: Run, site: Site) -> tuple[float, float, float, float]:
     They range from the highest source or block to beyond the road or the furthest block.
     """
     blocks = np.concatenate(
-        [_corners(run, f, i) for i in range(len(run.scene.blocks)) for f in (0, -1)]
+        [run.corners(i, f) for i in range(len(run.scene.blocks)) for f in (0, -1)]
     )
     points = np.array(site.slope.points)
     left = min(blocks[:, 0].min(), site.barrier_zone.start)
     right = max(blocks[:, 0].max(), site.road.end)
     way = right - left
     left, right = max(left - 0.08 * way, points[0, 0]), min(right + 0.06 * way, points[-1, 0])
-    _, y = ground_between(site, left, right)
+    y = site.ground_between(left, right)[:, 1]
     high = max(float(y.max()), blocks[:, 1].max())
     tall = high - y.min()
     bottom, top = float(y.min()) - 0.15 * tall, high + 0.2 * tall
     wider = max(PROPORTION * (top - bottom) - (right - left), 0.0)
     taller = max((right - left) / PROPORTION - (top - bottom), 0.0)
     return left - 0.5 * wider, right + 0.5 * wider, bottom - 0.3 * taller, top + 0.7 * taller
-
-
-def _corners(run: Run, frame: int, block: int) -> Floats:
-    """Return the (n, 2) corners of a block in a frame; the rotation is 0 in the first frame."""
-    x, y, theta = run.poses[frame, block]
-    cos, sin = np.cos(theta), np.sin(theta)
-    turn = np.array([[cos, -sin], [sin, cos]])
-    return (run.scene.blocks[block].vertices - run.poses[0, block, :2]) @ turn.T + [x, y]

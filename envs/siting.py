@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Barrier, GravityWall, Layout, Mesh, Site, check
-from rigdda.barriers import KINDS, Earthwork, MeshOption, as_layout, earthworks
+from rigdda.barriers import KINDS, Earthwork, as_layout, earthworks
 from rigdda.barriers.base import TOLERANCE
 from rigdda.model.barrier_zone import BarrierZone
 
@@ -26,7 +26,7 @@ MIN_GAP = 0.5
 def room(barrier: Barrier, works: Span) -> Span:
     """Return the chainages that a barrier occupies, including its elongation downhill [m]."""
     start, end = works
-    return start, end + barrier.elongation_path
+    return start, end + barrier.deflection
 
 
 def meet(one: Span, two: Span) -> bool:
@@ -116,15 +116,6 @@ class Rules:
         """Return the elevation of the natural ground at chainages [m]."""
         return np.interp(x, self._x, self._y)
 
-    def held(self, option: MeshOption) -> Span:
-        """Return the chainages of the sources whose events a mesh option makes rarer [m]."""
-        names = {
-            event.source for event in self.site.events if option.factors.get(event.name, 1) < 1
-        }
-        rock = [source for source in self.site.sources if source.name in names or not names]
-        ends = [s.band if s.band is not None else s.outline[:, 0].tolist() for s in rock]
-        return min(min(x) for x in ends), max(max(x) for x in ends)
-
     def works(self, barrier: Barrier) -> Span:
         """Return the chainages between which a barrier occupies the ground [m]."""
         return barrier.works(self.site.profile)
@@ -163,7 +154,7 @@ class Rules:
         """
         options = {option.name: option for option in self.site.meshes}
         check.one_of(f"{where}.option", mesh.option, options)
-        check.number(f"{where}.x", mesh.x, *self.held(options[mesh.option]))
+        check.number(f"{where}.x", mesh.x, *self.site.mesh_span(mesh.option))
 
     def check(self, where: str, barrier: Barrier) -> Span:
         """Return the works of a barrier after checking that it is feasible where it stands.
@@ -214,7 +205,7 @@ class Rules:
             mend = f"keep all of it, up to {end:g} m, within {rooms}"
             raise BadInput(f"{where}.x", barrier.x, mend)
         road = self.site.road.start
-        give = barrier.elongation_path
+        give = barrier.deflection
         if give > 0.0 and end + give > road + slack:
             most = road - give - barrier.extent
             mend = f"give at most {most:g}: it deflects by up to {give:g} m"
@@ -255,8 +246,9 @@ class Room(Rules):
 
     def mesh(self, option: int) -> Mesh:
         """Return a mesh option of the site, placed in the middle of the rock that it holds."""
-        low, high = self.held(self.site.meshes[option])
-        return Mesh(0.5 * (low + high), self.site.meshes[option].name)
+        name = self.site.meshes[option].name
+        low, high = self.site.mesh_span(name)
+        return Mesh(0.5 * (low + high), name)
 
     def put(self, barrier: Barrier, x: float) -> Barrier | None:
         """Return a barrier moved to `x` with the sizes required there, or None if impossible."""
@@ -305,7 +297,7 @@ class Room(Rules):
         """Return candidate places after quick checks of the room and the ground, nearest first."""
         length = barrier.extent
         give = room(barrier, (0.0, length))[1]  # includes the elongation downhill
-        last = self.site.road.start - give if barrier.elongation_path > 0.0 else math.inf
+        last = self.site.road.start - give if barrier.deflection > 0.0 else math.inf
         ends = [(low, min(high - length, last)) for low, high in self.parts]
         ends = [(low, high) for low, high in ends if low <= high]
         if not ends:

@@ -28,7 +28,8 @@ LOWEST, HIGHEST = 2.6, 5.5
 """Minimum and maximum height of an image [inch], which otherwise follows from the shape of the
 section."""
 
-GROUND, ROCK, BARRIER, ROAD, ZONE = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04", "#7fb2dd"
+GROUND, ROCK, BARRIER, ROAD, ZONE = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04", "#9dc3e6"
+"""Colours of all images of slopes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +60,8 @@ class Section:
     ----------
     ground : (m, 2) array
         Corners of the ground.
-    road, zone : (float, float), optional
-        Chainages of the ends of the road and of the barrier zone.
+    road, zone : (n, 2) array, optional
+        Corners of the ground along the road and along the barrier zone.
     sources : sequence of (n, 2) array
         Sources of rock: polygons, or the line of the ground in a band.
     blocks : sequence of (n, 2) array
@@ -70,8 +71,8 @@ class Section:
     """
 
     ground: Floats
-    road: tuple[float, float] | None = None
-    zone: tuple[float, float] | None = None
+    road: Floats | None = None
+    zone: Floats | None = None
     sources: Sequence[Floats] = ()
     blocks: Sequence[Floats] = ()
     barriers: Sequence[Outline] = ()
@@ -100,12 +101,12 @@ def draw(axes: Axes, section: Section) -> None:
     """Draw a section into axes."""
     x, y = section.ground.T
     axes.fill_between(x, y, y.min() - 0.05 * np.ptp(y), color=GROUND, linewidth=0)
-    for name, span, colour in (
+    for name, line, colour in (
         ("barrier zone", section.zone, ZONE),
         ("road", section.road, ROAD),
     ):
-        if span is not None:
-            axes.plot(*along(section.ground, span).T, color=colour, linewidth=4, label=name)
+        if line is not None:
+            axes.plot(*line.T, color=colour, linewidth=4, label=name)
     for i, corners in enumerate(section.sources):
         label = "rock source" if i == 0 else None
         axes.plot(*corners.T, color="black", linewidth=2.5, label=label)
@@ -124,14 +125,6 @@ def draw(axes: Axes, section: Section) -> None:
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
-
-
-def along(ground: Floats, span: tuple[float, float]) -> Floats:
-    """Return the (n, 2) corners of the ground between two chainages, with both ends [m]."""
-    x, y = ground.T
-    inner = (x > span[0]) & (x < span[1])
-    ends = np.interp(span, x, y)
-    return np.array([(span[0], ends[0]), *ground[inner], (span[1], ends[1])])
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -62,10 +62,11 @@ def test_a_section_holds_the_barriers_of_a_layout(site: Site) -> None:
         site.section((Embankment(500.0, 2.0),))
 
 
-def test_the_ground_between_two_chainages_has_both_ends() -> None:
-    ground = np.array([[0.0, 4.0], [2.0, 2.0], [4.0, 2.0]])
-    found = display.along(ground, (1.0, 3.0))
-    assert np.allclose(found, [[1.0, 3.0], [2.0, 2.0], [3.0, 2.0]])
+def test_the_ground_between_two_chainages_has_both_ends(site: Site) -> None:
+    (x0, y0), (x1, y1), *_ = site.slope.points[1:]
+    found = site.ground_between(0.5 * (x0 + x1), x1 + 1e-9)
+    assert np.allclose(found[:2], [[0.5 * (x0 + x1), 0.5 * (y0 + y1)], [x1, y1]])
+    assert len(found) == 3
 
 
 def test_a_run_shows_where_its_blocks_end(run: Run) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
@@ -203,6 +204,33 @@ def test_pictures_show_every_kind(released, seed):
     bare = picture(rigdda.release(QUICK, (), seed, "mass")[0], QUICK, (), "all")
     assert image.shape == bare.shape == (450, 800, 3)
     assert np.abs(image.astype(int) - bare).sum() > 0
+
+
+def test_mesh_over_a_jointed_mass_is_drawn() -> None:
+    from rigdda.envs.rendering import picture
+
+    mass = QUICK.source(QUICK.event("mass").source)
+    assert mass.band is None
+    option = rigdda.MeshOption("net", 20.0, 50.0, {"mass": 0.5})
+    site = msgspec.structs.replace(QUICK, meshes=(option,))
+    ends = mass.outline[:, 0]
+    assert site.mesh_span("net") == (ends.min(), ends.max())
+    run, _ = rigdda.release(site, (), 0, "block")
+    with_mesh = picture(run, site, (Mesh(float(ends.mean()), "net"),), "mesh")
+    assert (with_mesh != picture(run, site, (), "mesh")).any()
+
+
+def test_a_picture_names_the_state_of_a_wall_that_slid(monkeypatch: pytest.MonkeyPatch) -> None:
+    from rigdda.envs import rendering
+
+    run, _ = rigdda.release(QUICK, (GravityWall(17.0, 1.0, 1.0),), 3, "mass")
+    assert run.state(0, 0) == "stands" and run.state(0) in ("slid", "overturned")
+    written: list[str] = []
+    monkeypatch.setattr(
+        rendering, "write_labels", lambda axes, labels: written.extend(one.words for one in labels)
+    )
+    rendering.picture(run, QUICK, run.scene.barriers, "wall")
+    assert written == [f"gravity wall 1.0 m high: {run.state(0)}"]
 
 
 @pytest.mark.parametrize("size", [(6.0, 4.0), (12.0, 5.0)])

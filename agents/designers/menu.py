@@ -75,9 +75,9 @@ class Menu:
     def _ends(self, barrier: Barrier) -> list[float]:
         """Return the estimated last chainage in the zone at which a barrier may be built [m]."""
         last = self.zone.end - barrier.extent
-        if barrier.elongation_path > 0.0:
+        if barrier.deflection > 0.0:
             road = self.problem.site.road.start
-            last = min(last, road - barrier.extent - barrier.elongation_path)
+            last = min(last, road - barrier.extent - barrier.deflection)
         return [math.floor(10.0 * last + 1e-6) / 10.0]
 
     def neighbours(self, layout: Layout, step: float, level: int) -> Iterator[Layout]:
@@ -178,6 +178,6 @@ def _place(problem: DesignProblem, barrier: Barrier) -> list[str]:
         found.append("start of the zone")
     if zone.end - end <= NEAR:
         found.append("end of the zone")
-    if barrier.elongation_path > 0.0 and road - end - barrier.elongation_path <= NEAR:
+    if barrier.deflection > 0.0 and road - end - barrier.deflection <= NEAR:
         found.append("clearance to the road")
     return found

@@ -17,17 +17,13 @@ from numpy.typing import NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
 from rigdda.barriers import Earthwork, earthworks, standing
+from rigdda.display import BARRIER, GROUND, ROAD, ZONE
 from rigdda.envs import Evaluation
 from rigdda.envs.rendering import (
     BAND,
-    BARRIER,
-    GROUND,
-    ROAD,
-    ZONE,
     Label,
     draw_barrier,
     draw_mesh,
-    ground_between,
     name_places,
     top_of,
     write_labels,
@@ -419,7 +415,7 @@ def _slope(
     x, y = built.points.T
     *_, bottom, top = window
     axes.fill_between(x, y, bottom, color=GROUND, linewidth=0, zorder=2)
-    axes.plot(*ground_between(site, site.road.start, site.road.end), color=ROAD, linewidth=5,
+    axes.plot(*site.ground_between(site.road.start, site.road.end).T, color=ROAD, linewidth=5,
               zorder=3, solid_capstyle="butt")  # fmt: skip
     name_places(axes, site, (zone.start, zone.end))
     for flights, colour in zip(panel.flights, colours(len(panel.flights)), strict=True):

@@ -210,7 +210,7 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
         raise NotImplementedError
 
     @property
-    def elongation_path(self) -> float:
+    def deflection(self) -> float:
         """Clear distance downhill that it needs for its deflection [m]."""
         return 0.0
 

@@ -171,7 +171,7 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         return self._with(capacity=capacity, energy_class=None)
 
     @property
-    def elongation_path(self) -> float:
+    def deflection(self) -> float:
         """Its elongation: the clear distance downhill that it needs for its deflection [m]."""
         assert self.elongation is not None  # set at the start
         return self.elongation
@@ -246,10 +246,8 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
 
     def order(self, road: float) -> tuple[str, str]:
         """Return its deflection and the remaining clearance to the road in words."""
-        clear = road - self.end - self.elongation_path
-        told = (
-            f"; it deflects by up to {self.elongation_path:.1f} m, to {clear:.1f} m from the road"
-        )
+        clear = road - self.end - self.deflection
+        told = f"; it deflects by up to {self.deflection:.1f} m, to {clear:.1f} m from the road"
         return "", told
 
     @property

@@ -128,6 +128,11 @@ class Run:
         start = (float(self.times[0]), STANDS)
         return [start, *changes(self.times, poses, self.failure(barrier))]
 
+    def state(self, barrier: int, frame: int = -1) -> str:
+        """Return the state of a barrier in a frame, see `states`."""
+        now = self.times[frame]
+        return [state for time, state in self.states(barrier) if time <= now][-1]
+
     def passed(self, x: float) -> NDArray[np.bool_]:
         """Return whether each block's centroid has reached a chainage [m] by each frame, (T, N).
 

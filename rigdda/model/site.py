@@ -401,9 +401,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                 pieces = [np.array(piece, dtype=np.float64) for _, piece in source.pieces()]
                 sources += [np.concatenate([piece, piece[:1]]) for piece in pieces]
             else:
-                sources.append(display.along(ground, source.band))
-        road = self.road.start, self.road.end
-        zone = self.barrier_zone.start, self.barrier_zone.end
+                sources.append(self.ground_between(*source.band))
+        road = self.ground_between(self.road.start, self.road.end)
+        zone = self.ground_between(self.barrier_zone.start, self.barrier_zone.end)
         return display.Section(ground, road, zone, sources, barriers=barriers)
 
     def _repr_png_(self) -> bytes:

@@ -8,6 +8,8 @@ from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from rigdda import check, fields
 from rigdda.barriers import MeshOption
@@ -492,6 +494,11 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         usual = "concrete" if "concrete" in self.surfaces else "rock"
         return "soil" if "soil" in self.surfaces else usual
 
+    def ground_between(self, start: float, end: float) -> NDArray[np.float64]:
+        """Return the (n, 2) corners of the ground between two chainages, with both ends [m]."""
+        inner = [x for x, _ in self.slope.points if start < x < end]
+        return np.array([(x, self.profile.height(x)) for x in (start, *inner, end)])
+
     def ditch_side(self, x: float, width: float) -> float:
         """Return the side slope of a ditch [-], the flattest that the ground it cuts requires."""
         points, names = self.slope.chain()
@@ -515,6 +522,22 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             or "none: this site has no mesh options"
         )
         raise BadInput("mesh option", name, f"choose one of {known}")
+
+    def mesh_span(self, name: str) -> tuple[float, float]:
+        """Return the chainages of the sources whose events a mesh option makes less frequent [m].
+
+        If it changes no event, they are those of all sources.
+
+        Raises
+        ------
+        BadInput
+            If the site has no option of this name.
+        """
+        factors = self.mesh(name).factors
+        sources = {event.source for event in self.events if factors.get(event.name, 1.0) < 1.0}
+        rock = [source for source in self.sources if source.name in sources or not sources]
+        ends = [s.band if s.band is not None else s.outline[:, 0].tolist() for s in rock]
+        return min(min(x) for x in ends), max(max(x) for x in ends)
 
 
 @lru_cache(maxsize=256)

@@ -232,7 +232,12 @@ class _Draft:
     def _toe(self, most: float) -> float:
         """Return the foot of the slope, not beyond a chainage."""
         if self.wanted.toe is not None:
-            return self.profile.origin.x_of(self.wanted.toe)
+            at, origin = self.profile.origin.x_of(self.wanted.toe), self.profile.origin
+            if not self.x[0] <= at <= most:
+                ends = sorted(map(origin.chainage_of, (float(self.x[0]), most)))
+                mend = f"give a chainage on the slope, {ends[0]:.10g} to {ends[1]:.10g}"
+                raise BadInput("--toe", self.wanted.toe, mend)
+            return round(at, 3)
         steep = (self._inclinations() >= STEEP) & (self.x[:-1] < most)
         if not steep.any():
             return round(float(max(self.x[0], min(most, self.x[-1]))), 3)
@@ -261,11 +266,15 @@ class _Draft:
 
     def _sources(self) -> list[tuple[str, Span, str]]:
         """Return the name of each source, its band and how sure that is."""
-        found = []
+        found, origin = [], self.profile.origin
         for text in self.wanted.sources:
-            name, span = _ranged("--source", text, self.profile.origin)
+            name, span = _ranged("--source", text, origin)
             if span is None:
                 mend = 'give NAME:START-END with chainages, such as "cliff:2-8"'
+                raise BadInput("--source", text, mend)
+            if not self.x[0] <= span[0] < span[1] < self.road[0]:
+                low, high = sorted(map(origin.chainage_of, (float(self.x[0]), self.road[0])))
+                mend = f"put it uphill of the road, between chainage {low:.10g} and {high:.10g}"
                 raise BadInput("--source", text, mend)
             found.append((name, span, GIVEN))
         return found or [("face", self._face(), PLACEHOLDER)]

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -21,6 +21,7 @@ from rigdda.barriers.fence import FENCE_CLASSES
 from rigdda.envs.rendering import ROAD, ROCK
 from rigdda.geometry import polygon_properties
 from rigdda.model.joints import spaced_area
+from rigdda.model.site_tables import Origin
 from rigdda.model.soundness import BEYOND
 from rigdda.releases import Batch
 
@@ -178,8 +179,9 @@ def _source(source: Source) -> str:
         )
     areas = [_areas(source, seed) for seed in range(DRAWS if source.polygon else 1)]
     counts, every = [len(found) for found in areas], np.concatenate(areas)
-    low, middle, high = np.quantile(every, [0.1, 0.5, 0.9])
-    masses = np.array([low, middle, high, every.max()]) ** 1.5 * source.density / 1e3
+    shares = np.array([*np.quantile(every, [0.1, 0.5, 0.9]), every.max()])
+    low, middle, high, most = map(_figures, shares)
+    light, usual, heavy, top = map(_figures, shares**1.5 * source.density / 1e3)
     what, way = "given blocks", ""
     if source.polygon:
         what = "a jointed mass"
@@ -193,9 +195,8 @@ def _source(source: Source) -> str:
     number = f"{min(counts)}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
     return (
         f"source {source.name}: {what} of {source.area:.4g} m2{way}: {number} blocks; 10, 50 and "
-        f"90 % of them are below {_figures(low)}, {_figures(middle)} and {_figures(high)} m2 ({_figures(masses[0])}, "
-        f"{_figures(masses[1])} and {_figures(masses[2])} t), the largest has {_figures(every.max())} m2 "
-        f"({_figures(masses[3])} t)"
+        f"90 % of them are below {low}, {middle} and {high} m2 ({light}, {usual} and {heavy} t), "
+        f"and the largest has {most} m2 ({top} t)"
     )
 
 
@@ -569,18 +570,13 @@ def _draw_survey(axes: Axes, site: Site) -> None:
         return
     plain = FuncFormatter(lambda value, _: f"{value:,.0f}")
     if origin.chainage or origin.reversed:
-        above = axes.secondary_xaxis("top", functions=(origin.chainage_of, origin.x_of))
+        ways: Any = origin.chainage_of, origin.x_of
+        above = axes.secondary_xaxis("top", functions=ways)
         above.set_xlabel("chainage of the survey [m]")
         above.xaxis.set_major_formatter(plain)
     if origin.elevation:
-        low = origin.elevation
-
-        def up(y: Floats) -> Floats:
-            return y + low
-
-        def down(elevation: Floats) -> Floats:
-            return elevation - low
-
-        beside = axes.secondary_yaxis("right", functions=(up, down))
+        level = Origin(origin.elevation)
+        ways = level.chainage_of, level.x_of
+        beside = axes.secondary_yaxis("right", functions=ways)
         beside.set_ylabel("elevation of the survey [m]")
         beside.yaxis.set_major_formatter(plain)

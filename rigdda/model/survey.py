@@ -130,6 +130,10 @@ def parse_table(name: str, text: str) -> Survey:
     rows = _rows(name, text)
     head = [] if all(NUMBER.fullmatch(cell) for cell in rows[0][1][:2]) else rows[0][1]
     body = rows[1:] if head else rows
+    for line, cells in body:
+        if head and len(cells) > len(head) and any(cells[len(head) :]):
+            mend = "name all columns in the first line; with decimal commas use semicolons"
+            raise BadInput(f"{name} line {line}", f"{len(cells)} columns", mend)
     if not body:
         raise BadInput(name, "no numbers", "give at least two rows of chainage and elevation [m]")
     columns = _columns(name, head, body)
@@ -196,8 +200,6 @@ def _columns(
     if len(numeric) == 2 and all(names[k] not in NORTHINGS for k in numeric if names):
         return [("chainage", numeric[0]), ("elevation", numeric[1])]
     found = ", ".join(head) or f"{len(body[0][1])} columns without names"
-    if not head and {len(cells) for _, cells in body} == {4} and "," in body[0][1]:
-        found = f"{len(numeric)} columns"
     mend = (
         "name its columns in the first line: chainage and elevation, or easting, northing and "
         "elevation; with decimal commas separate columns by semicolons"
@@ -287,6 +289,11 @@ def profile_of(name: str, survey: Survey, road: tuple[float, float] | None = Non
     """
     notes = list(survey.notes)
     points = _distinct(name, survey.points, notes)
+    if points[0, 0] == points[-1, 0]:
+        mend = (
+            "let the profile run from the crest to beyond the road: its ends have the same chainage"
+        )
+        raise BadInput(name, points[-1].tolist(), mend)
     if points[0, 0] > points[-1, 0]:
         points = points[::-1]
         notes.append("the points were listed against the chainage; their order was reversed")
@@ -349,10 +356,12 @@ def _rises_to_crest(name: str, points: Floats, road: tuple[float, float] | None)
         if not (start <= min(road) and max(road) <= end):
             mend = f"put it on the profile, which runs from chainage {start:.10g} to {end:.10g}"
             raise BadInput("--road", list(road), mend)
-        if high > low and sum(road) > start + end:
+        x, y = points.T
+        at = float(np.interp(0.5 * sum(road), x, y))
+        if high > low and at > 0.5 * (high + y.min()):
             mend = (
-                f"check it: the profile rises to elevation {high:g} at chainage {end:.10g}, near "
-                "which this road lies"
+                f"check it: the road would be at elevation {at:g}, in the upper half of a profile "
+                f"that rises to {high:g} at chainage {end:.10g}"
             )
             raise BadInput("--road", list(road), mend)
     if high == low:

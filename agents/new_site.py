@@ -32,6 +32,7 @@ from rigdda.model.soundness import BEYOND
 from rigdda.model.source import Source
 from rigdda.model.surface import Surface
 from rigdda.model.survey import Profile, profile_of, read_survey
+from rigdda.model.terrain import Terrain
 
 Floats = NDArray[np.float64]
 Span = tuple[float, float]
@@ -62,6 +63,9 @@ PERIOD = 5.0
 
 BLOCK = 0.8
 """Edge of the placeholder of a block on ground that overhangs [m]."""
+
+CLEAR = 0.01
+"""Height of this block above the ground [m]: it shall not reach into it by rounding."""
 
 STEP = 0.01
 """Time step [s]: single blocks and groups need no shorter one."""
@@ -298,7 +302,7 @@ class _Draft:
         for name, span, sure in self.sources:
             blocks = self.overhangs and not self.wanted.sources
             place: dict[str, tuple[Any, str]] = (
-                {"blocks": ([_block(self.x, self.y, span)], sure)} if blocks else {}
+                {"blocks": ([_block(self.profile.points, span)], sure)} if blocks else {}
             )
             usual = Source(band=(1.0, 2.0))
             values: dict[str, tuple[Any, str]] = {
@@ -419,13 +423,14 @@ def _reach() -> float:
     return loose_blocks.reach(Source(band=(1.0, 2.0)), event)
 
 
-def _block(x: Floats, y: Floats, span: Span) -> list[list[float]]:
+def _block(points: Floats, span: Span) -> list[list[float]]:
     """Return the corners of a block just above the highest ground of a face."""
-    low = 0.5 * sum(span)
-    high = low + BLOCK
-    near = (np.maximum(x[:-1], x[1:]) >= low) & (np.minimum(x[:-1], x[1:]) <= high)
-    bottom = round(float(np.maximum(y[:-1], y[1:])[near].max()) + 0.01, 3)
-    return [[low, bottom], [high, bottom], [high, bottom + BLOCK], [low, bottom + BLOCK]]
+    ground, low = Terrain(points), round(0.5 * sum(span), 3)
+    high = round(low + BLOCK, 3)
+    inner = [x for x in points[:, 0] if low < x < high]
+    bottom = round(max(map(ground.height, [low, *inner, high])) + CLEAR, 3)
+    top = round(bottom + BLOCK, 3)
+    return [[low, bottom], [high, bottom], [high, top], [low, top]]
 
 
 def _ranged(option: str, text: str, origin: Origin) -> tuple[str, Span | None]:

@@ -18,7 +18,7 @@ from rigdda import Block, Event, Site, Source
 from rigdda.agents.reports.pictures import DPI, FONT, save, sources
 from rigdda.agents.reports.tables import empty_table
 from rigdda.barriers.fence import FENCE_CLASSES
-from rigdda.envs.rendering import ROAD, ROCK
+from rigdda.envs.rendering import ROAD, ROCK, Label, write_labels
 from rigdda.geometry import polygon_properties
 from rigdda.model.joints import spaced_area
 from rigdda.model.site_tables import Origin
@@ -192,6 +192,8 @@ def _source(source: Source) -> str:
             else f", cut at {scale:.2f} times the spacings to meet block_area = "
             f"{source.block_area:g} m2"
         )
+    if max(counts) == 1:
+        return f"source {source.name}: one block of {most} m2 ({top} t)"
     number = f"{min(counts)}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
     return (
         f"source {source.name}: {what} of {source.area:.4g} m2{way}: {number} blocks; 10, 50 and "
@@ -490,6 +492,7 @@ def draw(path: str | os.PathLike[str], site: Site) -> None:
         axes.set_title(site.name, loc="left", fontweight="bold", fontsize=12)
         _draw_survey(axes, site)
         figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=10)
+        write_labels(axes, _names(site))
         save(figure, path)
 
 
@@ -530,15 +533,19 @@ def _draw_sources(axes: Axes, site: Site) -> None:
     for i, corners in enumerate(sources(site)):
         axes.plot(*corners.T, color=STARTS, linewidth=3.0, zorder=3.2, solid_capstyle="butt",
                   label="rock starts here" if i == 0 else None)  # fmt: skip
+
+
+def _names(site: Site) -> list[Label]:
+    """Return the names of sources and where to write them: at the lower end of bands."""
+    found = []
     for source in site.sources:
         if source.band is not None:
-            x = 0.5 * sum(source.band)
-            at = x, site.profile.height(x)
+            at = source.band[1], site.profile.height(source.band[1])
         else:
             outline = source.outline
-            at = float(outline[:, 0].mean()), float(outline[:, 1].max())
-        axes.annotate(source.name, at, xytext=(8, 8), textcoords="offset points", fontsize=10,
-                      color=STARTS, zorder=6)  # fmt: skip
+            at = tuple(outline[outline[:, 1].argmax()].tolist())
+        found.append(Label(source.name, at, STARTS))
+    return found
 
 
 def _draw_places(axes: Axes, site: Site, lift: float) -> None:

@@ -148,6 +148,9 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if self.band is None:
                 mend = "leave it out: only blocks of a band have edges"
                 raise BadInput(f"{where}.edges", self.edges, mend)
+        if self.block_area is not None and not self.polygon:
+            mend = "leave it out: only a mass with a polygon is cut to an area"
+            raise BadInput(f"{where}.block_area", self.block_area, mend)
         given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
         mend = "give exactly one of band, polygon with joints, blocks"
         if not given:

@@ -408,7 +408,7 @@ class _Draft:
 
 
 JOINTED = (
-    "A jointed mass instead of a band, whose blocks `rigdda check` counts, would be:",
+    "A jointed mass instead of a band, whose blocks `rigdda check` counts, in x and y of this file:",
     "polygon = [[x, y], [x, y], [x, y], [x, y]]",
     "joints = [",
     "    { dip_deg = 45.0, spacing = 0.8, scatter = 0.2 },",
@@ -494,7 +494,7 @@ def _defaults(head: str, table: type[msgspec.Struct]) -> Part:
 
 def _render(head: Sequence[str], parts: Iterable[Part]) -> str:
     """Return the text of a file: before each value a line that says what it is."""
-    lines = [f"# {line}" for line in head]
+    lines = [f"# {''.join(c if c.isprintable() else ' ' for c in line)}" for line in head]
     for part in parts:
         lines.append("")
         if part.head:

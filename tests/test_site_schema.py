@@ -329,3 +329,12 @@ def test_only_a_mass_has_an_area_to_be_cut_to(tmp_path):
 def test_errors_of_stretches_name_the_surface(tmp_path):
     error = refused(tmp_path, "verge", "[61.0, -3.0]", "[58.0, -3.0]")
     assert error.field == "slope.surfaces[2].end" and "soil" in error.mend
+
+
+def test_rock_far_below_the_ground_is_refused(tmp_path):
+    text = sites.text("quick")
+    old = text[text.index("polygon = ") :].partition("\n")[0]
+    corners = msgspec.toml.decode(old)["polygon"]
+    sunk = [[x, y - 500.0] for x, y in corners]
+    error = refused(tmp_path, "quick", old, f"polygon = {sunk}")
+    assert error.field.startswith("sources.mass.polygon[") and "out of the ground" in error.mend

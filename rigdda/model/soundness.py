@@ -174,7 +174,8 @@ def _check_events(site: SiteTables) -> None:
 
 def _check_source(site: SiteTables, source: Source) -> None:
     chain = site.profile.points
-    deep = chain[:, 1].min() - 1.0
+    lowest = [y for _, piece in source.pieces() for _, y in piece]
+    deep = min([float(chain[:, 1].min()), *lowest]) - 1.0
     ground = shapely.Polygon([*chain, (chain[-1, 0], deep), (chain[0, 0], deep)])
     if source.band is not None:
         if (np.diff(chain[:, 0]) < 0.0).any():

@@ -54,6 +54,16 @@ def test_from_a_survey_to_a_checked_site(tmp_path):
     assert width >= 1200 and height >= 600
 
 
+def test_names_of_sites_and_sources_may_have_any_letters(tmp_path):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    strange = 'G\N{LATIN SMALL LETTER O WITH DIAERESIS}sgen "east"\n[slope]\x07'
+    run("new", strange, "--profile", "survey.csv", *ASKED, "--out", "a.toml", "--source",
+        'face "1": 12-18', folder=tmp_path)  # fmt: skip
+    site = Site.load(tmp_path / "a.toml")
+    assert site.name == strange and site.sources[0].name == 'face "1"'
+    assert "/" in refused("new", "a/b", "--profile", "survey.csv", folder=tmp_path)
+
+
 def test_a_drawing_becomes_a_site(tmp_path):
     ezdxf = pytest.importorskip("ezdxf")
     points = [tuple(map(float, row.split(","))) for row in GRID.splitlines()[1:]]

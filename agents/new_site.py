@@ -408,7 +408,7 @@ class _Draft:
 
 
 JOINTED = (
-    "A jointed mass instead of a band, whose blocks `rigdda check` counts, in x and y of this file:",
+    "A jointed mass instead of a band, in x and y of this file (`rigdda check` counts its blocks):",
     "polygon = [[x, y], [x, y], [x, y], [x, y]]",
     "joints = [",
     "    { dip_deg = 45.0, spacing = 0.8, scatter = 0.2 },",

@@ -337,4 +337,4 @@ def test_rock_far_below_the_ground_is_refused(tmp_path):
     corners = msgspec.toml.decode(old)["polygon"]
     sunk = [[x, y - 500.0] for x, y in corners]
     error = refused(tmp_path, "quick", old, f"polygon = {sunk}")
-    assert error.field.startswith("sources.mass.polygon[") and "out of the ground" in error.mend
+    assert error.field.startswith("sources.mass.polygon[") and "raise it" in error.mend

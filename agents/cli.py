@@ -101,6 +101,85 @@ def sites() -> None:
 
 
 @cli.command()
+@click.argument("name")
+@click.option("--profile", type=click.Path(path_type=Path), required=True, metavar="FILE",
+              help="Surveyed profile: a CSV file with columns such as chainage and elevation, or a "
+              "DXF drawing with a polyline (extra `dxf`).")  # fmt: skip
+@click.option("--layer", metavar="LAYER", help="Layer of the polyline in a DXF drawing.")
+@click.option("--road", type=float, nargs=2, metavar="START END", help="Edges of the road.")
+@click.option("--toe", type=float, metavar="X", help="Foot of the slope.")
+@click.option("--zone", type=float, nargs=2, metavar="START END", help="Where barriers may stand.")
+@click.option("--ground", "grounds", multiple=True, metavar="NAME:START-END",
+              help="Stretch of a ground of the library, such as talus:12-30, or only its name for "
+              "all other ground. May be repeated.")  # fmt: skip
+@click.option("--source", "sources", multiple=True, metavar="NAME:START-END",
+              help="Band of the slope where loose rock lies. May be repeated.")  # fmt: skip
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE.toml",
+              help="Site file to write.  [default: NAME.toml]")  # fmt: skip
+def new(
+    name: str,
+    profile: Path,
+    layer: str | None,
+    road: tuple[float, float] | None,
+    toe: float | None,
+    zone: tuple[float, float] | None,
+    grounds: tuple[str, ...],
+    sources: tuple[str, ...],
+    out: Path | None,
+) -> None:
+    """Write a site file for the surveyed profile of a slope.
+
+    All chainages are those of the survey. If the survey has the coordinates of a grid, an offset is
+    taken off and kept in the file. The comment on each value says whether it was surveyed or given,
+    or is a placeholder to replace.
+    """
+    from rigdda.agents import new_site
+
+    wanted = new_site.Wanted(road or None, toe, zone or None, grounds, sources, layer)
+    file = new_site.file_of(name, out)
+    text, found = new_site.compose(name, profile, wanted)
+    new_site.write(file, text)
+    for words in found.notes:
+        note(words)
+    count = text.count("placeholder: replace.")
+    click.echo(
+        f"{len(found.points)} points; {file} is written, with {count} placeholders to replace. "
+        f"To draw and check it: rigdda check {file}"
+    )
+
+
+@cli.command()
+@click.argument("site")
+@seed_option("Seed of the releases that are tried.")
+@out_option("check-SITE")
+def check(site: str, seed: int, out: Path | None) -> None:
+    """Draw SITE, say what will be computed and what looks odd.
+
+    SITE is the name of a built-in site or a TOML file. A few releases are simulated to estimate the
+    time that others take. Writes site.png.
+    """
+    import rigdda
+    from rigdda.agents import site_check
+
+    where = rigdda.Site.load(site)
+    folder = folder_for(out, f"check-{where.name}", "site.png")
+    with kept(folder):
+        site_check.draw(folder / "site.png", where)
+        trials = site_check.try_releases(where, seed)
+    for line in site_check.facts(where):
+        click.echo(line)
+    show(site_check.table(where, trials))
+    click.echo(site_check.time_of(where, trials))
+    if count := site_check.placeholders(site):
+        note(f"the file marks {count} values as placeholders to replace")
+    odd = site_check.oddities(where, trials)
+    for line in odd:
+        click.echo(f"odd: {line}")
+    words = f"{len(odd)} things look odd" if len(odd) != 1 else "1 thing looks odd"
+    click.echo(f"{words if odd else 'nothing looks odd'}; site.png is in {folder}")
+
+
+@cli.command()
 @click.argument("file", type=click.Choice(("site", "layout")), default="site")
 def schema(file: str) -> None:
     """Print the JSON Schema of site files, or of layout files.

@@ -118,7 +118,7 @@ def site_at_fidelity(site: Site, fidelity: str) -> Site:
         return site
     replace, motion = msgspec.structs.replace, site.motion
     sources = tuple(
-        replace(s, block_area=min(COARSER * s.block_area, s.area)) if s.polygon else s
+        replace(s, block_area=min(COARSER * s.mean_block_area, s.area)) if s.polygon else s
         for s in site.sources
     )
     return replace(site, sources=sources, motion=replace(motion, dt=max(motion.dt, FAST_DT)))

@@ -37,7 +37,7 @@ def surveyed(seed: int, disturbance: float) -> Site:
     site = Site.load(SITE)
     blocks = tuple(tuple(map(tuple, b.vertices.tolist())) for b in site.draw(seed, EVENT).blocks)
     sources = tuple(
-        replace(s, polygon=(), joints=(), blocks=blocks, disturbance=disturbance)
+        replace(s, polygon=(), joints=(), block_area=None, blocks=blocks, disturbance=disturbance)
         if s.polygon
         else s
         for s in site.sources

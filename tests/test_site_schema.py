@@ -278,3 +278,63 @@ def test_releases_that_take_minutes_are_doubted() -> None:
         DoubtfulInput, match=r"sources\.mass\.block_area: increase it.* 4\d{3} blocks"
     ):
         Site.parse(text.replace("block_area = ", "block_area = 0.01 # "), "site")
+
+
+def test_volumes_and_return_periods_are_areas_and_rates(tmp_path):
+    given = Event("boulder", return_period=8.0, volume=(0.3, 1.5), section_length=250.0)
+    assert given.rate == pytest.approx(1.0 / 8.0 / 2.5)
+    assert given.area == pytest.approx((0.3 ** (2 / 3), 1.5 ** (2 / 3)))
+    assert given == Event("boulder", given.rate, area=given.area)
+    assert Event("often", return_period=0.5).rate == 2.0
+    text = sites.text("verge")
+    old = text[text.index("rate = 2.8") :].partition("\n\n")[0]
+    new = old.replace("rate = 2.8", "return_period = 4.0\nsection_length = 50.0")
+    new = "\n".join(
+        "volume = [0.027, 0.125]" if line.startswith("area") else line for line in new.splitlines()
+    )
+    site = Site.parse(text.replace(old, new), "verge")
+    event = site.events[[e.rate for e in VERGE.events].index(2.8)]
+    assert event.rate == 0.5 and event.area == pytest.approx((0.09, 0.25))
+    drawn = site.draw(3, event.name)
+    rock, area = drawn.blocks[0], drawn.width**2
+    assert 0.027 <= area**1.5 <= 0.125 and rock.density == 2600.0
+    site.save(tmp_path / "saved.toml")
+    saved = (tmp_path / "saved.toml").read_text()
+    assert "volume" not in saved.split("[road]")[0] and "return_period" not in saved
+    assert Site.load(tmp_path / "saved.toml") == site
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "mend"),
+    [
+        ("rate = 2.8\n", "", "rate", "return_period"),
+        ("rate = 2.8", "rate = 2.8\nreturn_period = 2.0", "return_period", "leave it out"),
+        ("rate = 2.8", "rate = 2.8\nsection_length = 50.0", "section_length", "return_period"),
+        ("rate = 2.8", "rate = 2.8\nvolume = [0.1, 0.2]", "volume", "gives its area, too"),
+        ("rate = 2.8", "return_period = 0.0", "return_period", "above 0"),
+        ("rate = 2.8", "return_period = 1e-5", "return_period", "give years"),
+        ("rate = 2.8", "return_period = 1.0\nsection_length = 0.0", "section_length", "above 0"),
+    ],
+)  # fmt: skip
+def test_events_say_each_thing_once(old, new, field, mend, tmp_path):
+    error = refused(tmp_path, "verge", old, new)
+    assert error.field == f"events.small, face.{field}" and mend in str(error)
+
+
+def test_only_a_mass_has_an_area_to_be_cut_to(tmp_path):
+    error = refused(tmp_path, "verge", "band = [1.0, 2.8]", "band = [1.0, 2.8]\nblock_area = 2.0")
+    assert error.field == "sources.face.block_area" and "leave it out" in error.mend
+
+
+def test_errors_of_stretches_name_the_surface(tmp_path):
+    error = refused(tmp_path, "verge", "[61.0, -3.0]", "[58.0, -3.0]")
+    assert error.field == "slope.surfaces[2].end" and "soil" in error.mend
+
+
+def test_rock_far_below_the_ground_is_refused(tmp_path):
+    text = sites.text("quick")
+    old = text[text.index("polygon = ") :].partition("\n")[0]
+    corners = msgspec.toml.decode(old)["polygon"]
+    sunk = [[x, y - 500.0] for x, y in corners]
+    error = refused(tmp_path, "quick", old, f"polygon = {sunk}")
+    assert error.field.startswith("sources.mass.polygon[") and "raise it" in error.mend

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import Annotated, NamedTuple
 
 import msgspec
@@ -51,8 +52,8 @@ class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     spacing: Annotated[
         float,
         about(
-            "Mean spacing. The spacings of all sets are multiplied by a common factor so that the "
-            "mean area of the blocks is that specified by the source.",
+            "Mean spacing, measured across the joints. If the source specifies a `block_area`, the "
+            "spacings of all sets are multiplied by a common factor.",
             "m",
             ge=1e-3,
             le=1e3,
@@ -80,10 +81,10 @@ class JointSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def cut(
     source: shapely.Polygon,
     joints: tuple[JointSet, ...],
-    block_area: float,
+    block_area: float | None,
     rng: np.random.Generator,
 ) -> list[NDArray[np.float64]]:
-    """Cut a convex rock mass into blocks of a given mean area.
+    """Cut a convex rock mass into blocks.
 
     Blocks are convex except where a very small block was merged with a neighbour.
 
@@ -93,8 +94,9 @@ def cut(
         The rock mass.
     joints : tuple of JointSet
         At least two sets of different dip.
-    block_area : float
-        Mean area [m2]; met within 5 %.
+    block_area : float or None
+        Mean area [m2], met within 5 % by multiplying the spacings by a common factor. With None the
+        spacings are kept.
     rng : numpy.random.Generator
         Generator for offsets, spacings and rock bridges.
 
@@ -108,19 +110,40 @@ def cut(
     BadInput
         If the joints cannot cut the mass into blocks of that area.
     """
+    if block_area is None:
+        usual = min(spaced_area(joints), source.area)
+        return _outlines(_join_bridges(_cells(source, joints, 1.0, rng), joints, usual, rng))
     scale = math.sqrt(block_area / math.prod(j.spacing for j in joints[:2]))
     for _ in range(DRAWS):
         cells = _join_bridges(_cells(source, joints, scale, rng), joints, block_area, rng)
         mean = source.area / len(cells)
         if abs(mean / block_area - 1.0) <= AREA_TOLERANCE:
-            outlines = [shapely.get_coordinates(cell)[:-1] for cell in cells]
-            return [without_straight_corners(outline) for outline in outlines]
+            return _outlines(cells)
         scale *= math.sqrt(block_area / mean)
     raise BadInput(
         "source: block_area",
         block_area,
         f"choose joint sets that cut {source.area:g} m2 into blocks of this mean area",
     )
+
+
+def spaced_area(joints: tuple[JointSet, ...]) -> float:
+    """Return the mean area of the cells between persistent joints in a large mass [m2].
+
+    In a large mass there are as many cells as crossings of joints. Two sets of spacings a and b
+    whose dips differ by an angle t cross sin(t) / (a b) times per unit of area.
+    """
+    crossings = sum(
+        abs(math.sin(math.radians(one.dip_deg - two.dip_deg))) / (one.spacing * two.spacing)
+        for one, two in combinations(joints, 2)
+    )
+    return 1.0 / crossings
+
+
+def _outlines(cells: list[shapely.Polygon]) -> list[NDArray[np.float64]]:
+    """Return the corners of cells [m]."""
+    corners = [shapely.get_coordinates(cell)[:-1] for cell in cells]
+    return [without_straight_corners(outline) for outline in corners]
 
 
 def _cells(

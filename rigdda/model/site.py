@@ -41,6 +41,7 @@ from rigdda.model.site_tables import Drawn, Event, SiteTables
 from rigdda.model.soundness import check_damping, check_site
 from rigdda.model.source import Source
 from rigdda.model.surface import MOST_DAMPING, Surface, smaller
+from rigdda.model.survey import SURVEYS
 from rigdda.model.terrain import Roughness
 
 Value = TypeVar("Value")
@@ -97,6 +98,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if not isinstance(source, str | os.PathLike):
             raise BadInput("site", source, "name a TOML file or a built-in site")
         path = Path(source)
+        if path.suffix.lower() in SURVEYS:
+            mend = f"make a site file of this survey: rigdda new NAME --profile {source}"
+            raise BadInput("site", str(source), mend)
         if path.suffix != ".toml" and not path.is_file():
             return cls.named(str(source))
         if not path.is_file():
@@ -131,7 +135,12 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             If a surface has restitution None (plain penalty contact), which TOML cannot represent.
         """
         data = msgspec.to_builtins(self)
-        for table in (*data["sources"], *data["events"], data["motion"]):  # TOML has no null
+        for table in (
+            *data["sources"],
+            *data["events"],
+            data["motion"],
+            data["origin"],
+        ):  # TOML has no null
             for name in [name for name, value in table.items() if value is None]:
                 del table[name]
         laws = {f"surfaces.{name}": table for name, table in data["surfaces"].items()}

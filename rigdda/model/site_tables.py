@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -75,8 +75,14 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         last = -check.LARGEST
         for i, stretch in enumerate(self.surfaces):
             where = f"slope.surfaces[{i}]"
-            check.number(f"{where}.start", stretch.start, last)
-            last = check.number(f"{where}.end", stretch.end, stretch.start, open_low=True)
+            if stretch.start < last:
+                before = self.surfaces[i - 1].surface
+                mend = f"let {stretch.surface} begin at {last:g} or beyond, where {before} ends"
+                raise BadInput(f"{where}.start", stretch.start, mend)
+            if stretch.end <= stretch.start:
+                mend = f"let {stretch.surface} end beyond {stretch.start:g}, where it begins"
+                raise BadInput(f"{where}.end", stretch.end, mend)
+            last = stretch.end
 
     def surface_at(self, x: float) -> str:
         """Return the name of the surface at a chainage."""
@@ -109,8 +115,21 @@ MOST_OFTEN = 1000.0
 LARGEST_AREA, WIDEST = 1000.0, 1000.0
 """Maximum area of a block [m2] and maximum width of an event [m]."""
 
+SECTION = 100.0
+"""Length of slope that rates refer to [m]."""
+
+VOLUME_EXPONENT = 2.0 / 3.0
+"""Power of a block's volume that is its area: a block is as long along the road as the root of its
+area, as its mass and the width of its release have it."""
+
+
+_OPEN: Any = msgspec.UNSET
+"""Default of `Event.rate`, which may be given as a return period."""
 
 Area = Annotated[float, about(ge=1e-4, le=LARGEST_AREA)]
+Period = Annotated[float, about(gt=0.0, le=1e6)]
+Length = Annotated[float, about(gt=0.0, le=1e5)]
+Volume = Annotated[float, about(ge=1e-6, le=3e4)]
 Width = Annotated[float, about(gt=0.0, le=WIDEST)]
 Count = Annotated[int, about(ge=1, le=1000)]
 
@@ -119,28 +138,33 @@ Count = Annotated[int, about(ge=1, le=1000)]
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A type of rockfall event and its rate.
 
+    An event that is given by a `volume` or a `return_period` has the `area` and the `rate` that
+    follow from them, and these are what `Site.save` writes.
+
     Raises
     ------
     BadInput
-        If a value is of the wrong type or outside its range.
+        If a value is of the wrong type or outside its range, or there is not exactly one of `rate`
+        and `return_period`, or there are both `area` and `volume`.
     """
 
     name: Annotated[str, about("Name of the event.")]
     rate: Annotated[
         float,
         about(
-            "Mean number of occurrences per year on 100 m of slope.",
+            "Mean number of occurrences per year on 100 m of slope. Needed, unless the event gives "
+            "a `return_period`.",
             "1/year per 100 m of slope",
             ge=0.0,
             le=MOST_OFTEN,
         ),
-    ]
+    ] = _OPEN
     source: Annotated[str, about("Name of the source of the rock.")] = "rock"
     area: Annotated[
         tuple[Area, Area] | None,
         about(
             "Least and greatest cross-sectional area of a block. Needed for a band, unless "
-            "the band gives `edges`.",
+            "the event gives a `volume` or the band gives `edges`.",
             "m2",
             rising=True,
         ),
@@ -175,9 +199,64 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     design: Annotated[
         bool, about("Whether it is a design event, for which targets can be set.")
     ] = False
+    volume: Annotated[
+        tuple[Volume, Volume] | None,
+        about(
+            "Instead of `area`, the least and the greatest volume of a block. The area is the "
+            "volume to the power of 2/3: a block is taken to be as long along the road as the root "
+            "of its area.",
+            "m3",
+            rising=True,
+        ),
+    ] = None
+    return_period: Annotated[
+        Period | None,
+        about(
+            "Instead of `rate`, the mean time between two such events on 100 m of slope, or on "
+            "`section_length`.",
+            "years",
+        ),
+    ] = None
+    section_length: Annotated[
+        Length | None,
+        about(
+            "Length of slope that `return_period` refers to. The default is 100 m.",
+            "m",
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
         fields.check(self, f"{self.words}.")
+        _set = msgspec.structs.force_setattr
+        _set(self, "rate", self._yearly())
+        if self.volume is not None:
+            if self.area is not None:
+                mend = "leave it out: the event gives its area, too"
+                raise BadInput(f"{self.words}.volume", list(self.volume), mend)
+            low, high = (volume**VOLUME_EXPONENT for volume in self.volume)
+            _set(self, "area", (low, high))
+        for name in ("volume", "return_period", "section_length"):
+            _set(self, name, None)
+
+    def _yearly(self) -> float:
+        """Return its rate, as given or by its return period [1/year per 100 m of slope]."""
+        period, length = self.return_period, self.section_length
+        if period is None:
+            if self.rate is _OPEN:
+                mend = "add how often it happens on 100 m of slope a year, or a return_period"
+                raise BadInput(f"{self.words}.rate", None, mend)
+            if length is not None:
+                mend = "leave it out: it goes with a return_period, and the event gives a rate"
+                raise BadInput(f"{self.words}.section_length", length, mend)
+            return self.rate
+        if self.rate is not _OPEN:
+            mend = "leave it out: the event gives its rate, too"
+            raise BadInput(f"{self.words}.return_period", period, mend)
+        rate = SECTION / (period * (length or SECTION))
+        if rate > MOST_OFTEN:
+            mend = f"give years: this is {rate:g} events a year on 100 m, at most {MOST_OFTEN:g}"
+            raise BadInput(f"{self.words}.return_period", period, mend)
+        return rate
 
     @property
     def words(self) -> str:
@@ -196,14 +275,20 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if source.band is None:
             if self.area is not None or self.number != (1, 1):
                 what = "number" if self.area is None else "area"
-                mend = f"leave it out: source {source.name} is not a band and defines its blocks"
+                mend = (
+                    f"leave it (or volume) out: source {source.name} is not a band and defines its "
+                    "blocks"
+                )
                 raise BadInput(f"{self.words}.{what}", getattr(self, what), mend)
         elif source.edges is not None:
             if self.area is not None:
-                mend = f"leave it out: the edges of source {source.name} determine it"
+                mend = f"leave it (or volume) out: the edges of source {source.name} determine it"
                 raise BadInput(f"{self.words}.area", self.area, mend)
         elif self.area is None:
-            mend = f"give the least and the greatest area of a block of band {source.name} [m2]"
+            mend = (
+                f"give the least and the greatest area of a block of band {source.name} [m2], or a "
+                "volume [m3]"
+            )
             raise BadInput(f"{self.words}.area", None, mend)
         if source.band is not None and self.number[1] > 1 and self.width is None:
             mend = "give the width along the road of an event of several blocks [m]"
@@ -239,6 +324,53 @@ class Drawn(NamedTuple):
     order; empty if no surface varies."""
     roughness: Roughness | None = None
     """Pits in the ground; None if it is smooth."""
+
+
+@documented
+class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the survey has the point x = 0, y = 0 of the site.
+
+    Computation uses short coordinates that grow downhill. This table keeps what was taken off those
+    of a survey, so that results can be given back on its grid.
+
+    Raises
+    ------
+    BadInput
+        If a value is of the wrong type.
+    """
+
+    chainage: Annotated[float, about("Chainage of the survey at x = 0.", "m")] = 0.0
+    elevation: Annotated[float, about("Elevation of the survey at y = 0.", "m")] = 0.0
+    reversed: Annotated[
+        bool, about("Whether the chainage of the survey falls where x grows, which is downhill.")
+    ] = False
+    easting: Annotated[
+        float | None,
+        about("Easting on the grid at x = 0, if the survey has plan coordinates.", "m"),
+    ] = None
+    northing: Annotated[
+        float | None,
+        about("Northing on the grid at x = 0, if the survey has plan coordinates.", "m"),
+    ] = None
+    azimuth_deg: Annotated[
+        float | None,
+        about(
+            "Direction in which x grows, clockwise from grid north, if the survey has plan "
+            "coordinates.",
+            "deg",
+        ),
+    ] = None
+
+    def __post_init__(self) -> None:
+        fields.check(self, "origin.")
+
+    def chainage_of(self, x: float) -> float:
+        """Return the chainage of the survey at a chainage `x` of the site [m]."""
+        return self.chainage - x if self.reversed else self.chainage + x
+
+    def x_of(self, chainage: float) -> float:
+        """Return the chainage of the site at a chainage of the survey [m]."""
+        return self.chainage - chainage if self.reversed else chainage - self.chainage
 
 
 DURATION = (1.0, 3600.0)
@@ -394,6 +526,9 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             "band releases its rock once a year on 100 m of slope."
         ),
     ] = ()
+    origin: Annotated[Origin, about("Where the survey has the point x = 0, y = 0 of the site.")] = (
+        Origin()
+    )
     road: Annotated[Road, about("The road.")]
     barrier_zone: Annotated[
         BarrierZone, about("Where barriers may stand, and how large they may be.")

@@ -60,7 +60,8 @@ def check_site(site: SiteTables) -> None:
     for source in site.sources:
         blocks = source.area / source.mean_block_area if source.band is None else 0.0
         if blocks > MANY_BLOCKS:
-            _doubt(f"{source.words}.block_area", f"increase it: a release has {blocks:.0f} blocks")
+            where = "joints.spacing" if source.block_area is None else "block_area"
+            _doubt(f"{source.words}.{where}", f"increase it: a release has {blocks:.0f} blocks")
     if 0.0 < site.consequences.closure < CHEAPEST:
         _doubt("consequences.closure", "give EUR per day, not thousands of EUR")
     Settings(dt=motion.dt)
@@ -144,8 +145,11 @@ def _check_slope(site: SiteTables) -> None:
     if road.end <= road.start:
         raise BadInput("road.end", road.end, f"put it beyond road.start {road.start}")
     for i, stretch in enumerate(site.slope.surfaces):
-        check.number(f"slope.surfaces[{i}].start", stretch.start, low, high)
-        check.number(f"slope.surfaces[{i}].end", stretch.end, low, high)
+        for end in ("start", "end"):
+            at = getattr(stretch, end)
+            if not low <= at <= high:
+                mend = f"keep {stretch.surface} on the slope: at least {low:g} and at most {high:g}"
+                raise BadInput(f"slope.surfaces[{i}].{end}", at, mend)
     if high < road.end + BEYOND:
         raise BadInput(
             f"slope.points[{len(points) - 1}]",
@@ -170,7 +174,8 @@ def _check_events(site: SiteTables) -> None:
 
 def _check_source(site: SiteTables, source: Source) -> None:
     chain = site.profile.points
-    deep = chain[:, 1].min() - 1.0
+    lowest = [y for _, piece in source.pieces() for _, y in piece]
+    deep = min([float(chain[:, 1].min()), *lowest]) - 1.0
     ground = shapely.Polygon([*chain, (chain[-1, 0], deep), (chain[0, 0], deep)])
     if source.band is not None:
         if (np.diff(chain[:, 0]) < 0.0).any():

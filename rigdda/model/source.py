@@ -15,7 +15,7 @@ from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.geometry import overlap, without_straight_corners
 from rigdda.model.block import convex_polygon, simple_polygon
-from rigdda.model.joints import JointSet, cut
+from rigdda.model.joints import JointSet, cut, spaced_area
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
@@ -31,6 +31,7 @@ MOST_BLOCKS = 1e5
 """Maximum number of blocks of a mass; more would take days to simulate."""
 
 
+BlockArea = Annotated[float, about(gt=0.0)]
 Edge = Annotated[float, about(ge=0.01, le=30.0)]
 Corners = Annotated[int, about(ge=4, le=12)]
 Ratio = Annotated[float, about(ge=1.0, le=4.0)]
@@ -61,7 +62,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         tuple[Point, ...],
         about(
             "Instead of a band, the corners [x, y] of a convex mass of rock. `joints` cut it into "
-            "blocks whose mean area is `block_area`.",
+            "blocks, at the spacings that they have or to the mean area `block_area`.",
             "m",
         ),
     ] = ()
@@ -84,7 +85,16 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             le=1.0,
         ),
     ] = 1e-4
-    block_area: Annotated[float, about("Mean area of the blocks of a mass.", "m2", gt=0.0)] = 2.0
+    block_area: Annotated[
+        BlockArea | None,
+        about(
+            "Mean area of the blocks of a jointed mass, which is met within 5 % by scaling the "
+            "spacings of all joint sets by one factor. By default the spacings are kept as they "
+            "are given. In both cases, blocks of less than 0.35 of the mean area are joined to a "
+            "neighbour where the two make a convex block.",
+            "m2",
+        ),
+    ] = None
     density: Annotated[
         float,
         about("Density of the rock, about 2600.", "kg/m3", ge=LIGHTEST, le=DENSEST),
@@ -138,6 +148,9 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if self.band is None:
                 mend = "leave it out: only blocks of a band have edges"
                 raise BadInput(f"{where}.edges", self.edges, mend)
+        if self.block_area is not None and not self.polygon:
+            mend = "leave it out: only a mass with a polygon is cut to an area"
+            raise BadInput(f"{where}.block_area", self.block_area, mend)
         given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
         mend = "give exactly one of band, polygon with joints, blocks"
         if not given:
@@ -154,14 +167,19 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def _check_mass(self) -> None:
         convex_polygon(f"{self.words}.polygon", self.polygon)
-        rock = self.area
-        least = rock / MOST_BLOCKS
-        if not least <= self.block_area <= rock:
-            mend = f"give {least:g} to {rock:g} m2: the mass has {rock:g} m2"
-            raise BadInput(f"{self.words}.block_area", self.block_area, mend)
         if len({j.dip_deg % 180.0 for j in self.joints}) < 2:  # -90 and 90 are the same
             mend = "give at least two sets with different dips"
             raise BadInput(f"{self.words}.joints", self.joints, mend)
+        rock = self.area
+        least = rock / MOST_BLOCKS
+        if self.block_area is None:
+            if self.mean_block_area < least:
+                spacings = [joint.spacing for joint in self.joints]
+                mend = f"give spacings in metres that make at most {MOST_BLOCKS:g} blocks"
+                raise BadInput(f"{self.words}.joints.spacing", spacings, mend)
+        elif not least <= self.block_area <= rock:
+            mend = f"give {least:g} to {rock:g} m2: the mass has {rock:g} m2"
+            raise BadInput(f"{self.words}.block_area", self.block_area, mend)
 
     def _check_blocks(self) -> None:
         rocks = [shapely.Polygon(simple_polygon(where, b)) for where, b in self.pieces()]
@@ -201,8 +219,15 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def mean_block_area(self) -> float:
-        """Mean area of the blocks of a mass or of given blocks [m2]."""
-        return self.area / len(self.blocks) if self.blocks else self.block_area
+        """Mean area of the blocks of a mass or of given blocks [m2], 0 of a band.
+
+        That of a mass without a `block_area` follows from the spacings of its joints.
+        """
+        if self.blocks:
+            return self.area / len(self.blocks)
+        if self.block_area is not None or not self.joints:
+            return self.block_area or 0.0
+        return min(spaced_area(self.joints), self.area)
 
     def cut(self, rng: np.random.Generator) -> list[Floats]:
         """Return the corners of the blocks of a mass, cut by random joints, or of given blocks [m].

@@ -21,6 +21,7 @@ from rigdda.model.site_tables import (
     BarrierZone,
     Event,
     Motion,
+    Origin,
     Rebound,
     Road,
     Scatter,
@@ -40,6 +41,7 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[[sources]]`", Source),
     ("`[[sources.joints]]`", JointSet),
     ("`[[events]]`", Event),
+    ("`[origin]`", Origin),
     ("`[road]`", Road),
     ("`[barrier_zone]`", BarrierZone),
     ("`[surfaces.NAME]`", Surface),
@@ -178,7 +180,7 @@ def _default(field: Described) -> str:
     if field.needed:
         return "needed"
     if value is msgspec.UNSET:
-        return "that of its ground"
+        return "from `return_period`" if field.name == "rate" else "that of its ground"
     if isinstance(value, msgspec.Struct):
         return "see below"
     if value in (None, (), {}, ""):

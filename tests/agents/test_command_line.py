@@ -24,8 +24,8 @@ from rigdda.barriers import to_tables
 
 TINY = ("--budget", "400", "--verify", "40")
 COMMANDS = (
-    "sites", "simulate", "design", "study", "train", "evaluate", "fidelity", "validate", "replay",
-    "repeat",
+    "sites", "new", "check", "simulate", "design", "study", "train", "evaluate", "fidelity",
+    "validate", "replay", "repeat",
 )  # fmt: skip
 FILES = (
     "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png",
@@ -286,7 +286,7 @@ def test_a_quick_look_with_points(tmp_path: Path) -> None:
 def test_every_command_explains_itself(command: str, tmp_path: Path) -> None:
     words = run(command, "--help", folder=tmp_path)
     assert words.startswith(f"Usage: rigdda {command}")
-    if command not in ("sites", "repeat"):
+    if command not in ("sites", "new", "repeat"):
         assert "--seed" in words and "--out" in words
     assert list(tmp_path.iterdir()) == []
 

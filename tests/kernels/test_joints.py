@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigdda import Block, Site
-from rigdda.geometry import edges, overlap, turns
-from rigdda.model.joints import Bridges, JointSet, cut
+from rigdda.geometry import edges, overlap, polygon_properties, turns
+from rigdda.model.joints import Bridges, JointSet, cut, spaced_area
 
 SQUARE = shapely.Polygon([(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)])
 (ROCK,) = Site.load("shu-hwa-paper").sources
@@ -133,3 +133,31 @@ def test_a_set_that_is_open_is_not_bridged():
     assert level > 1.9 * upright  # slabs twice as long as high
     assert faces(1.0, 0.5)[0] / faces(1.0, 0.5)[1] > 1.2 * level / upright
     assert faces(0.5, 1.0)[0] / faces(0.5, 1.0)[1] < level / upright / 1.2
+
+
+@pytest.mark.parametrize("dips", [(0.0, 90.0), (45.0, -50.0), (20.0, 80.0), (0.0, 60.0, -60.0)])
+def test_spacings_are_kept_where_no_area_is_given(dips):
+    """Joints of spacing s whose sets cross at an angle t cut cells of s1 s2 / sin(t)."""
+    large = shapely.box(0.0, 0.0, 40.0, 30.0)
+    joints = tuple(JointSet(dip, 0.8 + 0.3 * k, 0.05) for k, dip in enumerate(dips))
+    areas = [
+        polygon_properties(block)[0]
+        for seed in range(3)
+        for block in cut(large, joints, None, np.random.default_rng(seed))
+    ]
+    assert sum(map(abs, areas)) == pytest.approx(3 * large.area)
+    if len(dips) == 2:
+        wanted = 0.8 * 1.1 / abs(np.sin(np.radians(dips[0] - dips[1])))
+        assert spaced_area(joints) == pytest.approx(wanted)
+        assert np.median(np.abs(areas)) == pytest.approx(wanted, rel=0.1)
+    else:
+        assert spaced_area(joints) < 0.8 * 1.1 / np.sin(np.radians(60.0))
+
+
+def test_a_small_mass_is_cut_at_its_spacings_too():
+    small = shapely.box(0.0, 0.0, 3.0, 2.0)
+    joints = (JointSet(0.0, 1.0), JointSet(90.0, 1.0))
+    kept = [len(cut(small, joints, None, np.random.default_rng(seed))) for seed in range(30)]
+    scaled = [len(cut(small, joints, 2.0, np.random.default_rng(seed))) for seed in range(30)]
+    assert set(scaled) == {3}
+    assert 5 <= np.mean(kept) <= 9

@@ -174,7 +174,7 @@ def surveyed(**change):
         for i in range(3)
     ]  # fmt: skip
     mass = msgspec.structs.replace(
-        site.sources[1], polygon=(), joints=(), blocks=tuple(rows), **change
+        site.sources[1], polygon=(), joints=(), block_area=None, blocks=tuple(rows), **change
     )
     return msgspec.structs.replace(site, sources=(site.sources[0], mass))
 

@@ -1,0 +1,589 @@
+"""What will be computed on a site, in words and as a picture, and what about it looks odd."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from rigdda import Block, Event, Site, Source
+from rigdda.agents.reports.pictures import DPI, FONT, save, sources
+from rigdda.agents.reports.tables import empty_table
+from rigdda.barriers.fence import FENCE_CLASSES
+from rigdda.envs.rendering import ROAD, ROCK, Label, write_labels
+from rigdda.geometry import polygon_properties
+from rigdda.model.joints import spaced_area
+from rigdda.model.site_tables import Origin
+from rigdda.model.soundness import BEYOND
+from rigdda.releases import Batch
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from rich.table import Table
+
+Floats = NDArray[np.float64]
+
+DRAWS = 20
+"""Times that a jointed mass is cut to tell its blocks."""
+
+WIDE, NARROW = 20.0, 3.0
+"""Widths of a road beyond which its unit is doubted [m]."""
+
+TALL, LOW = 1500.0, 2.0
+"""Heights of a slope beyond which its unit is doubted [m]."""
+
+LIGHT, HEAVY = 1500.0, 3500.0
+"""Densities beyond which rock is unusual [kg/m3]."""
+
+OFTEN = 5.0
+"""Rate from which on a return period may be meant [1/year per 100 m]."""
+
+HUGE = 20.0
+"""Volume of a block above which an area may have been meant for one [m3]."""
+
+HANGING = 0.05
+"""Distance from the ground above which rock hangs in mid-air [m]."""
+
+FLAT = 20.0
+"""Inclination of a band below which loose blocks may stay where they are [deg]."""
+
+SHORT = 1.2 * BEYOND
+"""Length of the ground beyond the road that leaves a run-out little room [m]."""
+
+FALLING = 10.0
+"""Inclination of the last piece of the ground above which rock goes on beyond it [deg]."""
+
+SCALED = 1.2
+"""Factor on the spacings of joints that is worth a word, either way."""
+
+LEAST_ROOM = 3.0
+"""Length of the zone below which there is little to choose [m]."""
+
+FENCE = 500
+"""Energy class of the least fence that there should be room for [kJ]."""
+
+TRIES = 3
+"""Releases of each event that are timed."""
+
+LONG = 2.0
+"""Time of a release after which no other one of the event is tried [s]."""
+
+
+class Trial(NamedTuple):
+    """What releases of an event took."""
+
+    event: str
+    steps: int
+    """Most time steps of a release."""
+    seconds: float
+    """Processor time of one, mean [s]."""
+    cut_off: bool
+    """Whether rock above the road still moved at the end of one."""
+
+
+def facts(site: Site) -> list[str]:
+    """Return sentences on what the site is and what will be computed."""
+    x, y = np.array(site.slope.points).T
+    road, zone = site.road, site.barrier_zone
+    tall = y.max() - site.profile.height(road.start)
+    rooms = " and ".join(f"{low:.1f} to {high:.1f} m" for low, high in site.rooms)
+    total = sum(event.rate for event in site.events)
+    design = [event.name for event in site.events if event.design]
+    return [
+        f"{site.name}: a slope {tall:.1f} m high above a road "
+        f"{road.end - road.start:.1f} m wide at x = {road.start:g} to {road.end:g} m; "
+        f"{len(x)} points from x = {x[0]:g} to {x[-1]:g} m, {x[-1] - road.end:.1f} m beyond the "
+        "road",
+        *_origin(site),
+        "ground: " + "; ".join(_grounds(site)),
+        f"barriers may stand at x = {rooms}, up to {zone.max_height:g} m high; "
+        + _fences(site),
+        *(_source(source) for source in site.sources),
+        f"{total:.3g} events a year on 100 m of slope, {_period(total)}; design events: "
+        + (", ".join(design) or "none (design = true), so that no target can be set"),
+    ]  # fmt: skip
+
+
+def placeholders(path: str) -> int:
+    """Return how many values a file of `rigdda new` still marks as placeholders; 0 of a name."""
+    file = Path(path)
+    if not file.is_file():
+        return 0
+    lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+    return sum(line.startswith("#") and line.endswith("placeholder: replace.") for line in lines)
+
+
+def _origin(site: Site) -> Iterator[str]:
+    """Yield where the survey has the origin of the site."""
+    origin = site.origin
+    if origin.chainage or origin.elevation or origin.reversed:
+        way = "falls" if origin.reversed else "grows"
+        yield (
+            f"survey: x = 0 is chainage {origin.chainage:,.10g}, which {way} downhill, and y = 0 "
+            f"is elevation {origin.elevation:,.10g}; the road is at chainage "
+            f"{origin.chainage_of(site.road.start):,.10g} to "
+            f"{origin.chainage_of(site.road.end):,.10g}"
+        )
+    if origin.easting is not None and origin.northing is not None:
+        yield (
+            f"plan: x = 0 is at easting {origin.easting:,.10g}, northing {origin.northing:,.10g}, "
+            f"and x grows towards {origin.azimuth_deg or 0.0:.1f} deg from north"
+        )
+
+
+def _grounds(site: Site) -> list[str]:
+    """Return the stretches of the ground with their surfaces, from the crest on."""
+    found: list[tuple[float, float, str]] = []
+    points, names = site.slope.chain()
+    for (a, _), (b, _), name in zip(points, points[1:], names, strict=False):
+        start, end = min(a, b), max(a, b)
+        if found and found[-1][2] == name:
+            start, before, _ = found.pop()
+            end = max(end, before)
+        found.append((start, end, name))
+    return [f"{_called(site, name)} x = {a:g} to {b:g} m" for a, b, name in found]
+
+
+def _called(site: Site, surface: str) -> str:
+    """Return the name of a surface with its ground."""
+    ground = site.surfaces[surface].ground
+    return f"{surface} ({ground})" if ground not in ("", surface) else surface
+
+
+def _fences(site: Site) -> str:
+    """Return which fences have room for their elongation, in words."""
+    room = site.road.start - site.rooms[0][0]
+    fit = [kj for kj, kind in FENCE_CLASSES.items() if kind.elongation <= room]
+    if not fit:
+        return f"no fence has room for its elongation: {room:.1f} m up to the road"
+    most = max(fit)
+    return (
+        f"fences up to {most:,} kJ have room for their elongation, "
+        f"{FENCE_CLASSES[most].elongation:g} m, uphill of the road"
+    )
+
+
+def _source(source: Source) -> str:
+    """Return what a source is and what blocks it makes."""
+    if source.band is not None:
+        return (
+            f"source {source.name}: loose blocks at x = {source.band[0]:g} to {source.band[1]:g} m"
+        )
+    areas = [_areas(source, seed) for seed in range(DRAWS if source.polygon else 1)]
+    counts, every = [len(found) for found in areas], np.concatenate(areas)
+    shares = np.array([*np.quantile(every, [0.1, 0.5, 0.9]), every.max()])
+    low, middle, high, most = map(_figures, shares)
+    light, usual, heavy, top = map(_figures, shares**1.5 * source.density / 1e3)
+    what, way = "given blocks", ""
+    if source.polygon:
+        what = "a jointed mass"
+        scale = _scale(source)
+        way = (
+            ", cut at the spacings as given"
+            if scale is None
+            else f", cut at {scale:.2f} times the spacings to meet block_area = "
+            f"{source.block_area:g} m2"
+        )
+    if max(counts) == 1:
+        return f"source {source.name}: one block of {most} m2 ({top} t)"
+    number = f"{min(counts)}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
+    return (
+        f"source {source.name}: {what} of {source.area:.4g} m2{way}: {number} blocks; 10, 50 and "
+        f"90 % of them are below {low}, {middle} and {high} m2 ({light}, {usual} and {heavy} t), "
+        f"and the largest has {most} m2 ({top} t)"
+    )
+
+
+def _areas(source: Source, seed: int) -> list[float]:
+    """Return the areas of the blocks of a mass or of given blocks [m2]."""
+    outlines = source.cut(np.random.default_rng([seed, 0]))
+    return [abs(polygon_properties(outline)[0]) for outline in outlines]
+
+
+def _scale(source: Source) -> float | None:
+    """Return the factor that `block_area` sets on the spacings of joints, None without it."""
+    if source.block_area is None or not source.joints:
+        return None
+    return math.sqrt(source.block_area / spaced_area(source.joints))
+
+
+def _period(rate: float) -> str:
+    """Return how often something happens, in words."""
+    if rate <= 0.0:
+        return "never"
+    years = 1.0 / rate
+    return f"one in {years:.3g} years" if years >= 1.0 else f"one in {365.0 * years:.3g} days"
+
+
+def try_releases(site: Site, seed: int = 0) -> list[Trial]:
+    """Simulate a few releases of each event without barriers, and return what they took.
+
+    Raises
+    ------
+    Diverged
+        If one diverges.
+    """
+    batch, found = Batch(site, ()), []
+    batch.outcome(seed, site.event_names[0])  # compiles what is not compiled yet
+    for event in site.events:
+        spent, steps, cut = [], 0, False
+        for k in range(TRIES):
+            scene = site.realise((), seed + k, event.name)
+            steps = max(steps, math.ceil(site.motion.duration / site.settings(scene).dt))
+            start = time.process_time()
+            outcome = batch.outcome(seed + k, event.name)
+            spent.append(time.process_time() - start)
+            cut = cut or outcome.cut_off
+            if spent[-1] > LONG:
+                break
+        found.append(Trial(event.name, steps, float(np.mean(spent)), cut))
+    return found
+
+
+def table(site: Site, trials: Sequence[Trial]) -> Table:
+    """Return the table of events: how often, how large, and what a release takes."""
+    found = empty_table(("event", "1/year", "years", "blocks", "m3", "t", "steps", "ms"))
+    for event, trial in zip(site.events, trials, strict=True):
+        source = site.source(event.source)
+        number, areas = _blocks(event, source)
+        volumes = [area**1.5 for area in areas]
+        masses = [volume * source.density / 1e3 for volume in volumes]
+        found.add_row(
+            event.name,
+            f"{event.rate:.3g}",
+            f"{1.0 / event.rate:.3g}" if event.rate > 0.0 else "never",
+            number,
+            _range(volumes),
+            _range(masses),
+            f"{trial.steps:,}",
+            f"{1e3 * trial.seconds:.3g}",
+        )
+    return found
+
+
+def _blocks(event: Event, source: Source) -> tuple[str, tuple[float, float]]:
+    """Return the number of blocks of an event, and the least and greatest area of one [m2]."""
+    low, high = event.number
+    number = f"{low}" if low == high else f"{low} to {high}"
+    if source.edges is not None:
+        long, middle, short = sorted(source.edges, reverse=True)
+        return number, (middle * short, long * middle)
+    if event.area is not None:
+        return number, event.area
+    areas = _areas(source, 0)
+    return f"{len(areas)}", (min(areas), max(areas))
+
+
+def _figures(value: float) -> str:
+    """Return a number in two figures, or as a whole number from 100 on."""
+    return f"{value:.2g}" if value < 99.5 else f"{value:,.0f}"
+
+
+def _range(values: Sequence[float]) -> str:
+    """Return the least and the greatest of some numbers, in words."""
+    low, high = _figures(min(values)), _figures(max(values))
+    return low if low == high else f"{low} to {high}"
+
+
+def time_of(site: Site, trials: Sequence[Trial]) -> str:
+    """Return how long 1,000 releases take, in words."""
+    rates = np.array([event.rate for event in site.events])
+    each = float(rates @ [trial.seconds for trial in trials] / rates.sum())
+    cores = os.cpu_count() or 1
+    return (
+        "1/year and years: rate and return period on 100 m of slope; m3 and t: volume and mass of "
+        "a block; ms: processor time of a release.\n"
+        f"1,000 releases by rate take about {1000.0 * each / cores:,.0f} s on {cores} cores"
+    )
+
+
+def oddities(site: Site, trials: Sequence[Trial] = ()) -> list[str]:
+    """Return what about a site may not be meant: the field, its value, and what to check."""
+    return [
+        *_odd_profile(site),
+        *_odd_zone(site),
+        *(words for source in site.sources for words in _odd_source(site, source)),
+        *(words for event in site.events for words in _odd_event(site, event)),
+        *(
+            f"motion.duration = {site.motion.duration:g} s: rock of {trial.event!r} still moves "
+            "above the road as releases end; give more"
+            for trial in trials
+            if trial.cut_off
+        ),
+    ]
+
+
+def _odd_profile(site: Site) -> Iterator[str]:
+    """Yield what is odd about the ground and the road."""
+    x, y = np.array(site.slope.points).T
+    road, toe = site.road, site.slope.toe
+    foot, crest = site.profile.height(road.start), float(y.max())
+    tall, wide = crest - foot, road.end - road.start
+    if tall > TALL or tall < LOW:
+        yield (
+            f"slope.points: the crest is {tall:g} m above the road; are the coordinates in metres, "
+            "not in millimetres or feet?"
+        )
+    if wide > WIDE or wide < NARROW:
+        yield f"road: it is {wide:g} m wide; are chainages in metres, not in feet or kilometres?"
+    above = site.profile.height(toe) - foot
+    if tall > 0.0 and above > 0.5 * tall:
+        yield (
+            f"slope.toe = {toe:g}: it is {above:.1f} m above the road, in the upper half of the "
+            "slope; give the chainage of its foot, not of its crest"
+        )
+    beyond = float(x[-1]) - road.end
+    if beyond < SHORT:
+        yield (
+            f"slope.points: the ground ends {beyond:.1f} m beyond the road; survey farther if rock "
+            "can run on there"
+        )
+    fall = math.degrees(math.atan2(y[-2] - y[-1], abs(x[-1] - x[-2])))
+    if fall > FALLING:
+        yield (
+            f"slope.points: the ground falls by {fall:.0f} deg where it ends; survey it to where "
+            "rock stops if what lies below the road counts"
+        )
+
+
+def _odd_zone(site: Site) -> Iterator[str]:
+    """Yield what is odd about the place and size of barriers."""
+    zone, rooms = site.barrier_zone, site.rooms
+    longest = max(high - low for low, high in rooms)
+    if longest < LEAST_ROOM:
+        yield (
+            f"barrier_zone: {longest:.1f} m are free of loose rock; the best place will lie on an "
+            "end of it"
+        )
+    room, needed = site.road.start - rooms[0][0], FENCE_CLASSES[FENCE].elongation
+    if room < needed:
+        yield (
+            f"barrier_zone.start = {zone.start:g}: a fence of {FENCE} kJ gives way by {needed:g} "
+            f"m, and there are {room:.1f} m up to the road; begin the zone farther uphill"
+        )
+    size = max(_size(site, event) for event in site.events)
+    for name, factor in (("max_height", 1.5), ("max_depth", 1.0), ("max_width", 1.5)):
+        value = getattr(zone, name)
+        if value < factor * size:
+            yield (
+                f"barrier_zone.{name} = {value:g}: the largest block is {size:.1f} m long, so that "
+                "the best barrier will lie on this bound; allow more if it can be built"
+            )
+
+
+def _size(site: Site, event: Event) -> float:
+    """Return the length of the largest block of an event [m]."""
+    source = site.source(event.source)
+    _, (_, most) = _blocks(event, source)
+    return math.sqrt(most * (source.aspect[1] if source.band is not None else 1.0))
+
+
+def _odd_source(site: Site, source: Source) -> Iterator[str]:
+    """Yield what is odd about a source."""
+    if not LIGHT <= source.density <= HEAVY:
+        yield f"{source.words}.density = {source.density:g} kg/m3: rock has 2,000 to 3,100"
+    if source.band is not None:
+        start, end = source.band
+        fall = site.profile.height(start) - site.profile.height(end)
+        steep = math.degrees(math.atan2(fall, end - start))
+        if steep < FLAT:
+            yield (
+                f"{source.words}.band = [{start:g}, {end:g}]: the ground is {steep:.0f} deg steep "
+                "there, so that blocks may stay where they are"
+            )
+        if start > site.slope.toe:
+            yield f"{source.words}.band = [{start:g}, {end:g}]: it lies below slope.toe"
+        return
+    for words, high in _hanging(site, source):
+        yield f"{words}: it hangs {high:.2f} m above the ground; let it rest there"
+    scale = _scale(source)
+    if scale is not None and not 1.0 / SCALED <= scale <= SCALED:
+        area = spaced_area(source.joints)
+        yield (
+            f"{source.words}.block_area = {source.block_area:g} m2: the spacings as given make "
+            f"blocks of {area:.2g} m2, and are scaled by {scale:.2f}; leave block_area out to keep "
+            "them"
+        )
+    if source.polygon and source.area / source.mean_block_area < 2.0:
+        yield f"{source.words}.joints: the mass is hardly cut; are the spacings in metres?"
+
+
+def _hanging(site: Site, source: Source) -> Iterator[tuple[str, float]]:
+    """Yield what errors call each heap of rock in mid-air, and its height above the ground [m]."""
+    ground = site.profile.solid
+    names, rocks = zip(*source.pieces(), strict=True)
+    shapes = [shapely.Polygon(rock) for rock in rocks]
+    heaps = shapely.union_all([shape.buffer(0.5 * HANGING) for shape in shapes])
+    for heap in shapely.get_parts(heaps):
+        inside = [k for k, shape in enumerate(shapes) if heap.intersects(shape)]
+        high = min(float(shapes[k].distance(ground)) for k in inside)
+        if high > HANGING:
+            yield names[inside[0]], high
+
+
+def _odd_event(site: Site, event: Event) -> Iterator[str]:
+    """Yield what is odd about an event."""
+    if event.rate >= OFTEN:
+        yield (
+            f"{event.words}.rate = {event.rate:g}: so many a year on 100 m of slope; if it happens "
+            f"once in {event.rate:g} years, write return_period = {event.rate:g}"
+        )
+    if event.area is not None:
+        most = event.area[1]
+        if most**1.5 > HUGE:
+            yield (
+                f"{event.words}.area = [{event.area[0]:.3g}, {most:.3g}] m2: blocks of up to "
+                f"{most**1.5:.3g} m3; if the numbers are volumes, write volume"
+            )
+
+
+COLOURS = {
+    "hard_rock": "#a9a39b",
+    "weathered_rock": "#bfae95",
+    "coarse_talus": "#d8c08a",
+    "fine_scree": "#e6d6a8",
+    "hard_soil": "#c79f73",
+    "meadow": "#b5cf92",
+    "asphalt": "#5f6670",
+    "concrete": "#8f9aa5",
+}
+"""Colour of each ground of the library in pictures."""
+
+OTHERS = ("#e0b8a0", "#c4b7d6", "#b8d4d0", "#d9d9d9")
+"""Colours of surfaces that name no ground."""
+
+ZONED, STARTS = "#1c5aa0", "#b3261e"
+"""Colours of the barrier zone and of sources."""
+
+INCHES = (11.0, 4.2, 9.0)
+"""Width, and least and greatest height of the picture."""
+
+
+def draw(path: str | os.PathLike[str], site: Site) -> None:
+    """Write a PNG of the whole section: ground by materials, sources, barrier zone and road."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    points = np.array(site.slope.points)
+    long, tall = np.ptp(points, axis=0)
+    wide, low, high = INCHES
+    height = min(max(low, 1.9 + (wide - 1.0) * 1.2 * tall / long), high)
+    with rc_context(FONT):
+        figure = Figure((wide, height), dpi=DPI, layout="constrained")
+        axes = figure.subplots()
+        bottom = float(points[:, 1].min() - 0.12 * tall)
+        _draw_ground(axes, site, bottom)
+        _draw_sources(axes, site)
+        _draw_places(axes, site, 0.03 * tall)
+        axes.set_aspect("equal")
+        axes.set(
+            xlim=(points[0, 0], points[-1, 0]),
+            ylim=(bottom, float(points[:, 1].max()) + 0.14 * tall),
+        )
+        axes.set(xlabel="x [m]", ylabel="y [m]")
+        axes.set_title(site.name, loc="left", fontweight="bold", fontsize=12)
+        _draw_survey(axes, site)
+        figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=10)
+        write_labels(axes, _names(site))
+        save(figure, path)
+
+
+def _draw_ground(axes: Axes, site: Site, bottom: float) -> None:
+    """Fill the ground below each segment with the colour of its surface."""
+    points, names = site.slope.chain()
+    used = list(dict.fromkeys(names))
+    unknown = iter(OTHERS * len(used))
+    colours = {n: COLOURS.get(site.surfaces[n].ground) or next(unknown) for n in used}
+    told: set[str] = set()
+    overhangs = any(b[0] < a[0] for a, b in pairwise(points))
+    if overhangs:  # columns below its pieces would lie over one another
+        frame = [(points[-1][0], bottom), (points[0][0], bottom)]
+        axes.fill(*np.array([*points, *frame]).T, color="#e8e4dc", linewidth=0)
+    for (a, b), name in zip(pairwise(points), names, strict=True):
+        label = None if name in told else _called(site, name)
+        told.add(name)
+        if overhangs:
+            axes.plot([a[0], b[0]], [a[1], b[1]], color=colours[name], linewidth=6, label=label,
+                      solid_capstyle="round", zorder=1.5)  # fmt: skip
+        else:
+            axes.fill([a[0], b[0], b[0], a[0]], [a[1], b[1], bottom, bottom],
+                      facecolor=colours[name], edgecolor=colours[name], linewidth=0.3,
+                      label=label)  # fmt: skip
+    axes.plot(*np.array(points).T, color="#333333", linewidth=1.0, zorder=2)
+    axes.plot(*np.array(site.slope.points).T, ".", color="#333333", markersize=4, zorder=2.1,
+              label="points of the profile")  # fmt: skip
+
+
+def _draw_sources(axes: Axes, site: Site) -> None:
+    """Draw bands as lines on the ground, and the blocks of masses."""
+    for source in site.sources:
+        if source.band is None:
+            blocks = [Block(outline) for outline in source.cut(np.random.default_rng([0, 0]))]
+            for block in blocks:
+                axes.fill(*block.vertices.T, facecolor=ROCK, edgecolor="white", linewidth=0.4,
+                          zorder=3)  # fmt: skip
+    for i, corners in enumerate(sources(site)):
+        axes.plot(*corners.T, color=STARTS, linewidth=3.0, zorder=3.2, solid_capstyle="butt",
+                  label="rock starts here" if i == 0 else None)  # fmt: skip
+
+
+def _names(site: Site) -> list[Label]:
+    """Return the names of sources and where to write them: at the lower end of bands."""
+    found = []
+    for source in site.sources:
+        if source.band is not None:
+            at = source.band[1], site.profile.height(source.band[1])
+        else:
+            outline = source.outline
+            at = tuple(outline[outline[:, 1].argmax()].tolist())
+        found.append(Label(source.name, at, STARTS))
+    return found
+
+
+def _draw_places(axes: Axes, site: Site, lift: float) -> None:
+    """Draw the road and the parts of the zone, and name the toe."""
+    ground = site.profile
+
+    def line(start: float, end: float, up: float) -> tuple[Floats, Floats]:
+        inner = [x for x, _ in site.slope.points if start < x < end]
+        at = np.array([start, *inner, end])
+        return at, np.array([ground.height(x) + up for x in at])
+
+    road, toe = site.road, site.slope.toe
+    axes.plot(*line(road.start, road.end, 0.0), color=ROAD, linewidth=5, zorder=3.1,
+              solid_capstyle="butt", label="road")  # fmt: skip
+    for i, (low, high) in enumerate(site.rooms):
+        axes.plot(*line(low, high, lift), color=ZONED, linewidth=2.5, zorder=3.1,
+                  label="barriers may stand here" if i == 0 else None)  # fmt: skip
+    axes.annotate("toe", (toe, ground.height(toe)), xytext=(0, -22), textcoords="offset points",
+                  ha="center", fontsize=10, zorder=6,
+                  arrowprops={"arrowstyle": "->", "color": "black"})  # fmt: skip
+
+
+def _draw_survey(axes: Axes, site: Site) -> None:
+    """Add the coordinates of the survey on the upper and the right side, if they are others."""
+    from matplotlib.ticker import FuncFormatter
+
+    origin = site.origin
+    if not (origin.chainage or origin.elevation or origin.reversed):
+        return
+    plain = FuncFormatter(lambda value, _: f"{value:,.0f}")
+    if origin.chainage or origin.reversed:
+        ways: Any = origin.chainage_of, origin.x_of
+        above = axes.secondary_xaxis("top", functions=ways)
+        above.set_xlabel("chainage of the survey [m]")
+        above.xaxis.set_major_formatter(plain)
+    if origin.elevation:
+        level = Origin(origin.elevation)
+        ways = level.chainage_of, level.x_of
+        beside = axes.secondary_yaxis("right", functions=ways)
+        beside.set_ylabel("elevation of the survey [m]")
+        beside.yaxis.set_major_formatter(plain)

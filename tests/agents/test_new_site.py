@@ -1,0 +1,307 @@
+"""`rigdda new` and `rigdda check` as users meet them: real processes, real files."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from test_command_line import png_size, refused, rig, run
+
+import rigdda
+from rigdda import Event, Site
+from rigdda.agents import site_check
+from rigdda.agents.site_check import Trial, oddities
+
+GRID = """chainage,elevation
+2683400.0,1892.0
+2683410.0,1890.0
+2683422.0,1860.0
+2683472.0,1820.0
+2683494.0,1806.0
+2683504.0,1804.5
+2683512.0,1804.0
+2683521.0,1804.0
+2683561.0,1800.0
+"""
+SOUND = "x,y\n0,92\n10,90\n22,60\n72,20\n94,6\n104,4.5\n112,4\n121,4\n161,0\n"
+ASKED = ("--road", 112, 121)
+
+replace = msgspec.structs.replace
+
+
+def test_from_a_survey_to_a_checked_site(tmp_path):
+    (tmp_path / "survey.csv").write_text(GRID)
+    out = run("new", "slope", "--profile", "survey.csv", "--road", 2683512, 2683521, "--ground",
+              "talus:2683422-2683512", "--source", "cliff:2683412-2683418",
+              folder=tmp_path)  # fmt: skip
+    assert "x = 0 is chainage 2,683,400" in out and "9 points; slope.toml is written" in out
+    text = (tmp_path / "slope.toml").read_text()
+    assert f"with {text.count('placeholder: replace.')} placeholders" in out
+    site = Site.load(tmp_path / "slope.toml")
+    assert site.origin.chainage_of(site.road.start) == 2683512.0
+    assert site.surface_at(30.0) == "talus"
+    told = run("check", "slope.toml", "--out", "checked", folder=tmp_path)
+    assert "the road is at chainage 2,683,512 to 2,683,521" in told
+    assert "talus (coarse_talus) x = 22 to 112 m" in told
+    assert "0.2 events a year on 100 m of slope, one in 5 years" in told
+    assert "nothing looks odd; site.png is in checked" in told
+    width, height = png_size(tmp_path / "checked" / "site.png")
+    assert width >= 1200 and height >= 600
+
+
+def test_names_of_sites_and_sources_may_have_any_letters(tmp_path):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    strange = 'G\N{LATIN SMALL LETTER O WITH DIAERESIS}sgen "east"\n[slope]\x07'
+    run("new", strange, "--profile", "survey.csv", *ASKED, "--out", "a.toml", "--source",
+        'face "1": 12-18', folder=tmp_path)  # fmt: skip
+    site = Site.load(tmp_path / "a.toml")
+    assert site.name == strange and site.sources[0].name == 'face "1"'
+    assert "/" in refused("new", "a/b", "--profile", "survey.csv", folder=tmp_path)
+
+
+def test_a_drawing_becomes_a_site(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    points = [tuple(map(float, row.split(","))) for row in GRID.splitlines()[1:]]
+    flat = ezdxf.new()
+    flat.modelspace().add_lwpolyline(points, dxfattribs={"layer": "ground"})
+    flat.modelspace().add_lwpolyline([(0, 0), (1, 1)], dxfattribs={"layer": "frame"})
+    flat.modelspace().add_line((0, 0), (5, 5))
+    flat.saveas(tmp_path / "flat.dxf")
+    space = ezdxf.new()
+    turned = [(2600000.0 + 0.6 * (x - 2683400.0), 1200000.0 + 0.8 * (x - 2683400.0), y)
+              for x, y in points]  # fmt: skip
+    space.modelspace().add_polyline3d(turned)
+    space.saveas(tmp_path / "space.dxf")
+    line = refused("new", "several", "--profile", "flat.dxf", folder=tmp_path)
+    assert "--layer" in line and "frame, ground" in line
+    run("new", "flat", "--profile", "flat.dxf", "--layer", "ground", "--road", 2683512, 2683521,
+        folder=tmp_path)  # fmt: skip
+    run("new", "space", "--profile", "space.dxf", "--road", 112, 121, folder=tmp_path)
+    one, other = (Site.load(tmp_path / f"{name}.toml") for name in ("flat", "space"))
+    assert np.abs(np.subtract(one.slope.points, other.slope.points)).max() < 1e-3
+    assert one.road == other.road
+    assert other.origin.azimuth_deg == pytest.approx(36.869898, abs=1e-3)
+    (tmp_path / "broken.dxf").write_text("  0\nSECTION\n  2\nENTITIES\n  x\n")
+    (tmp_path / "text.dxf").write_text("chainage,elevation\n0,1\n")
+    ezdxf.new().saveas(tmp_path / "empty.dxf")
+    for name, mend in (("broken", "save it as DXF again"), ("text", "save it as DXF again"),
+                       ("empty", "one polyline"), ("missing", "name a file")):  # fmt: skip
+        assert mend in refused("new", "a", "--profile", f"{name}.dxf", folder=tmp_path)
+
+
+def test_a_drawing_without_the_extra_is_one_clear_error(tmp_path):
+    (tmp_path / "flat.dxf").write_text("0\nEOF\n")
+    code = (
+        "import sys; sys.modules['ezdxf'] = None; from rigdda.agents import cli; "
+        "sys.exit(cli.main(['new', 'a', '--profile', 'flat.dxf']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300,
+        env={"PYTHONPATH": str(Path(rigdda.__file__).parents[1])},
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1 and 'pip install "rigdda[dxf]"' in done.stderr
+
+
+SURVEYS = {
+    "nothing": ("", "empty"),
+    "only a header": ("x,y\n", "at least two rows"),
+    "one point": ("x,y\n0,1\n", "at least two points"),
+    "one place": ("x,y\n0,1\n0,1\n", "different points"),
+    "one column": ("x\n0\n1\n", "name its columns"),
+    "columns without names": ("0,1,2\n1,2,3\n", "name its columns"),
+    "unknown columns": ("a,b,c\n0,1,2\n1,2,3\n", "chainage and elevation"),
+    "no elevation": ("easting,northing\n0,1\n1,2\n", "elevation"),
+    "text": (SOUND.replace("22,60", "22,high"), "line 4: elevation = 'high': give a number"),
+    "gap": (SOUND.replace("22,60", "22,"), "line 4: elevation = '': give a number"),
+    "short line": (SOUND.replace("22,60", "22"), "line 4"),
+    "nan": (SOUND.replace("22,60", "nan,60"), "line 4: chainage = 'nan'"),
+    "infinite": (SOUND.replace("22,60", "1e999,60"), "finite"),
+    "hexadecimal": (SOUND.replace("22,60", "0x16,60"), "0x16"),
+    "thousands": ("x;y\n2.683.412,5;92\n2.683.500,5;3\n", "separators of thousands"),
+    "apostrophes": ("x;y\n2'683'412.5;92\n2'683'500.5;3\n", "separators of thousands"),
+    "decimal commas": ("x,y\n0,0,92,0\n10,5,90,5\n", "semicolons"),
+    "degrees": (SOUND.replace("22,60", "22\N{DEGREE SIGN},60"), "give a number"),
+    "millimetres": ("x [mm],y [mm]\n0,92000\n161000,0\n", "give metres"),
+    "feet": ("x (ft),y (ft)\n0,92\n161,0\n", "feet"),
+    "kilometres": ("chainage_km,elevation\n0,92\n0.161,0\n", "kilometres"),
+    "too long": ("x,y\n0,92000\n161000,0\n", "161000 m long"),
+    "too high": ("x,y\n0,9000\n161,0\n", "9000 m high"),
+    "level": ("x,y\n0,5\n100,5\n161,5\n", "with a slope"),
+    "ends level": ("x,y\n0,5\n100,1\n161,5\n", "below"),
+    "unsorted": ("x,y\n0,92\n90,6\n20,60\n110,4\n30,50\n161,0\n", "sort the points"),
+    "before the crest": (SOUND.replace("10,90", "-10,90"), "begin and end"),
+    "crossing": (
+        "x,y\n0,92\n20,80\n30,70\n50,40\n40,70\n60,10\n45,50\n112,4\n161,0\n",
+        "crosses itself",
+    ),
+    "vertical": ("x,y\n5,92\n5,0\n", "same chainage"),
+}
+"""Tables that are refused, and a part of the line that says why."""
+
+OPTIONS = {
+    "no file": (("--profile", "none.csv"), "none.csv"),
+    "a folder": (("--profile", "."), "'.'"),
+    "a picture": (("--profile", "survey.png"), "CSV"),
+    "a workbook": (("--profile", "survey.xlsx"), "CSV"),
+    "no profile": ((), "--profile"),
+    "road beyond": (("--road", 170, 180), "--road"),
+    "road of no width": (("--road", 112, 112), "--road"),
+    "road at the end": (("--road", 150, 158), "30 m beyond the road"),
+    "road on the crest": (("--road", 2, 8), "--source"),
+    "half a road": (("--road", 112), "--road"),
+    "road of text": (("--road", "a", "b"), "'a'"),
+    "toe beyond the road": ((*ASKED, "--toe", 130), "--toe = 130.0"),
+    "zone on the road": ((*ASKED, "--zone", 100, 115), "barrier_zone.end"),
+    "zone of no length": ((*ASKED, "--zone", 100, 100), "--zone"),
+    "unknown ground": ((*ASKED, "--ground", "lava:10-20"), "'lava'"),
+    "several grounds": ((*ASKED, "--ground", "hard:10-20"), "hard_rock, hard_soil"),
+    "ground without end": ((*ASKED, "--ground", "talus:10"), "talus:10"),
+    "ground of no length": ((*ASKED, "--ground", "talus:10-10"), "--ground"),
+    "ground of bad number": ((*ASKED, "--ground", "talus:1.2.3-20"), "1.2.3"),
+    "grounds that overlap": (
+        (*ASKED, "--ground", "talus:10-30", "--ground", "meadow:20-40"), "talus ends",
+    ),
+    "source without range": ((*ASKED, "--source", "cliff"), "cliff:2-8"),
+    "source on the road": ((*ASKED, "--source", "cliff:100-115"), "uphill of the road"),
+    "source beyond": ((*ASKED, "--source", "cliff:-50--40"), "uphill of the road"),
+    "layer of a table": ((*ASKED, "--layer", "0"), "--layer"),
+    "out of other kind": ((*ASKED, "--out", "site.csv"), "--out"),
+    "out that is there": ((*ASKED, "--out", "there.toml"), "there.toml"),
+}  # fmt: skip
+"""Options that are refused, and a part of the line that says why."""
+
+
+@pytest.mark.parametrize("case", SURVEYS)
+def test_a_malformed_survey_is_refused_in_one_line(case, tmp_path):
+    text, part = SURVEYS[case]
+    (tmp_path / "survey.csv").write_text(text, encoding="utf-8")
+    line = refused("new", "slope", "--profile", "survey.csv", folder=tmp_path)
+    assert "survey.csv" in line and part in line, line
+    assert re.fullmatch(r"rigdda: .+ = .+: .+\n", line)
+    assert not (tmp_path / "slope.toml").exists()
+
+
+@pytest.mark.parametrize("case", OPTIONS)
+def test_a_wrong_option_is_refused_in_one_line(case, tmp_path):
+    options, part = OPTIONS[case]
+    (tmp_path / "survey.csv").write_text(SOUND)
+    (tmp_path / "there.toml").write_text("edited = true\n")
+    usual = () if "--profile" in options or not options else ("--profile", "survey.csv")
+    line = refused("new", "slope", *usual, *options, folder=tmp_path)
+    assert part in line, line
+    assert (tmp_path / "there.toml").read_text() == "edited = true\n"
+    assert not (tmp_path / "slope.toml").exists()
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    (tmp_path / "survey.csv").write_bytes(b"x;H\xf6he\n0;1\n")
+    line = refused("new", "slope", "--profile", "survey.csv", folder=tmp_path)
+    assert "UTF-8" in line and "survey.csv" in line
+    (tmp_path / "survey.csv").write_bytes(b"x,y\n0,1\x00\n")
+    assert "line 2" in refused("new", "slope", "--profile", "survey.csv", folder=tmp_path)
+
+
+@pytest.mark.parametrize("name", ["survey.csv", "survey.dxf", "SURVEY.XLSX"])
+def test_a_survey_in_place_of_a_site_says_how_to_import_it(name, tmp_path):
+    (tmp_path / name).write_text(SOUND)
+    for command in ("check", "simulate", "design"):
+        line = refused(command, name, folder=tmp_path)
+        assert f"rigdda new NAME --profile {name}" in line
+
+
+@pytest.fixture(scope="module")
+def slope(tmp_path_factory) -> Site:
+    folder = tmp_path_factory.mktemp("slope")
+    (folder / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *map(str, ASKED), folder=folder)
+    return Site.load(folder / "slope.toml")
+
+
+def changed(site: Site, table: str, **values: object) -> Site:
+    """Return a site with other values in a table, of lists in the first."""
+    old = getattr(site, table)
+    many = isinstance(old, tuple)
+    new = replace(old[0] if many else old, **values)
+    return replace(site, **{table: (new, *old[1:]) if many else new})
+
+
+def test_the_new_site_is_not_odd(slope):
+    assert oddities(slope) == []
+
+
+@pytest.mark.parametrize(
+    ("table", "values", "part"),
+    [
+        ("sources", {"density": 900.0}, "density = 900 kg/m3"),
+        ("sources", {"band": (95.0, 100.0)}, "the ground is 9 deg steep"),
+        ("events", {"rate": 30.0}, "return_period = 30"),
+        ("events", {"area": (1.0, 15.0)}, "if the numbers are volumes"),
+        ("road", {"end": 113.0}, "it is 1 m wide"),
+        ("road", {"end": 130.5}, "30.5 m beyond the road"),
+        ("slope", {"toe": 11.0}, "of its foot, not of its crest"),
+        ("barrier_zone", {"start": 109.0}, "a fence of 500 kJ gives way by 3.5 m"),
+        ("barrier_zone", {"start": 109.0}, "the best place will lie on an end"),
+        ("barrier_zone", {"max_height": 1.0}, "the best barrier will lie on this bound"),
+        ("barrier_zone", {"max_depth": 0.6}, "barrier_zone.max_depth = 0.6"),
+    ],
+)  # fmt: skip
+def test_what_looks_odd_is_told(slope, table, values, part):
+    assert [line for line in oddities(changed(slope, table, **values)) if part in line]
+
+
+def test_coordinates_in_other_units_look_odd(slope):
+    feet = 3.28084
+    points = tuple((x, y * 20.0) for x, y in slope.slope.points)
+    high = replace(slope, slope=replace(slope.slope, points=points))
+    assert any("not in millimetres or feet" in line for line in oddities(high))
+    grown = tuple((feet * x, feet * y) for x, y in slope.slope.points)
+    road = replace(slope.road, start=feet * 112.0, end=feet * 121.0)
+    wide = replace(slope, slope=replace(slope.slope, points=grown), road=road)
+    assert any("not in feet" in line for line in oddities(wide))
+
+
+def test_rock_in_mid_air_looks_odd(slope):
+    square = np.array([[14.0, 0.0], [16.0, 0.0], [16.0, 2.0], [14.0, 2.0]])
+    for lift, odd in ((0.001, False), (3.0, True)):
+        bottom = slope.profile.height(14.0) + lift
+        block = tuple(map(tuple, np.add(square, [0.0, bottom]).tolist()))
+        source = rigdda.Source("face", blocks=(block,))
+        event = Event("block", 0.2, "face")
+        rock = replace(slope, sources=(source,), events=(event,))
+        assert any("hangs" in line for line in oddities(rock)) == odd
+
+
+def test_releases_that_are_cut_off_look_odd(slope):
+    name = slope.event_names[0]
+    line = oddities(slope, [Trial(name, 100, 0.1, True)])
+    assert len(line) == 1 and "motion.duration" in line[0]
+
+
+def test_the_blocks_of_a_jointed_mass_are_told(slope):
+    top = slope.profile.height(12.0)
+    corners = ((12.0, top), (18.0, slope.profile.height(18.0)), (18.0, top), (15.0, top + 4.0))
+    sets = tuple(rigdda.model.joints.JointSet(dip, spacing, 0.1)
+                 for dip, spacing in ((45.0, 0.8), (-50.0, 1.1)))  # fmt: skip
+    source = rigdda.Source("mass", polygon=corners, joints=sets)
+    site = replace(slope, sources=(source,), events=(Event("mass", 0.01, "mass", width=10.0),))
+    told = next(line for line in site_check.facts(site) if line.startswith("source mass"))
+    low, high = map(int, re.search(r"given: (\d+) to (\d+) blocks", told).groups())
+    counts = [len(site.realise(seed=seed).blocks) for seed in range(10)]
+    assert 0.8 * low <= min(counts) and max(counts) <= 1.2 * high
+    assert not [line for line in oddities(site) if "block_area" in line]
+    scaled = replace(site, sources=(replace(source, block_area=2.0),))
+    assert [line for line in oddities(scaled) if "leave block_area out to keep them" in line]
+    assert len(scaled.realise().blocks) < min(counts)
+
+
+def test_progress_of_a_check_needs_no_terminal(tmp_path):
+    process = rig("check", "quick", "--out", "a", folder=tmp_path)
+    out, err = process.communicate(timeout=300)
+    assert (process.returncode, err) == (0, "")
+    assert "source mass: a jointed mass" in out and "1 thing looks odd" in out

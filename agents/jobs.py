@@ -71,6 +71,7 @@ def simulate(
     Diverged
         If a simulation diverges.
     """
+    tick(0, "simulating")
     run, _ = rigdda.release(site, layout, seeds[0], event)
     names = site.event_names if event is None else (event,)
     chunk = max(LEAST, CHUNK // max(largest(site, name) for name in names))

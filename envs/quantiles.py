@@ -43,7 +43,7 @@ class Quantile(NamedTuple):
     high: float
 
 
-class Sample(NamedTuple):
+class BlockSample(NamedTuple):
     """Values of blocks in releases of one or several events.
 
     Parameters
@@ -88,7 +88,7 @@ class Sample(NamedTuple):
         return out
 
 
-def mean(sample: Sample) -> Mean:
+def mean(sample: BlockSample) -> Mean:
     """Return the mean with Student's interval; NaN where there are too few values."""
     if not len(sample.values):
         return Mean(math.nan, math.nan, math.nan)
@@ -100,7 +100,7 @@ def mean(sample: Sample) -> Mean:
     return Mean(value, value - half, value + half)
 
 
-def quantiles(sample: Sample, levels: ArrayLike) -> list[Quantile]:
+def quantiles(sample: BlockSample, levels: ArrayLike) -> list[Quantile]:
     """Return quantiles with their intervals.
 
     A quantile is the smallest value that at least this share of the weight does not exceed.
@@ -128,7 +128,7 @@ def quantiles(sample: Sample, levels: ArrayLike) -> list[Quantile]:
     return out
 
 
-def _effective(sample: Sample, value: float, level: float) -> int:
+def _effective(sample: BlockSample, value: float, level: float) -> int:
     """Return the number of independent values that know a quantile as well as a sample does."""
     n, releases = len(sample.values), len(np.unique(sample.release))
     weight = sample.weight

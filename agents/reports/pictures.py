@@ -76,7 +76,7 @@ class Flights:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Envelope:
+class PassageEnvelope:
     """95 % quantiles of what passes stations in releases of one event.
 
     Parameters
@@ -96,7 +96,7 @@ class Envelope:
     energy: Floats
 
     @classmethod
-    def of(cls, event: str, rows: Rows) -> Envelope:
+    def of(cls, event: str, rows: Rows) -> PassageEnvelope:
         """Return the envelope in a table along the slope, see `rigdda.agents.reports.stations`."""
         own = [row for row in rows if row["event"] == event]
 
@@ -135,7 +135,9 @@ def _run(site: Site, layout: Layout, event: str, seed: int) -> Run:
     return simulation.run(site.motion.duration, EVERY)
 
 
-def envelopes(site: Site, layout: Layout, seeds: Sequence[int], stations: Floats) -> list[Envelope]:
+def envelopes(
+    site: Site, layout: Layout, seeds: Sequence[int], stations: Floats
+) -> list[PassageEnvelope]:
     """Simulate releases of every event of a site and return their envelopes.
 
     The seeds are used in order until `ENOUGH` blocks of an event have been released.
@@ -150,7 +152,7 @@ def envelopes(site: Site, layout: Layout, seeds: Sequence[int], stations: Floats
     found = passages(site, layout, releases, stations.tolist())
     passing = Passing.of(site, layout, None, found)
     rows = summary(passing, range(len(stations)))
-    return [Envelope.of(name, rows) for name in site.event_names]
+    return [PassageEnvelope.of(name, rows) for name in site.event_names]
 
 
 def sources(site: Site) -> list[Floats]:
@@ -330,7 +332,7 @@ def section(
     site: Site,
     zone: BarrierZone,
     panels: Sequence[Panel],
-    envelopes: Sequence[Envelope],
+    envelopes: Sequence[PassageEnvelope],
     words: str,
 ) -> None:
     """Write a PNG picture of a slope in section.
@@ -345,7 +347,7 @@ def section(
         The zone in which barriers may be built.
     panels : sequence of Panel
         Slopes drawn to scale, side by side or one above the other.
-    envelopes : sequence of Envelope
+    envelopes : sequence of PassageEnvelope
         Heights and energies that are shown below the slopes.
     words : str
         Description of the releases of the envelopes, for their titles.
@@ -408,7 +410,9 @@ def released(path: str | os.PathLike[str], passing: Passing, layout: Layout, row
     title = f"{site.name}: {count:,} releases; some trajectories of each event"
     words = f"With the layout, {count:,} releases" if layout else f"{count:,} releases"
     panels = [Panel(title, layout, flights)]
-    section(path, site, site.barrier_zone, panels, [Envelope.of(n, rows) for n in drawn], words)
+    section(
+        path, site, site.barrier_zone, panels, [PassageEnvelope.of(n, rows) for n in drawn], words
+    )
 
 
 def _window(site: Site, panels: Sequence[Panel]) -> tuple[float, float, float, float]:
@@ -468,7 +472,7 @@ def _envelopes(
     energies: Axes,
     site: Site,
     layout: Layout,
-    found: Sequence[Envelope],
+    found: Sequence[PassageEnvelope],
     words: str,
 ) -> None:
     """Draw the envelopes of height and energy, and the height and class of the barriers."""
@@ -537,7 +541,7 @@ RATIO = 1e4
 """Greatest ratio of the ends of a logarithmic axis."""
 
 
-def _key(figure: FigureBase, site: Site, found: Sequence[Envelope]) -> None:
+def _key(figure: FigureBase, site: Site, found: Sequence[PassageEnvelope]) -> None:
     """Draw the legend below the picture."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

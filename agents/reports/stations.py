@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rigdda import Layout, Site
 from rigdda.agents.reports.tables import empty_table, write_rows
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
-from rigdda.envs.quantiles import Quantile, Sample, mean, quantiles
+from rigdda.envs.quantiles import BlockSample, Quantile, mean, quantiles
 from rigdda.files import atomic
 from rigdda.passages import LEFT, MOVING, STATES, Passages, ends
 
@@ -109,10 +109,10 @@ class Passing(NamedTuple):
             return rows[self.rate[rows["event"]] > 0.0]
         return rows[rows["event"] == self.site.event_names.index(group)]
 
-    def sample(self, group: str, rows: NDArray[np.void], values: Floats) -> Sample:
+    def sample(self, group: str, rows: NDArray[np.void], values: Floats) -> BlockSample:
         """Return values of some rows of an event, or of all events, as a sample of the releases."""
         rate = self.rate if group == ALL else np.ones(len(self.rate))
-        return Sample(values, rows["release"], self.found.event, rate)
+        return BlockSample(values, rows["release"], self.found.event, rate)
 
     def frequency(self, group: str, rows: NDArray[np.void]) -> Mean:
         """Return how often a release has at least one of some rows [1/year per 100 m]."""

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from rigdda.envs.quantiles import Sample, mean, quantiles
+from rigdda.envs.quantiles import BlockSample, mean, quantiles
 
 LEVELS = (0.5, 0.9, 0.95, 0.99)
 
 
-def single(values: np.ndarray) -> Sample:
+def single(values: np.ndarray) -> BlockSample:
     """Return a sample of one event, one value a release."""
     n = len(values)
-    return Sample(values, np.arange(n), np.zeros(n, dtype=int), np.ones(1))
+    return BlockSample(values, np.arange(n), np.zeros(n, dtype=int), np.ones(1))
 
 
 @pytest.mark.parametrize("n", [1, 20, 59, 100, 373, 1000])
@@ -43,7 +43,7 @@ def test_an_end_is_missing_where_no_order_statistic_bounds_it() -> None:
 
 
 def test_no_blocks_give_no_numbers() -> None:
-    empty = Sample(np.zeros(0), np.zeros(0, dtype=int), np.zeros(5, dtype=int), np.ones(1))
+    empty = BlockSample(np.zeros(0), np.zeros(0, dtype=int), np.zeros(5, dtype=int), np.ones(1))
     assert math.isnan(mean(empty).value)
     assert all(math.isnan(end) for end in quantiles(empty, [0.5])[0])
 
@@ -62,7 +62,7 @@ def test_rates_weigh_values() -> None:
     rng = np.random.default_rng(3)
     values = np.concatenate([rng.normal(1.0, 0.1, 90), rng.normal(9.0, 0.1, 10)])
     event = np.repeat([0, 1], [90, 10])
-    sample = Sample(values, np.arange(100), event, np.array([0.5, 1.5]))
+    sample = BlockSample(values, np.arange(100), event, np.array([0.5, 1.5]))
     weights = np.where(event == 0, 0.5 / 90, 1.5 / 10)
     expected = np.quantile(values, LEVELS, method="inverted_cdf", weights=weights)
     assert [q.value for q in quantiles(sample, LEVELS)] == expected.tolist()
@@ -76,11 +76,11 @@ def covered(draw, level: float, truth: float, runs: int) -> float:
     return float(np.mean(held))
 
 
-def cluster(rng: np.random.Generator) -> Sample:
+def cluster(rng: np.random.Generator) -> BlockSample:
     """Return 80 releases of 10 blocks each that nearly all behave alike."""
     common = np.repeat(rng.normal(size=80), 10)
     values = common + 0.1 * rng.normal(size=800)
-    return Sample(values, np.repeat(np.arange(80), 10), np.zeros(80, dtype=int), np.ones(1))
+    return BlockSample(values, np.repeat(np.arange(80), 10), np.zeros(80, dtype=int), np.ones(1))
 
 
 def test_blocks_of_a_release_count_as_one_where_they_are_alike() -> None:
@@ -93,7 +93,7 @@ def test_blocks_of_a_release_count_as_one_where_they_are_alike() -> None:
 
 
 def test_intervals_of_single_blocks_hold_the_quantile() -> None:
-    def draw(rng: np.random.Generator) -> Sample:
+    def draw(rng: np.random.Generator) -> BlockSample:
         return single(rng.exponential(size=300))
 
     assert 0.93 < covered(draw, 0.95, -math.log(0.05), 1000) < 0.99

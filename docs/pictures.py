@@ -11,7 +11,10 @@ from matplotlib.image import imsave
 import rigdda.envs
 from rigdda import Barrier, Ditch, Fence, Site
 from rigdda.agents.reports import pictures
+from rigdda.agents.reports.simulation_folder import along
+from rigdda.agents.reports.stations import Passing, summary
 from rigdda.files import atomic
+from rigdda.passages import passages
 
 DOCS = Path(__file__).parent
 LAYOUT: tuple[Barrier, ...] = (Fence(17.0, 3.0, energy_class=1000), Ditch(30.3, 1.0, 3.0))
@@ -41,7 +44,11 @@ def tutorial(path: Path) -> None:
     page = (DOCS / "tutorials/engineer.md").read_text(encoding="utf-8")
     block = re.search(r"```toml\n(.*?)```", page, re.DOTALL)
     assert block
-    pictures.released(path, Site.parse(block[1], "my-slope.toml"), (), range(200), None)
+    site = Site.parse(block[1], "my-slope.toml")
+    lines = along(site)
+    found = passages(site, (), [(seed, None) for seed in range(200)], lines.tolist())
+    passing = Passing.of(site, (), None, found)
+    pictures.released(path, passing, (), summary(passing, range(len(lines))))
 
 
 def _write(path: Path, env: gymnasium.Env) -> None:

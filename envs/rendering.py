@@ -6,12 +6,13 @@ Matplotlib is imported on first use.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import Barrier, Fence, Layout, Mesh, Run, Site
+from rigdda import Barrier, Fence, Layout, Mesh, Run, Site, Terrain
 from rigdda.barriers import standing
 from rigdda.barriers.base import STANDS
 from rigdda.display import BARRIER, GROUND, ROAD, ROCK, ZONE
@@ -30,6 +31,24 @@ PROPORTION = 2.0
 
 CUT, BROKEN = "#dbe7f3", "#d62846"
 """Colours of the inside of a ditch and of failed barriers."""
+
+MATERIALS = {
+    "hard_rock": "#b3aea6",
+    "weathered_rock": "#c4b196",
+    "coarse_talus": "#dccb9a",
+    "fine_scree": "#e8ddba",
+    "hard_soil": "#b98d5b",
+    "meadow": "#9fbf7f",
+    "asphalt": "#5c6066",
+    "concrete": "#d3d7dc",
+}
+"""Colours of surfaces by their ground of the library."""
+
+OTHERS = (GROUND, "#b9c4a4", "#d8b9a0", "#a9b7c0", "#cfc0d6")
+"""Colours of surfaces without a ground of the library, in turn."""
+
+STRETCH = 0.3
+"""Opacity of the band over which a fence may give way."""
 
 POST = 5.0
 """Line width of a fence post [points], wide enough to be visible on a slope of 200 m."""
@@ -82,6 +101,46 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
+
+
+def materials(site: Site) -> dict[str, str]:
+    """Return the colour of each surface of the ground of a site, by its name."""
+    out: dict[str, str] = {}
+    for name in dict.fromkeys(site.profile.surfaces):
+        library = site.surfaces[name].ground if name in site.surfaces else None
+        taken = sum(colour in OTHERS for colour in out.values())
+        out[name] = MATERIALS[library] if library in MATERIALS else OTHERS[taken % len(OTHERS)]
+    return out
+
+
+def draw_ground(axes: Axes, site: Site, ground: Terrain, bottom: float) -> None:
+    """Draw the ground in the colours of its materials, see `materials`.
+
+    Parameters
+    ----------
+    ground : Terrain
+        The ground with its earthworks.
+    bottom : float
+        Elevation down to which it is filled [m].
+    """
+    colours = materials(site)
+    begin = 0
+    for name, segments in groupby(ground.surfaces):
+        end = begin + len(list(segments))
+        x, y = ground.points[begin : end + 1].T
+        colour, begin = colours.get(name, GROUND), end
+        axes.fill_between(x, y, bottom, color=colour, linewidth=0, alpha=0.55, zorder=2)
+        axes.plot(x, y, color=colour, linewidth=4, zorder=2.2, solid_capstyle="butt")
+    axes.plot(*ground.points.T, color="#4a4239", linewidth=0.7, zorder=2.4)
+
+
+def draw_elongation(axes: Axes, site: Site, fence: Fence) -> None:
+    """Draw the space downhill of a fence into which it gives way, as a light band."""
+    x, path, foot = fence.x, fence.deflection, site.profile.height(fence.x)
+    high, low = foot + fence.height, foot + fence.left_height(path)
+    corners = [(x, foot), (x, high), (x + path, low), (x + path, foot)]
+    axes.fill(*np.array(corners).T, facecolor=BARRIER, edgecolor="none", alpha=STRETCH,
+              zorder=4.2)  # fmt: skip
 
 
 def draw_barrier(

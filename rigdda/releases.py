@@ -265,10 +265,22 @@ class Batch:
         The site.
     layout : sequence of Barrier
         The barriers.
+    more : sequence of float
+        Stations that `simulation` records in addition to those that outcomes need [m].
+    end : float, optional
+        Chainage beyond which `simulation` ignores blocks that move downhill [m]; by default that
+        of outcomes.
     """
 
-    def __init__(self, site: Site, layout: Sequence[Barrier]):
+    def __init__(
+        self,
+        site: Site,
+        layout: Sequence[Barrier],
+        more: Sequence[float] = (),
+        end: float | None = None,
+    ):
         self._site, self._layout = as_site(site), as_layout(layout)
+        self._more, self._end = more, end
         self._standing = list(standing(self._layout))
         self._watch = watch(site)
         self._base: tuple[Scene, Drawn] | None = None
@@ -325,19 +337,26 @@ class Batch:
 
     def simulation(self, scene: Scene) -> Simulation:
         """Return the simulation of such a scene; it invalidates the previous one."""
-        if len(scene.blocks) > MOST_BLOCKS:
-            return simulation(self._site, scene)
         settings = self._site.settings(scene)
+        if len(scene.blocks) > MOST_BLOCKS:
+            return Simulation(scene, settings, self.lines(scene), self._watch, self._beyond(scene))
         corners = max(len(b.vertices) for b in scene.blocks)
         ground = len(scene.ground.points) if scene.ground is not None else 0
         key = len(scene.blocks), corners, settings.dt, ground
         template = self._templates.get(key)
         if template is None or not template.fits(scene):
-            lines = chainages(stations(self._site, scene.barriers))
-            beyond = leave(self._site, scene)
+            lines, beyond = chainages(self.lines(scene)), self._beyond(scene)
             template = Template(scene, settings, lines, self._watch, beyond)
             self._templates[key] = template
         return Simulation(scene, settings, template=template)
+
+    def lines(self, scene: Scene) -> tuple[float, ...]:
+        """Return the ascending stations at which `simulation` records crossings [m]."""
+        return tuple(sorted({*stations(self._site, scene.barriers), *self._more}))
+
+    def _beyond(self, scene: Scene) -> float:
+        """Return the chainage beyond which blocks that move downhill are ignored [m]."""
+        return leave(self._site, scene) if self._end is None else self._end
 
 
 def simulation(site: Site, scene: Scene) -> Simulation:

@@ -9,7 +9,8 @@ from rigdda import Layout, Site
 from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import findings, pictures
-from rigdda.agents.reports.pictures import BLOCKS, Flights, Panel, fly, section
+from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
+from rigdda.agents.reports.simulation_folder import along
 from rigdda.agents.reports.wording import euros, span
 from rigdda.barriers import standing
 from rigdda.envs.replay_record import release_record
@@ -49,13 +50,14 @@ def _section(done: DesignStudy, path: Path, seed: int) -> None:
     layout = chosen.evaluation.layout
     if layout:
         panels.append(Panel(f"With the layout: {_words(chosen)}", layout, _all(site, layout, seed)))
-    section(path, site, done.problem.zone, panels, nothing)
+    found = envelopes(site, (), release_seeds("ensemble", seed, ENOUGH), along(site))
+    section(path, site, done.problem.zone, panels, found, "Without barriers")
 
 
 def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:
     """Simulate releases of every event of a site."""
-    seeds, stations = release_seeds("ensemble", seed, BLOCKS), pictures.stations_of(site)
-    return [fly(site, layout, event.name, seeds, stations) for event in site.events]
+    seeds = release_seeds("ensemble", seed, DRAWN)
+    return [fly(site, layout, event.name, seeds) for event in site.events]
 
 
 def _words(case: VerifiedLayout) -> str:

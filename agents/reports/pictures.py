@@ -13,42 +13,43 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
+from rigdda.agents.reports.stations import Passing, Rows, summary
 from rigdda.barriers import Earthwork, earthworks, standing
-from rigdda.display import BARRIER, GROUND, ROAD, ZONE
+from rigdda.display import BARRIER, ROAD, ZONE
 from rigdda.envs import Evaluation
+from rigdda.envs.envelope import largest
 from rigdda.envs.rendering import (
     BAND,
+    STRETCH,
     Label,
     draw_barrier,
+    draw_elongation,
+    draw_ground,
     draw_mesh,
+    materials,
     name_places,
     top_of,
     write_labels,
 )
 from rigdda.files import atomic
-from rigdda.geometry import polygon_properties
 from rigdda.model.site_tables import BarrierZone
+from rigdda.passages import ends, passages
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure, FigureBase
 
 Floats = NDArray[np.float64]
 
-QUANTILE = 0.95
-"""Quantile that the envelopes show [-]."""
+DRAWN = 30
+"""Largest number of trajectories of an event that are drawn."""
 
-LEAST = 20
-"""Least number of blocks that must pass a chainage for a meaningful 95 % quantile."""
-
-BLOCKS = 60
-"""Number of blocks of an event that are simulated, rounded up to whole releases."""
-
-STATIONS = 60
-"""Number of chainages of an envelope."""
+ENOUGH = 600
+"""Number of blocks of an event behind an envelope of a design; 30 are above the 95 % quantile."""
 
 EVERY = 0.05
 """Time between two points of a trajectory [s]."""
@@ -56,42 +57,57 @@ EVERY = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Flights:
-    """Releases of one event.
+    """Trajectories in releases of one event.
 
     Parameters
     ----------
     event : str
         Name of the event.
-    releases : int
-        Number of releases.
     ways : tuple of (n, 2) array
         Trajectory of the centroid of each block [m].
-    run : Run
-        The first release.
-    stations : (K,) array
-        Chainages of the envelopes [m], ascending.
-    height : (K,) array
-        95 % quantile of the height of the tops of passing blocks above the ground [m]. The top is
-        the height of the centroid plus the circumscribed radius. NaN where fewer than 20 blocks
-        pass.
-    energy : (K,) array
-        95 % quantile of the energy of translation and rotation of passing blocks [J]. The width of
-        a block is taken as the square root of its area.
     """
 
     event: str
-    releases: int
     ways: tuple[Floats, ...]
-    run: Run
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PassageEnvelope:
+    """95 % quantiles of what passes stations in releases of one event.
+
+    Parameters
+    ----------
+    event : str
+        Its name.
+    stations : (K,) array
+        Chainages [m], ascending.
+    height, energy : (3, K) array
+        Quantile and the ends of its 95 % interval: of the height of the tops of blocks above the
+        ground [m] and of their energy [kJ]. NaN where there are too few blocks.
+    """
+
+    event: str
     stations: Floats
     height: Floats
     energy: Floats
 
+    @classmethod
+    def of(cls, event: str, rows: Rows) -> PassageEnvelope:
+        """Return the envelope in a table along the slope, see `rigdda.agents.reports.stations`."""
+        own = [row for row in rows if row["event"] == event]
 
-def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int], stations: Floats) -> Flights:
-    """Simulate releases of an event in threads on all cores.
+        def lines(quantity: str) -> Floats:
+            found = [row for row in own if row["quantity"] == quantity]
+            return np.array([[row[f"q95{end}"] for row in found] for end in ("", "_low", "_high")])
 
-    The seeds are used in order until `BLOCKS` blocks have been released.
+        stations = np.array([row["x_m"] for row in own if row["quantity"] == "energy"])
+        return cls(event, stations, lines("height_top"), lines("energy"))
+
+
+def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -> Flights:
+    """Simulate releases of an event in threads on all cores, for their trajectories.
+
+    The seeds are used in order until `DRAWN` blocks have been released.
 
     Raises
     ------
@@ -101,26 +117,38 @@ def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int], stations: 
         If a simulation diverges.
     """
     barriers = standing(layout)
-    first = _run(site, barriers, event, seeds[0], stations)
-    more = seeds[1 : max(1, -(-BLOCKS // len(first.scene.blocks)))]
+    first = _run(site, barriers, event, seeds[0])
+    more = seeds[1 : max(1, -(-DRAWN // len(first.scene.blocks)))]
     with ThreadPoolExecutor() as pool:
-        rest = pool.map(lambda seed: _run(site, barriers, event, seed, stations), more)
-        runs = [first, *rest]
-    height, energy = _passage_envelopes(runs, len(stations))
-    ways = tuple(run.poses[:, i, :2] for run in runs for i in range(run.poses.shape[1]))
-    return Flights(event, len(runs), ways, first, stations, height, energy)
+        runs = [first, *pool.map(lambda seed: _run(site, barriers, event, seed), more)]
+    ways = [run.poses[:, i, :2] for run in runs for i in range(run.poses.shape[1])]
+    return Flights(event, tuple(ways[:: max(1, len(ways) // DRAWN)]))
 
 
-def _run(site: Site, layout: Layout, event: str, seed: int, stations: Floats) -> Run:
+def _run(site: Site, layout: Layout, event: str, seed: int) -> Run:
     scene = site.realise(layout, seed, event)
-    simulation = Simulation(scene, site.settings(scene), tuple(stations.tolist()))
+    simulation = Simulation(scene, site.settings(scene), leave=ends(site)[1])
     return simulation.run(site.motion.duration, EVERY)
 
 
-def stations_of(site: Site) -> Floats:
-    """Return the chainages of the envelopes: from the highest source to the road's far edge [m]."""
-    left = max(site.slope.points[0][0], min(start for start, _ in map(reach, sources(site))))
-    return np.linspace(left, site.road.end, STATIONS + 1)[1:]
+def envelopes(
+    site: Site, layout: Layout, seeds: Sequence[int], stations: Floats
+) -> list[PassageEnvelope]:
+    """Simulate releases of every event of a site and return their envelopes.
+
+    The seeds are used in order until `ENOUGH` blocks of an event have been released.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `rigdda.passages.passages` does.
+    """
+    counts = {name: max(1, ENOUGH // largest(site, name)) for name in site.event_names}
+    releases = [(seed, name) for name, count in counts.items() for seed in seeds[:count]]
+    found = passages(site, layout, releases, stations.tolist())
+    passing = Passing.of(site, layout, None, found)
+    rows = summary(passing, range(len(stations)))
+    return [PassageEnvelope.of(name, rows) for name in site.event_names]
 
 
 def sources(site: Site) -> list[Floats]:
@@ -142,30 +170,7 @@ def reach(corners: Floats) -> tuple[float, float]:
     return float(corners[:, 0].min()), float(corners[:, 0].max())
 
 
-def _passage_envelopes(runs: Sequence[Run], stations: int) -> tuple[Floats, Floats]:
-    """Return the 95 % quantiles of heights [m] and of energies [J] at each station."""
-    height, energy = np.full(stations, np.nan), np.full(stations, np.nan)
-    sizes = [np.array([_size(block.vertices) for block in run.scene.blocks]) for run in runs]
-    for k in range(stations):
-        tops, works = [], []
-        for run, size in zip(runs, sizes, strict=True):
-            crossed = run.crossings(k)
-            radius, width = size[crossed["block"]].T
-            tops.append(crossed["height"] + radius)
-            works.append(crossed["energy"] * width)
-        if sum(map(len, tops)) >= LEAST:
-            height[k] = np.quantile(np.concatenate(tops), QUANTILE)
-            energy[k] = np.quantile(np.concatenate(works), QUANTILE)
-    return height, energy
-
-
-def _size(vertices: Floats) -> tuple[float, float]:
-    """Return a block's circumscribed radius about its centroid and the root of its area [m]."""
-    area, centre, _ = polygon_properties(vertices)
-    return float(np.hypot(*(vertices - centre).T).max()), float(np.sqrt(area))
-
-
-__all__ = ["BARRIER", "DPI", "FONT", "GROUND", "ROAD", "ZONE", "Point", "colours", "cost", "save"]
+__all__ = ["BARRIER", "DPI", "FONT", "ROAD", "ZONE", "Point", "colours", "cost", "save"]
 
 TRIED, EQUAL = "#9aa5b1", "#c8ccd0"
 EVENTS = ("#0072b2", "#d0312d", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b4fb0", "#6b4226")
@@ -212,6 +217,11 @@ class Point:
 def colours(count: int) -> list[str]:
     """Return the colours of the events of a site, in the order of the site."""
     return [EVENTS[i % len(EVENTS)] for i in range(count)]
+
+
+def colour_of(site: Site, event: str) -> str:
+    """Return the colour of an event of a site."""
+    return colours(len(site.events))[site.event_names.index(event)]
 
 
 def cost(
@@ -304,10 +314,6 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         figure.savefig(part, format="png")
 
 
-DRAWN = 30
-"""Largest number of trajectories of an event that are drawn."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
     """One slope of the picture with its title, its layout and releases of every event."""
@@ -322,7 +328,8 @@ def section(
     site: Site,
     zone: BarrierZone,
     panels: Sequence[Panel],
-    envelopes: Sequence[Flights],
+    envelopes: Sequence[PassageEnvelope],
+    words: str,
 ) -> None:
     """Write a PNG picture of a slope in section.
 
@@ -336,13 +343,15 @@ def section(
         The zone in which barriers may be built.
     panels : sequence of Panel
         Slopes drawn to scale, side by side or one above the other.
-    envelopes : sequence of Flights
-        Releases without barriers, whose heights and energies are shown.
+    envelopes : sequence of PassageEnvelope
+        Heights and energies that are shown below the slopes.
+    words : str
+        Description of the releases of the envelopes, for their titles.
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    window = _window(site)
+    window = _window(site, panels)
     left, right, bottom, top = window
     ratio = (top - bottom) / (right - left)
     width = 13.0 if ratio > 0.3 else 11.0
@@ -362,46 +371,54 @@ def section(
         heights.set_xlim(left, right)
         for axes in (heights, energies):
             axes.axvspan(zone.start, zone.end, color=ZONE, alpha=0.25, lw=0)
-        _envelopes(heights, energies, site, panels[-1].layout, envelopes)
+        _envelopes(heights, energies, site, panels[-1].layout, envelopes, words)
         _key(lower, site, envelopes)
         for axes, own in zip(grid.flat, labels, strict=True):
             write_labels(axes, own)
         save(figure, path)
 
 
-def released(
-    path: str | os.PathLike[str],
-    site: Site,
-    layout: Layout,
-    seeds: Sequence[int],
-    event: str | None = None,
-) -> None:
-    """Write a PNG picture of releases with a layout, of one event or of all events.
+def released(path: str | os.PathLike[str], passing: Passing, layout: Layout, rows: Rows) -> None:
+    """Write a PNG picture of releases with a layout.
+
+    Parameters
+    ----------
+    path : path
+        The PNG.
+    passing : Passing
+        The releases. Trajectories are those of the first releases of each event.
+    layout : Layout
+        The barriers.
+    rows : list of dict
+        Table along the slope, see `rigdda.agents.reports.stations.summary`.
 
     Raises
     ------
     BadInput, Diverged
         The same errors as `fly`.
     """
-    names = site.event_names if event is None else (event,)
-    stations = stations_of(site)
-    nothing = [fly(site, (), name, seeds, stations) for name in names]
-    after = [fly(site, layout, name, seeds, stations) for name in names] if layout else nothing
-    count = sum(flights.releases for flights in after)
-    title = f"{site.name}: {count} releases, by event" if event is None else f"{event}: {count}"
-    section(path, site, site.barrier_zone, [Panel(title, layout, after)], nothing)
+    site, drawn = passing.site, [name for name in passing.events if name not in passing.not_drawn]
+    flights = []
+    for name in drawn:
+        seeds = [passing.found.seed[i] for i in passing.releases(name).tolist()]
+        flights.append(fly(site, layout, name, seeds))
+    count = len(passing.found.seed)
+    title = f"{site.name}: {count:,} releases; some trajectories of each event"
+    words = f"With the layout, {count:,} releases" if layout else f"{count:,} releases"
+    panels = [Panel(title, layout, flights)]
+    section(
+        path, site, site.barrier_zone, panels, [PassageEnvelope.of(n, rows) for n in drawn], words
+    )
 
 
-def _window(site: Site) -> tuple[float, float, float, float]:
-    """Return left, right, bottom and top of the picture, from the sources to the road [m]."""
+def _window(site: Site, panels: Sequence[Panel]) -> tuple[float, float, float, float]:
+    """Return left, right, bottom, top of the whole profile and all trajectories [m]."""
     x, y = np.array(site.slope.points).T
-    pieces = sources(site)
-    start = min(reach(piece)[0] for piece in pieces)
-    high = max(float(piece[:, 1].max()) for piece in pieces)
-    way = site.road.end - start
-    left, right = max(start - 0.05 * way, x[0]), min(site.road.end + 0.06 * way, x[-1])
-    low = float(y[(x >= left) & (x <= right)].min())
-    return left, right, low - 0.1 * (high - low), high + 0.05 * (high - low)
+    ways = (way for panel in panels for flights in panel.flights for way in flights.ways)
+    shown = (y, *(piece[:, 1] for piece in sources(site)), *(way[:, 1] for way in ways))
+    high = max(float(part.max()) for part in shown)
+    low = float(y.min())
+    return float(x[0]), float(x[-1]), low - 0.1 * (high - low), high + 0.05 * (high - low)
 
 
 def _slope(
@@ -412,15 +429,15 @@ def _slope(
     Return the labels of the barriers, which are written when the size of the axes is final.
     """
     built, moved = earthworks(site.profile, standing(panel.layout), site.slope.surface)
-    x, y = built.points.T
     *_, bottom, top = window
-    axes.fill_between(x, y, bottom, color=GROUND, linewidth=0, zorder=2)
+    draw_ground(axes, site, built, bottom)
     axes.plot(*site.ground_between(site.road.start, site.road.end).T, color=ROAD, linewidth=5,
               zorder=3, solid_capstyle="butt")  # fmt: skip
     name_places(axes, site, (zone.start, zone.end))
-    for flights, colour in zip(panel.flights, colours(len(panel.flights)), strict=True):
-        for way in flights.ways[:: max(1, len(flights.ways) // DRAWN)]:
-            axes.plot(*way.T, color=colour, linewidth=0.6, alpha=0.55, zorder=4)
+    for flights in panel.flights:
+        for way in flights.ways:
+            axes.plot(*way.T, color=colour_of(site, flights.event), linewidth=0.6, alpha=0.55,
+                      zorder=4)  # fmt: skip
     for corners in sources(site):
         axes.plot(*corners.T, color="black", linewidth=2.0, zorder=4.5)
     axes.set_aspect("equal")
@@ -440,17 +457,26 @@ def _barriers(
     for built in standing(layout):
         outline = moved[built] if isinstance(built, Earthwork) else built.outline(site.profile)
         draw_barrier(axes, built, outline)
+        if isinstance(built, Fence):
+            draw_elongation(axes, site, built)
         labels.append(Label(built.label, top_of(outline)))
     return labels
 
 
 def _envelopes(
-    heights: Axes, energies: Axes, site: Site, layout: Layout, envelopes: Sequence[Flights]
+    heights: Axes,
+    energies: Axes,
+    site: Site,
+    layout: Layout,
+    found: Sequence[PassageEnvelope],
+    words: str,
 ) -> None:
     """Draw the envelopes of height and energy, and the height and class of the barriers."""
-    for flights, colour in zip(envelopes, colours(len(envelopes)), strict=True):
-        heights.plot(flights.stations, flights.height, color=colour, linewidth=1.6)
-        energies.plot(flights.stations, flights.energy / 1e3, color=colour, linewidth=1.6)
+    for own in found:
+        for axes, lines in ((heights, own.height), (energies, own.energy)):
+            colour = colour_of(site, own.event)
+            draw_quantile(axes, own.stations, lines[0], lines[2], color=colour)
+            axes.fill_between(own.stations, lines[1], lines[2], color=colour, alpha=0.2, lw=0)
     for axes in (heights, energies):
         axes.axvspan(site.road.start, site.road.end, color=ROAD, alpha=0.2, lw=0)
         axes.grid(alpha=0.25)
@@ -466,28 +492,69 @@ def _envelopes(
             energies.plot(barrier.x, barrier.energy_class, "D", color=BARRIER, markersize=8)
         else:
             energies.axvline(barrier.x, color=BARRIER, linewidth=1, linestyle=":")
-    if any((flights.energy > 0.0).any() for flights in envelopes):  # otherwise there are no curves
-        energies.set_yscale("log")
+    if any((own.energy[0] > 0.0).any() for own in found):  # otherwise there are no curves
+        plain_log(energies)
     heights.set_ylim(bottom=0.0)
-    heights.set_title("Without barriers: 95 % quantile of block tops [m above ground]",
+    heights.set_title(f"{words}: 95 % quantile of block tops [m above ground]",
                       loc="left", fontsize=10)  # fmt: skip
-    energies.set_title("Without barriers: 95 % quantile of the energy of blocks [kJ]",
-                       loc="left", fontsize=10)  # fmt: skip
+    energies.set_title(
+        f"{words}: 95 % quantile of the energy of blocks [kJ]", loc="left", fontsize=10
+    )
 
 
-def _key(figure: FigureBase, site: Site, envelopes: Sequence[Flights]) -> None:
+def draw_quantile(axes: Axes, x: ArrayLike, value: Floats, high: Floats, **style: Any) -> None:
+    """Draw a quantile along the slope, thin where it has no upper end of its interval.
+
+    Parameters
+    ----------
+    x, value, high : (K,) array
+        Chainages, quantile and the upper end, NaN where there are too few blocks for one.
+    **style
+        Colour and style of the line.
+    """
+    axes.plot(x, value, linewidth=0.7, alpha=0.6, **style)
+    axes.plot(x, np.where(np.isnan(high), np.nan, value), linewidth=1.6, **style)
+
+
+def plain_log(axes: Axes) -> None:
+    """Make the y axis logarithmic, with plain numbers and at most four powers of ten."""
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    axes.set_ylim(bottom=max(low, high / RATIO))
+    plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
+
+
+def plain_numbers(axis: Axis, multiples: Sequence[float]) -> None:
+    """Write plain numbers at these multiples of powers of ten of a logarithmic axis."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    axis.set_major_locator(LogLocator(subs=multiples))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
+
+
+RATIO = 1e4
+"""Greatest ratio of the ends of a logarithmic axis."""
+
+
+def _key(figure: FigureBase, site: Site, found: Sequence[PassageEnvelope]) -> None:
     """Draw the legend below the picture."""
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
-    lines = []
-    for flights, colour in zip(envelopes, colours(len(envelopes)), strict=True):
-        label = f"{flights.event}, {site.event(flights.event).rate:g} per year and 100 m"
-        lines.append(Line2D([], [], color=colour, linewidth=2, label=label))
+    lines: list[Any] = []
+    for own in found:
+        label = f"{own.event}, {site.event(own.event).rate:g} a year per 100 m"
+        lines.append(Line2D([], [], color=colour_of(site, own.event), linewidth=2, label=label))
+    lines += [Patch(color=colour, label=name) for name, colour in materials(site).items()]
     lines += [
         Line2D([], [], color="black", linewidth=3, label="rock source"),
         Line2D([], [], color=ZONE, linewidth=6, label="barrier zone"),
         Line2D([], [], color=ROAD, linewidth=6, label="road"),
         Line2D([], [], color=BARRIER, marker="D", linewidth=4, label="barrier: height, class"),
+        Patch(color=BARRIER, alpha=STRETCH, lw=0, label="elongation of a fence"),
+        Patch(color="black", alpha=0.2, lw=0, label="95 % interval"),
+        Line2D([], [], color="black", linewidth=0.7, label="too few blocks for one"),
     ]
     figure.legend(handles=lines, loc="outside lower center", ncols=min(4, len(lines)),
                   frameon=False)  # fmt: skip

@@ -84,3 +84,15 @@ def test_without_post_correction_a_mass_comes_down_too(dt):
     sim.step(round(2.0 / dt))
     assert (sim.poses[:, 1] < start[:, 1]).mean() > 0.9
     assert np.hypot(*sim.velocities[:, :2].T).max() < 25.0  # a fall of 32 m
+
+
+def test_a_mass_in_static_mode_settles():
+    """Contacts that form later are softer than those of the first step, or the mass explodes.
+
+    Without inertia, every step starts at rest: a block may settle, but it cannot gather speed.
+    """
+    scene = Site.load("quick").realise((), 1, "mass")
+    sim = Simulation(scene, Settings(dt=1e-2, mode="static"))
+    start = sim.poses
+    sim.step(200)
+    assert np.hypot(*(sim.poses - start)[:, :2].T).max() < 2.0  # about the size of a block

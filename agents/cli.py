@@ -404,6 +404,9 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that a barrier fails in a design "
               "event.")  # fmt: skip
+@click.option("--target-risk", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable individual risk of a commuter [1/year]. The site must have "
+              "a table [traffic].")  # fmt: skip
 @click.option("--zone", type=float, nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m].  [default: the zone of "
               "the site]")  # fmt: skip
@@ -417,6 +420,7 @@ def design(
     kinds: Kinds,
     target: float | None,
     failure: float | None,
+    target_risk: float | None,
     zone: tuple[float, float] | None,
     budget: int,
     verify: int,
@@ -437,7 +441,7 @@ def design(
     from rigdda.agents.designers.store import FILE, claim
     from rigdda.agents.reports.folder import FILES, write
 
-    problem = _pose(site, kinds, target, failure, zone)
+    problem = _pose(site, kinds, (target, failure, target_risk), zone)
     folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
     claim(folder, problem, *FILES)
     with kept(folder):
@@ -448,20 +452,30 @@ def design(
     _tell(done, store, verify, folder)
 
 
+TRAFFIC = (
+    "risk to the traffic on {0.section_length:g} m of road, per year: vehicles hit by falling "
+    "rock,\nvehicles that run into debris, fatalities, fatalities per km, and risk of a person "
+    "who\ntravels it {0.commuter_trips:g} times"
+)
+"""Line above the table of the risk to a `Traffic`."""
+
+
 def _pose(
     site: str,
     kinds: Kinds,
-    target: float | None,
-    failure: float | None,
+    targets: tuple[float | None, float | None, float | None],
     zone: tuple[float, float] | None,
 ) -> DesignProblem:
-    """Return the design problem that the options describe."""
+    """Return the design problem that the options describe.
+
+    `targets` are the greatest acceptable probabilities of reach and failure and individual risk.
+    """
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
     asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None}
-    if target is not None or failure is not None:
-        asked["targets"] = Targets(target, failure)
+    if any(target is not None for target in targets):
+        asked["targets"] = Targets(*targets)
     return DesignProblem(site, **asked)
 
 
@@ -483,6 +497,10 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         show(chances)
     else:
         click.echo("the site has no design events (design = true)")
+    risks = tables.risks(done)
+    if risks is not None:
+        click.echo(TRAFFIC.format(done.problem.site.traffic))
+        show(risks)
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
     click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
     for barrier in chosen.layout:
@@ -524,6 +542,10 @@ def study(file: str, seed: int, out: Path | None) -> None:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
     show(studies.table(asked, folder / "study.csv"))
+    risks = studies.risks(asked, folder / "study.csv")
+    if risks is not None:
+        click.echo(TRAFFIC.format(asked.site.traffic))
+        show(risks)
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):
             note(f"the layout {name!r} {words}")

@@ -147,7 +147,8 @@ def study(
     """
     store = Store(out / "evaluations.jsonl")
     tick(0, "simulating releases without barriers")
-    with EvaluationsFile(out / "evaluations.csv") as file:
+    traffic = problem.site.traffic is not None
+    with EvaluationsFile(out / "evaluations.csv", traffic) as file:
 
         def progress(entry: Entry) -> None:
             file.add(entry)

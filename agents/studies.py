@@ -19,11 +19,19 @@ from numpy.typing import NDArray
 import rigdda
 from rigdda import BadInput, Layout, Outcome, Site, check
 from rigdda.agents import limits
-from rigdda.agents.reports.tables import HIT, OUTCOME, empty_table, outcome_row, write_rows
+from rigdda.agents.reports.tables import (
+    HIT,
+    OUTCOME,
+    empty_table,
+    outcome_row,
+    risk_table,
+    write_rows,
+)
 from rigdda.agents.reports.wording import euros, span
 from rigdda.barriers import from_table, standing
 from rigdda.envs.cost import Account, Facts, learn, stratified
 from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.traffic_risk import Risk
 from rigdda.fields import about, checked, parse
 from rigdda.files import read
 
@@ -122,6 +130,9 @@ _NUMBERS = (
 _MONEY = ("harm", "repair")
 """Columns with the costs of a release [EUR per occurrence of its event]."""
 
+_TOLL = ("vehicles_hit", "vehicles_run_into", "fatalities")
+"""Columns with the expected consequences of a release for the traffic, if the site gives it."""
+
 
 def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
     """Simulate the releases that a CSV file does not contain yet and append them to it.
@@ -177,6 +188,8 @@ def _row(study: Study, job: Job, outcome: Outcome) -> dict[str, Any]:
     bill = study.site.bill(layout, outcome)
     row: dict[str, Any] = {"layout": job[0], "seed": job[2]}
     row |= {"capital": study.site.capital(layout), "harm": bill.harm, "repair": bill.repair}
+    if study.site.traffic is not None:
+        row |= zip(_TOLL, map(float, study.site.toll(layout, outcome)), strict=True)
     return row | outcome_row(outcome)
 
 
@@ -191,7 +204,13 @@ def _fields(study: Study) -> list[str]:
     """Return the columns, with those of as many barriers as the largest layout has."""
     most = max(len(standing(layout)) for layout in study.layouts.values())
     barriers = [f"barrier_{i}_{name}" for i in range(most) for name in HIT]
-    return ["layout", "event", "seed", "capital", *_MONEY, *_NUMBERS, *barriers, "key"]
+    money = _money(study.site)
+    return ["layout", "event", "seed", "capital", *money, *_NUMBERS, *barriers, "key"]
+
+
+def _money(site: Site) -> tuple[str, ...]:
+    """Return the columns with costs and, if the site gives traffic, with the toll."""
+    return _MONEY if site.traffic is None else (*_MONEY, *_TOLL)
 
 
 def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
@@ -240,7 +259,7 @@ def _sound(row: dict[str, Any], study: Study, job: Job) -> bool:
         return False
     mine = {f"barrier_{i}_{hit}" for i in range(len(standing(layout))) for hit in HIT}
     said = {field for field, text in row.items() if field.startswith("barrier_") and text}
-    wanted = {*mine, *_NUMBERS, *_MONEY}
+    wanted = {*mine, *_NUMBERS, *_money(study.site)}
     return said == mine and all(math.isfinite(_number(row[field])) for field in wanted)
 
 
@@ -254,11 +273,11 @@ def _number(text: str) -> float:
 
 def table(study: Study, path: Path) -> Table:
     """Return the table of the costs of each layout [EUR per metre of road and year]."""
-    out = empty_table(("layout", "Z (95 %)", "capital", "harm", "repair", "to build"))
     rows, site = _read(path, _fields(study)), study.site
+    out = empty_table(("layout", "Z (95 %)", "capital", "harm", "repair", "to build"))
     facts = _facts(site, rows)
     for name, layout in study.layouts.items():
-        own = _account([row for row in rows if row["layout"] == name])
+        own = _account(site, [row for row in rows if row["layout"] == name])
         sums, annual = stratified(site, layout, own, facts), site.annual(layout)
         ends = [annual + end for end in sums.both.interval]
         words = f"{euros(annual + sums.both.value)} ({span(ends)})"
@@ -267,7 +286,21 @@ def table(study: Study, path: Path) -> Table:
     return out
 
 
-def _account(rows: Sequence[dict[str, str]]) -> Account:
+def risks(study: Study, path: Path) -> Table | None:
+    """Return the table of the risk of each layout to the traffic, or None without traffic."""
+    site = study.site
+    if site.traffic is None:
+        return None
+    rows = _read(path, _fields(study))
+    facts, found = _facts(site, rows), []
+    for name, layout in study.layouts.items():
+        own = _account(site, [row for row in rows if row["layout"] == name])
+        toll = stratified(site, layout, own, facts).toll
+        found.append((name, Risk.of(site.traffic, toll)))
+    return risk_table(found)
+
+
+def _account(site: Site, rows: Sequence[dict[str, str]]) -> Account:
     """Return the account of the releases in some rows."""
 
     def column(name: str) -> NDArray[np.float64]:
@@ -281,6 +314,7 @@ def _account(rows: Sequence[dict[str, str]]) -> Account:
         volume=column("road_volume"),
         reached=column("reached") > 0.0,
         failed=np.array(["True" in texts for texts in said], dtype=bool),
+        toll=None if site.traffic is None else np.column_stack([column(n) for n in _TOLL]),
     )
 
 
@@ -290,9 +324,10 @@ def _tells_failure(field: str) -> bool:
 
 def _facts(site: Site, rows: Sequence[dict[str, str]]) -> dict[str, Facts]:
     """Return the facts about each event that the releases with all layouts provide."""
-    found, out = _account(rows), {}
+    found, out = _account(site, rows), {}
     released = np.array([_number(row["released_volume"]) for row in rows])
+    widths = np.array([_number(row["width"]) for row in rows])
     for name in site.event_names:
         own = found.event == name
-        out[name] = learn(site, found.of(own), released[own], 1.0)
+        out[name] = learn(site, found.of(own), released[own], widths[own], 1.0)
     return out

@@ -108,10 +108,11 @@ def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:
     """Return the statistics of each event from releases without barriers."""
     found, out = account(site, (), outcomes), {}
     released = np.array([o.released_volume for o in outcomes])
+    widths = np.array([o.width for o in outcomes])
     for name in site.event_names:
         own = found.event == name
         blocks = [len(site.draw(seed, name).blocks) for seed in range(SEEDS, SEEDS + FIRST)]
-        out[name] = learn(site, found.of(own), released[own], float(np.mean(blocks)))
+        out[name] = learn(site, found.of(own), released[own], widths[own], float(np.mean(blocks)))
     return out
 
 

@@ -265,6 +265,8 @@ class Effects:
         road = ensemble.at(len(ensemble.stations))
         volume = np.bincount(road["release"], road["volume"], minlength=count)
         self._volume = volume.astype(np.float64)
+        self._energy = np.zeros(count)  # largest energy of a block at the road [J]
+        np.maximum.at(self._energy, road["release"], road["energy"])
         self.base = self._harm(self._volume)
 
     def of(self, barrier: Barrier) -> tuple[Floats, Floats]:
@@ -314,7 +316,11 @@ class Effects:
 
     def _harm(self, volume: Floats) -> Floats:
         """Return the harm of volumes on the road [EUR], which is 0 for a volume of 0."""
-        harms = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
+        harms: Any = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
+        traffic, width = self.site.traffic, self.ensemble.width
+        if traffic is not None:
+            toll = traffic.toll(True, True, width, volume, self._energy)
+            harms = harms + traffic.price(toll.fatalities)
         return np.where(volume > 0.0, harms, 0.0)
 
 

@@ -25,6 +25,7 @@ from rigdda.agents.designers.menu import on_bound
 from rigdda.agents.designers.store import Store, StoredEvaluation
 from rigdda.agents.limits import RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.problem import excess
 
 STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
 """Streams of release seeds. search: all layouts of a search; semifinal, final: the best layouts
@@ -69,8 +70,8 @@ year]."""
 def score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, float]:
     """Return the sort key of a layout: the amount by which it misses a target, then its objective.
 
-    The amount is the excess of the upper bound of the probability over the target. It is 0 if the
-    targets are met or undecided.
+    The amount is the excess of the upper bound over the target. It is 0 if the targets are met or
+    undecided.
     """
     if evaluation.targets != "missed":
         return 0.0, evaluation.objective
@@ -83,7 +84,11 @@ def final_score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, 
 
 
 def shortfall(problem: DesignProblem, evaluation: Evaluation) -> float:
-    """Return the largest excess of an upper bound over its target in all design events [-]."""
+    """Return the largest excess of an upper bound over its target [-].
+
+    Targets are those of all design events and of the individual risk, see
+    `rigdda.envs.problem.excess`.
+    """
     design = [event.name for event in problem.site.events if event.design]
     over = [0.0]
     for wanted, found in (
@@ -92,6 +97,9 @@ def shortfall(problem: DesignProblem, evaluation: Evaluation) -> float:
     ):
         if wanted is not None:
             over += [found[name].bound - wanted for name in design]
+    wanted = problem.targets.individual
+    if wanted is not None and evaluation.risk is not None:
+        over.append(excess(evaluation.risk.individual.high, wanted))
     return max(over)
 
 

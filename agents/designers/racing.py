@@ -18,6 +18,7 @@ from rigdda.agents.designers.protocol import Ledger
 from rigdda.agents.designers.store import Release
 from rigdda.envs import DesignProblem
 from rigdda.envs.intervals import CONFIDENCE, upper_bound
+from rigdda.envs.problem import excess
 
 Floats = NDArray[np.float64]
 
@@ -104,10 +105,10 @@ class Arm:
         return float(own.std(ddof=1)) if len(own) > 1 else 0.0
 
     def shortfall(self) -> float:
-        """Return the largest excess of a design event over a target [-], 0 if there is none.
+        """Return the largest excess over a target [-], 0 if there is none.
 
-        The excess is that of the estimate or, if `strict`, of its upper bound. The upper bound is 1
-        without releases.
+        The excess is that of the estimate or, if `strict`, of its upper bound. The upper bound of a
+        probability is 1 without releases.
         """
         targets = self.problem.targets
         over = [0.0]
@@ -119,6 +120,10 @@ class Arm:
                         count = sum(getattr(r, which) for r in own)
                         share = upper_bound(count, len(own)) if self.strict else count / len(own)
                         over.append(share - wanted)
+        if targets.individual is not None:
+            killed = {name: [r.fatalities for r in own] for name, own in self.releases.items()}
+            risk = self.problem.individual_risk(self.layout, killed)
+            over.append(excess(risk.high if self.strict else risk.value, targets.individual))
         return max(over)
 
     def key(self) -> tuple[float, float]:

@@ -104,13 +104,14 @@ class Release(NamedTuple):
     """Stored values of a release.
 
     These are its bill [EUR per occurrence], the volume on the road [m3], whether a block reached
-    the road and whether a barrier failed.
+    the road, whether a barrier failed, and the expected fatalities (0 without `[traffic]`).
     """
 
     bill: float
     volume: float
     reached: bool
     failed: bool
+    fatalities: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +240,10 @@ def _release(problem: DesignProblem, layout: Layout, outcome: Outcome) -> Releas
     """Return the stored values of an outcome."""
     bill = problem.site.bill(layout, outcome)
     failed = any(barrier.failed for barrier in outcome.barriers)
-    return Release(bill.harm + bill.repair, outcome.road_volume, outcome.reached, failed)
+    killed = 0.0
+    if problem.site.traffic is not None:
+        killed = float(problem.site.toll(layout, outcome).fatalities)
+    return Release(bill.harm + bill.repair, outcome.road_volume, outcome.reached, failed, killed)
 
 
 def _sum(key: str, data: Any) -> str:

@@ -149,5 +149,8 @@ def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
         return ""
     pairs = (("reach", asked.reach), ("failure", asked.failure))
     words = " and ".join(f"P({name}) <= {percent(p)}" for name, p in pairs if p is not None)
+    parts = [f"{words} in every design event"] if words else []
+    if asked.individual is not None:
+        parts.append(f"individual risk <= {asked.individual:.2g} a year")
     more = "; a larger --verify would decide it" if evaluation.targets == "undecided" else ""
-    return f"target {words} in every design event: {evaluation.targets}{more}"
+    return f"target {' and '.join(parts)}: {evaluation.targets}{more}"

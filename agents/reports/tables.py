@@ -27,7 +27,8 @@ from rigdda.agents.design_study import SHED, DesignStudy, design_events
 from rigdda.agents.designers.protocol import Entry
 from rigdda.agents.reports.wording import euros, percent, span
 from rigdda.barriers import Earthwork, standing, to_tables
-from rigdda.envs.intervals import Estimate, estimate, mid_p, student_interval
+from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
+from rigdda.envs.traffic_risk import Risk
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
@@ -71,7 +72,8 @@ class EvaluationsFile:
     """A CSV file with one row per evaluated layout, which is written during the search.
 
     Costs are in EUR per metre of road and year, except `cost`, which is in EUR per metre. The
-    column `barriers` is a JSON list of tables as in a layout file. The class is a context manager.
+    column `barriers` is a JSON list of tables as in a layout file. With traffic, there are also
+    the columns of `RISK`. The class is a context manager.
     """
 
     FIELDS = (
@@ -80,10 +82,15 @@ class EvaluationsFile:
         "barriers",
     )  # fmt: skip
 
-    def __init__(self, path: str | os.PathLike[str]):
+    RISK = (
+        "vehicles_hit", "vehicles_run_into", "fatalities", "individual_risk",
+        "individual_risk_low", "individual_risk_high",
+    )  # fmt: skip
+
+    def __init__(self, path: str | os.PathLike[str], traffic: bool = False):
         self._file = Path(path).open("w", newline="", encoding="utf-8")
         self._rows = csv.writer(self._file)
-        self._rows.writerow(self.FIELDS)
+        self._rows.writerow((*self.FIELDS, *self.RISK) if traffic else self.FIELDS)
 
     def __enter__(self) -> EvaluationsFile:
         return self
@@ -94,11 +101,13 @@ class EvaluationsFile:
     def add(self, entry: Entry) -> None:
         """Write one row and flush it."""
         e = entry.evaluation
-        row = (
+        row: tuple[Any, ...] = (
             entry.simulations, entry.stage, e.releases, e.objective, *e.ci, e.capital, e.harm,
             e.repair, e.cost, e.debris, e.debris_share, e.targets or "", e.seconds,
             json.dumps(to_tables(e.layout)),
         )  # fmt: skip
+        if (r := e.risk) is not None:
+            row += (r.hit.value, r.run_into.value, r.fatalities.value, *r.individual)
         self._rows.writerow(row)
         self._file.flush()
 
@@ -305,6 +314,28 @@ def chances(study: DesignStudy) -> Table | None:
             table.add_row(name, case.name, _chance(reach), fails, f"{reach.releases:,}")
         table.add_section()
     return table
+
+
+def risks(study: DesignStudy) -> Table | None:
+    """Return the table of the risk of each layout to the traffic, or None without traffic."""
+    found = [(c.name, c.evaluation.risk) for c in study.cases if c.evaluation.risk is not None]
+    return risk_table(found) if found else None
+
+
+def risk_table(found: Sequence[tuple[str, Risk]]) -> Table:
+    """Return the table of the risk of named layouts to the traffic on the section, per year."""
+    table = empty_table(
+        ("layout", "hit", "run into", "fatalities", "per km", "individual risk (95 %)")
+    )
+    for name, risk in found:
+        means = (risk.hit, risk.run_into, risk.fatalities, risk.per_km)
+        table.add_row(name, *(f"{mean.value:.2g}" for mean in means), _mean(risk.individual))
+    return table
+
+
+def _mean(mean: Mean) -> str:
+    """Return a small mean with its interval as text."""
+    return f"{mean.value:.2g} ({mean.low:.2g} to {mean.high:.2g})"
 
 
 def _chance(estimate: Estimate) -> str:

@@ -145,7 +145,8 @@ class Consequences(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     closure: Annotated[
         float,
         about(
-            "Cost of a day of closure, including detours and the risk to life.",
+            "Cost of a day of closure, including detours. It includes the risk to life only if "
+            "`[traffic]` does not give a value of a prevented fatality.",
             "EUR/day",
             ge=0.0,
             le=1e9,

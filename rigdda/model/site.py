@@ -43,6 +43,7 @@ from rigdda.model.source import Source
 from rigdda.model.surface import MOST_DAMPING, Surface, smaller
 from rigdda.model.survey import SURVEYS
 from rigdda.model.terrain import Roughness
+from rigdda.model.traffic import Toll
 
 Value = TypeVar("Value")
 
@@ -135,12 +136,15 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             If a surface has restitution None (plain penalty contact), which TOML cannot represent.
         """
         data = msgspec.to_builtins(self)
+        if data["traffic"] is None:  # TOML has no null
+            del data["traffic"]
         for table in (
             *data["sources"],
             *data["events"],
             data["motion"],
             data["origin"],
-        ):  # TOML has no null
+            data.get("traffic", {}),
+        ):
             for name in [name for name, value in table.items() if value is None]:
                 del table[name]
         laws = {f"surfaces.{name}": table for name, table in data["surfaces"].items()}
@@ -370,19 +374,43 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         rock.
         """
         layout = as_layout(layout)
-        volume, reached = outcome.road_volume, outcome.reached
         repair = self.prices.removal * outcome.held_fraction * outcome.released_volume
         if any(found.failed for found in outcome.barriers):
-            built = standing(layout)
             cost = _capital_of(self, layout)
+            for barrier, found in zip(standing(layout), outcome.barriers, strict=True):
+                if found.failed:
+                    repair += cost[barrier] * max(outcome.width, barrier.repaired)
+        volume, reached = self.on_road(layout, outcome)
+        harm = self.consequences.harm(volume, reached)
+        if self.traffic is not None and self.traffic.fatality_value:
+            harm += float(self.traffic.price(self.toll(layout, outcome).fatalities))
+        return Bill(harm, repair)
+
+    def on_road(self, layout: Sequence[Barrier], outcome: Outcome) -> tuple[float, bool]:
+        """Return the volume on the road [m3], with that of failed walls, and whether any is."""
+        volume, reached = outcome.road_volume, outcome.reached
+        if any(found.failed for found in outcome.barriers):
+            built = standing(as_layout(layout))
             for barrier, found in zip(built, outcome.barriers, strict=True):
-                if not found.failed:
-                    continue
-                length = max(outcome.width, barrier.repaired)
-                repair += cost[barrier] * length
-                volume += found.road_area * length
-                reached = reached or found.road_area > 0.0
-        return Bill(self.consequences.harm(volume, reached), repair)
+                if found.failed:
+                    volume += found.road_area * max(outcome.width, barrier.repaired)
+                    reached = reached or found.road_area > 0.0
+        return volume, reached
+
+    def toll(self, layout: Sequence[Barrier], outcome: Outcome) -> Toll:
+        """Return the expected consequences of a release for the traffic.
+
+        Raises
+        ------
+        BadInput
+            If the site has no `[traffic]`.
+        """
+        if self.traffic is None:
+            raise BadInput("traffic", None, f"add the table [traffic] to site {self.name}")
+        volume, reached = self.on_road(layout, outcome)
+        lies = outcome.debris_on_road > 0.0 or volume > outcome.road_volume
+        energy = outcome.max_energy_on_road * outcome.width
+        return self.traffic.toll(reached, lies, outcome.width, volume, energy)
 
     def shed(self) -> float:
         """Return the annual cost of a rock shed over the road [EUR per metre of road and year].

@@ -22,6 +22,7 @@ from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
 from rigdda.model.source import Point, Source
 from rigdda.model.surface import Damping, Interface, Surface
 from rigdda.model.terrain import Roughness, Terrain
+from rigdda.model.traffic import Traffic
 
 
 @documented
@@ -546,6 +547,10 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     ] = ()
     prices: Annotated[Prices, about("Prices of barriers.")] = msgspec.field(default_factory=Prices)
     consequences: Annotated[Consequences, about("Costs of rock on the road.")] = Consequences()
+    traffic: Annotated[
+        Traffic | None,
+        about("Traffic on the road. Without this table the risk to life is not computed."),
+    ] = None
     meshes: Annotated[tuple[MeshOption, ...], about("Mesh options for the rock face.")] = ()
     motion: Annotated[Motion, about("Parameters of the simulation of releases.")] = Motion()
     scatter: Annotated[

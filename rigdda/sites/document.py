@@ -31,6 +31,7 @@ from rigdda.model.site_tables import (
 )
 from rigdda.model.source import Source
 from rigdda.model.surface import Interface, Surface
+from rigdda.model.traffic import Traffic
 
 PATH = Path(__file__).parents[2] / "docs" / "site.md"
 
@@ -48,6 +49,7 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[[interfaces]]`", Interface),
     ("`[prices]`", Prices),
     ("`[consequences]`", Consequences),
+    ("`[traffic]`", Traffic),
     ("`[[meshes]]`", MeshOption),
     ("`[motion]`", Motion),
     ("`[scatter]`", Scatter),

@@ -205,7 +205,8 @@ def schema(file: str) -> None:
 )
 @count_option("--releases", 1, 100, "Number of releases.")
 @click.option("--station", "at", type=float, multiple=True, metavar="X",
-              help="Chainage at which passing blocks are recorded [m]. May be repeated.  "
+              help="Chainage at which passing blocks are recorded [m], as in the site file, not "
+              "of its survey. May be repeated.  "
               "[default: the uphill edge of the road]")  # fmt: skip
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
               show_default=True, help="Mechanical model. 'lumped' treats each block as a point; "
@@ -266,7 +267,7 @@ def simulate(
         passing = Passing.of(where, barriers, event, found.passages)
         rows = simulation_folder.write(folder, passing, barriers, asked)
         jobs.forget(folder)
-    show(tables.outcomes(barriers, found.outcomes))
+    show(tables.outcomes(where, barriers, found.outcomes))
     for line, table in stations.tables(rows):
         click.echo(line)
         show(table)
@@ -321,7 +322,6 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     """
     import rigdda
     from rigdda.agents.reports import findings
-    from rigdda.barriers import standing
     from rigdda.envs.replay_record import release_record
     from rigdda.replay.recording import Marks
     from rigdda.replay.viewer import open_viewer
@@ -345,7 +345,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
     if words := findings.of_layout(where, barriers, event):
         notes["note"] = words
-    road, labels = (where.road.start, where.road.end), tuple(b.label for b in standing(barriers))
+    road, labels = (where.road.start, where.road.end), where.labels(barriers)
     record = release_record(where, barriers, seed, event, outcome)
     run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels, record))
     click.echo(folder / "episode.rrd")
@@ -408,8 +408,8 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               help="Largest acceptable individual risk of a commuter [1/year]. The site must have "
               "a table [traffic].")  # fmt: skip
 @click.option("--zone", type=float, nargs=2, metavar="A B",
-              help="Place barriers between the chainages A and B [m].  [default: the zone of "
-              "the site]")  # fmt: skip
+              help="Place barriers between the chainages A and B [m], as in the site file, not of "
+              "its survey.  [default: the zone of the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the search and of its releases.", SEED)
@@ -454,7 +454,7 @@ def design(
 
 TRAFFIC = (
     "risk to the traffic on {0.section_length:g} m of road, per year: vehicles hit by falling "
-    "rock,\nvehicles that run into debris, fatalities, fatalities per km, and risk of a person "
+    "rock,\nvehicles that run into debris, deaths, deaths per km, and individual risk of a person "
     "who\ntravels it {0.commuter_trips:g} times"
 )
 """Line above the table of the risk to a `Traffic`."""
@@ -483,7 +483,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
     from rigdda.agents.reports import findings, tables
     from rigdda.agents.reports.folder import FILES
-    from rigdda.agents.reports.wording import order
+    from rigdda.agents.reports.wording import order, unchanged
 
     chosen, result = done.chosen.evaluation, done.result
     click.echo(
@@ -502,9 +502,12 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         click.echo(TRAFFIC.format(done.problem.site.traffic))
         show(risks)
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
-    click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
+    site = done.problem.site
+    click.echo(f"layout{from_start}:" if chosen.layout else f"layout: {unchanged(site)}")
     for barrier in chosen.layout:
-        click.echo(f"  {order(barrier, done.problem.site)}")
+        click.echo(f"  {order(barrier, site)}")
+    for line in findings.kept(site, chosen.layout):
+        click.echo(f"  {line}")
     cases = [(case.name, case.evaluation) for case in done.cases]
     lines = [findings.limits(result, cases, done.left)]
     lines += [

@@ -15,7 +15,14 @@ import numpy as np
 import rigdda
 from rigdda import Barrier, Layout, Outcome, Run, Site
 from rigdda.agents import designers
-from rigdda.agents.design_study import CONSTANT, NOTHING, RULE, DesignStudy, VerifiedLayout
+from rigdda.agents.design_study import (
+    AS_IT_STANDS,
+    CONSTANT,
+    NOTHING,
+    RULE,
+    DesignStudy,
+    VerifiedLayout,
+)
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Entry, release_seeds, verify
 from rigdda.agents.designers.store import Store
@@ -147,8 +154,7 @@ def study(
     """
     store = Store(out / "evaluations.jsonl")
     tick(0, "simulating releases without barriers")
-    traffic = problem.site.traffic is not None
-    with EvaluationsFile(out / "evaluations.csv", traffic) as file:
+    with EvaluationsFile(out / "evaluations.csv", problem.site) as file:
 
         def progress(entry: Entry) -> None:
             file.add(entry)
@@ -175,7 +181,8 @@ def _compared(
     store: Store,
 ) -> list[tuple[str, Layout]]:
     """Return the layouts to verify: no barrier, the rule, the constant and the designer's."""
-    out: list[tuple[str, Layout]] = [(NOTHING, ())]
+    bare = AS_IT_STANDS if problem.site.existing else NOTHING
+    out: list[tuple[str, Layout]] = [(bare, ())]
     for words, module in ((RULE, "rule"), (CONSTANT, "constant")):
         if module != name:
             found = designers.module(module).design(problem, simulations, seed, None, store)
@@ -215,13 +222,13 @@ HOLDS = 0.5
 def tried(problem: DesignProblem) -> tuple[Layout, ...]:
     """Return layouts with one of the largest barriers of each kind, at `STATIONS` places each.
 
-    Mesh is left out because it makes an event rarer but does not stop it.
+    Mesh and removals are left out because they do not stop an event.
     """
     menu, found = Menu(problem), list[Barrier]()
     for kind in problem.kinds:
         barriers = (
             [menu.put(b.thickest(menu.zone), b.x) or b for b in menu.lone(kind)]
-            if kind != "mesh"
+            if kind not in ("mesh", "removal")
             else []
         )
         least = LARGE * max((b.size for b in barriers), default=0.0)

@@ -28,7 +28,7 @@ from rigdda.agents.reports.tables import (
     write_rows,
 )
 from rigdda.agents.reports.wording import euros, span
-from rigdda.barriers import from_table, standing
+from rigdda.barriers import from_table
 from rigdda.envs.cost import Account, Facts, learn, stratified
 from rigdda.envs.outcome_cache import mechanics
 from rigdda.envs.traffic_risk import Risk
@@ -202,7 +202,7 @@ def _key(study: Study, name: str, event: str, seed: int) -> str:
 
 def _fields(study: Study) -> list[str]:
     """Return the columns, with those of as many barriers as the largest layout has."""
-    most = max(len(standing(layout)) for layout in study.layouts.values())
+    most = max(len(study.site.standing(layout)) for layout in study.layouts.values())
     barriers = [f"barrier_{i}_{name}" for i in range(most) for name in HIT]
     money = _money(study.site)
     return ["layout", "event", "seed", "capital", *money, *_NUMBERS, *barriers, "key"]
@@ -257,7 +257,7 @@ def _sound(row: dict[str, Any], study: Study, job: Job) -> bool:
         return False
     if _number(row["capital"]) != study.site.capital(layout):
         return False
-    mine = {f"barrier_{i}_{hit}" for i in range(len(standing(layout))) for hit in HIT}
+    mine = {f"barrier_{i}_{hit}" for i in range(len(study.site.standing(layout))) for hit in HIT}
     said = {field for field, text in row.items() if field.startswith("barrier_") and text}
     wanted = {*mine, *_NUMBERS, *_money(study.site)}
     return said == mine and all(math.isfinite(_number(row[field])) for field in wanted)

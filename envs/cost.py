@@ -485,5 +485,5 @@ def _mending(site: Site, layout: Layout) -> float:
 
     It is the cost of one fence panel length, the least unit of repair; 0 if no barrier can fail.
     """
-    prices = zip(layout, site.capitals(layout), strict=True)
+    prices = site.values(layout).items()
     return PANEL * max((price for b, price in prices if b.fallible), default=0.0)

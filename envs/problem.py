@@ -156,7 +156,8 @@ MOST_BARRIERS = 100
 """Maximum number of slots of a layout; a site has room for only a few barriers."""
 
 USUAL_KINDS = tuple(name for name, kind in KINDS.items() if kind.designed and name != "mesh")
-"""Default kinds of barrier, to which mesh is added on sites that have mesh options. The rigid wall,
+"""Default kinds of barrier. Mesh is added on sites that have mesh options, and removal on sites
+with existing barriers that may be removed. The rigid wall,
 which cannot move, is for experiments only and not included."""
 
 
@@ -183,7 +184,8 @@ def checked_zone(site: Site, zone: object) -> BarrierZone:
 def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
     """Return the validated kinds of barrier to choose from."""
     if kinds is None:
-        return (*USUAL_KINDS, "mesh") if site.meshes else USUAL_KINDS
+        mesh = ("mesh",) if site.meshes else ()
+        return (*USUAL_KINDS, *mesh, *(("removal",) if site.removals else ()))
     if not isinstance(kinds, Sequence) or isinstance(kinds, str):
         raise BadInput("kinds", kinds, "give a sequence of names")
     names = tuple(check.one_of("kinds", kind, KINDS) for kind in kinds)
@@ -191,6 +193,9 @@ def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
         raise BadInput("kinds", kinds, "name each kind once")
     if "mesh" in names and not site.meshes:
         raise BadInput("kinds", kinds, f"leave mesh out: {site.name} has no options of it")
+    if "removal" in names and not site.removals:
+        mend = f"leave removal out: {site.name} has no existing barrier with removable = true"
+        raise BadInput("kinds", kinds, mend)
     return names
 
 
@@ -297,7 +302,8 @@ class DesignProblem:
     """Barrier design on a site: find the layout with the lowest annual cost.
 
     Z [EUR per metre of road and year] = annual cost of the barriers + expected harm on the road +
-    expected repair cost, see `rigdda.envs.cost`.
+    expected repair cost, see `rigdda.envs.cost`. A layout lists what is built or removed: the
+    existing barriers of the site are part of every layout, also of the empty one.
 
     Parameters
     ----------
@@ -307,7 +313,8 @@ class DesignProblem:
         Number of slots for barriers; each may be empty.
     kinds : sequence of str, optional
         Kinds of barrier to choose from: "fence", "ditch", "embankment", "gravity_wall", "mesh",
-        "wall". By default all but "wall", and "mesh" only on sites with mesh options.
+        "wall", "removal". By default all but "wall", "mesh" only on sites with mesh options, and
+        "removal" (of an existing barrier) only on sites with removable barriers.
     targets : Targets or mapping, optional
         Greatest acceptable probabilities in the design events and individual risk, such as
         {"reach": 0.01} or {"individual": 1e-6}.

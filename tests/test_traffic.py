@@ -112,7 +112,7 @@ def test_risk_of_a_site_equals_hand_calculation(site: Site) -> None:
     density, rate = 7200.0 / 24.0 / 72_000.0, 0.6 / 100.0
     hits = rate * 0.5 * density * (5.4 + 1.2)
     runs = rate * 0.5 * density * (20.0 * 2.5 + 400.0 / 6.8)
-    killed = 1.5 * (hits * 0.3 + runs * 0.3)
+    killed = 1.5 * (hits * 0.3 + runs * 0.1)
     assert risk.hit.value == pytest.approx(250.0 * hits, rel=1e-12)
     assert risk.run_into.value == pytest.approx(250.0 * runs, rel=1e-12)
     assert risk.fatalities.value == pytest.approx(250.0 * killed, rel=1e-12)

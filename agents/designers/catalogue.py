@@ -26,6 +26,7 @@ from rigdda import (
 )
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import Ledger, release_seeds
+from rigdda.barriers import Removal
 from rigdda.barriers.base import ELEMENT
 from rigdda.barriers.fence import PANEL
 from rigdda.barriers.gravity_wall import SLID
@@ -202,7 +203,8 @@ class Catalogue:
     relief : (R, J) array
         Reduction of the harm of each release by each barrier [EUR].
     annual : (J,) array
-        Annual cost of each barrier including its expected repair [EUR per m].
+        Annual cost of each barrier including its expected repair, in addition to the upkeep of
+        existing barriers [EUR per m].
     span : (J, 2) array
         Chainages of the start and the end of each barrier [m].
     """
@@ -233,14 +235,14 @@ def tabulate(
     """Return the catalogue of some barriers of a problem."""
     site = problem.site
     weight = ensemble.weights([site.rate(name, ()) for name in site.event_names])
-    effects = Effects(site, ensemble)
+    effects, standing = Effects(site, ensemble), site.annual(())
     relief = np.zeros((len(weight), len(barriers)))
     annual = np.zeros(len(barriers))
     for j, barrier in enumerate(barriers):
         harm, mended = effects.of(barrier)
         relief[:, j] = effects.base - harm
         capital = site.capital((barrier,)) if mended.any() else 0.0
-        annual[j] = site.annual((barrier,)) + capital * float(weight @ mended)
+        annual[j] = site.annual((barrier,)) - standing + capital * float(weight @ mended)
     span = np.array([[b.x, b.x + b.extent] for b in barriers]).reshape(-1, 2)
     return Catalogue(barriers, weight, effects.base, relief, annual, span)
 
@@ -276,6 +278,8 @@ class Effects:
             factor = [site.rate(name, (barrier,)) / max(site.rate(name, ()), 1e-300)
                       for name in site.event_names]  # fmt: skip
             return self.base * np.array(factor)[self.ensemble.event], np.zeros_like(self.base)
+        if isinstance(barrier, Removal):  # what else it changes is left to the simulation
+            return self.base, np.zeros_like(self.base)
         k = int(np.argmin(np.abs(self.ensemble.stations - barrier.x)))
         table, risky = self._at[k], self._risky[k]
         stopped, broken = self._stopped(barrier, table)

@@ -210,7 +210,8 @@ class Store:
                 found[outcome.event].append(_release(problem, layout, outcome))
             kept = {name: tuple(releases) for name, releases in found.items()}
             missing = {name: LENT for name in problem.site.event_names if not asked.get(name)}
-            lent = problem.sample((), missing) if missing else ()
+            sample = problem.sample((), missing) if missing else ()
+            lent = [replace(outcome, barriers=()) for outcome in sample]  # existing barriers
             return StoredEvaluation(problem.judge(layout, (*outcomes, *lent)), kept)
 
         count = sum(map(len, asked.values()))

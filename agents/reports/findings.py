@@ -34,6 +34,16 @@ def of_layout(site: Site, layout: Layout, event: str | None) -> str:
     return "; ".join(words)
 
 
+def kept(site: Site, layout: Layout) -> list[str]:
+    """Return lines on what happens to the existing barriers of a site with a layout."""
+    stand = site.standing(layout)
+    return [
+        f"existing {barrier.label}, at x = {barrier.x:.1f} m: "
+        + ("kept" if barrier in stand else "removed")
+        for barrier in site.existing_barriers
+    ]
+
+
 def unfitted(site: Site) -> str:
     """Return a text that names the surfaces with default coefficients of the lumped-mass model."""
     names = sorted({*site.slope.chain()[1]} - set(site.lumped))
@@ -132,7 +142,7 @@ def left_over(evaluation: Evaluation) -> str:
 def failing(site: Site, evaluation: Evaluation) -> list[str]:
     """Return lines on the failure of barriers in design events, if it may be above 5 %."""
     lines = []
-    for event in design_events(site) if evaluation.layout else ():
+    for event in design_events(site) if site.standing(evaluation.layout) else ():
         chance = evaluation.failure[event]
         if chance.releases and chance.bound > SURE:
             lines.append(

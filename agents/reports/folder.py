@@ -11,8 +11,7 @@ from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import findings, pictures
 from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
 from rigdda.agents.reports.simulation_folder import along
-from rigdda.agents.reports.wording import euros, span
-from rigdda.barriers import standing
+from rigdda.agents.reports.wording import euros, span, unchanged
 from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
 
@@ -46,18 +45,24 @@ def _section(done: DesignStudy, path: Path, seed: int) -> None:
     """Draw the slope without barriers and with the layout."""
     site, chosen = done.problem.site, done.chosen
     nothing = _all(site, (), seed)
-    panels = [Panel(f"Without barriers: {_words(done.nothing)}", (), nothing)]
+    bare = "As it stands" if site.existing else "Without barriers"
+    panels = [Panel(f"{bare}: {_words(done.nothing)}", (), nothing)]
     layout = chosen.evaluation.layout
     if layout:
         panels.append(Panel(f"With the layout: {_words(chosen)}", layout, _all(site, layout, seed)))
     found = envelopes(site, (), release_seeds("ensemble", seed, ENOUGH), along(site))
-    section(path, site, done.problem.zone, panels, found, "Without barriers")
+    section(path, site, done.problem.zone, panels, found, bare)
 
 
 def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:
     """Simulate releases of every event of a site."""
     seeds = release_seeds("ensemble", seed, DRAWN)
     return [fly(site, layout, event.name, seeds) for event in site.events]
+
+
+def _before(site: Site) -> str:
+    """Return what the case without a layout is called."""
+    return "as it stands" if site.existing else "without barriers"
 
 
 def _words(case: VerifiedLayout) -> str:
@@ -79,14 +84,14 @@ def _replay(done: DesignStudy, path: Path, seed: int) -> None:
     run, outcome = rigdda.release(site, layout, drawn, event)
     risk = nothing.evaluation.by_event[event]
     notes = {
-        "layout": "; ".join(b.label for b in layout) or "no barrier",
-        "event": f"{event}, {euros(risk)} EUR per metre and year without barriers",
+        "layout": "; ".join(b.label for b in layout) or unchanged(site),
+        "event": f"{event}, {euros(risk)} EUR per metre and year {_before(site)}",
         "release": f"seed {drawn}, {outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3 "
         "reach the road",
-        "without barriers": _words(nothing),
+        _before(site): _words(nothing),
         "with the layout": _words(chosen),
     }
-    labels = tuple(barrier.label for barrier in standing(layout))
+    labels = site.labels(layout)
     road = site.road.start, site.road.end
     record = release_record(site, layout, drawn, event, outcome)
     run.to_rerun(path, Marks(road, notes, f"{site.name}: {chosen.name}", labels, record))

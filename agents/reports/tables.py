@@ -25,8 +25,8 @@ from rigdda import (
 )
 from rigdda.agents.design_study import SHED, DesignStudy, design_events
 from rigdda.agents.designers.protocol import Entry
-from rigdda.agents.reports.wording import euros, percent, span
-from rigdda.barriers import Earthwork, standing, to_tables
+from rigdda.agents.reports.wording import euros, percent, span, survey_place, surveyed
+from rigdda.barriers import Earthwork, to_tables
 from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
 from rigdda.envs.traffic_risk import Risk
 from rigdda.files import atomic
@@ -72,8 +72,10 @@ class EvaluationsFile:
     """A CSV file with one row per evaluated layout, which is written during the search.
 
     Costs are in EUR per metre of road and year, except `cost`, which is in EUR per metre. The
-    column `barriers` is a JSON list of tables as in a layout file. With traffic, there are also
-    the columns of `RISK`. The class is a context manager.
+    column `barriers` is a JSON list of tables as in a layout file. If the site has traffic, there
+    are also the columns of `RISK`; if it has other coordinates than its survey, `survey` is a JSON
+    list of the chainage and elevation on the survey of each barrier. The class is a context
+    manager.
     """
 
     FIELDS = (
@@ -87,10 +89,13 @@ class EvaluationsFile:
         "individual_risk_low", "individual_risk_high",
     )  # fmt: skip
 
-    def __init__(self, path: str | os.PathLike[str], traffic: bool = False):
+    def __init__(self, path: str | os.PathLike[str], site: Site):
+        self._site = site
         self._file = Path(path).open("w", newline="", encoding="utf-8")
         self._rows = csv.writer(self._file)
-        self._rows.writerow((*self.FIELDS, *self.RISK) if traffic else self.FIELDS)
+        risk = () if site.traffic is None else self.RISK
+        survey = ("survey",) if site.origin.surveyed else ()
+        self._rows.writerow((*self.FIELDS, *risk, *survey))
 
     def __enter__(self) -> EvaluationsFile:
         return self
@@ -108,6 +113,8 @@ class EvaluationsFile:
         )  # fmt: skip
         if (r := e.risk) is not None:
             row += (r.hit.value, r.run_into.value, r.fatalities.value, *r.individual)
+        if self._site.origin.surveyed:
+            row += (json.dumps([survey_place(self._site, b.x) for b in e.layout]),)
         self._rows.writerow(row)
         self._file.flush()
 
@@ -153,7 +160,7 @@ def applies_not(value: Any) -> bool:
     return isinstance(value, float) and math.isnan(value)
 
 
-def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
+def outcomes(site: Site, layout: Layout, results: Sequence[Outcome]) -> Table:
     """Return the table of means over releases with 95 % intervals."""
     table = empty_table(("", "mean", "95 % interval"))
 
@@ -170,9 +177,10 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
         add(words, unit, factor, [getattr(outcome, name) for outcome in results])
     run_out = [outcome.run_out[1] for outcome in results]
     add("run-out of 95 % of the rock", "m", 1.0, run_out, -math.inf)
-    for i, barrier in enumerate(standing(layout)):
+    built = zip(site.standing(layout), site.labels(layout), strict=True)
+    for i, (barrier, label) in enumerate(built):
         table.add_section()
-        table.add_row(f"{barrier.label}, at {barrier.x:.1f} m")
+        table.add_row(f"{label}, at {barrier.x:.1f} m{surveyed(site, barrier.x)}")
         for name, (words, unit, factor) in HIT.items():
             if isinstance(barrier, Earthwork) and name not in ("overtopped", "caught", *ONLY):
                 continue
@@ -309,7 +317,8 @@ def chances(study: DesignStudy) -> Table | None:
         for i, case in enumerate(study.cases):
             e = case.evaluation
             reach = e.reach[event]
-            fails = _chance(e.failure[event]) if e.layout else "-"
+            standing = study.problem.site.standing(e.layout)
+            fails = _chance(e.failure[event]) if standing else "-"
             name = "" if i else event
             table.add_row(name, case.name, _chance(reach), fails, f"{reach.releases:,}")
         table.add_section()
@@ -324,9 +333,7 @@ def risks(study: DesignStudy) -> Table | None:
 
 def risk_table(found: Sequence[tuple[str, Risk]]) -> Table:
     """Return the table of the risk of named layouts to the traffic on the section, per year."""
-    table = empty_table(
-        ("layout", "hit", "run into", "fatalities", "per km", "individual risk (95 %)")
-    )
+    table = empty_table(("layout", "hit", "run into", "deaths", "per km", "one person (95 %)"))
     for name, risk in found:
         means = (risk.hit, risk.run_into, risk.fatalities, risk.per_km)
         table.add_row(name, *(f"{mean.value:.2g}" for mean in means), _mean(risk.individual))

@@ -77,6 +77,7 @@ Heights and elongations are orders of magnitude without a source."""
 CLASSES = tuple(FENCE_CLASSES)
 """Energy classes of fences, ascending [kJ]."""
 
+Condition = Annotated[float, about(ge=0.05, le=1.0)]
 Capacity = Annotated[float, about(ge=LEAST_CAPACITY)]
 Elongation = Annotated[float, about(ge=SHORTEST)]
 
@@ -130,6 +131,14 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
             "m",
         ),
     ] = None
+    condition: Annotated[
+        Condition,
+        about(
+            "Share of the energy of its class that it absorbs. It is 1 for a new fence; one that "
+            "stands already may absorb less.",
+            "-",
+        ),
+    ] = 1.0
     repaired: ClassVar[float] = PANEL
     fallible: ClassVar[bool] = True
     lengths: ClassVar[tuple[Length, ...]] = (Length("height", "max_height"),)
@@ -139,6 +148,9 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         if (self.capacity is None) == (self.energy_class is None):
             given = (self.capacity, self.energy_class)
             raise BadInput("fence capacity, energy_class", given, "give exactly one of them")
+        if self.capacity is not None and self.condition < 1.0:
+            mend = "leave it out: the capacity is what the fence absorbs"
+            raise BadInput("fence condition", self.condition, mend)
         if self.capacity is None:
             self._check_class()
         elif self.elongation is None:
@@ -162,13 +174,13 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     def for_width(self, width: float) -> Self:
         """Return the fence for a scene of this width [m], with a capacity instead of a class.
 
-        The capacity is the class energy divided by the width, or by the panel length if that is
-        less. A fence with a given capacity is returned unchanged.
+        The capacity is the class energy times the condition, divided by the width, or by the panel
+        length if that is less. A fence with a given capacity is returned unchanged.
         """
         if self.energy_class is None:
             return self
-        capacity = 1e3 * self.energy_class / min(width, PANEL)
-        return self._with(capacity=capacity, energy_class=None)
+        capacity = self.condition * (1e3 * self.energy_class / min(width, PANEL))
+        return self._with(capacity=capacity, energy_class=None, condition=1.0)
 
     @property
     def deflection(self) -> float:
@@ -233,9 +245,10 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
 
     @property
     def strength(self) -> str:
-        """Its energy class, or its capacity per metre, in words."""
+        """Its energy class with its condition, or its capacity per metre, in words."""
         if self.energy_class is not None:
-            return f"{self.energy_class:,g} kJ"
+            worn = f" at {100.0 * self.condition:.0f} %" if self.condition < 1.0 else ""
+            return f"{self.energy_class:,g} kJ{worn}"
         assert self.capacity is not None
         return f"{self.capacity / 1e3:,.0f} kJ/m"
 
@@ -257,13 +270,16 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         return self.energy_class
 
     def check_design(self, where: str, site: KnownSite) -> None:
-        """Check that it has an energy class.
+        """Check that it has an energy class and is new.
 
         Raises
         ------
         BadInput
-            If it has none; the message begins with `where`.
+            If it has none or is worn; the message begins with `where`.
         """
+        if self.condition < 1.0:
+            mend = "leave it out: a new fence has 1, and one that stands goes into [[existing]]"
+            raise BadInput(f"{where}.condition", self.condition, mend)
         if self.energy_class is None:
             mend = "give its energy class instead of a capacity"
             raise BadInput(f"{where}.capacity", self.capacity, mend)

@@ -126,7 +126,11 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
         `usual` is the upkeep of a kind that is neither in the table `upkeep` nor built-in.
         """
-        return float(self.annuity + self.upkeep.get(kind, 0.0 if kind in UPKEEP else usual))
+        return float(self.annuity + self.upkeep_of(kind, usual))
+
+    def upkeep_of(self, kind: str, usual: float = 0.0) -> float:
+        """Return the annual upkeep of a kind of barrier as a share of its capital cost [1/year]."""
+        return self.upkeep.get(kind, 0.0 if kind in UPKEEP else usual)
 
 
 @documented

@@ -61,6 +61,11 @@ USUAL = ((1.0, 0.3), (10.0, 1.0))
 Australian Geomechanics Society (2007) for a vehicle that is damaged only (0 to 0.3) and for one
 that is buried or crushed (0.9 to 1). The volumes are an assumption."""
 
+RUNS_INTO = 0.1
+"""Default vulnerability in a vehicle that runs into debris [-]. It lies in the range from 0 to 0.3
+of the Australian Geomechanics Society (2007) for a vehicle that is damaged only. It is below the
+recommended 0.3 because most drivers have braked and pieces of rock seldom block all lanes."""
+
 Probability = Annotated[float, about(ge=0.0, le=1.0)]
 Size = Annotated[float, about(ge=0.0)]
 Pairs = Annotated[tuple[tuple[Size, Size], ...], about(least=1)]
@@ -131,6 +136,7 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "probability] with increasing sizes. It is interpolated linearly, and constant beyond "
             "the first and the last size. The size is the volume that reaches the road [m3] or the "
             "energy on it [kJ], see `vulnerability_by`. The default is [[1, 0.3], [10, 1]] in m3.",
+            "m3 or kJ, and -",
         ),
     ] = None
     vulnerability_by: Annotated[
@@ -142,7 +148,7 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         about(
             "Probability of death of a person in a vehicle that runs into debris on the road.", "-"
         ),
-    ] = 0.3
+    ] = RUNS_INTO
     decision_sight_distance: Annotated[
         Distance | None,
         about(

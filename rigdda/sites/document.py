@@ -14,6 +14,7 @@ from rigdda import sites
 from rigdda.barriers import KINDS, MeshOption
 from rigdda.fields import Described, described
 from rigdda.files import atomic
+from rigdda.model.existing import Existing
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
 from rigdda.model.prices import Consequences, Prices
@@ -45,6 +46,7 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[origin]`", Origin),
     ("`[road]`", Road),
     ("`[barrier_zone]`", BarrierZone),
+    ("`[[existing]]`", Existing),
     ("`[surfaces.NAME]`", Surface),
     ("`[[interfaces]]`", Interface),
     ("`[prices]`", Prices),

@@ -454,8 +454,8 @@ def design(
 
 TRAFFIC = (
     "risk to the traffic on {0.section_length:g} m of road, per year: vehicles hit by falling "
-    "rock,\nvehicles that run into debris, deaths, deaths per km, and individual risk of a person "
-    "who\ntravels it {0.commuter_trips:g} times"
+    "rock,\nvehicles that run into debris, deaths, deaths per km, and the individual risk\n"
+    "of a person who travels it {0.commuter_trips:g} times, with the upper end of its 95 % interval"
 )
 """Line above the table of the risk to a `Traffic`."""
 

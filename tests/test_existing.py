@@ -16,6 +16,7 @@ from rigdda.agents import designers
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.site_check import facts, oddities
 from rigdda.barriers import Removal
+from rigdda.barriers.fence import WornFence
 from rigdda.envs import DesignProblem
 from rigdda.envs.rendering import picture
 from rigdda.model.existing import Existing
@@ -37,7 +38,10 @@ def site() -> Site:
 
 def test_it_is_part_of_every_layout(site: Site) -> None:
     (old,) = site.existing_barriers
-    assert old == Fence(20.0, 2.0, energy_class=250, condition=0.5)
+    assert old == WornFence(20.0, 2.0, energy_class=250, condition=0.5)
+    assert having(msgspec.structs.replace(OLD, condition=1.0)).existing_barriers == (
+        Fence(20.0, 2.0, energy_class=250),
+    )
     assert site.standing() == (old,)
     assert site.standing((NEW, Mesh(4.0, "face"))) == (NEW, old)
     assert site.standing(site.as_built((NEW,))) == (NEW, old)  # adding it again changes nothing
@@ -52,6 +56,16 @@ def test_condition_reduces_the_energy_not_the_height(site: Site) -> None:
         assert new.capacity is not None
         assert worn.capacity == pytest.approx(0.5 * new.capacity, rel=1e-15)
         assert worn.left_height(0.0) == 2.0
+
+
+def test_a_worn_fence_acts_as_one_of_its_remaining_capacity(site: Site) -> None:
+    """125 kJ over the width of the mass, 10 m."""
+    bare = rigdda.sites.load("quick")
+    same = (Fence(20.0, 2.0, capacity=12.5e3, elongation=2.5),)
+    for seed in range(3):
+        found, expected = release(site, (), seed, "mass")[1], release(bare, same, seed, "mass")[1]
+        assert found == expected
+        assert found.barriers[0].resistance == 12.5e3 / 2.5
 
 
 def test_a_release_equals_that_of_the_same_barrier_in_a_layout(site: Site) -> None:

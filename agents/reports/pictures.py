@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
 from rigdda.agents.reports.stations import Passing, Rows, summary
 from rigdda.barriers import Earthwork, earthworks
+from rigdda.barriers.fence import WornFence
 from rigdda.display import BARRIER, OLD, ROAD, ZONE
 from rigdda.envs import Evaluation
 from rigdda.envs.envelope import largest
@@ -492,7 +493,7 @@ def _envelopes(
         else:
             heights.axvline(barrier.x, color=colour, linewidth=1, linestyle=":")
         if isinstance(barrier, Fence) and barrier.energy_class is not None:
-            takes = barrier.condition * barrier.energy_class
+            takes = barrier.remaining if isinstance(barrier, WornFence) else barrier.rated
             energies.plot(barrier.x, takes, "D", color=colour, markersize=8)
         else:
             energies.axvline(barrier.x, color=colour, linewidth=1, linestyle=":")

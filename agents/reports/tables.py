@@ -27,7 +27,7 @@ from rigdda.agents.design_study import SHED, DesignStudy, design_events
 from rigdda.agents.designers.protocol import Entry
 from rigdda.agents.reports.wording import euros, percent, span, survey_place, surveyed
 from rigdda.barriers import Earthwork, to_tables
-from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
+from rigdda.envs.intervals import Estimate, estimate, mid_p, student_interval
 from rigdda.envs.traffic_risk import Risk
 from rigdda.files import atomic
 
@@ -332,17 +332,16 @@ def risks(study: DesignStudy) -> Table | None:
 
 
 def risk_table(found: Sequence[tuple[str, Risk]]) -> Table:
-    """Return the table of the risk of named layouts to the traffic on the section, per year."""
-    table = empty_table(("layout", "hit", "run into", "deaths", "per km", "one person (95 %)"))
+    """Return the table of the risk of named layouts to the traffic on the section, per year.
+
+    The individual risk is followed by the upper end of its 95 % interval.
+    """
+    table = empty_table(("layout", "hit", "run into", "deaths", "per km", "one person"))
     for name, risk in found:
         means = (risk.hit, risk.run_into, risk.fatalities, risk.per_km)
-        table.add_row(name, *(f"{mean.value:.2g}" for mean in means), _mean(risk.individual))
+        one = f"{risk.individual.value:.2g} (<= {risk.individual.high:.2g})"
+        table.add_row(name, *(f"{mean.value:.2g}" for mean in means), one)
     return table
-
-
-def _mean(mean: Mean) -> str:
-    """Return a small mean with its interval as text."""
-    return f"{mean.value:.2g} ({mean.low:.2g} to {mean.high:.2g})"
 
 
 def _chance(estimate: Estimate) -> str:

@@ -131,14 +131,6 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
             "m",
         ),
     ] = None
-    condition: Annotated[
-        Condition,
-        about(
-            "Share of the energy of its class that it absorbs. It is 1 for a new fence; one that "
-            "stands already may absorb less.",
-            "-",
-        ),
-    ] = 1.0
     repaired: ClassVar[float] = PANEL
     fallible: ClassVar[bool] = True
     lengths: ClassVar[tuple[Length, ...]] = (Length("height", "max_height"),)
@@ -148,9 +140,6 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         if (self.capacity is None) == (self.energy_class is None):
             given = (self.capacity, self.energy_class)
             raise BadInput("fence capacity, energy_class", given, "give exactly one of them")
-        if self.capacity is not None and self.condition < 1.0:
-            mend = "leave it out: the capacity is what the fence absorbs"
-            raise BadInput("fence condition", self.condition, mend)
         if self.capacity is None:
             self._check_class()
         elif self.elongation is None:
@@ -174,13 +163,13 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     def for_width(self, width: float) -> Self:
         """Return the fence for a scene of this width [m], with a capacity instead of a class.
 
-        The capacity is the class energy times the condition, divided by the width, or by the panel
-        length if that is less. A fence with a given capacity is returned unchanged.
+        The capacity is the class energy divided by the width, or by the panel length if that is
+        less. A fence with a given capacity is returned unchanged.
         """
         if self.energy_class is None:
             return self
-        capacity = self.condition * (1e3 * self.energy_class / min(width, PANEL))
-        return self._with(capacity=capacity, energy_class=None, condition=1.0)
+        capacity = 1e3 * self.energy_class / min(width, PANEL)
+        return self._with(capacity=capacity, energy_class=None)
 
     @property
     def deflection(self) -> float:
@@ -245,10 +234,9 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
 
     @property
     def strength(self) -> str:
-        """Its energy class with its condition, or its capacity per metre, in words."""
+        """Its energy class, or its capacity per metre, in words."""
         if self.energy_class is not None:
-            worn = f" at {100.0 * self.condition:.0f} %" if self.condition < 1.0 else ""
-            return f"{self.energy_class:,g} kJ{worn}"
+            return f"{self.energy_class:,g} kJ"
         assert self.capacity is not None
         return f"{self.capacity / 1e3:,.0f} kJ/m"
 
@@ -270,16 +258,13 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         return self.energy_class
 
     def check_design(self, where: str, site: KnownSite) -> None:
-        """Check that it has an energy class and is new.
+        """Check that it has an energy class.
 
         Raises
         ------
         BadInput
-            If it has none or is worn; the message begins with `where`.
+            If it has none; the message begins with `where`.
         """
-        if self.condition < 1.0:
-            mend = "leave it out: a new fence has 1, and one that stands goes into [[existing]]"
-            raise BadInput(f"{where}.condition", self.condition, mend)
         if self.energy_class is None:
             mend = "give its energy class instead of a capacity"
             raise BadInput(f"{where}.capacity", self.capacity, mend)
@@ -344,6 +329,32 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         capacity, named = self.capacity, self.energy_class
         takes = f"{named} kJ" if capacity is None else f"{capacity / 1e3:.0f} kJ/m"
         return f"{metres(self.height)} high, {takes}"
+
+
+class WornFence(Fence, frozen=True, tag="fence", omit_defaults=True):
+    """A fence of an energy class that absorbs only a share of the energy of its class.
+
+    It is a barrier that stands already, see `rigdda.Existing`; layout files have no such fences.
+    """
+
+    condition: Annotated[Condition, about("Share of the energy of its class.", "-")] = 1.0
+
+    def for_width(self, width: float) -> Self:
+        """Return the fence for a scene of this width [m], see `Fence.for_width`."""
+        new = super().for_width(width)
+        if new is self or new.capacity is None:
+            return self
+        return new._with(capacity=self.condition * new.capacity)
+
+    @property
+    def strength(self) -> str:
+        """Its energy class and its condition in words."""
+        return f"{super().strength} at {100.0 * self.condition:.0f} %"
+
+    @property
+    def remaining(self) -> float:
+        """Energy that it absorbs [kJ]."""
+        return self.condition * self.rated
 
 
 def tallest(zone: BarrierZone) -> float:

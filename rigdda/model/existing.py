@@ -13,8 +13,18 @@ from typing import Annotated
 import msgspec
 
 from rigdda import fields
-from rigdda.barriers import Barrier, Built, Earthwork, Layout, Removal, earthworks, from_table
+from rigdda.barriers import (
+    Barrier,
+    Built,
+    Earthwork,
+    Fence,
+    Layout,
+    Removal,
+    earthworks,
+    from_table,
+)
 from rigdda.barriers.base import Metres
+from rigdda.barriers.fence import WornFence
 from rigdda.barriers.spacing import meet, room
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
@@ -116,13 +126,13 @@ def _barrier(existing: Existing, where: str) -> Built:
         if existing.energy_class is None:
             mend = "add the energy class that the fence had when it was new"
             raise BadInput(f"{where}.energy_class", None, mend)
-        if existing.condition < 1.0:
-            given["condition"] = existing.condition
     elif existing.condition < 1.0:
         mend = f"leave it out: give the sizes that the {existing.kind.replace('_', ' ')} has today"
         raise BadInput(f"{where}.condition", existing.condition, mend)
     found = from_table(where, given)
     assert isinstance(found, Built)
+    if isinstance(found, Fence) and existing.condition < 1.0:
+        return WornFence(**msgspec.structs.asdict(found), condition=existing.condition)
     return found
 
 

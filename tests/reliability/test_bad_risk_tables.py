@@ -6,6 +6,7 @@ import pytest
 
 import rigdda
 from rigdda import BadInput, Site
+from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem
 
 TEXT = rigdda.sites.text("quick")
@@ -150,8 +151,6 @@ def test_kinds_without_removable_barriers() -> None:
         DesignProblem("quick", kinds=("fence", "removal"))
 
 
-def test_a_new_fence_has_no_condition() -> None:
-    with pytest.raises(BadInput, match=r"layout\[0\].condition = 0.5: leave it out: a new fence"):
-        DesignProblem("quick").check((rigdda.Fence(30.0, 2.0, energy_class=250, condition=0.5),))
-    with pytest.raises(BadInput, match=r"fence condition = 0.5: leave it out: the capacity"):
-        rigdda.Fence(30.0, 2.0, capacity=1e5, condition=0.5)
+def test_a_layout_file_has_no_condition() -> None:
+    with pytest.raises(BadInput, match=r"^barriers\[0\].condition = 0.5: there is no such key"):
+        from_table("barriers[0]", {"kind": "fence", "x": 3.0, "height": 2.0, "condition": 0.5})

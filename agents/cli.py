@@ -396,8 +396,8 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--designer", type=click.Choice(DESIGNERS), default=DEFAULT, show_default=True,
               help="Search method.")  # fmt: skip
 @click.option("--kinds", callback=_kinds, metavar="KIND,...",
-              help="Allowed kinds of barrier: fence, ditch, embankment, gravity_wall, mesh, wall.  "
-              "[default: all except wall]")  # fmt: skip
+              help="Allowed kinds of barrier: fence, ditch, embankment, gravity_wall, mesh, wall, "
+              "removal (of a removable existing barrier).  [default: all except wall]")  # fmt: skip
 @click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that rock of a design event reaches the "
               "road.")  # fmt: skip

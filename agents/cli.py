@@ -488,7 +488,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     chosen, result = done.chosen.evaluation, done.result
     click.echo(
         "Z, capital, harm and repair in EUR per metre of road and year; to build in EUR per\n"
-        "metre; rule: UNI 11211-4; debris: rock on the road, relative to no barriers"
+        "metre; rule: UNI 11211-4; debris: rock on the road, relative to the first layout"
     )
     show(tables.costs(done))
     chances = tables.chances(done)

@@ -180,7 +180,9 @@ def outcomes(site: Site, layout: Layout, results: Sequence[Outcome]) -> Table:
     built = zip(site.standing(layout), site.labels(layout), strict=True)
     for i, (barrier, label) in enumerate(built):
         table.add_section()
-        table.add_row(f"{label}, at {barrier.x:.1f} m{surveyed(site, barrier.x)}")
+        table.add_row(f"{label}, at {barrier.x:.1f} m")
+        if words := surveyed(site, barrier.x):
+            table.add_row(words.strip())
         for name, (words, unit, factor) in HIT.items():
             if isinstance(barrier, Earthwork) and name not in ("overtopped", "caught", *ONLY):
                 continue

@@ -351,6 +351,10 @@ class WornFence(Fence, frozen=True, tag="fence", omit_defaults=True):
         """Its energy class and its condition in words."""
         return f"{super().strength} at {100.0 * self.condition:.0f} %"
 
+    def sizes(self, metres: Callable[[float], str]) -> str:
+        """Return its dimensions, its class and its condition in words."""
+        return f"{super().sizes(metres)} at {100.0 * self.condition:.0f} %"
+
     @property
     def remaining(self) -> float:
         """Energy that it absorbs [kJ]."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rigdda import BadInput, Layout, Mesh, Site
 from rigdda.agents.design_study import design_events
 from rigdda.agents.designers.protocol import DesignResult
-from rigdda.agents.reports.wording import euros, percent, span
+from rigdda.agents.reports.wording import before, euros, percent, span
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.siting import Room
@@ -83,7 +83,7 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
     """
     chosen = cases[-1][1]
     cheap = [name for name, other in cases[1:-1] if other.ci[1] < chosen.ci[0]]
-    parts = [] if cheap and not chosen.layout else [_pays(cases[0][1], chosen)]
+    parts = [] if cheap and not chosen.layout else [_pays(result.site, cases[0][1], chosen)]
     parts += [
         f"the layout {name!r} costs less per year than the optimised one: use a larger --budget"
         for name in cheap
@@ -93,7 +93,7 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
     return "; ".join(filter(None, [*parts, left]))
 
 
-def _pays(nothing: Evaluation, chosen: Evaluation) -> str:
+def _pays(site: Site, nothing: Evaluation, chosen: Evaluation) -> str:
     """Return a text if no layout pays or if this is not shown; otherwise an empty text."""
     if not chosen.layout:
         return "no layout was found that saves more per year than it costs"
@@ -101,7 +101,7 @@ def _pays(nothing: Evaluation, chosen: Evaluation) -> str:
         return ""
     return (
         f"{chosen.releases:,} releases do not show that the layout saves more than it costs: Z is "
-        f"{span(chosen.ci)} with the layout and {span(nothing.ci)} without barriers"
+        f"{span(chosen.ci)} with the layout and {span(nothing.ci)} {before(site)}"
     )
 
 

@@ -11,7 +11,7 @@ from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import findings, pictures
 from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
 from rigdda.agents.reports.simulation_folder import along
-from rigdda.agents.reports.wording import euros, span, unchanged
+from rigdda.agents.reports.wording import before, euros, span, unchanged
 from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
 
@@ -60,11 +60,6 @@ def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:
     return [fly(site, layout, event.name, seeds) for event in site.events]
 
 
-def _before(site: Site) -> str:
-    """Return what the case without a layout is called."""
-    return "as it stands" if site.existing else "without barriers"
-
-
 def _words(case: VerifiedLayout) -> str:
     e = case.evaluation
     return f"Z = {euros(e.objective)} ({span(e.ci)}) EUR per metre and year"
@@ -78,17 +73,17 @@ def _replay(done: DesignStudy, path: Path, seed: int) -> None:
     site, nothing, chosen = done.problem.site, done.nothing, done.chosen
     event = findings.worst(nothing.evaluation) or site.event_names[0]
     seeds = release_seeds("verification", seed, SEEN)
-    before = done.problem.sample((), {event: seeds})
-    drawn = next((s for s, o in zip(seeds, before, strict=True) if o.reached), seeds[0])
+    bare = done.problem.sample((), {event: seeds})
+    drawn = next((s for s, o in zip(seeds, bare, strict=True) if o.reached), seeds[0])
     layout = chosen.evaluation.layout
     run, outcome = rigdda.release(site, layout, drawn, event)
     risk = nothing.evaluation.by_event[event]
     notes = {
         "layout": "; ".join(b.label for b in layout) or unchanged(site),
-        "event": f"{event}, {euros(risk)} EUR per metre and year {_before(site)}",
+        "event": f"{event}, {euros(risk)} EUR per metre and year {before(site)}",
         "release": f"seed {drawn}, {outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3 "
         "reach the road",
-        _before(site): _words(nothing),
+        before(site): _words(nothing),
         "with the layout": _words(chosen),
     }
     labels = site.labels(layout)

@@ -56,6 +56,11 @@ def unchanged(site: Site) -> str:
     return "as it stands" if site.existing else "no barrier"
 
 
+def before(site: Site) -> str:
+    """Return what the case without a layout is called in a sentence."""
+    return "as it stands" if site.existing else "without barriers"
+
+
 def euros(value: float) -> str:
     """Return an amount of money: whole euros from 100, three significant figures below."""
     return f"{value:,.0f}" if abs(value) >= 99.95 else f"{value:.3g}"

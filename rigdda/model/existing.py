@@ -25,6 +25,7 @@ from rigdda.barriers import (
 )
 from rigdda.barriers.base import Metres
 from rigdda.barriers.fence import WornFence
+from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE
 from rigdda.barriers.spacing import meet, room
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
@@ -34,7 +35,7 @@ KINDS = ("fence", "ditch", "embankment", "gravity_wall", "wall")
 """Kinds that may stand already. Mesh is not among them, because the rates of events are those with
 it."""
 
-SIZES = ("height", "depth", "width", "thickness", "energy_class")
+SIZES = ("height", "depth", "width", "thickness", "side_slope", "energy_class")
 """Sizes of barriers."""
 
 NEAR = 1e-6
@@ -42,6 +43,7 @@ NEAR = 1e-6
 
 Cost = Annotated[float, about(ge=0.0, le=1e6)]
 Condition = Annotated[float, about(ge=0.05, le=1.0)]
+SideSlope = Annotated[float, about(ge=LEAST_SLOPE, le=FLATTEST_SLOPE)]
 Class = Annotated[int, about(ge=1)]
 
 
@@ -73,6 +75,14 @@ class Existing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
     thickness: Annotated[
         Metres | None, about("Thickness of a wall, a gravity wall or a fence.", "m")
+    ] = None
+    side_slope: Annotated[
+        SideSlope | None,
+        about(
+            "Run over rise of the sides of a ditch or an embankment. The default is that of layout "
+            "files.",
+            "-",
+        ),
     ] = None
     energy_class: Annotated[
         Class | None,

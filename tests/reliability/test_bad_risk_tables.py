@@ -110,6 +110,8 @@ def test_existing(change: dict[str, object], field: str, mend: str) -> None:
     ("values", "field", "mend"),
     [
         (DITCH | {"condition": 0.5}, "existing[1].condition = 0.5", "sizes that the ditch has"),
+        (DITCH | {"side_slope": -1.0}, "existing[1].side_slope = -1", "at least 0.02"),
+        (DITCH | {"side_slope": 9.0}, "existing[1].side_slope = 9", "at most"),
         (DITCH | {"width": None}, "existing[1].width = None", "add this key"),
         (DITCH | {"height": 1.0}, "existing[1].height = 1", "no such key"),
         (FENCE | {"x": 20.1}, "existing[1].x = 20.1", "overlaps the existing fence at 20"),

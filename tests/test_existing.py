@@ -14,11 +14,16 @@ import rigdda
 from rigdda import BadInput, Ditch, Fence, Mesh, Site, release, release_many
 from rigdda.agents import designers
 from rigdda.agents.designers.menu import Menu
+from rigdda.agents.reports import findings
+from rigdda.agents.reports.wording import before, order, unchanged
 from rigdda.agents.site_check import facts, oddities
 from rigdda.barriers import Removal
 from rigdda.barriers.fence import WornFence
 from rigdda.envs import DesignProblem
 from rigdda.envs.rendering import picture
+from rigdda.envs.repetition import repeat
+from rigdda.envs.replay_record import ReleaseRecord, release_record
+from rigdda.envs.site_sampling import Venue
 from rigdda.model.existing import Existing
 
 OLD = Existing("fence", 20.0, 2.0, energy_class=250, condition=0.5, removable=True, removal=60.0)
@@ -213,3 +218,32 @@ def test_an_earthwork_that_stands_changes_the_ground() -> None:
     ditch = Ditch(30.5, 1.0, 2.0)
     for seed in range(4):
         assert release(site, (), seed, "block")[1] == release(bare, (ditch,), seed, "block")[1]
+
+
+def test_reports_say_what_happens_to_it(site: Site) -> None:
+    assert findings.kept(site, (NEW,)) == [
+        "existing fence 250 kJ at 50 %, 2.0 m high, at x = 20.0 m: kept"
+    ]
+    assert findings.kept(site, (REPLACING,))[0].endswith(": removed")
+    assert order(Removal(20.0), site) == (
+        "remove the existing barrier at x = 20.0 m: 60 EUR per metre"
+    )
+    bare = rigdda.sites.load("quick")
+    assert (unchanged(site), before(site)) == ("as it stands", "as it stands")
+    assert (unchanged(bare), before(bare)) == ("no barrier", "without barriers")
+    assert findings.kept(bare, (NEW,)) == []
+
+
+def test_a_record_of_a_release_is_repeated(site: Site) -> None:
+    for layout in ((NEW,), (Removal(20.0),)):
+        _, outcome = release(site, layout, 3, "group")
+        text = release_record(site, layout, 3, "group", outcome)
+        again = repeat(msgspec.json.decode(text, type=ReleaseRecord))
+        assert again.same
+
+
+def test_an_environment_takes_sites_with_and_without_it(site: Site) -> None:
+    slots = Venue(site, 2, None, "full").slots
+    assert slots.kinds[-1] == "removal"
+    assert "removal" not in slots.shared(rigdda.sites.load("quick"))
+    assert slots.shared(site) == slots.kinds

@@ -17,7 +17,16 @@ from rigdda.envs.registration import register
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
-__all__ = ["CorridorEvaluation", "CorridorProblem", "DesignProblem", "Difference", "Evaluation", "Targets", "compare", "sb3_vec_env"]
+__all__ = [
+    "CorridorEvaluation",
+    "CorridorProblem",
+    "DesignProblem",
+    "Difference",
+    "Evaluation",
+    "Targets",
+    "compare",
+    "sb3_vec_env",
+]
 
 
 def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:

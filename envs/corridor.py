@@ -96,11 +96,11 @@ class CorridorProblem:
         for section in whole.sections:
             targets = {"reach": section.reach, "failure": section.failure}
             try:
-                problems.append(
-                    DesignProblem(section.site, max_barriers, kinds, targets, fidelity)
-                )
+                problems.append(DesignProblem(section.site, max_barriers, kinds, targets, fidelity))
             except BadInput as bad:
-                raise BadInput(f"sections.{section.name}.{bad.field}", bad.value, bad.mend) from None
+                raise BadInput(
+                    f"sections.{section.name}.{bad.field}", bad.value, bad.mend
+                ) from None
         object.__setattr__(self, "corridor", whole)
         object.__setattr__(self, "problems", tuple(problems))
 
@@ -144,7 +144,9 @@ class CorridorProblem:
             try:
                 found.append(problem.check(layout))
             except BadInput as bad:
-                raise BadInput(f"sections.{section.name}.{bad.field}", bad.value, bad.mend) from None
+                raise BadInput(
+                    f"sections.{section.name}.{bad.field}", bad.value, bad.mend
+                ) from None
         return tuple(found)
 
     def affordable(self, layouts: Sequence[Sequence[Barrier]], budget: float) -> bool:
@@ -212,3 +214,8 @@ def difference(one: Mean, other: Mean) -> Interval:
     below = math.hypot(one.value - one.low, other.high - other.value)
     above = math.hypot(one.high - one.value, other.value - other.low)
     return value - below, value + above
+
+
+def _of_section(name: str, bad: BadInput) -> BadInput:
+    """Return an error about a section with the name of the section."""
+    return BadInput(f"sections.{name}.{bad.field}", bad.value, bad.mend)

@@ -116,9 +116,7 @@ class Option:
 def joined(evaluations: Sequence[Evaluation]) -> Mean:
     """Return Z from independent evaluations of a layout, weighted by their releases."""
     whole = sum(evaluation.releases for evaluation in evaluations)
-    return total(
-        Mean(e.objective, *e.ci).times(e.releases / whole) for e in evaluations
-    )
+    return total(Mean(e.objective, *e.ci).times(e.releases / whole) for e in evaluations)
 
 
 def _joined(seen: Sequence[Estimate]) -> Estimate:
@@ -470,7 +468,10 @@ def _following(options: Options, choice: Choice) -> tuple[Increment, ...]:
     """
     found = []
     for s, k in enumerate(choice):
-        cost, value = options.costs[s] - options.costs[s][k], options.values[s][k] - options.values[s]
+        cost, value = (
+            options.costs[s] - options.costs[s][k],
+            options.values[s][k] - options.values[s],
+        )
         better = [j for j in range(len(cost)) if cost[j] > 0.0 and value[j] > 0.0]
         if better:
             j = max(better, key=lambda i: value[i] / cost[i])

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,7 +142,7 @@ def optimum(
         limits.append(excess >= total(scenarios) / scale - threshold)
         goal = threshold + cp.sum(excess) / (tail * count)
     _solve(cp.Problem(cp.Minimize(goal), limits))
-    return tuple(int(np.argmax(x.value)) for x in chosen)
+    return tuple(int(np.argmax(np.asarray(x.value))) for x in chosen)
 
 
 def _solve(problem: object) -> float:
@@ -196,7 +197,7 @@ def increments(options: Options) -> list[Increment]:
     found = []
     for s in range(len(options.values)):
         hull = convex_hull(options.costs[s], options.values[s])
-        for i, k in zip(hull, hull[1:], strict=False):
+        for i, k in pairwise(hull):
             cost = float(options.costs[s][k] - options.costs[s][i])
             saving = float(options.values[s][i] - options.values[s][k])
             found.append(Increment(s, i, k, cost, saving))

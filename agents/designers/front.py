@@ -63,9 +63,7 @@ def layouts(
     known = [layout for layout in unsearched(problem, ensemble, menu) if problem.fits(layout)]
     budget = int(SINGLES * simulations)
     lone, kinds = scout(track, menu, ensemble, known, budget, first, PRICES)
-    pairs = [
-        foretold(problem, lone, lone, track.nothing, MOST // 2, price) for price in PRICES[:3]
-    ]
+    pairs = [foretold(problem, lone, lone, track.nothing, MOST // 2, price) for price in PRICES[:3]]
     singles = _believed(kinds, {arm.layout for arm in lone})
     wanted = [layout for row in itertools.zip_longest(*pairs, singles) for layout in row if layout]
     seen = lone + track.look(_new(wanted, track), first, int(PAIRS * simulations))
@@ -133,5 +131,3 @@ def front(arms: Sequence[Arm], most: int) -> list[Arm]:
         if len(chosen) >= most:
             break
     return sorted((arms[i] for i in chosen), key=lambda arm: float(site.capital(arm.layout)))
-
-

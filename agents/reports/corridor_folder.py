@@ -255,7 +255,7 @@ def draw_strip(path: Path, plan: CorridorPlan) -> None:
         below.set_ylabel("annual cost [EUR/m]")
         below.legend(frameon=False, fontsize=9, ncol=3, loc="lower left", bbox_to_anchor=(0, 1))
         for row, own in enumerate(plans):
-            _row(above, row, own, starts, lengths, colours)
+            _row(above, row, own, starts.tolist(), lengths.tolist(), colours)
         above.set_yticks(range(len(plans)), [f"{euros(own.budget / 1e3)}" for own in plans])
         above.set_ylim(-0.6, len(plans) - 0.4)
         above.set_ylabel("budget [thousand EUR]")

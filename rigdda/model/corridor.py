@@ -38,6 +38,7 @@ MOST_SECTIONS = 10_000
 FOLDER = resources.files("rigdda") / "sites" / "corridors"
 """Folder with the files of the built-in corridors."""
 
+
 @documented
 class SectionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A section in a corridor file.
@@ -54,30 +55,34 @@ class SectionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "Name of a built-in or generated site, or a site file relative to the corridor file."
         ),
     ]
-    length: Annotated[
-        float, about("Length of road below the slope.", "m", gt=0.0, le=1e6)
-    ]
+    length: Annotated[float, about("Length of road below the slope.", "m", gt=0.0, le=1e6)]
     name: Annotated[
         str, about("Name of the section, such as its chainage on the road; by default the site.")
     ] = ""
-    reach: Annotated[
-        float,
-        about(
-            "Greatest acceptable probability that a block of a design event reaches the road.",
-            "-",
-            gt=0.0,
-            le=1.0,
-        ),
-    ] | None = None
-    failure: Annotated[
-        float,
-        about(
-            "Greatest acceptable probability that a barrier fails in a design event.",
-            "-",
-            gt=0.0,
-            le=1.0,
-        ),
-    ] | None = None
+    reach: (
+        Annotated[
+            float,
+            about(
+                "Greatest acceptable probability that a block of a design event reaches the road.",
+                "-",
+                gt=0.0,
+                le=1.0,
+            ),
+        ]
+        | None
+    ) = None
+    failure: (
+        Annotated[
+            float,
+            about(
+                "Greatest acceptable probability that a barrier fails in a design event.",
+                "-",
+                gt=0.0,
+                le=1.0,
+            ),
+        ]
+        | None
+    ) = None
 
     def __post_init__(self) -> None:
         fields.check(self)
@@ -107,13 +112,13 @@ class CorridorFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] | None = None  # fmt: skip
     prices: Annotated[
         dict[str, Any], about("Prices that replace those of every site, see the site file.")
-    ] = {}  # noqa: RUF012  # msgspec copies it
+    ] = {}  # msgspec copies it
     consequences: Annotated[
         dict[str, Any], about("Consequences that replace those of every site.")
-    ] = {}  # noqa: RUF012
+    ] = {}
 
 
-class Section(msgspec.Struct, frozen=True):
+class CorridorSection(msgspec.Struct, frozen=True):
     """A stretch of road below one slope.
 
     Parameters
@@ -155,7 +160,7 @@ class Corridor(msgspec.Struct, frozen=True):
     ----------
     name : str
         Name of the corridor.
-    sections : tuple of Section
+    sections : tuple of CorridorSection
         Sections in order along the road.
     budgets : tuple of float
         Budgets for construction [EUR], increasing.
@@ -169,7 +174,7 @@ class Corridor(msgspec.Struct, frozen=True):
     """
 
     name: str
-    sections: tuple[Section, ...]
+    sections: tuple[CorridorSection, ...]
     budgets: tuple[float, ...]
     yearly_budget: float | None = None
 
@@ -258,9 +263,7 @@ def checked_budgets(field: str, budgets: Any) -> tuple[float, ...]:
     given = budgets if isinstance(budgets, list | tuple) else [budgets]
     if not given:
         raise BadInput(field, budgets, "give at least one budget in EUR")
-    return tuple(
-        sorted({check.number(field, value, 0.0, 1e12, unit="EUR") for value in given})
-    )
+    return tuple(sorted({check.number(field, value, 0.0, 1e12, unit="EUR") for value in given}))
 
 
 def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
@@ -280,7 +283,9 @@ def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
             except BadInput as bad:
                 raise BadInput(f"{where}.{bad.field}", bad.value, bad.mend) from None
         name = table.name or table.site.removesuffix(".toml")
-        sections.append(Section(sites[table.site], table.length, name, table.reach, table.failure))
+        sections.append(
+            CorridorSection(sites[table.site], table.length, name, table.reach, table.failure)
+        )
     budgets = checked_budgets("budget", file.budget)
     return Corridor(file.name, tuple(sections), budgets, file.yearly_budget)
 

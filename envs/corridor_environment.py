@@ -19,7 +19,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 import rigdda
-from rigdda import BadInput, Barrier, Corridor, Layout, check
+from rigdda import BadInput, Barrier, Corridor, Layout, Site, check
 from rigdda.barriers import describe
 from rigdda.envs import encoding, observation
 from rigdda.envs.corridor import ROUNDING
@@ -43,7 +43,12 @@ from rigdda.envs.problem import DesignProblem
 from rigdda.envs.recorder import Recorder, Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import release_record
-from rigdda.envs.site_sampling import Venue, drawn_from
+from rigdda.envs.site_sampling import Place, Venue, drawn_from
+from rigdda.model.corridor import is_corridor
+from rigdda.model.corridor import names as corridor_names
+
+SECTIONS = 12
+"""Default number of sections of an episode."""
 
 MOST_SECTIONS = 1_000
 """Maximum number of sections of an episode."""
@@ -115,12 +120,12 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
 
     Parameters
     ----------
-    site : str, Corridor or sequence of str
+    site : str, path, Site, Corridor or sequence of sites
         Where sections come from: a split of the generated sites ("train", "validation", "test"), a
-        list of names of sites, from which `sections` are drawn without repetition, or a corridor,
-        whose sections are all taken.
-    sections : int
-        Number of sections of an episode.
+        site or a sequence of sites, from which `sections` are drawn without repetition, or a
+        corridor (also its name or file), whose sections are all taken.
+    sections : int, optional
+        Number of sections of an episode; by default 12, or all sites if there are fewer.
     budget : float or (float, float), optional
         Budget per metre of road [EUR/m], or the range from which its logarithm is drawn. By default
         `BUDGETS`, or, for a corridor, one of its budgets.
@@ -145,8 +150,8 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
 
     def __init__(
         self,
-        site: str | os.PathLike[str] | Corridor | Sequence[str] = "train",
-        sections: int = 12,
+        site: Place | Corridor | Sequence[Place] = "train",
+        sections: int | None = None,
         budget: float | tuple[float, float] | None = None,
         lengths: tuple[float, float] = LENGTHS,
         max_barriers: int = 3,
@@ -161,9 +166,12 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         self._corridor, self._names = _places(site)
         self._venue = Venue("train", max_barriers, kinds, fidelity)
         most = len(self._corridor.sections) if self._corridor else len(self._names)
-        self.sections = most if self._corridor else check.integer(
-            "sections", sections, 1, min(most, MOST_SECTIONS)
-        )  # fmt: skip
+        usual = most if self._corridor else min(SECTIONS, most)
+        self.sections = check.integer(
+            "sections", usual if sections is None else sections, 1, min(most, MOST_SECTIONS)
+        )
+        if self._corridor and self.sections < most:
+            raise BadInput("sections", sections, f"leave it out: the corridor has {most} sections")
         self._budget = _range("budget", budget or BUDGETS) if budget or not self._corridor else None
         self._lengths = _range("lengths", lengths)
         self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
@@ -187,6 +195,9 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         self.stretches: tuple[Stretch, ...] = ()
         self.budget = 0.0
         self.open = False
+        self._done: list[Evaluation] = []  # of the sections that were designed
+        self._gains: list[float] = []  # [EUR/year]
+        self._dropped: tuple[str, ...] = ()
 
     @property
     def width(self) -> int:
@@ -231,7 +242,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         if unknown:
             raise BadInput("options", unknown, "the only option is budget")
         super().reset(seed=seed)
-        self.open = False
+        self.open, self._done, self._gains, self._dropped = False, [], [], ()
         rng = self.np_random
         self.stretches = self._drawn(rng)
         total = math.fsum(stretch.length for stretch in self.stretches)
@@ -261,17 +272,14 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
             return tuple(Stretch(self._venue.pose(r.site), r.length, r.name) for r in rows)
         chosen = rng.choice(len(self._names), self.sections, replace=False).tolist()
         lengths = np.round(rng.uniform(*self._lengths, size=self.sections), 1).tolist()
+        problems = [self._venue.pose(self._names[i]) for i in chosen]
         return tuple(
-            Stretch(self._venue.pose(self._names[i]), length, self._names[i])
-            for i, length in zip(chosen, lengths, strict=True)
+            Stretch(problem, length, problem.site.name)
+            for problem, length in zip(problems, lengths, strict=True)
         )
 
     def start(self, _: Sample) -> tuple[Observation, Info]:
         """Start the drawn episode and return its first observation and info."""
-        self._done: list[Evaluation] = []
-        self._gains: list[float] = []
-        self._dropped: tuple[str, ...] = ()
-        self._asked: Layout = ()
         self.open = True
         without = [s.length * s.problem.nothing.objective for s in self.stretches]
         self._risk = np.array(without)
@@ -292,7 +300,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         place = len(self._done)
         built, dropped = self.slots.built(self.problem, numbers)
         layout, refused = self._affordable(built)
-        self._asked, self._dropped = layout, (*dropped, *refused)
+        self._dropped = (*dropped, *refused)
         if not layout:
             return None
         return Ask(self.problem, layout, self._seeds[place], 0)
@@ -436,19 +444,23 @@ def _downhill(barriers: Sequence[Barrier]) -> Layout:
     return tuple(sorted(barriers, key=lambda barrier: barrier.x))
 
 
-def _places(site: Any) -> tuple[Corridor | None, tuple[str, ...]]:
-    """Return the corridor, or the names of the sites, from which episodes draw."""
+def _places(site: Any) -> tuple[Corridor | None, tuple[Place, ...]]:
+    """Return the corridor, or the sites, from which episodes draw."""
     if isinstance(site, Corridor):
         return site, ()
-    if isinstance(site, str | os.PathLike):
-        names = drawn_from(site) if isinstance(site, str) else ()
-        return (None, names) if names else (Corridor.load(site), ())
-    if not isinstance(site, Sequence) or not site:
-        mend = "give a split, a corridor or a sequence of names of sites"
-        raise BadInput("site", site, mend)
-    for name in site:
-        rigdda.Site.load(name)
-    return None, tuple(site)
+    if isinstance(site, str) and drawn_from(site):
+        return None, drawn_from(site)
+    if isinstance(site, str) and site in corridor_names():
+        return Corridor.load(site), ()
+    if isinstance(site, str | os.PathLike) and is_corridor(site):
+        return Corridor.load(site), ()
+    sites = (site,) if isinstance(site, str | os.PathLike | Site) else site
+    if not isinstance(sites, Sequence) or not sites:
+        raise BadInput("site", site, "give a split, a corridor, a site or a sequence of sites")
+    for place in sites:
+        if not isinstance(place, Site):
+            Site.load(place)
+    return None, tuple(sites)
 
 
 def _range(field: str, value: Any) -> tuple[float, float]:

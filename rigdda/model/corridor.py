@@ -252,6 +252,15 @@ def names() -> list[str]:
     return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml"))
 
 
+def is_corridor(path: str | os.PathLike[str]) -> bool:
+    """Return whether a path is a TOML file with the sections of a corridor."""
+    file = Path(path)
+    if file.suffix != ".toml" or not file.is_file():
+        return False
+    data = fields.parse("corridor", str(path), read("corridor", file))
+    return "sections" in data or "table" in data
+
+
 def checked_budgets(field: str, budgets: Any) -> tuple[float, ...]:
     """Return budgets [EUR] as an increasing tuple; `field` names them in messages.
 

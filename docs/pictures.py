@@ -41,8 +41,8 @@ def placement(path: Path) -> None:
 
 def corridor(path: Path) -> None:
     """Draw what `rigdda/Corridor-v0` renders after its first section."""
-    env = gymnasium.make("rigdda/Corridor-v0", site=["verge", "quick"], max_barriers=2,
-                         kinds=("fence", "ditch"), budget=2000.0, render_mode="rgb_array")  # fmt: skip
+    env = gymnasium.make("rigdda/Corridor-v0", site=["verge", "quick"], budget=2000.0,
+                         render_mode="rgb_array")  # fmt: skip
     env.reset(seed=3)
     problem = env.unwrapped.problem  # type: ignore[attr-defined]
     ditch = Ditch(problem.site.slope.toe, 1.5, 4.0)

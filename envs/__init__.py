@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rigdda.envs.comparison import Difference, compare
-from rigdda.envs.corridor import CorridorEvaluation, CorridorProblem
+from rigdda.envs.corridor_problem import CorridorEvaluation, CorridorProblem
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.registration import register

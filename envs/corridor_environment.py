@@ -22,7 +22,7 @@ import rigdda
 from rigdda import BadInput, Barrier, Corridor, Layout, Site, check
 from rigdda.barriers import describe
 from rigdda.envs import encoding, observation
-from rigdda.envs.corridor import ROUNDING
+from rigdda.envs.corridor_problem import ROUNDING
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.environments import (
     MOST_RELEASES,
@@ -84,7 +84,7 @@ FIELDS: dict[str, observation.Field] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class PlacedSection:
     """A section of an episode: its problem, its length [m] and its name."""
 
     problem: DesignProblem
@@ -192,7 +192,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         self.flat = check.boolean("flat", flat)
         self.observation_space = spaces.flatten_space(self._space) if flat else self._space
         self._episode = 0
-        self.stretches: tuple[Stretch, ...] = ()
+        self.stretches: tuple[PlacedSection, ...] = ()
         self.budget = 0.0
         self.open = False
         self._done: list[Evaluation] = []  # of the sections that were designed
@@ -264,17 +264,17 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
             tuple(rng.integers(SCORED_SEEDS, size=self.releases).tolist()) for _ in self.stretches
         ]
 
-    def _drawn(self, rng: np.random.Generator) -> tuple[Stretch, ...]:
+    def _drawn(self, rng: np.random.Generator) -> tuple[PlacedSection, ...]:
         """Return the sections of an episode in random order."""
         if self._corridor is not None:
             order = rng.permutation(len(self._corridor.sections)).tolist()
             rows = [self._corridor.sections[i] for i in order]
-            return tuple(Stretch(self._venue.pose(r.site), r.length, r.name) for r in rows)
+            return tuple(PlacedSection(self._venue.pose(r.site), r.length, r.name) for r in rows)
         chosen = rng.choice(len(self._names), self.sections, replace=False).tolist()
         lengths = np.round(rng.uniform(*self._lengths, size=self.sections), 1).tolist()
         problems = [self._venue.pose(self._names[i]) for i in chosen]
         return tuple(
-            Stretch(problem, length, problem.site.name)
+            PlacedSection(problem, length, problem.site.name)
             for problem, length in zip(problems, lengths, strict=True)
         )
 
@@ -474,7 +474,7 @@ def _range(field: str, value: Any) -> tuple[float, float]:
     return low, high
 
 
-def _ahead(stretches: Sequence[Stretch]) -> list[float]:
+def _ahead(stretches: Sequence[PlacedSection]) -> list[float]:
     """Return quantiles of log10 of Z without barriers of sections, weighted by length."""
     if not stretches:
         return [0.0] * 5

@@ -20,6 +20,7 @@ from rigdda.agents.limits import SEED
 from rigdda.agents.terminal import (
     Stopped,
     count_option,
+    executor_option,
     fail,
     folder_for,
     kept,
@@ -212,6 +213,7 @@ def schema(file: str) -> None:
               "it is fast but cannot simulate barriers that stand on the ground.")  # fmt: skip
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("simulate-SITE")
+@executor_option
 def simulate(
     site: str,
     layout: str | None,
@@ -411,6 +413,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the search and of its releases.", SEED)
 @out_option("design-SITE")
+@executor_option
 def design(
     site: str,
     designer: str,
@@ -508,6 +511,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
 @click.argument("file", metavar="STUDY.toml")
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("study-NAME")
+@executor_option
 def study(file: str, seed: int, out: Path | None) -> None:
     """Compare the layouts of STUDY.toml on the same releases.
 
@@ -541,6 +545,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
               "cost of the layouts may be (conditional value at risk).")  # fmt: skip
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("corridor-NAME")
+@executor_option
 def corridor(
     file: str, budgets: tuple[float, ...], releases: int, robust: bool, seed: int, out: Path | None
 ) -> None:
@@ -598,6 +603,7 @@ def corridor(
 @count_option("--releases", 10, 150, "Number of releases of each event for each parameter set.")
 @seed_option("Seed of the search and of the first release.", SEED)
 @out_option("fit-SITE")
+@executor_option
 def fit(
     site: str,
     observed: Path,
@@ -674,6 +680,7 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
 @count_option("--verify", 10, 2_000, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("evaluate")
+@executor_option
 def evaluate(
     names: tuple[str, ...],
     policy: str | None,

@@ -26,15 +26,18 @@ import msgspec
 import numpy as np
 from scipy.stats import norm
 
-from rigdda import Corridor, Layout, check
+from rigdda import BadInput, Corridor, Layout, __version__, check, distribution
 from rigdda.agents.corridor import programme
 from rigdda.agents.corridor.programme import METHODS, Choice, Increment, Options
 from rigdda.agents.designers import front
 from rigdda.agents.designers.protocol import Entry, release_seeds
 from rigdda.agents.designers.store import Store
 from rigdda.agents.limits import SEED
+from rigdda.barriers import from_table, to_tables
 from rigdda.envs import CorridorEvaluation, CorridorProblem, DesignProblem, Evaluation
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
+from rigdda.envs.outcome_cache import mechanics
+from rigdda.files import atomic
 
 Floats = np.ndarray
 
@@ -56,6 +59,9 @@ SCENARIOS = 400
 
 DEVIATIONS = 1.96
 """Distance between a mean and a limit of its 95 % interval, in standard errors."""
+
+CHOICES = "final"
+"""Stream of the releases that affect choices."""
 
 OPTIMUM = "integer programme"
 """Name of the choice by the integer programme."""
@@ -222,7 +228,7 @@ class Planner:
         self.used = 0
         self._tick = tick or (lambda done, words: None)
         self._folder = folder
-        self._stores: dict[int, Store] = {}
+        self._store = Store(None if folder is None else folder / "evaluations.jsonl")
         self.fronts: list[list[Option]] = []
 
     def plan(self) -> CorridorPlan:
@@ -238,19 +244,12 @@ class Planner:
         self._at_margin()
         return self._choose()
 
-    def _store(self, s: int) -> Store:
-        """Return the store of the evaluations of a section."""
-        if s not in self._stores:
-            path = None
-            if self._folder is not None:
-                path = self._folder / f"{s + 1:04d}-{self._key(s)}.jsonl"
-            self._stores[s] = Store(path)
-        return self._stores[s]
-
-    def _key(self, s: int) -> str:
-        """Return a hash of what the search of a section depends on."""
-        asked = [self.problem.problems[s].site, self.releases, self.seed]
-        return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:12]
+    def _file(self, kind: str, *asked: object) -> Path | None:
+        """Return the file of stored results that depend on some values, None without a folder."""
+        if self._folder is None:
+            return None
+        key = msgspec.json.encode([__version__, mechanics(), *asked])
+        return self._folder / f"{kind}-{hashlib.sha256(key).hexdigest()[:16]}.json"
 
     def _seed(self, s: int) -> int:
         """Return the seed of the releases of a section."""
@@ -262,50 +261,84 @@ class Planner:
     def _search(self) -> None:
         """Search the front of every section."""
         budget = int(SEARCH * self.releases)
+        asks = [(problem, budget, self._seed(s)) for s, problem in enumerate(self.problem.problems)]
+        files = [self._file("front", p.site, p.kinds, p.max_barriers, *ask) for p, *ask in asks]
+        found = [_read(file) for file in files]
+        new = distribution.mapped(
+            self._searched if distribution.current() is None else _searched,
+            [(s, *ask) for s, ask in enumerate(asks) if found[s] is None],
+        )
         for s, problem in enumerate(self.problem.problems):
-            begun, words = self.used, f"searching {self._name(s)}"
-
-            def told(entry: Entry, begun: int = begun, words: str = words) -> None:
-                self._tick(begun + entry.simulations, words)
-
-            self._tick(self.used, words)
-            found = front.layouts(problem, budget, self._seed(s), told, self._store(s))
+            self._tick(self.used, f"searching {self._name(s)}")
+            layouts = found[s]
+            if layouts is None:
+                layouts = next(new)
+                _write(files[s], layouts)
             site = problem.site
-            options = [Option(own, site.capital(own), site.annual(own)) for own in found]
+            options = [Option(own, site.capital(own), site.annual(own)) for own in layouts]
             self.fronts.append(options)
             self.used += budget
 
-    def _evaluate(self, s: int, k: int, releases: int) -> None:
-        """Evaluate an option on its next releases."""
-        option, problem = self.fronts[s][k], self.problem.problems[s]
-        start = option.releases
-        seeds = release_seeds("final", self._seed(s), releases, start)
-        self._tick(self.used, f"evaluating {self._name(s)}")
-        option.batches.append(self._store(s).evaluate(problem, option.layout, seeds))
-        self.used += releases
+    def _searched(self, ask: tuple[int, DesignProblem, int, int]) -> tuple[Layout, ...]:
+        """Return the front of a section; report progress and store evaluations."""
+        s, problem, budget, seed = ask
+        begun, words = self.used, f"searching {self._name(s)}"
+
+        def told(entry: Entry) -> None:
+            self._tick(begun + entry.simulations, words)
+
+        path = None if self._folder is None else self._folder / f"search-{s + 1:04d}.jsonl"
+        return front.layouts(problem, budget, seed, told, Store(path))
+
+    def _evaluate(self, stream: str, wanted: Sequence[tuple[int, int, int]]) -> list[Evaluation]:
+        """Evaluate options on releases of a stream.
+
+        `wanted` gives the section, the option and the number of releases. In the stream of choices,
+        releases follow those of earlier batches.
+        """
+        asks = []
+        for s, k, count in wanted:
+            option = self.fronts[s][k]
+            start = option.releases if stream == CHOICES else 0
+            seeds = release_seeds(stream, self._seed(s), count, start)
+            asks.append((self.problem.problems[s], option.layout, seeds))
+        found = []
+        for (s, _, count), evaluation in zip(wanted, self._store.evaluate_many(asks), strict=True):
+            found.append(evaluation)
+            self.used += count
+            self._tick(self.used, f"evaluating {self._name(s)}")
+        return found
+
+    def _add(self, wanted: Sequence[tuple[int, int, int]]) -> None:
+        """Evaluate options on further releases that affect choices."""
+        found = self._evaluate(CHOICES, wanted)
+        for (s, k, _), evaluation in zip(wanted, found, strict=True):
+            self.fronts[s][k].batches.append(evaluation)
 
     def _first(self) -> None:
         """Evaluate the options of all sections on the same number of releases."""
-        for s, options in enumerate(self.fronts):
-            each = max(BATCH // 2, int(CHOICE * self.releases / len(options)))
-            for k in range(len(options)):
-                self._evaluate(s, k, each)
+        self._add(self._evenly(CHOICE, BATCH // 2))
+
+    def _evenly(self, share: float, least: int) -> list[tuple[int, int, int]]:
+        """Return a share of the releases of each section, divided evenly between its options."""
+        return [
+            (s, k, max(least, int(share * self.releases / len(options))))
+            for s, options in enumerate(self.fronts)
+            for k in range(len(options))
+        ]
 
     def _at_margin(self) -> None:
         """Spend further releases where they reduce the expected opportunity cost most."""
         whole = int(MARGIN * self.releases * len(self.fronts))
         if not self.margin:
-            for s, options in enumerate(self.fronts):
-                each = int(MARGIN * self.releases / len(options))
-                for k in range(len(options)) if each else ():
-                    self._evaluate(s, k, each)
+            self._add(self._evenly(MARGIN, 1))
             return
         spent = 0
         for done in range(ROUNDS):
-            wanted = self._batches(self._prices(), whole * (done + 1) // ROUNDS - spent)
-            for (s, k), count in wanted.items():
-                self._evaluate(s, k, count * BATCH)
-                spent += count * BATCH
+            counts = self._batches(self._prices(), whole * (done + 1) // ROUNDS - spent)
+            wanted = [(s, k, n * BATCH) for (s, k), n in counts.items()]
+            self._add(wanted)
+            spent += sum(count for _, _, count in wanted)
 
     def _prices(self) -> list[float]:
         """Return the different shadow prices of all budgets [1/year]."""
@@ -380,12 +413,9 @@ class Planner:
         share = 1.0 - SEARCH - CHOICE - MARGIN
         each = int(share * self.releases * len(self.fronts) / max(1, len(built)))
         count = min(MOST, max(LEAST, each))
-        for s, k in built:
-            option, problem = self.fronts[s][k], self.problem.problems[s]
-            self._tick(self.used, f"reporting {self._name(s)}")
-            seeds = release_seeds("report", self._seed(s), count)
-            option.report = self._store(s).evaluate(problem, option.layout, seeds)
-            self.used += count
+        found = self._evaluate("report", [(s, k, count) for s, k in built])
+        for (s, k), evaluation in zip(built, found, strict=True):
+            self.fronts[s][k].report = evaluation
 
     def _judged(self, choice: Choice) -> CorridorEvaluation:
         """Return the evaluation of a choice from the reports of its options."""
@@ -405,6 +435,30 @@ class Planner:
             drawn = value + error * rng.standard_normal((SCENARIOS, len(own)))
             out.append(length * np.maximum(drawn, 0.0))
         return out
+
+
+def _searched(ask: tuple[int, DesignProblem, int, int]) -> tuple[Layout, ...]:
+    """Return the front of a section that was sent to this worker."""
+    _, problem, budget, seed = ask
+    return front.layouts(problem, budget, seed)
+
+
+def _read(file: Path | None) -> tuple[Layout, ...] | None:
+    """Return the stored layouts of a front, None if there are none or they are damaged."""
+    if file is None or not file.is_file():
+        return None
+    try:
+        rows = msgspec.json.decode(file.read_bytes())
+        return tuple(tuple(from_table("front", row) for row in layout) for layout in rows)
+    except (msgspec.MsgspecError, BadInput, TypeError):
+        return None
+
+
+def _write(file: Path | None, layouts: Sequence[Layout]) -> None:
+    """Store the layouts of a front."""
+    if file is not None:
+        with atomic(file) as part:
+            part.write_bytes(msgspec.json.encode([to_tables(layout) for layout in layouts]))
 
 
 @dataclass(slots=True)

@@ -143,6 +143,15 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
     ------
     BadInput
         If a keyword or, in `step`, the action is invalid.
+
+    Attributes
+    ----------
+    placed : tuple of PlacedSection
+        The sections of the episode, in order.
+    evaluations : list of Evaluation
+        Evaluations of the sections that were designed.
+    budget : float
+        Budget of the episode [EUR].
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
@@ -192,10 +201,10 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         self.flat = check.boolean("flat", flat)
         self.observation_space = spaces.flatten_space(self._space) if flat else self._space
         self._episode = 0
-        self.stretches: tuple[PlacedSection, ...] = ()
+        self.placed: tuple[PlacedSection, ...] = ()
         self.budget = 0.0
         self.open = False
-        self._done: list[Evaluation] = []  # of the sections that were designed
+        self.evaluations: list[Evaluation] = []
         self._gains: list[float] = []  # [EUR/year]
         self._dropped: tuple[str, ...] = ()
 
@@ -207,7 +216,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
     @property
     def problem(self) -> DesignProblem:
         """The problem of the current section, or of the last one after the end."""
-        return self.stretches[min(len(self._done), len(self.stretches) - 1)].problem
+        return self.placed[min(len(self.evaluations), len(self.placed) - 1)].problem
 
     sights = 0
     """Number of observation releases per event, as the vectorised environment needs it."""
@@ -215,8 +224,10 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
     @property
     def spent(self) -> float:
         """Construction cost of all sections so far [EUR]."""
-        lengths = (stretch.length for stretch in self.stretches)
-        return math.fsum(length * e.cost for length, e in zip(lengths, self._done, strict=False))
+        lengths = (section.length for section in self.placed)
+        return math.fsum(
+            length * e.cost for length, e in zip(lengths, self.evaluations, strict=False)
+        )
 
     @property
     def gain(self) -> float:
@@ -231,7 +242,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         `options` may contain `budget` [EUR/m], which sets the budget of this episode.
         """
         self.draw(seed, options)
-        look_ahead([(stretch.problem, 0) for stretch in self.stretches])
+        look_ahead([(section.problem, 0) for section in self.placed])
         return self.start(Sample())
 
     def draw(self, seed: int | None, options: Mapping[str, Any] | None = None) -> None:
@@ -242,10 +253,10 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         if unknown:
             raise BadInput("options", unknown, "the only option is budget")
         super().reset(seed=seed)
-        self.open, self._done, self._gains, self._dropped = False, [], [], ()
+        self.open, self.evaluations, self._gains, self._dropped = False, [], [], ()
         rng = self.np_random
-        self.stretches = self._drawn(rng)
-        total = math.fsum(stretch.length for stretch in self.stretches)
+        self.placed = self._drawn(rng)
+        total = math.fsum(section.length for section in self.placed)
         given: Any = (options or {}).get("budget")
         if given is not None:
             low, high = _range("budget", given)
@@ -261,7 +272,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         )
         self.budget = each * total
         self._seeds = [
-            tuple(rng.integers(SCORED_SEEDS, size=self.releases).tolist()) for _ in self.stretches
+            tuple(rng.integers(SCORED_SEEDS, size=self.releases).tolist()) for _ in self.placed
         ]
 
     def _drawn(self, rng: np.random.Generator) -> tuple[PlacedSection, ...]:
@@ -281,10 +292,10 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
     def start(self, _: Sample) -> tuple[Observation, Info]:
         """Start the drawn episode and return its first observation and info."""
         self.open = True
-        without = [s.length * s.problem.nothing.objective for s in self.stretches]
+        without = [s.length * s.problem.nothing.objective for s in self.placed]
         self._risk = np.array(without)
         self._scale = math.fsum(without) or 1.0
-        first = self.stretches[0].problem.nothing
+        first = self.placed[0].problem.nothing
         return self._seen(), self._info(0, first)
 
     def step(self, action: Action) -> Step:
@@ -297,7 +308,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         if not self.open:
             raise ResetNeeded("the episode has ended: call reset() before the next step")
         numbers = encoding.vector("action", action, self.width)
-        place = len(self._done)
+        place = len(self.evaluations)
         built, dropped = self.slots.built(self.problem, numbers)
         layout, refused = self._affordable(built)
         self._dropped = (*dropped, *refused)
@@ -307,32 +318,32 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
 
     def _affordable(self, built: Sequence[Barrier]) -> tuple[Layout, list[str]]:
         """Return the barriers that the money left allows, and the refused ones with the reason."""
-        stretch, left = self.stretches[len(self._done)], self.budget - self.spent
+        section, left = self.placed[len(self.evaluations)], self.budget - self.spent
         kept: list[Barrier] = []
         refused = []
         for barrier in built:
-            site = stretch.problem.site
-            cost = stretch.length * site.capital(_downhill([*kept, barrier]))
+            site = section.problem.site
+            cost = section.length * site.capital(_downhill([*kept, barrier]))
             if cost <= left + ROUNDING * self.budget:
                 kept.append(barrier)
             else:
-                more = cost - stretch.length * site.capital(_downhill(kept))
-                rest = left - stretch.length * site.capital(_downhill(kept))
+                more = cost - section.length * site.capital(_downhill(kept))
+                rest = left - section.length * site.capital(_downhill(kept))
                 refused.append(f"{barrier.label}: costs {more:,.0f} EUR, {rest:,.0f} EUR are left")
         return _downhill(kept), refused
 
     def tell(self, answer: Answer | None) -> Step:
         """Finish the step with the result of its ask."""
-        place = len(self._done)
-        stretch = self.stretches[place]
-        nothing = now = stretch.problem.nothing
+        place = len(self.evaluations)
+        section = self.placed[place]
+        nothing = now = section.problem.nothing
         if answer is not None:
             assert answer.evaluation is not None
             now = answer.evaluation
-        gain = stretch.length * (nothing.objective - now.objective)
-        self._done.append(now)
+        gain = section.length * (nothing.objective - now.objective)
+        self.evaluations.append(now)
         self._gains.append(gain)
-        terminated = len(self._done) == len(self.stretches)
+        terminated = len(self.evaluations) == len(self.placed)
         seen, info = self._seen(), self._info(place, now)
         if terminated:
             self._end()
@@ -340,25 +351,25 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
 
     def _seen(self) -> Observation:
         """Return the observation of the current section and of what is left."""
-        place = min(len(self._done), len(self.stretches) - 1)
-        stretch = self.stretches[place]
-        lengths = np.array([s.length for s in self.stretches])
+        place = min(len(self.evaluations), len(self.placed) - 1)
+        section = self.placed[place]
+        lengths = np.array([s.length for s in self.placed])
         metres = float(lengths[place:].sum())
         left = max(self.budget - self.spent, 0.0)
         values = {
-            "length": [math.log10(stretch.length)],
+            "length": [math.log10(section.length)],
             "metres": [metres / float(lengths.sum())],
             "money": [
                 math.log10(1.0 + left / metres),
                 math.log10(1.0 + self.budget / float(lengths.sum())),
             ],
-            "ahead": _ahead(self.stretches[place + 1 :]),
+            "ahead": _ahead(self.placed[place + 1 :]),
             "risk_ahead": [
                 self._risk[place] / self._scale,
                 float(self._risk[place + 1 :].sum()) / self._scale,
             ],
         }
-        seen = observation.observe(stretch.problem)
+        seen = observation.observe(section.problem)
         for name, value in values.items():
             field = FIELDS[name]
             scaled = (np.asarray(value, dtype=np.float64) - field.centre) / field.spread
@@ -370,16 +381,16 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
 
     def _info(self, place: int, now: Evaluation) -> Info:
         """Return the info of the section that was designed last."""
-        stretch, done = self.stretches[place], len(self._done)
+        section, done = self.placed[place], len(self.evaluations)
         return {
-            "site": stretch.problem.site.name,
-            "section": stretch.name,
-            "length": stretch.length,
+            "site": section.problem.site.name,
+            "section": section.name,
+            "length": section.length,
             "layout": now.layout,
             "dropped": self._dropped,
             "outcomes": plain(now.outcomes),
             "money": self.budget - self.spent,
-            "metres": math.fsum(s.length for s in self.stretches[done:]),
+            "metres": math.fsum(s.length for s in self.placed[done:]),
             "spent": self.spent,
             "gain": self.gain,
             **{name: float(getattr(now, name)) for name in TOLD},
@@ -400,20 +411,20 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         from rigdda.replay.recording import Marks
 
         folder.mkdir(parents=True, exist_ok=True)
-        for i, (stretch, now) in enumerate(zip(self.stretches, self._done, strict=True)):
+        for i, (section, now) in enumerate(zip(self.placed, self.evaluations, strict=True)):
             if not now.layout:
                 continue
-            site, (seed, event) = stretch.problem.site, now.typical
+            site, (seed, event) = section.problem.site, now.typical
             run, outcome = rigdda.release(site, now.layout, seed, event)
             notes = {
-                "section": f"{stretch.name}, {stretch.length:g} m",
+                "section": f"{section.name}, {section.length:g} m",
                 "release": f"{seed}, event {event}, representative of {self.releases} scored",
                 "layout": "; ".join(describe(barrier, 2) for barrier in now.layout),
                 "objective": f"{now.objective:.4f}",
-                "cost": f"{stretch.length * now.cost:,.0f} EUR",
+                "cost": f"{section.length * now.cost:,.0f} EUR",
                 "gain": f"{self._gains[i]:,.0f} EUR a year",
             }
-            title = f"{stretch.name}, section {i + 1} of {len(self.stretches)}"
+            title = f"{section.name}, section {i + 1} of {len(self.placed)}"
             record = release_record(site, now.layout, seed, event, outcome)
             road = site.road.start, site.road.end
             path = folder / f"section-{i + 1:04d}.rrd"
@@ -424,18 +435,18 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         if self.render_mode is None:
             gymnasium.logger.warn("render() returns None: make the environment with a render_mode")
             return None
-        if not self.stretches:
+        if not self.placed:
             raise ResetNeeded("call reset() before render()")
-        place = max(len(self._done) - 1, 0)
-        stretch = self.stretches[place]
-        now = self._done[place] if self._done else stretch.problem.nothing
-        problem, site = stretch.problem, stretch.problem.site
+        place = max(len(self.evaluations) - 1, 0)
+        section = self.placed[place]
+        now = self.evaluations[place] if self.evaluations else section.problem.nothing
+        problem, site = section.problem, section.problem.site
         seed, event = self._seeds[place][0], problem.plan(self._seeds[place])[0]
         if now.outcomes:
             seed, event = now.typical
         run, _ = rigdda.release(site, now.layout, seed, event)
-        title = f"{stretch.name}, section {place + 1} of {len(self.stretches)}: "
-        title += f"{stretch.length * now.cost:,.0f} EUR, gain {self.gain:,.0f} EUR a year so far"
+        title = f"{section.name}, section {place + 1} of {len(self.placed)}: "
+        title += f"{section.length * now.cost:,.0f} EUR, gain {self.gain:,.0f} EUR a year so far"
         return picture(run, site, now.layout, title)
 
 
@@ -474,12 +485,12 @@ def _range(field: str, value: Any) -> tuple[float, float]:
     return low, high
 
 
-def _ahead(stretches: Sequence[PlacedSection]) -> list[float]:
+def _ahead(sections: Sequence[PlacedSection]) -> list[float]:
     """Return quantiles of log10 of Z without barriers of sections, weighted by length."""
-    if not stretches:
+    if not sections:
         return [0.0] * 5
-    risk = np.array([math.log10(1e-3 + s.problem.nothing.objective) for s in stretches])
-    length = np.array([s.length for s in stretches])
+    risk = np.array([math.log10(1e-3 + s.problem.nothing.objective) for s in sections])
+    length = np.array([s.length for s in sections])
     order = np.argsort(risk)
     share = (np.cumsum(length[order]) - 0.5 * length[order]) / length.sum()
     return [float(np.interp(q, share, risk[order])) for q in (0.0, 0.25, 0.5, 0.75, 1.0)]

@@ -43,7 +43,7 @@ def test_every_section_is_seen_once_and_rewards_add_up() -> None:
     env = make(budget=500.0)
     rewards, infos = played(env, 3)
     assert sorted(info["section"] for info in infos) == sorted(NAMES)
-    before = math.fsum(s.length * s.problem.nothing.objective for s in env.stretches)
+    before = math.fsum(s.length * s.problem.nothing.objective for s in env.placed)
     after = math.fsum(info["length"] * info["objective"] for info in infos)
     assert sum(rewards) == pytest.approx((before - after) / before)
     assert infos[-1]["gain"] == pytest.approx(before - after)

@@ -20,6 +20,7 @@ from rigdda.agents.limits import SEED
 from rigdda.agents.terminal import (
     Stopped,
     count_option,
+    executor_option,
     fail,
     folder_for,
     kept,
@@ -212,6 +213,7 @@ def schema(file: str) -> None:
               "it is fast but cannot simulate barriers that stand on the ground.")  # fmt: skip
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("simulate-SITE")
+@executor_option
 def simulate(
     site: str,
     layout: str | None,
@@ -411,6 +413,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the search and of its releases.", SEED)
 @out_option("design-SITE")
+@executor_option
 def design(
     site: str,
     designer: str,
@@ -508,6 +511,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
 @click.argument("file", metavar="STUDY.toml")
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("study-NAME")
+@executor_option
 def study(file: str, seed: int, out: Path | None) -> None:
     """Compare the layouts of STUDY.toml on the same releases.
 
@@ -532,6 +536,62 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
 
 @cli.command()
+@click.argument("file", metavar="CORRIDOR")
+@click.option("--budget", "budgets", type=click.FloatRange(0.0, 1e12), multiple=True, metavar="EUR",
+              help="Budget for construction. May be repeated.  [default: those of the "
+              "file]")  # fmt: skip
+@count_option("--releases", 200, 4_000, "Number of releases per section.")
+@click.option("--robust", is_flag=True, help="Choose by the mean of the worst fifth of what the "
+              "cost of the layouts may be (conditional value at risk).")  # fmt: skip
+@seed_option("Seed of the searches and of their releases.", SEED)
+@out_option("corridor-NAME")
+@executor_option
+def corridor(
+    file: str, budgets: tuple[float, ...], releases: int, robust: bool, seed: int, out: Path | None
+) -> None:
+    """Choose the barriers of all sections of CORRIDOR within a common budget.
+
+    CORRIDOR is a TOML file or a built-in corridor (corridor-12, corridor-50). Every section is
+    searched for layouts from the cheapest to the best, and an integer programme chooses one layout
+    for each section and budget. The choice is compared with the same money for every metre of road,
+    with the worst section first and with the greatest saving per cost.
+
+    Writes budgets.csv, sections.csv, fronts.csv (all layouts), priorities.csv (what should be built
+    next), the folder layouts, and pictures: gain.png (gain against budget) and strip.png (what is
+    built where). An interrupted run continues where it stopped.
+    """
+    from msgspec.structs import replace
+
+    import rigdda
+    from rigdda.agents.corridor.planning import Planner
+    from rigdda.agents.reports import corridor_folder as report
+    from rigdda.envs import CorridorProblem
+
+    where = rigdda.Corridor.load(file)
+    if budgets:
+        where = replace(where, budgets=budgets)
+    problem = CorridorProblem(where)
+    folder = folder_for(out, f"corridor-{where.name}", *report.FILES)
+    stored = folder / "evaluations"
+    stored.mkdir(exist_ok=True)
+    with kept(folder), progress(releases * len(where.sections)) as tick:
+        plan = Planner(problem, releases, seed, robust, stored, tick).plan()
+        report.write(plan, folder)
+    click.echo(
+        "EUR and EUR per year; share: of the gain of unlimited money, also for the same money for\n"
+        "every metre, the worst section first and the greatest saving per cost"
+    )
+    show(report.table_of_budgets(plan))
+    for own in plan.plans[:-1][-1:]:
+        click.echo(f"budget {own.budget:,.0f} EUR:")
+        show(report.table_of_sections(plan, own))
+    click.echo(
+        f"{len(where.sections)} sections, {where.length:,.0f} m, {plan.releases:,} releases; "
+        f"{', '.join(report.FILES)} and layouts are in {folder}"
+    )
+
+
+@cli.command()
 @click.argument("site")
 @click.argument("observed", type=click.Path(dir_okay=False, path_type=Path))
 @click.option("--parameters", "names", multiple=True, required=True, metavar="PATH[=LOW:HIGH]",
@@ -543,6 +603,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 @count_option("--releases", 10, 150, "Number of releases of each event for each parameter set.")
 @seed_option("Seed of the search and of the first release.", SEED)
 @out_option("fit-SITE")
+@executor_option
 def fit(
     site: str,
     observed: Path,
@@ -619,6 +680,7 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
 @count_option("--verify", 10, 2_000, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("evaluate")
+@executor_option
 def evaluate(
     names: tuple[str, ...],
     policy: str | None,

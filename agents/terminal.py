@@ -56,6 +56,24 @@ def seed_option(words: str, most: int | None = None) -> Callable[..., Any]:
     return click.option("--seed", type=kind, default=0, show_default=True, help=words)
 
 
+def _connect(context: click.Context, _: click.Parameter, address: str | None) -> None:
+    """Compute the releases of a command on the workers of a scheduler, if one is given."""
+    if address is not None and not context.resilient_parsing:
+        from rigdda.distribution import connected
+
+        context.with_resource(connected(address))
+
+
+executor_option = click.option(
+    "--executor",
+    metavar="dask://HOST:PORT",
+    callback=_connect,
+    expose_value=False,
+    help="Compute releases on the workers of a Dask scheduler (extra `dask`).  [default: threads "
+    "of this process]",
+)
+
+
 def count_option(name: str, least: int, default: int, words: str) -> Callable[..., Any]:
     """Return an option that takes a count, for example of releases."""
     kind = click.IntRange(least, RELEASES)

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from rigdda import BadInput, Layout, Site, check, sites
+from rigdda import BadInput, Barrier, Layout, Site, check, sites
 from rigdda.barriers import KINDS as ALL
-from rigdda.envs.encoding import NUMBERS, Floats, encode, slot_size
+from rigdda.envs.encoding import NUMBERS, Floats, built_and_dropped, encode, slot_size
 from rigdda.envs.problem import FIDELITIES, DesignProblem, Targets, read_targets
 from rigdda.envs.problem import USUAL_KINDS as USUAL
 
@@ -71,6 +71,11 @@ class Slots:
     def dropped(self, problem: DesignProblem, numbers: Floats) -> tuple[str, ...]:
         """Return the barriers that the first slots request but that are not built, with reasons."""
         return problem.dropped(self._vector(problem, numbers))
+
+    def built(self, problem: DesignProblem, numbers: Floats) -> tuple[list[Barrier], list[str]]:
+        """Return the barriers in the order of the slots, and the dropped ones with reasons."""
+        vector = self._vector(problem, numbers)
+        return built_and_dropped(problem.place, vector, problem.kinds)
 
     def _vector(self, problem: DesignProblem, numbers: Floats) -> Floats:
         """Return the vector of the problem for the first slots; the others are empty."""

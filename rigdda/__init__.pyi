@@ -20,6 +20,7 @@ from .errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from .lumped_mass import Points, lumped
 from .model import grounds
 from .model.block import Block
+from .model.corridor import Corridor, CorridorSection
 from .model.loads import BodyForce, Bolt, FixedPoint, LineLoad, PointLoad
 from .model.outcome import BarrierOutcome, Outcome
 from .model.prices import Bill, Consequences, Prices
@@ -43,6 +44,8 @@ __all__ = [
     "BodyForce",
     "Bolt",
     "Consequences",
+    "Corridor",
+    "CorridorSection",
     "Ditch",
     "Diverged",
     "DoubtfulInput",

@@ -9,14 +9,14 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
-from rigdda import BadInput, Layout, Outcome, __version__
+from rigdda import BadInput, Layout, Outcome, __version__, distribution
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import atomic
@@ -100,6 +100,10 @@ LENT = (0, 1)
 """Seeds of releases without barriers that are used for an event without releases."""
 
 
+Ask = tuple[DesignProblem, Layout, Sequence[int]]
+"""A layout to evaluate on release seeds."""
+
+
 class Release(NamedTuple):
     """Stored values of a release.
 
@@ -180,6 +184,24 @@ class Store:
         found = self._recall(_key(problem, layout, drawn), len(drawn), simulate)
         return replace(found.evaluation, layout=layout, seeds=drawn)
 
+    def evaluate_many(self, asks: Sequence[Ask]) -> Iterator[Evaluation]:
+        """Yield the evaluations of several layouts, each on release seeds of its own.
+
+        Those that are not in the store are computed by the executor in use, see
+        `rigdda.distribution`, each by one worker.
+
+        Raises
+        ------
+        BadInput, Diverged
+            The same errors as `DesignProblem.evaluate`.
+        """
+        keys = [_key(problem, layout, tuple(seeds)) for problem, layout, seeds in asks]
+        new = [ask for key, ask in zip(keys, asks, strict=True) if key not in self._known]
+        found = distribution.mapped(_evaluated, new)
+        for key, (_, layout, seeds) in zip(keys, asks, strict=True):
+            kept = self._recall(key, len(seeds), lambda: StoredEvaluation(next(found), {}))
+            yield replace(kept.evaluation, layout=layout, seeds=tuple(seeds))
+
     def sample(
         self, problem: DesignProblem, layout: Layout, seeds: Mapping[str, Sequence[int]]
     ) -> StoredEvaluation:
@@ -233,6 +255,12 @@ class Store:
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(line + "\n")
         return self._known[key]
+
+
+def _evaluated(ask: Ask) -> Evaluation:
+    """Return the evaluation of a layout, without its outcomes."""
+    problem, layout, seeds = ask
+    return replace(problem.evaluate(layout, seeds), outcomes=())
 
 
 def _release(problem: DesignProblem, layout: Layout, outcome: Outcome) -> Release:

@@ -21,6 +21,7 @@ from rigdda.agents.terminal import (
     Stopped,
     count_option,
     fail,
+    finding,
     folder_for,
     kept,
     layout_option,
@@ -55,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with warnings.catch_warnings():
             warnings.showwarning = once()
-            return cli.main(argv, prog_name="rigdda", standalone_mode=False) or 0
+            return _run(sys.argv[1:] if argv is None else argv)
     except click.Abort:
         return fail("interrupted", 130)
     except click.ClickException as error:
@@ -71,6 +72,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not isinstance(error, Error):
             raise
         return fail(str(error), 2 if isinstance(error, BadInput) else 1)
+
+
+def _run(argv: Sequence[str]) -> int:
+    """Run a command; its arguments are the object of the context, from which they are recorded."""
+    typed = list(argv)
+    return cli.main(typed, prog_name="rigdda", standalone_mode=False, obj=list(typed)) or 0
 
 
 def _version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -163,7 +170,7 @@ def check(site: str, seed: int, out: Path | None) -> None:
 
     where = rigdda.Site.load(site)
     folder = folder_for(out, f"check-{where.name}", "site.png")
-    with kept(folder):
+    with kept(folder, where):
         site_check.draw(folder / "site.png", where)
         trials = site_check.try_releases(where, seed)
     for line in site_check.facts(where):
@@ -174,7 +181,7 @@ def check(site: str, seed: int, out: Path | None) -> None:
         note(f"the file marks {count} values as placeholders to replace")
     odd = site_check.oddities(where, trials)
     for line in odd:
-        click.echo(f"odd: {line}")
+        finding(f"odd: {line}")
     words = f"{len(odd)} things look odd" if len(odd) != 1 else "1 thing looks odd"
     click.echo(f"{words if odd else 'nothing looks odd'}; site.png is in {folder}")
 
@@ -257,7 +264,7 @@ def simulate(
     where.realise(barriers, seed, event)  # report an impossible layout before making a folder
     asked = check_stations(where, at or (where.road.start,))
     folder = folder_for(out, f"simulate-{where.name}", *simulation_folder.files(asked.tolist()))
-    with kept(folder), progress(releases) as tick:
+    with kept(folder, where), progress(releases) as tick:
         lines = simulation_folder.lines(where, asked)
         found = jobs.simulate(where, barriers, seeds, event, lines.tolist(), folder, tick)
         tick(releases, "tables and pictures")
@@ -296,7 +303,7 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
 
     where = DesignProblem(site).site
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
-    with kept(folder), progress(6 * releases) as tick:
+    with kept(folder, where), progress(6 * releases) as tick:
         found = fidelity_bias.compare(where, releases, seed, tick)
     fidelity_bias.write(folder / "fidelity.csv", where, found)
     show(fidelity_bias.table(found))
@@ -440,7 +447,7 @@ def design(
     problem = _pose(site, kinds, target, failure, zone)
     folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
     claim(folder, problem, *FILES)
-    with kept(folder):
+    with kept(folder, problem.site):
         with progress(budget + CASES * verify) as tick:
             done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
             tick(budget + CASES * verify, "pictures")
@@ -494,8 +501,8 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         *findings.failing(done.problem.site, chosen),
         findings.undecided(done.problem, chosen),
     ]
-    for line in filter(None, lines):
-        click.echo(line)
+    for line in lines:
+        finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
@@ -520,7 +527,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
     asked = studies.load(file)
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
-    with kept(folder), progress(asked.size) as tick:
+    with kept(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
     show(studies.table(asked, folder / "study.csv"))
@@ -567,7 +574,7 @@ def fit(
     where = rigdda.Site.load(site)
     seen, parameters = job.read(observed, where), [job.parse(name) for name in names]
     folder = folder_for(out, f"fit-{where.name}", "site.toml", "fit.csv", "fit.png")
-    with kept(folder), progress(budget) as tick:
+    with kept(folder, where), progress(budget) as tick:
         found = job.fit(where, seen, parameters, budget, releases, seed, tick, model)
         found.site.save(folder / "site.toml")
         job.write(folder / "fit.csv", found, seen)

@@ -18,6 +18,7 @@ import click
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.agents.limits import SEED
 from rigdda.agents.terminal import (
+    Folder,
     Stopped,
     count_option,
     fail,
@@ -346,7 +347,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     where, barriers = rigdda.Site.load(target), read_layout(layout)
     where.realise(barriers, seed, event)
     folder = folder_for(out, f"replay-{where.name}", "episode.rrd")
-    with kept(folder):
+    with kept(folder, where):
         run, outcome = rigdda.release(where, barriers, seed, event)
     came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
     notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
@@ -509,6 +510,40 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         f"verification: {verify:,} new releases of each layout{resumed}\n"
         f"{', '.join(FILES)} are in {folder}"
     )
+
+
+@cli.command()
+@click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=Folder(file_okay=False, path_type=Path),
+              help="Folder to write into.  [default: the first of RESULTS]")  # fmt: skip
+@click.option("--pdf", is_flag=True, help="Print the report to report.pdf as well. Needs Chromium, "
+              "Chrome or Edge.")  # fmt: skip
+@click.option("--serve", is_flag=True, help="Show the report in a browser beside the replay of "
+              "RESULTS, which begins at the first impact. Ctrl-C ends it.")  # fmt: skip
+def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) -> None:
+    """Write one report of results folders: report.html.
+
+    RESULTS are folders that design, simulate, study, check or fit wrote. The page holds everything
+    in itself, so that it opens without a network and prints on A4: a summary, the site, the
+    assumptions with their sources, what comes down, the layouts compared, the limits of the method,
+    and the commands, seeds and versions to repeat the results.
+    """
+    from rigdda.agents import browser
+    from rigdda.agents.reports import report_page, results_folder
+
+    folders = results_folder.open_all(results)
+    program = browser.find() if pdf else None
+    replay = results_folder.replay_of(folders) if serve else None
+    page = report_page.compose(folders)
+    files = (report_page.FILE, "report.pdf") if pdf else (report_page.FILE,)
+    file = report_page.write(page, folder_for(out or results[0], "", *files))
+    click.echo(file)
+    if program is not None:
+        click.echo(browser.print_pdf(program, file))
+    if replay is not None:
+        from rigdda.agents.report_server import serve as show_both
+
+        show_both(file, replay, click.echo)
 
 
 @cli.command()

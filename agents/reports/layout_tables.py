@@ -21,14 +21,18 @@ def layouts(done: DesignStudy) -> list[Row]:
 
     Z and its parts are in EUR per metre of road and year, `cost` is the price to build in EUR per
     metre, and `debris` is the volume on the road in m3 per metre and year; `debris_share` is that
-    volume divided by the one without barriers. `_low` and `_high` are the ends of 95 % intervals.
+    volume divided by the one without barriers. `chosen` marks the layout found. `_low` and `_high`
+    are the ends of 95 % intervals.
     """
     site, whole = done.problem.site, done.nothing.evaluation.debris
-    rows = [{"layout": case.name, **_costs(case.evaluation, whole)} for case in done.cases]
-    shed = {name: 0.0 for name in rows[0] if name not in ("layout", "targets", "barriers")}
+    rows = [
+        {"layout": case.name, "chosen": case is done.chosen, **_costs(case.evaluation, whole)}
+        for case in done.cases
+    ]
+    shed = {name: 0.0 for name in rows[0] if name not in ("layout", "chosen")}
     known = ("objective", "objective_low", "objective_high", "capital")
     shed |= dict.fromkeys(known, site.shed()) | {"cost": site.prices.shed, "releases": 0}
-    return [*rows, {"layout": SHED, **shed, "targets": "", "barriers": ""}]
+    return [*rows, {"layout": SHED, "chosen": False, **shed, "targets": "", "barriers": ""}]
 
 
 def _costs(e: Evaluation, whole: float) -> Row:

@@ -309,7 +309,7 @@ def _named(axes: Axes, point: Point, marker: str, colour: str) -> None:
                   label=f"{point.name}: Z = {point.capital + point.risk:,.0f}")  # fmt: skip
 
 
-VECTOR: dict[str, Any] = {"svg.hashsalt": "rigdda", "svg.fonttype": "path"}
+VECTOR: dict[Any, Any] = {"svg.hashsalt": "rigdda", "svg.fonttype": "path"}
 """Settings of vector pictures: the same figure gives the same file, and letters are outlines, so
 that no font is needed."""
 

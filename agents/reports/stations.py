@@ -351,4 +351,3 @@ def _words(row: dict[str, Any], name: str) -> str:
         return figure(row[name])
     low, high = (figure(row[f"{name}_{end}"]) for end in ("low", "high"))
     return f"{figure(row[name])} ({low} to {high})"
-

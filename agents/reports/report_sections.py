@@ -1,0 +1,500 @@
+"""Sections of a report, and which file of a results folder is shown in which of them."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import rigdda
+from rigdda import Site
+from rigdda.agents.reports import assumptions
+from rigdda.agents.reports.html_blocks import (
+    Block,
+    Column,
+    Figures,
+    Heading,
+    Items,
+    Listing,
+    Paragraph,
+    Row,
+    bounded,
+    interval,
+    listed,
+    money,
+    picture,
+    plain,
+    table,
+    value,
+    words,
+)
+from rigdda.agents.reports.results_folder import ResultsFolder
+from rigdda.agents.reports.stations import ALL, QUANTITIES, RATE
+from rigdda.agents.reports.stations import SHOWN as MAIN
+from rigdda.agents.reports.wording import euros, figure, order, percent, span
+from rigdda.agents.run_record import RunRecord
+
+Folders = Sequence[ResultsFolder]
+
+PER_YEAR = "EUR per metre of road and year"
+"""Unit of annual costs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A section: its name in `EXHIBITS`, its title, and what it says besides the exhibits."""
+
+    name: str
+    title: str
+    opening: Callable[[Folders], Iterable[Block]] = lambda folders: ()
+
+
+@dataclass(frozen=True, slots=True)
+class Exhibit:
+    """A table or picture of a results folder that is shown in a section.
+
+    Parameters
+    ----------
+    section : str
+        Name of the section.
+    files : str
+        Name of the file, or a pattern such as "station_*.png". Of a picture that ends in .png, the
+        vector picture beside it is shown.
+    title, words : str
+        Title and explanation. In the title, {part} is what the star in the pattern stands for.
+    columns : tuple of Column
+        Columns of a table; by default all of the file.
+    shown : callable
+        Function of a row that returns whether the row is shown.
+    command : str
+        Command whose file is meant; empty if any.
+    """
+
+    section: str
+    files: str
+    title: str
+    words: str = ""
+    columns: tuple[Column, ...] = ()
+    shown: Callable[[Row], bool] = lambda row: True
+    command: str = ""
+
+
+def _main(row: Row) -> bool:
+    """Return whether a row of the table of stations is shown: of single events only the main."""
+    return row["event"] == ALL or row["quantity"] in (*MAIN, RATE)
+
+
+def _quantity(name: str, unit: str) -> str:
+    """Return the name of a quantity with its unit."""
+    said = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
+    return f"{said} [{unit}]"
+
+
+EXHIBITS = (
+    Exhibit(
+        "passing",
+        "section.png",
+        "Trajectories and envelopes",
+        "Some trajectories of each event to scale, and the heights and energies that 95 % of the "
+        "passing blocks stay below, from all releases.",
+        command="simulate",
+    ),
+    Exhibit(
+        "passing",
+        "stations.csv",
+        "What passes the stations",
+        "Means, and quantiles with the ends of their 95 % intervals, from n passing blocks; “?” "
+        "where there are too few blocks for an end. Energies are those of a whole block. The "
+        "passing rate counts releases with at least one passing block.",
+        (
+            value("x [m]", "x_m", plain),
+            words("event", "event"),
+            Column("quantity", ("quantity", "unit"), _quantity, number=False),
+            value("n", "n"),
+            value("mean", "mean"),
+            value("50 %", "q50"),
+            value("90 %", "q90"),
+            interval("95 %", "q95"),
+            interval("99 %", "q99"),
+        ),
+        _main,
+    ),
+    Exhibit("passing", "station_*m.png", "Histograms at x = {part} m",
+            "Shares of the passing blocks, and the quantiles over all events."),
+    Exhibit("passing", "along_slope.png", "Along the slope",
+            "Quantiles over all events, and how often a release passes."),
+    Exhibit("passing", "run_out.png", "Run-out",
+            "How often rock stops beyond each chainage, also beyond the road."),
+    Exhibit(
+        "layouts",
+        "layouts.csv",
+        "Cost of each layout",
+        f"Z is the sum of capital and upkeep, expected harm on the road and expected repair, in "
+        f"{PER_YEAR} with 95 % intervals. To build: EUR per metre of road. Debris: volume on the "
+        "road, relative to no barriers. rule: the fence of UNI 11211-4; rock shed: a reference "
+        "with full protection. All layouts were verified on the same number of releases that the "
+        "search did not use.",
+        (
+            words("layout", "layout"),
+            words("barriers", "barriers"),
+            interval("Z", "objective", euros),
+            money("capital", "capital"),
+            interval("harm", "harm", euros),
+            interval("repair", "repair", euros),
+            money("to build", "cost"),
+            value("debris", "debris_share", percent),
+            words("targets", "targets"),
+            value("releases", "releases"),
+        ),
+    ),
+    Exhibit(
+        "layouts",
+        "chances.csv",
+        "Probabilities by event",
+        "Probability that a block of a release reaches the road and that a barrier fails, with "
+        "one-sided 95 % upper bounds, from the given number of releases; and the expected harm and "
+        f"repair of the event in {PER_YEAR}.",
+        (
+            words("event", "event"),
+            words("design event", "design"),
+            words("layout", "layout"),
+            bounded("reaches the road", "reach"),
+            bounded("a barrier fails", "failure"),
+            money("harm and repair", "cost"),
+            value("releases", "releases"),
+        ),
+    ),
+    Exhibit("layouts", "section.png", "Without barriers and with the layout",
+            "Some trajectories of each event to scale. Below, the heights and energies that 95 % "
+            "of the passing blocks stay below without barriers.", command="design"),
+    Exhibit("layouts", "cost.png", "Cost and risk",
+            "Annual capital cost of layouts against their remaining risk. Z is the same along the "
+            "thin lines."),
+    Exhibit("sureness", "fit.csv", "Fit to observations",
+            "Fitted numbers with 95 % intervals, and how well the fit predicts observations that "
+            "were left out."),
+    Exhibit("sureness", "fit.png", "Fit to observations"),
+)  # fmt: skip
+"""What is shown of each results folder, in the order of the report. A new table or picture needs
+one entry here; tables without an entry are listed in the appendix."""
+
+RAW = {
+    "evaluations.csv": "layouts that the search evaluated",
+    "outcomes.csv": "one row for each release: what reached the road and each barrier",
+    "passages.csv": "one row for each passage of a block at a station",
+    "along_slope.csv": "quantiles at evenly spaced stations along the slope",
+    "run_out.csv": "how often rock stops beyond each chainage",
+    "stops.csv": "where each block stopped",
+    "study.csv": "one row for each release with each layout",
+    "points.csv": "one row for each block of the lumped-mass model",
+}
+"""Tables that are too long to show, and what they hold."""
+
+LIMITS = (
+    "The section is two-dimensional. Blocks do not leave its plane, and channels or ridges that "
+    "gather or spread rock along the road are not seen.",
+    "A block is as long along the road as the root of its cross-section. Volumes, masses and "
+    "energies of whole blocks rest on this.",
+    "Blocks are rigid and do not break. A block that shatters loses energy, and its fragments may "
+    "fly farther.",
+    "Trees, snow and water are neglected.",
+    "The loss of energy at the ground is the least certain input. Where it was not fitted to "
+    "observed run-outs, deposits or impacts, results may change by more than their intervals.",
+    "Intervals describe the random variation of the releases only. They do not cover errors of the "
+    "profile, the ground, the rates of events, the sizes of blocks or the prices.",
+    "Rates of events are inputs. Costs and rates of passage are proportional to them.",
+    "Barriers are idealised: a fence yields until its elongation is used up, a wall slides or "
+    "overturns as a rigid body, a ditch fills up. Foundations, anchors and the stability of the "
+    "slope itself are not designed.",
+    "The program supports a decision. The engineer who signs it is responsible for it.",
+)
+"""Limits of the method."""
+
+
+def _titled(blocks: list[Block], title: str, many: bool) -> list[Block]:
+    """Return blocks below a heading if there are several folders, and any blocks at all."""
+    return [Heading(title), *blocks] if many and blocks else blocks
+
+
+def exhibits(section: str, folders: Folders) -> list[Block]:
+    """Return the tables and pictures of all folders that a section shows."""
+    many, found = len(folders) > 1, list[Block]()
+    for k, folder in enumerate(folders):
+        own = [e for e in EXHIBITS if e.section == section]
+        blocks = [
+            block for i, e in enumerate(own) for block in _show(e, folder, f"{section}{k}{i}")
+        ]
+        found += _titled(blocks, f"Results in {folder.label}", many)
+    return found
+
+
+def _show(exhibit: Exhibit, folder: ResultsFolder, mark: str) -> Iterator[Block]:
+    """Yield an exhibit for each file of a folder that matches it."""
+    before, _, after = exhibit.files.partition("*")
+    for i, name in enumerate(folder.files(exhibit.files, exhibit.command)):
+        title = exhibit.title.format(part=name.removeprefix(before).removesuffix(after))
+        if name.endswith(".csv"):
+            yield table(folder, name, title, exhibit.words, exhibit.columns, exhibit.shown)
+        else:
+            yield picture(folder.picture(name), title, exhibit.words, f"{mark}{i}")
+
+
+def summary(folders: Folders) -> Iterator[Block]:
+    """Yield the answer first: what to build and what it is worth, or what comes down."""
+    designs = [folder for folder in folders if folder.files("layouts.csv")]
+    for folder in designs:
+        yield from _titled([*_design(folder)], f"Design in {folder.label}", len(designs) > 1)
+    passing = [block for f in folders if f.files("stations.csv") for block in _passing(f)]
+    yield from _titled(passing, "What comes down", bool(designs))
+    site = _site(folders)
+    lines = [f"{line}" for folder in folders for line in _findings(folder, len(folders) > 1)]
+    if site is not None and designs:
+        lines += assumptions.defaults(site)
+    if lines:
+        yield Heading("What limits this answer")
+        yield Items(lines)
+
+
+def _findings(folder: ResultsFolder, many: bool) -> Iterator[str]:
+    """Yield the findings of the commands in a folder, which they printed."""
+    for record in folder.records.values():
+        for line in record.findings:
+            text = line[0].upper() + line[1:] + ("" if line.endswith((".", "?", "!")) else ".")
+            yield f"{folder.label}: {text}" if many else text
+
+
+def _design(folder: ResultsFolder) -> Iterator[Block]:
+    """Yield what to build, where, and what it costs and is worth."""
+    _, rows = folder.table("layouts.csv")
+    chosen = next((row for row in rows if row["chosen"] == "True"), rows[-1])
+    site, targets = folder.site, chosen["targets"]
+    layout = rigdda.load_layout(folder.path / "layout.toml")
+    if layout and site is not None:
+        built = [_place(order(barrier, site), barrier.x, site) for barrier in layout]
+        yield Paragraph(f"Build: {'; '.join(built)}.", "answer")
+    else:
+        yield Paragraph("Build nothing: no layout was found that is worth its cost.", "answer")
+    if targets:
+        asked = _asked(folder)
+        mood = "good" if targets == "met" else "warning"
+        yield Paragraph(_verdict(targets, asked), mood)
+    z, nothing = _money_of(chosen), _money_of(rows[0])
+    yield Figures([
+        ("To build", f"{euros(float(chosen['cost']))} EUR", "per metre of road"),
+        ("Annual cost Z", f"{z} EUR", f"per metre and year with it ({_ends_of(chosen)})"),
+        ("Without barriers", f"{nothing} EUR", f"per metre and year ({_ends_of(rows[0])})"),
+        *_chances(folder, chosen["layout"], rows[0]["layout"]),
+    ])  # fmt: skip
+
+
+def _place(text: str, x: float, site: Site) -> str:
+    """Return the order of a barrier with its place on the survey, if the survey has another."""
+    origin = site.origin
+    if not (origin.chainage or origin.elevation or origin.reversed):
+        return text
+    level = site.profile.height(x) + origin.elevation
+    return (
+        f"{text} (chainage {origin.chainage_of(x):,.1f} m of the survey, ground at elevation "
+        f"{level:,.1f} m)"
+    )
+
+
+def _asked(folder: ResultsFolder) -> str:
+    """Return the targets of a design in words."""
+    options = folder.records["design"].options if "design" in folder.records else {}
+    pairs = (("reaches the road", "target"), ("fails", "failure"))
+    said = [
+        f"{what} with a probability of at most {percent(float(options[name]))}"
+        for what, name in pairs
+        if options.get(name) is not None
+    ]
+    return " and ".join(said)
+
+
+def _verdict(state: str, asked: str) -> str:
+    """Return whether the targets are met, in words."""
+    goal = f"the target that a block of a design event {asked}" if asked else "the target"
+    if state == "met":
+        return f"This layout meets {goal}."
+    if state == "missed":
+        return f"This layout does not meet {goal}."
+    return f"The releases do not decide whether this layout meets {goal}: verify with more."
+
+
+def _money_of(row: Row) -> str:
+    return euros(float(row["objective"]))
+
+
+def _ends_of(row: Row) -> str:
+    return span((float(row["objective_low"]), float(row["objective_high"])))
+
+
+def _chances(folder: ResultsFolder, name: str, without: str) -> Iterator[tuple[str, str, str]]:
+    """Yield the probabilities of the design events with a layout, and without barriers."""
+    _, rows = folder.table("chances.csv") if folder.files("chances.csv") else ([], [])
+    for row in rows:
+        if row["design"] == "True" and row["layout"] == name:
+            before = next(r for r in rows if r["event"] == row["event"] and r["layout"] == without)
+            reach, bound = float(row["reach"]), float(row["reach_bound"])
+            rest = f"at most {percent(bound)}; without barriers {percent(float(before['reach']))}"
+            yield f"“{row['event']}” reaches the road", percent(reach), rest
+            fails, bound = float(row["failure"]), float(row["failure_bound"])
+            if name != without:
+                yield f"A barrier fails in “{row['event']}”", percent(fails), (
+                    f"at most {percent(bound)}"
+                )  # fmt: skip
+
+
+def _passing(folder: ResultsFolder) -> Iterator[Block]:
+    """Yield what passes the stations of a simulation, in sentences."""
+    _, rows = folder.table("stations.csv")
+    last = rows[-1]["event"] if rows else ""
+    record = folder.records.get("simulate")
+    layout = record.options.get("layout") if record else None
+    what = f"with the layout of {layout}" if layout else "without barriers"
+    lines = []
+    for row in rows:
+        if row["event"] == last and row["quantity"] == RATE:
+            own = {r["quantity"]: r for r in rows if r["x_m"] == row["x_m"] and r["event"] == last}
+            lines.append(_station(row, own, what))
+    if lines:
+        yield Items(lines)
+
+
+def _station(rate: Row, own: dict[str, Row], what: str) -> str:
+    """Return a sentence on what passes a station."""
+    where = f"At x = {plain(float(rate['x_m']))} m, {what}, "
+    if int(rate["n"]) == 0:
+        return f"{where}no block passes in {int(rate['releases']):,} releases."
+    energy, height = own["energy"], own["height"]
+    return (
+        f"{where}{figure(float(rate['mean']))} releases a year pass on 100 m of road; 95 % of the "
+        f"{int(rate['n']):,} passing blocks have less than {figure(float(energy['q95']))} kJ, and "
+        f"the centres of 95 % are lower than {figure(float(height['q95']))} m above the ground."
+    )
+
+
+def _site(folders: Folders) -> Site | None:
+    return next((folder.site for folder in folders if folder.site is not None), None)
+
+
+def site(folders: Folders) -> Iterator[Block]:
+    """Yield the site, and how the sites of other folders differ from it."""
+    first = _site(folders)
+    if first is None:
+        return
+    yield from assumptions.the_site(first)
+    for folder in folders:
+        if folder.site is not None and folder.site != first:
+            yield Paragraph(f"The site of {folder.label} differs from this one:")
+            yield Items(assumptions.differences(first, folder.site))
+
+
+def assumed(folders: Folders) -> Iterator[Block]:
+    """Yield the assumptions of the site."""
+    first = _site(folders)
+    if first is not None:
+        yield from assumptions.assumptions(first)
+
+
+def limits(_: Folders) -> Iterator[Block]:
+    """Yield the limits of the method."""
+    yield Items(LIMITS)
+
+
+def repeat(folders: Folders) -> Iterator[Block]:
+    """Yield commands, seeds and versions, with which the results can be repeated."""
+    yield Paragraph(
+        "On one machine, the same version gives the same numbers bit for bit. The results folders "
+        "hold the site as it was used and all options in run.json."
+    )
+    records = [(folder, record) for folder in folders for record in folder.records.values()]
+    commands = [shlex.join(["rigdda", *record.arguments]) for _, record in records]
+    yield Listing("\n".join(commands))
+    head = ("results", "command", "began (UTC)", "ended (UTC)", "seed", "rigdda", "mechanics")
+    rows = [_run(folder, record) for folder, record in records]
+    yield listed("Runs", "mechanics: hash of all sources that affect a result.", head, rows)
+    versions = dict.fromkeys(record.versions for _, record in records)
+    names = ("rigdda", "kernels", "numba", "numpy", "python", "machine")
+    yield listed("Versions", "", names, [[getattr(v, name) for name in names] for v in versions])
+    rest = [_options(record) for _, record in records]
+    yield listed("Options", "All options, also those that were not typed.", ("command", "options"),
+                 rest)  # fmt: skip
+
+
+def _run(folder: ResultsFolder, record: RunRecord) -> list[str]:
+    seed = record.options.get("seed")
+    began, ended = (time[:19].replace("T", " ") for time in (record.started, record.ended))
+    return [folder.label, record.command, began, ended, "-" if seed is None else str(seed),
+            record.versions.rigdda, record.mechanics]  # fmt: skip
+
+
+def _options(record: RunRecord) -> list[str]:
+    said = [f"{name} = {'-' if v is None else v}" for name, v in record.options.items()]
+    return [record.command, ", ".join(said)]
+
+
+SMALL = 40
+"""Rows up to which a table without an exhibit is shown as a whole."""
+
+WIDE = 12
+"""Columns up to which a table without an exhibit is shown as a whole."""
+
+
+def appendix(folders: Folders) -> Iterator[Block]:
+    """Yield the tables that are in no section: small ones as a whole, others by name."""
+    rows = []
+    for folder in folders:
+        shown = {name for e in EXHIBITS for name in folder.files(e.files, e.command)}
+        for name in (name for name in folder.others() if name not in shown):
+            head, found = folder.table(name)
+            if name not in RAW and len(found) <= SMALL and len(head) <= WIDE:
+                yield table(folder, name, f"{folder.label}/{name}", "All rows of the file.")
+            else:
+                what = RAW.get(name, f"columns: {', '.join(head)}")
+                rows.append((f"{folder.label}/{name}", what, f"{len(found):,}"))
+    if rows:
+        names = ("file", "what it holds", "rows")
+        yield listed("Tables that are too long to show", "", names, rows, ("rows",))
+    sites: dict[str, list[str]] = {}
+    for folder in folders:
+        for text in dict.fromkeys(record.site for record in folder.records.values()):
+            sites.setdefault(text, []).append(folder.label)
+    for text, labels in sites.items():
+        if text:
+            yield Listing(compact(text), f"Site file of {', '.join(labels)}, with all defaults")
+
+
+NUMBERS = re.compile(r"\[\s+((?:[-+.\de]+,\s+)+)\]")
+"""A list of numbers in TOML, one on each line."""
+
+
+def compact(text: str) -> str:
+    """Return a TOML text with each list of numbers on one line."""
+    short = NUMBERS.sub(lambda found: f"[{', '.join(found[1].replace(',', ' ').split())}]", text)
+    return short if tomllib.loads(short) == tomllib.loads(text) else text
+
+
+SECTIONS = (
+    Section("summary", "Summary", summary),
+    Section("site", "Site", site),
+    Section("assumptions", "Assumptions and their sources", assumed),
+    Section("passing", "What comes down"),
+    Section("layouts", "Layouts compared"),
+    Section("checks", "Checks"),
+    Section("risk", "Risk to life and traffic"),
+    Section("sureness", "How sure the answer is"),
+    Section("frontier", "What other targets cost"),
+    Section("limits", "Limits of the method", limits),
+    Section("repeat", "How to repeat the results", repeat),
+    Section("appendix", "Appendix", appendix),
+)
+"""Sections of a report in their order. One without content is left out."""
+
+
+def filled(folders: Folders) -> list[tuple[Section, list[Block]]]:
+    """Return the sections that have content, with their blocks."""
+    found = [(s, [*s.opening(folders), *exhibits(s.name, folders)]) for s in SECTIONS]
+    return [(section, blocks) for section, blocks in found if blocks]

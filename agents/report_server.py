@@ -57,26 +57,35 @@ ELSEWHERE = re.compile(rb"<link[^>]*https://[^>]*>", re.DOTALL)
 """Links of the viewer's page to other machines."""
 
 
-def first_impact(run: Run, road: float) -> float | None:
-    """Return the time of the first impact on a barrier, otherwise the first arrival at the road.
+class Moment(NamedTuple):
+    """A time of a run [s], and what happens at it."""
 
-    None if no block does either.
+    time: float
+    words: str
+
+
+def first_impact(run: Run, road: float) -> Moment | None:
+    """Return the first impact on a barrier, otherwise the first arrival at the road.
+
+    None if no block does either. `road` is the chainage of the road's uphill edge [m].
     """
     hits = [hit["time"] for i in range(len(run.scene.barriers)) for hit in run.hits(i)]
     if hits:
-        return float(min(hits))
+        return Moment(float(min(hits)), "first impact on a barrier")
     arrived = run.passed(road).any(axis=1)
-    return float(run.times[arrived.argmax()]) if arrived.any() else None
+    if not arrived.any():
+        return None
+    return Moment(float(run.times[arrived.argmax()]), "first arrival at the road")
 
 
-def record_impact(replay: Path, out: Path) -> float | None:
+def record_impact(replay: Path, out: Path) -> Moment | None:
     """Record the release of a replay again from shortly before its first impact into a file.
 
     Returns
     -------
-    float or None
-        Time of the first impact [s]. None, and no file, if there is none or the replay holds no
-        release that this version can compute again.
+    Moment or None
+        The first impact. None, and no file, if there is none or the replay holds no release that
+        this version can compute again.
     """
     try:
         known = replay_record.load(replay)
@@ -93,10 +102,10 @@ def record_impact(replay: Path, out: Path) -> float | None:
     notes = {
         "layout": "; ".join(barrier.label for barrier in layout) or "no barrier",
         "release": f"event {outcome.event}, seed {known.seed}",
-        "first impact": f"{when:.2f} s after the release; the replay begins {LEAD:g} s before",
+        when.words: f"{when.time:.2f} s after the release; the replay begins {LEAD:g} s before",
     }
     labels = tuple(barrier.label for barrier in standing(layout))
-    _since(run, when - LEAD).to_rerun(out, Marks(road, notes, known.site.name, labels))
+    _since(run, when.time - LEAD).to_rerun(out, Marks(road, notes, known.site.name, labels))
     return when
 
 
@@ -169,14 +178,14 @@ def _interrupt_on_termination(stack: contextlib.ExitStack) -> None:
     stack.callback(signal.signal, signal.SIGTERM, before)
 
 
-def _frame(address: str, when: float | None) -> str:
+def _frame(address: str, when: Moment | None) -> str:
     """Return the page with the report on the left and the viewer on the right."""
 
     def link(name: str) -> str:
         asked = quote(f"{address}/{name}.rrd", safe="")
         return f"viewer/?url={asked}&amp;hide_welcome_screen=1&amp;persist=0&amp;notebook=0"
 
-    words = "no impact" if when is None else f"first impact at {when:.2f} s"
+    words = "no impact" if when is None else f"{when.words} at {when.time:.2f} s"
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Report and replay</title><style>
 body {{ margin: 0; height: 100vh; display: grid; grid-template-columns: 1fr 1fr; }}
@@ -186,9 +195,9 @@ nav {{ font: 14px/1.5 system-ui, sans-serif; padding: .3rem .8rem; background: #
 a {{ color: #1c5aa0; margin-left: .8rem; }}
 </style></head><body>
 <iframe src="report.html" title="Report"></iframe>
-<div><nav>Replay, {words}:
-<a href="{link("impact")}" target="viewer">from the first impact</a>
-<a href="{link("whole")}" target="viewer">from the release</a></nav>
+<div><nav>Replay: {words},
+<a href="{link("impact")}" target="viewer">from there</a>
+<a href="{link("whole")}" target="viewer">from the start</a></nav>
 <iframe src="{link("impact")}" name="viewer" title="Replay"></iframe></div>
 </body></html>
 """

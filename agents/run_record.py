@@ -105,7 +105,7 @@ def read(folder: Path) -> dict[str, RunRecord]:
         return msgspec.json.decode(file.read_bytes(), type=dict[str, RunRecord])
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         mend = f"run the command that made this folder again: the file is damaged ({error})"
-        raise BadInput("results", str(file), mend) from None
+        raise BadInput("RESULTS", str(file), mend) from None
 
 
 def as_toml(site: Site) -> str:

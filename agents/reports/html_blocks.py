@@ -135,18 +135,16 @@ class Column:
         Raises
         ------
         BadInput
-            If the row lacks a column or a value is not a number; the message names `where`.
+            If a value is not a number; the message names `where`.
         """
-        values: list[Any] = []
-        for name in self.names:
-            if name not in row:
-                mend = f"it lacks the column {name!r}: run the command that made it again"
-                raise BadInput(FIELD, where, mend)
-            values.append(_float(row[name], name, where) if self.number else row[name])
+        values: list[Any] = [
+            _float(row[name], name, where) if self.number else row[name] for name in self.names
+        ]
         return Cell(self.form(*values), " ".join(self.names), self.number)
 
 
 def _float(text: str, name: str, where: str) -> float:
+    """Return the number in a cell, NaN if it is empty."""
     if not text:
         return math.nan
     try:
@@ -251,7 +249,8 @@ def table(
     BadInput
         If the file lacks a column, or a value in it is not a number.
     """
-    head, rows = folder.table(name)
+    needed = [column for own in columns for column in own.names]
+    head, rows = folder.table(name, needed)
     kept = [(i, row) for i, row in enumerate(rows) if shown(row)]
     used = columns or usual_columns(head, rows)
     where = str(folder.path / name)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import rigdda
-from rigdda import Site
+from rigdda import BadInput, Site
 from rigdda.agents.reports import assumptions
 from rigdda.agents.reports.html_blocks import (
     Block,
@@ -30,7 +30,7 @@ from rigdda.agents.reports.html_blocks import (
     value,
     words,
 )
-from rigdda.agents.reports.results_folder import ResultsFolder
+from rigdda.agents.reports.results_folder import FIELD, ResultsFolder
 from rigdda.agents.reports.stations import ALL, QUANTITIES, RATE
 from rigdda.agents.reports.stations import SHOWN as MAIN
 from rigdda.agents.reports.wording import euros, figure, order, percent, span
@@ -267,8 +267,11 @@ def _findings(folder: ResultsFolder, many: bool) -> Iterator[str]:
 
 def _design(folder: ResultsFolder) -> Iterator[Block]:
     """Yield what to build, where, and what it costs and is worth."""
-    _, rows = folder.table("layouts.csv")
-    chosen = next((row for row in rows if row["chosen"] == "True"), rows[-1])
+    _, rows = folder.table("layouts.csv", ("chosen", "objective_low", "objective_high"))
+    chosen = next((row for row in rows if row["chosen"] == "True"), None)
+    if chosen is None:
+        mend = "no row is the chosen one: run the command that made it again"
+        raise BadInput(FIELD, str(folder.path / "layouts.csv"), mend)
     site, targets = folder.site, chosen["targets"]
     layout = rigdda.load_layout(folder.path / "layout.toml")
     if layout and site is not None:
@@ -496,5 +499,6 @@ SECTIONS = (
 
 def filled(folders: Folders) -> list[tuple[Section, list[Block]]]:
     """Return the sections that have content, with their blocks."""
-    found = [(s, [*s.opening(folders), *exhibits(s.name, folders)]) for s in SECTIONS]
+    shown = {s.name: exhibits(s.name, folders) for s in SECTIONS}  # first, as they check the files
+    found = [(s, [*s.opening(folders), *shown[s.name]]) for s in SECTIONS]
     return [(section, blocks) for section, blocks in found if blocks]

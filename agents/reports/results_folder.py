@@ -67,17 +67,22 @@ class ResultsFolder:
         """Return the names of all tables in the folder, also of those that no record names."""
         return sorted(file.name for file in self.path.glob("*.csv"))
 
-    def table(self, name: str) -> tuple[list[str], list[dict[str, str]]]:
+    def table(
+        self, name: str, needed: Sequence[str] = ()
+    ) -> tuple[list[str], list[dict[str, str]]]:
         """Return the columns and the rows of a CSV file.
 
         Raises
         ------
         BadInput
-            If the file is missing, is not UTF-8 or a row has more or fewer cells than there are
-            columns.
+            If the file is missing, is not UTF-8, lacks one of the columns `needed`, or a row has
+            more or fewer cells than there are columns.
         """
         file = self.path / name
         head, *rows = [*csv.reader(io.StringIO(read(FIELD, file), newline=""))] or [[]]
+        if lacking := [column for column in needed if column not in head]:
+            mend = f"it lacks the column {lacking[0]!r}: run the command that made it again"
+            raise BadInput(FIELD, str(file), mend)
         for number, row in enumerate(rows, 2):
             if len(row) != len(head):
                 mend = f"repair line {number}, which has {len(row)} cells, not {len(head)}"

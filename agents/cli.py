@@ -178,13 +178,20 @@ def check(site: str, seed: int, out: Path | None) -> None:
         click.echo(line)
     show(site_check.table(where, trials))
     click.echo(site_check.time_of(where, trials))
-    if count := site_check.placeholders(site):
-        note(f"the file marks {count} values as placeholders to replace")
+    _warn_of_placeholders(site)
     odd = site_check.oddities(where, trials)
     for line in odd:
         finding(f"odd: {line}")
     words = f"{len(odd)} things look odd" if len(odd) != 1 else "1 thing looks odd"
     click.echo(f"{words if odd else 'nothing looks odd'}; site.png is in {folder}")
+
+
+def _warn_of_placeholders(site: str) -> None:
+    """Print a note if a site file still has placeholders of `rigdda new`."""
+    from rigdda.agents import site_check
+
+    if count := site_check.placeholders(site):
+        note(f"the site file marks {count} values as placeholders to replace")
 
 
 @cli.command()
@@ -280,6 +287,7 @@ def simulate(
         show(table)
     click.echo("intervals: 95 %; ?: too few blocks for this end; height: of the centre of a block")
     note(findings.of_layout(where, barriers, event))
+    _warn_of_placeholders(site)
     note(stations.undecided(passing))
     if passing.not_drawn:
         names = ", ".join(passing.not_drawn)
@@ -454,6 +462,7 @@ def design(
             tick(budget + CASES * verify, "pictures")
             write(done, folder, seed)
     _tell(done, store, verify, folder)
+    _warn_of_placeholders(site)
 
 
 def _pose(

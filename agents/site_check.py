@@ -515,7 +515,7 @@ def _draw_ground(axes: Axes, site: Site, bottom: float) -> None:
                       solid_capstyle="round", zorder=1.5)  # fmt: skip
         else:
             axes.fill([a[0], b[0], b[0], a[0]], [a[1], b[1], bottom, bottom],
-                      facecolor=colours[name], edgecolor=colours[name], linewidth=0.3,
+                      facecolor=colours[name], edgecolor=colours[name], linewidth=0.8,
                       label=label)  # fmt: skip
     axes.plot(*np.array(points).T, color="#333333", linewidth=1.0, zorder=2)
     axes.plot(*np.array(site.slope.points).T, ".", color="#333333", markersize=4, zorder=2.1,

@@ -38,7 +38,7 @@ def compose(folders: Sequence[ResultsFolder]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["unbroken"] = unbroken
+    environment.filters |= {"unbroken": unbroken, "together": together}
     page = environment.get_template("report.html.jinja")
     site = next((folder.site for folder in folders if folder.site is not None), None)
     if site is None:
@@ -62,6 +62,15 @@ UNITS = re.compile(r"(?<=[\d?]) (?=(?:%|‰|m|kJ|MJ|t|kg|deg|EUR|m2|m3|m²|m³|m
 def unbroken(text: str) -> str:
     """Return a text whose lines do not break between a number and its unit."""
     return UNITS.sub("\u00a0", text)
+
+
+BRACKET = re.compile(r"\([^()]*\)")
+"""An interval or a bound in brackets."""
+
+
+def together(text: str) -> str:
+    """Return the text of a number whose interval in brackets stays on one line."""
+    return BRACKET.sub(lambda found: found[0].replace(" ", "\u00a0"), unbroken(text))
 
 
 def write(page: str, out: str | os.PathLike[str]) -> Path:

@@ -86,6 +86,11 @@ def _main(row: Row) -> bool:
     return row["event"] == ALL or row["quantity"] in (*MAIN, RATE)
 
 
+def _called(name: str, barriers: str) -> str:
+    """Return the name of a layout with its barriers."""
+    return f"{name}: {barriers}" if barriers and barriers != "no barrier" else name
+
+
 def _quantity(name: str, unit: str) -> str:
     """Return the name of a quantity with its unit."""
     said = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
@@ -137,8 +142,7 @@ EXHIBITS = (
         "with full protection. All layouts were verified on the same number of releases that the "
         "search did not use.",
         (
-            words("layout", "layout"),
-            words("barriers", "barriers"),
+            Column("layout", ("layout", "barriers"), _called, number=False),
             interval("Z", "objective", euros),
             money("capital", "capital"),
             interval("harm", "harm", euros),
@@ -284,6 +288,13 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
         mood = "good" if targets == "met" else "warning"
         yield Paragraph(_verdict(targets, asked), mood)
     z, nothing = _money_of(chosen), _money_of(rows[0])
+    if layout and float(chosen["objective_low"]) > float(rows[0]["objective_high"]):
+        yield Paragraph(
+            f"A year costs {z} EUR per metre of road with this layout and {nothing} EUR without "
+            "barriers: it costs more than it saves"
+            + (", and only the target is a reason to build it." if targets else "."),
+            "warning",
+        )
     yield Figures([
         ("To build", f"{euros(float(chosen['cost']))} EUR", "per metre of road"),
         ("Annual cost Z", f"{z} EUR", f"per metre and year with it ({_ends_of(chosen)})"),

@@ -43,7 +43,7 @@ PER_YEAR = "EUR per metre of road and year"
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class ReportSection:
     """A section: its name in `EXHIBITS`, its title, and what it says besides the exhibits."""
 
     name: str
@@ -492,23 +492,23 @@ def compact(text: str) -> str:
 
 
 SECTIONS = (
-    Section("summary", "Summary", summary),
-    Section("site", "Site", site),
-    Section("assumptions", "Assumptions and their sources", assumed),
-    Section("passing", "What comes down"),
-    Section("layouts", "Layouts compared"),
-    Section("checks", "Checks"),
-    Section("risk", "Risk to life and traffic"),
-    Section("sureness", "How sure the answer is"),
-    Section("frontier", "What other targets cost"),
-    Section("limits", "Limits of the method", limits),
-    Section("repeat", "How to repeat the results", repeat),
-    Section("appendix", "Appendix", appendix),
+    ReportSection("summary", "Summary", summary),
+    ReportSection("site", "Site", site),
+    ReportSection("assumptions", "Assumptions and their sources", assumed),
+    ReportSection("passing", "What comes down"),
+    ReportSection("layouts", "Layouts compared"),
+    ReportSection("checks", "Checks"),
+    ReportSection("risk", "Risk to life and traffic"),
+    ReportSection("sureness", "How sure the answer is"),
+    ReportSection("frontier", "What other targets cost"),
+    ReportSection("limits", "Limits of the method", limits),
+    ReportSection("repeat", "How to repeat the results", repeat),
+    ReportSection("appendix", "Appendix", appendix),
 )
 """Sections of a report in their order. One without content is left out."""
 
 
-def filled(folders: Folders) -> list[tuple[Section, list[Block]]]:
+def filled(folders: Folders) -> list[tuple[ReportSection, list[Block]]]:
     """Return the sections that have content, with their blocks."""
     shown = {s.name: exhibits(s.name, folders) for s in SECTIONS}  # first, as they check the files
     found = [(s, [*s.opening(folders), *shown[s.name]]) for s in SECTIONS]

@@ -170,6 +170,11 @@ def value(head: str, name: str, form: Callable[[float], str] = figure) -> Column
 
 def interval(head: str, name: str, form: Callable[[float], str] = figure) -> Column:
     """Return a column of numbers with the ends of their intervals in brackets, if they differ."""
+    return spread(head, (name, f"{name}_low", f"{name}_high"), form)
+
+
+def spread(head: str, names: tuple[str, str, str], form: Callable[[float], str] = figure) -> Column:
+    """Return a column like `interval` from three columns: the value and the ends."""
 
     def text(x: float, low: float, high: float) -> str:
         if math.isnan(x) or low == x == high:
@@ -177,7 +182,7 @@ def interval(head: str, name: str, form: Callable[[float], str] = figure) -> Col
         ends = " to ".join("?" if math.isnan(end) else form(end) for end in (low, high))
         return f"{form(x)} ({ends})"
 
-    return Column(head, (name, f"{name}_low", f"{name}_high"), text)
+    return Column(head, names, text)
 
 
 def bounded(head: str, name: str) -> Column:

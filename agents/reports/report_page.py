@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rigdda import BadInput
 from rigdda.agents.reports import report_sections
-from rigdda.agents.reports.results_folder import FIELD, ResultsFolder
+from rigdda.agents.reports.results_folder import ResultsFolder
 from rigdda.files import atomic
 
 FILE = "report.html"
@@ -25,7 +24,7 @@ def compose(folders: Sequence[ResultsFolder]) -> str:
     Raises
     ------
     BadInput
-        If there is nothing to report, or a file of a folder is damaged.
+        If a file of a folder is damaged.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
@@ -41,11 +40,9 @@ def compose(folders: Sequence[ResultsFolder]) -> str:
     environment.filters |= {"unbroken": unbroken, "together": together}
     page = environment.get_template("report.html.jinja")
     site = next((folder.site for folder in folders if folder.site is not None), None)
-    if site is None:
-        mend = "name a folder of a command that has a site, such as rigdda design or simulate"
-        raise BadInput(FIELD, ", ".join(str(folder.path) for folder in folders), mend)
+    subject = folders[0].label if site is None else site.name
     return page.render(
-        title=f"Rockfall protection: {site.name}",
+        title=f"Rockfall protection: {subject}",
         made=datetime.now(UTC).strftime("%d %B %Y"),
         style=Markup((HERE / "report.css").read_text(encoding="utf-8")),
         sections=sections,

@@ -1,4 +1,4 @@
-"""Sections of a report, and which file of a results folder is shown in which of them."""
+"""Sections of a report: what each says besides the exhibits of the results folders."""
 
 from __future__ import annotations
 
@@ -11,35 +11,26 @@ from dataclasses import dataclass
 import rigdda
 from rigdda import BadInput, Site
 from rigdda.agents.reports import assumptions
+from rigdda.agents.reports.exhibits import EXHIBITS, RAW, Exhibit
 from rigdda.agents.reports.html_blocks import (
     Block,
-    Column,
     Figures,
     Heading,
     Items,
     Listing,
     Paragraph,
     Row,
-    bounded,
-    interval,
     listed,
-    money,
     picture,
     plain,
     table,
-    value,
-    words,
 )
 from rigdda.agents.reports.results_folder import FIELD, ResultsFolder
-from rigdda.agents.reports.stations import ALL, QUANTITIES, RATE
-from rigdda.agents.reports.stations import SHOWN as MAIN
+from rigdda.agents.reports.stations import RATE
 from rigdda.agents.reports.wording import euros, figure, order, percent, span
 from rigdda.agents.run_record import RunRecord
 
 Folders = Sequence[ResultsFolder]
-
-PER_YEAR = "EUR per metre of road and year"
-"""Unit of annual costs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,151 +41,6 @@ class ReportSection:
     title: str
     opening: Callable[[Folders], Iterable[Block]] = lambda folders: ()
 
-
-@dataclass(frozen=True, slots=True)
-class Exhibit:
-    """A table or picture of a results folder that is shown in a section.
-
-    Parameters
-    ----------
-    section : str
-        Name of the section.
-    files : str
-        Name of the file, or a pattern such as "station_*.png". Of a picture that ends in .png, the
-        vector picture beside it is shown.
-    title, words : str
-        Title and explanation. In the title, {part} is what the star in the pattern stands for.
-    columns : tuple of Column
-        Columns of a table; by default all of the file.
-    shown : callable
-        Function of a row that returns whether the row is shown.
-    command : str
-        Command whose file is meant; empty if any.
-    """
-
-    section: str
-    files: str
-    title: str
-    words: str = ""
-    columns: tuple[Column, ...] = ()
-    shown: Callable[[Row], bool] = lambda row: True
-    command: str = ""
-
-
-def _main(row: Row) -> bool:
-    """Return whether a row of the table of stations is shown: of single events only the main."""
-    return row["event"] == ALL or row["quantity"] in (*MAIN, RATE)
-
-
-def _called(name: str, barriers: str) -> str:
-    """Return the name of a layout with its barriers."""
-    return f"{name}: {barriers}" if barriers and barriers != "no barrier" else name
-
-
-def _quantity(name: str, unit: str) -> str:
-    """Return the name of a quantity with its unit."""
-    said = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
-    return f"{said} [{unit}]"
-
-
-EXHIBITS = (
-    Exhibit(
-        "passing",
-        "section.png",
-        "Trajectories and envelopes",
-        "Some trajectories of each event to scale, and the heights and energies that 95 % of the "
-        "passing blocks stay below, from all releases.",
-        command="simulate",
-    ),
-    Exhibit(
-        "passing",
-        "stations.csv",
-        "What passes the stations",
-        "Means, and quantiles with the ends of their 95 % intervals, from n passing blocks; “?” "
-        "where there are too few blocks for an end. Energies are those of a whole block. The "
-        "passing rate counts releases with at least one passing block.",
-        (
-            value("x [m]", "x_m", plain),
-            words("event", "event"),
-            Column("quantity", ("quantity", "unit"), _quantity, number=False),
-            value("n", "n"),
-            value("mean", "mean"),
-            value("50 %", "q50"),
-            value("90 %", "q90"),
-            interval("95 %", "q95"),
-            interval("99 %", "q99"),
-        ),
-        _main,
-    ),
-    Exhibit("passing", "station_*m.png", "Histograms at x = {part} m",
-            "Shares of the passing blocks, and the quantiles over all events."),
-    Exhibit("passing", "along_slope.png", "Along the slope",
-            "Quantiles over all events, and how often a release passes."),
-    Exhibit("passing", "run_out.png", "Run-out",
-            "How often rock stops beyond each chainage, also beyond the road."),
-    Exhibit(
-        "layouts",
-        "layouts.csv",
-        "Cost of each layout",
-        f"Z is the sum of capital and upkeep, expected harm on the road and expected repair, in "
-        f"{PER_YEAR} with 95 % intervals. To build: EUR per metre of road. Debris: volume on the "
-        "road, relative to no barriers. rule: the fence of UNI 11211-4; rock shed: a reference "
-        "with full protection. All layouts were verified on the same number of releases that the "
-        "search did not use.",
-        (
-            Column("layout", ("layout", "barriers"), _called, number=False),
-            interval("Z", "objective", euros),
-            money("capital", "capital"),
-            interval("harm", "harm", euros),
-            interval("repair", "repair", euros),
-            money("to build", "cost"),
-            value("debris", "debris_share", percent),
-            words("targets", "targets"),
-            value("releases", "releases"),
-        ),
-    ),
-    Exhibit(
-        "layouts",
-        "chances.csv",
-        "Probabilities by event",
-        "Probability that a block of a release reaches the road and that a barrier fails, with "
-        "one-sided 95 % upper bounds, from the given number of releases; and the expected harm and "
-        f"repair of the event in {PER_YEAR}.",
-        (
-            words("event", "event"),
-            words("design event", "design"),
-            words("layout", "layout"),
-            bounded("reaches the road", "reach"),
-            bounded("a barrier fails", "failure"),
-            money("harm and repair", "cost"),
-            value("releases", "releases"),
-        ),
-    ),
-    Exhibit("layouts", "section.png", "Without barriers and with the layout",
-            "Some trajectories of each event to scale. Below, the heights and energies that 95 % "
-            "of the passing blocks stay below without barriers.", command="design"),
-    Exhibit("layouts", "cost.png", "Cost and risk",
-            "Annual capital cost of layouts against their remaining risk. Z is the same along the "
-            "thin lines."),
-    Exhibit("sureness", "fit.csv", "Fit to observations",
-            "Fitted numbers with 95 % intervals, and how well the fit predicts observations that "
-            "were left out."),
-    Exhibit("sureness", "fit.png", "Fit to observations"),
-)  # fmt: skip
-"""What is shown of each results folder, in the order of the report. A new table or picture needs
-one entry here; tables without an entry are listed in the appendix."""
-
-RAW = {
-    "evaluations.csv": "layouts that the search evaluated",
-    "outcomes.csv": "one row for each release: what reached the road and each barrier",
-    "passages.csv": "one row for each passage of a block at a station",
-    "along_slope.csv": "quantiles at evenly spaced stations along the slope",
-    "run_out.csv": "how often rock stops beyond each chainage",
-    "stops.csv": "where each block stopped",
-    "study.csv": "one row for each release with each layout",
-    "points.csv": "one row for each block of the lumped-mass model",
-}
-"""Tables that are too long to show, and what they hold."""
 
 LIMITS = (
     "The section is two-dimensional. Blocks do not leave its plane, and channels or ridges that "
@@ -247,7 +93,7 @@ def _show(exhibit: Exhibit, folder: ResultsFolder, mark: str) -> Iterator[Block]
 
 def summary(folders: Folders) -> Iterator[Block]:
     """Yield the answer first: what to build and what it is worth, or what comes down."""
-    designs = [folder for folder in folders if folder.files("layouts.csv")]
+    designs = [folder for folder in folders if folder.files("layouts.csv", "design")]
     for folder in designs:
         yield from _titled([*_design(folder)], f"Design in {folder.label}", len(designs) > 1)
     passing = [block for f in folders if f.files("stations.csv") for block in _passing(f)]
@@ -497,6 +343,7 @@ SECTIONS = (
     ReportSection("assumptions", "Assumptions and their sources", assumed),
     ReportSection("passing", "What comes down"),
     ReportSection("layouts", "Layouts compared"),
+    ReportSection("corridor", "Corridor"),
     ReportSection("checks", "Checks"),
     ReportSection("risk", "Risk to life and traffic"),
     ReportSection("sureness", "How sure the answer is"),

@@ -28,6 +28,7 @@ import rigdda
 from rigdda import BadInput, Site
 from rigdda.agents import browser, cli, report_server
 from rigdda.agents.reports import assumptions, report_sections
+from rigdda.agents.reports.exhibits import EXHIBITS
 from rigdda.agents.reports.html_blocks import inline
 from rigdda.agents.run_record import RunRecord, read
 from rigdda.envs.outcome_cache import mechanics
@@ -238,7 +239,7 @@ def test_unknown_tables_are_in_the_appendix(made: Made, tmp_path: Path) -> None:
 
 def test_each_exhibit_belongs_to_a_section() -> None:
     names = {section.name for section in report_sections.SECTIONS}
-    assert {exhibit.section for exhibit in report_sections.EXHIBITS} <= names
+    assert {exhibit.section for exhibit in EXHIBITS} <= names
 
 
 def test_differences_of_sites_name_each_value() -> None:

@@ -212,7 +212,7 @@ def usual_columns(head: Sequence[str], rows: Sequence[Row]) -> tuple[Column, ...
 
 
 def _usual(name: str, ends: set[str], rows: Sequence[Row]) -> Column:
-    said = name.replace("_", " ")
+    said = name.replace("_", " ").replace(".", ".\u200b")  # a path may break after a dot
     if not all(_is_number(row[name]) for row in rows):
         return words(said, name)
     form = plain if name in ("x", "x_m", "seed") else figure

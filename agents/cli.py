@@ -527,8 +527,8 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
               help="Folder to write into.  [default: the first of RESULTS]")  # fmt: skip
 @click.option("--pdf", is_flag=True, help="Print the report to report.pdf as well. Needs Chromium, "
               "Chrome or Edge.")  # fmt: skip
-@click.option("--serve", is_flag=True, help="Show the report in a browser beside the replay of "
-              "RESULTS, which begins at the first impact. Ctrl-C ends it.")  # fmt: skip
+@click.option("--serve", is_flag=True, help="Serve the report on this machine beside the replay "
+              "of RESULTS, which begins at the first impact. Ctrl-C ends it.")  # fmt: skip
 def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) -> None:
     """Write one report of results folders: report.html.
 

@@ -263,7 +263,8 @@ def simulate(
             raise click.UsageError("--station is for --model blocks")
         points = rigdda.lumped(where, barriers, seeds, event)
         folder = folder_for(out, f"simulate-{where.name}", "points.csv")
-        tables.write_points(folder / "points.csv", seeds, points)
+        with kept(folder, where):
+            tables.write_points(folder / "points.csv", seeds, points)
         show(tables.points(points))
         note(findings.unfitted(where))
         note(findings.of_layout(where, barriers, event))

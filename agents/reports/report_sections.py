@@ -163,19 +163,22 @@ def _place(text: str, x: float, site: Site) -> str:
 
 def _asked(folder: ResultsFolder) -> str:
     """Return the targets of a design in words."""
-    options = folder.records["design"].options if "design" in folder.records else {}
-    pairs = (("reaches the road", "target"), ("fails", "failure"))
+    options = folder.records["design"].options
+    pairs = (
+        ("target", "a block of a design event reaches the road"),
+        ("failure", "a barrier fails in a design event"),
+    )
     said = [
         f"{what} with a probability of at most {percent(float(options[name]))}"
-        for what, name in pairs
+        for name, what in pairs
         if options.get(name) is not None
     ]
-    return " and ".join(said)
+    return " and that ".join(said)
 
 
 def _verdict(state: str, asked: str) -> str:
     """Return whether the targets are met, in words."""
-    goal = f"the target that a block of a design event {asked}" if asked else "the target"
+    goal = f"the target that {asked}"
     if state == "met":
         return f"This layout meets {goal}."
     if state == "missed":

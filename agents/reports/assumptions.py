@@ -103,9 +103,9 @@ def _surface(name: str, surface: Surface) -> Iterator[tuple[str, ...]]:
             continue
         spread = getattr(surface, f"{field}_sd", getattr(surface, "friction_sd_deg", 0.0))
         spread = 0.0 if field == "roughness" else spread
-        text = plain(value) + (f" ± {plain(spread)}" if spread else "")
+        text = plain(value) + (f"\u00a0±\u00a0{plain(spread)}" if spread else "")
         known: Span | None = getattr(ground, field) if ground else None
-        ends = f"{plain(known.low)} to {plain(known.high)}" if known else "-"
+        ends = f"{plain(known.low)}\u00a0to\u00a0{plain(known.high)}" if known else "-"
         yield called, f"{words} [{unit}]", text, ends, _source(value, known)
         called = ""
 

@@ -134,19 +134,30 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
         mood = "good" if targets == "met" else "warning"
         yield Paragraph(_verdict(targets, asked), mood)
     z, nothing = _money_of(chosen), _money_of(rows[0])
-    if layout and float(chosen["objective_low"]) > float(rows[0]["objective_high"]):
-        yield Paragraph(
-            f"A year costs {z} EUR per metre of road with this layout and {nothing} EUR without "
-            "barriers: it costs more than it saves"
-            + (", and only the target is a reason to build it." if targets else "."),
-            "warning",
-        )
+    if layout and (doubt := _doubt(chosen, rows[0], bool(targets))):
+        yield Paragraph(doubt, "warning")
     yield Figures([
         ("To build", f"{euros(float(chosen['cost']))} EUR", "per metre of road"),
         ("Annual cost Z", f"{z} EUR", f"per metre and year with it ({_ends_of(chosen)})"),
         ("Without barriers", f"{nothing} EUR", f"per metre and year ({_ends_of(rows[0])})"),
         *_chances(folder, chosen["layout"], rows[0]["layout"]),
     ])  # fmt: skip
+
+
+def _doubt(chosen: Row, nothing: Row, targets: bool) -> str:
+    """Return a warning if a layout costs more than it saves, or is not shown to save anything."""
+    if float(chosen["objective_low"]) > float(nothing["objective_high"]):
+        reason = ", and only the target is a reason to build it" if targets else ""
+        return (
+            f"A year costs {_money_of(chosen)} EUR per metre of road with this layout and "
+            f"{_money_of(nothing)} EUR without barriers: it costs more than it saves{reason}."
+        )
+    if float(chosen["objective_high"]) >= float(nothing["objective_low"]):
+        return (
+            f"{int(chosen['releases']):,} releases do not show that this layout saves more than it "
+            "costs: verify it with more."
+        )
+    return ""
 
 
 def _place(text: str, x: float, site: Site) -> str:

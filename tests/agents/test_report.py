@@ -242,6 +242,24 @@ def test_each_exhibit_belongs_to_a_section() -> None:
     assert {exhibit.section for exhibit in EXHIBITS} <= names
 
 
+@pytest.mark.parametrize(
+    "low, high, words",
+    [
+        (10.0, 20.0, ""),
+        (90.0, 110.0, "40 releases do not show"),
+        (190.0, 210.0, "it costs more than it saves, and only the target"),
+    ],
+)
+def test_a_layout_that_does_not_pay_is_warned_of(low: float, high: float, words: str) -> None:
+    def row(z: float, low: float, high: float) -> dict[str, str]:
+        ends = {"objective": z, "objective_low": low, "objective_high": high, "releases": 40}
+        return {name: str(value) for name, value in ends.items()}
+
+    nothing = row(100.0, 95.0, 105.0)
+    found = report_sections._doubt(row(0.5 * (low + high), low, high), nothing, targets=True)
+    assert words in found and bool(found) == bool(words)
+
+
 def test_differences_of_sites_name_each_value() -> None:
     site = Site.load("quick")
     prices = msgspec.structs.replace(site.prices, interest=0.05)

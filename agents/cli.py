@@ -18,10 +18,12 @@ import click
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.agents.limits import SEED
 from rigdda.agents.terminal import (
+    Folder,
     Stopped,
     count_option,
     executor_option,
     fail,
+    finding,
     folder_for,
     kept,
     layout_option,
@@ -56,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with warnings.catch_warnings():
             warnings.showwarning = once()
-            return cli.main(argv, prog_name="rigdda", standalone_mode=False) or 0
+            return _run(sys.argv[1:] if argv is None else argv)
     except click.Abort:
         return fail("interrupted", 130)
     except click.ClickException as error:
@@ -72,6 +74,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not isinstance(error, Error):
             raise
         return fail(str(error), 2 if isinstance(error, BadInput) else 1)
+
+
+def _run(argv: Sequence[str]) -> int:
+    """Run a command; its arguments are the object of the context, from which they are recorded."""
+    typed = list(argv)
+    return cli.main(typed, prog_name="rigdda", standalone_mode=False, obj=list(typed)) or 0
 
 
 def _version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -164,20 +172,27 @@ def check(site: str, seed: int, out: Path | None) -> None:
 
     where = rigdda.Site.load(site)
     folder = folder_for(out, f"check-{where.name}", "site.png")
-    with kept(folder):
+    with kept(folder, where):
         site_check.draw(folder / "site.png", where)
         trials = site_check.try_releases(where, seed)
     for line in site_check.facts(where):
         click.echo(line)
     show(site_check.table(where, trials))
     click.echo(site_check.time_of(where, trials))
-    if count := site_check.placeholders(site):
-        note(f"the file marks {count} values as placeholders to replace")
+    _warn_of_placeholders(site)
     odd = site_check.oddities(where, trials)
     for line in odd:
-        click.echo(f"odd: {line}")
+        finding(f"odd: {line}")
     words = f"{len(odd)} things look odd" if len(odd) != 1 else "1 thing looks odd"
     click.echo(f"{words if odd else 'nothing looks odd'}; site.png is in {folder}")
+
+
+def _warn_of_placeholders(site: str) -> None:
+    """Print a note if a site file still has placeholders of `rigdda new`."""
+    from rigdda.agents import site_check
+
+    if count := site_check.placeholders(site):
+        note(f"the site file marks {count} values as placeholders to replace")
 
 
 @cli.command()
@@ -250,7 +265,8 @@ def simulate(
             raise click.UsageError("--station is for --model blocks")
         points = rigdda.lumped(where, barriers, seeds, event)
         folder = folder_for(out, f"simulate-{where.name}", "points.csv")
-        tables.write_points(folder / "points.csv", seeds, points)
+        with kept(folder, where):
+            tables.write_points(folder / "points.csv", seeds, points)
         show(tables.points(points))
         note(findings.unfitted(where))
         note(findings.of_layout(where, barriers, event))
@@ -259,7 +275,7 @@ def simulate(
     where.realise(barriers, seed, event)  # report an impossible layout before making a folder
     asked = check_stations(where, at or (where.road.start,))
     folder = folder_for(out, f"simulate-{where.name}", *simulation_folder.files(asked.tolist()))
-    with kept(folder), progress(releases) as tick:
+    with kept(folder, where), progress(releases) as tick:
         lines = simulation_folder.lines(where, asked)
         found = jobs.simulate(where, barriers, seeds, event, lines.tolist(), folder, tick)
         tick(releases, "tables and pictures")
@@ -274,6 +290,7 @@ def simulate(
         show(table)
     click.echo("intervals: 95 %; ?: too few blocks for this end; height: of the centre of a block")
     note(findings.of_layout(where, barriers, event))
+    _warn_of_placeholders(site)
     note(stations.undecided(passing))
     if passing.not_drawn:
         names = ", ".join(passing.not_drawn)
@@ -298,7 +315,7 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
 
     where = DesignProblem(site).site
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
-    with kept(folder), progress(6 * releases) as tick:
+    with kept(folder, where), progress(6 * releases) as tick:
         found = fidelity_bias.compare(where, releases, seed, tick)
     fidelity_bias.write(folder / "fidelity.csv", where, found)
     show(fidelity_bias.table(found))
@@ -341,7 +358,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     where, barriers = rigdda.Site.load(target), read_layout(layout)
     where.realise(barriers, seed, event)
     folder = folder_for(out, f"replay-{where.name}", "episode.rrd")
-    with kept(folder):
+    with kept(folder, where):
         run, outcome = rigdda.release(where, barriers, seed, event)
     came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
     notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
@@ -443,12 +460,13 @@ def design(
     problem = _pose(site, kinds, target, failure, zone)
     folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
     claim(folder, problem, *FILES)
-    with kept(folder):
+    with kept(folder, problem.site):
         with progress(budget + CASES * verify) as tick:
             done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
             tick(budget + CASES * verify, "pictures")
             write(done, folder, seed)
     _tell(done, store, verify, folder)
+    _warn_of_placeholders(site)
 
 
 def _pose(
@@ -497,14 +515,48 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         *findings.failing(done.problem.site, chosen),
         findings.undecided(done.problem, chosen),
     ]
-    for line in filter(None, lines):
-        click.echo(line)
+    for line in lines:
+        finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
         f"verification: {verify:,} new releases of each layout{resumed}\n"
         f"{', '.join(FILES)} are in {folder}"
     )
+
+
+@cli.command()
+@click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=Folder(file_okay=False, path_type=Path),
+              help="Folder to write into.  [default: the first of RESULTS]")  # fmt: skip
+@click.option("--pdf", is_flag=True, help="Print the report to report.pdf as well. Needs Chromium, "
+              "Chrome or Edge.")  # fmt: skip
+@click.option("--serve", is_flag=True, help="Serve the report on this machine beside the replay "
+              "of RESULTS, which begins at the first impact. Ctrl-C ends it.")  # fmt: skip
+def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) -> None:
+    """Write one report of results folders: report.html.
+
+    RESULTS are folders that design, simulate, study, check or fit wrote. The page holds everything
+    in itself, so that it opens without a network and prints on A4: a summary, the site, the
+    assumptions with their sources, what comes down, the layouts compared, the limits of the method,
+    and the commands, seeds and versions to repeat the results.
+    """
+    from rigdda.agents import browser
+    from rigdda.agents.reports import report_page, results_folder
+
+    folders = results_folder.open_all(results)
+    program = browser.find() if pdf else None
+    replay = results_folder.replay_of(folders) if serve else None
+    page = report_page.compose(folders)
+    files = (report_page.FILE, "report.pdf") if pdf else (report_page.FILE,)
+    file = report_page.write(page, folder_for(out or results[0], "", *files))
+    click.echo(file)
+    if program is not None:
+        click.echo(browser.print_pdf(program, file))
+    if replay is not None:
+        from rigdda.agents.report_server import serve as show_both
+
+        show_both(file, replay, click.echo)
 
 
 @cli.command()
@@ -524,7 +576,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
     asked = studies.load(file)
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
-    with kept(folder), progress(asked.size) as tick:
+    with kept(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
     show(studies.table(asked, folder / "study.csv"))
@@ -628,7 +680,7 @@ def fit(
     where = rigdda.Site.load(site)
     seen, parameters = job.read(observed, where), [job.parse(name) for name in names]
     folder = folder_for(out, f"fit-{where.name}", "site.toml", "fit.csv", "fit.png")
-    with kept(folder), progress(budget) as tick:
+    with kept(folder, where), progress(budget) as tick:
         found = job.fit(where, seen, parameters, budget, releases, seed, tick, model)
         found.site.save(folder / "site.toml")
         job.write(folder / "fit.csv", found, seen)

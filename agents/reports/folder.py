@@ -8,16 +8,18 @@ import rigdda
 from rigdda import Layout, Site
 from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.reports import findings, pictures
+from rigdda.agents.reports import findings, layout_tables, pictures
 from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
 from rigdda.agents.reports.simulation_folder import along
+from rigdda.agents.reports.tables import write_rows
 from rigdda.agents.reports.wording import euros, span
 from rigdda.barriers import standing
 from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
 
 FILES = (
-    "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png", "episode.rrd",
+    "evaluations.csv", "evaluations.jsonl", "layouts.csv", "chances.csv", "layout.toml",
+    "section.png", "cost.png", "episode.rrd",
 )  # fmt: skip
 
 
@@ -26,13 +28,15 @@ SEEN = 50
 
 
 def write(done: DesignStudy, out: Path, seed: int) -> None:
-    """Write `layout.toml`, `section.png`, `cost.png` and `episode.rrd` of a study into `out`.
+    """Write the tables of the layouts, `layout.toml`, pictures and `episode.rrd` into `out`.
 
     Raises
     ------
     Diverged
         If a simulation diverges.
     """
+    write_rows(out / "layouts.csv", layout_tables.layouts(done))
+    write_rows(out / "chances.csv", layout_tables.chances(done))
     rigdda.save_layout(done.chosen.evaluation.layout, out / "layout.toml")
     _section(done, out / "section.png", seed)
     tried = [entry.evaluation for entry in done.result.history.stage("search")]

@@ -10,6 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -308,10 +309,19 @@ def _named(axes: Axes, point: Point, marker: str, colour: str) -> None:
                   label=f"{point.name}: Z = {point.capital + point.risk:,.0f}")  # fmt: skip
 
 
+VECTOR: dict[Any, Any] = {"svg.hashsalt": "rigdda", "svg.fonttype": "path"}
+"""Settings of vector pictures: the same figure gives the same file, and letters are outlines, so
+that no font is needed."""
+
+
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure as PNG atomically."""
+    """Write a figure as PNG and, beside it, as SVG for reports; each atomically."""
+    from matplotlib import rc_context
+
     with atomic(path) as part:
         figure.savefig(part, format="png")
+    with rc_context(VECTOR), atomic(Path(path).with_suffix(".svg")) as part:
+        figure.savefig(part, format="svg", metadata={"Date": None})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

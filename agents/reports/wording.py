@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rigdda import Barrier, Mesh, Site
@@ -36,3 +37,10 @@ def percent(share: float) -> str:
     """Return a probability or a share in per cent: two significant figures below 10 %."""
     value = 100.0 * share
     return f"{value:.0f} %" if value >= 9.95 or value == 0.0 else f"{value:.2g} %"
+
+
+def figure(value: float) -> str:
+    """Return a number with three significant figures, and "?" if there is none."""
+    if math.isnan(value):
+        return "?"
+    return f"{value:,.0f}" if abs(value) >= 99.95 else f"{value:.3g}"

@@ -28,8 +28,8 @@ COMMANDS = (
     "validate", "replay", "repeat",
 )  # fmt: skip
 FILES = (
-    "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png",
-    "episode.rrd", "problem.json",
+    "evaluations.csv", "evaluations.jsonl", "layouts.csv", "chances.csv", "layout.toml",
+    "section.png", "section.svg", "cost.png", "cost.svg", "episode.rrd", "problem.json", "run.json",
 )  # fmt: skip
 NUMBERS = ("objective", "objective_low", "objective_high", "capital", "harm", "repair", "cost")
 

@@ -406,6 +406,8 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that a barrier fails in a design "
               "event.")  # fmt: skip
+@click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
+              help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
 @click.option("--zone", type=float, nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m].  [default: the zone of "
               "the site]")  # fmt: skip
@@ -420,6 +422,7 @@ def design(
     kinds: Kinds,
     target: float | None,
     failure: float | None,
+    max_cost: float | None,
     zone: tuple[float, float] | None,
     budget: int,
     verify: int,
@@ -440,7 +443,7 @@ def design(
     from rigdda.agents.designers.store import FILE, claim
     from rigdda.agents.reports.folder import FILES, write
 
-    problem = _pose(site, kinds, target, failure, zone)
+    problem = _pose(site, kinds, target, failure, max_cost, zone)
     folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
     claim(folder, problem, *FILES)
     with kept(folder):
@@ -456,13 +459,14 @@ def _pose(
     kinds: Kinds,
     target: float | None,
     failure: float | None,
+    max_cost: float | None,
     zone: tuple[float, float] | None,
 ) -> DesignProblem:
     """Return the design problem that the options describe."""
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
-    asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None}
+    asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None, "max_cost": max_cost}
     if target is not None or failure is not None:
         asked["targets"] = Targets(target, failure)
     return DesignProblem(site, **asked)

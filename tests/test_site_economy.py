@@ -43,10 +43,10 @@ def test_annuity_pays_back_a_loan():
     rate, life = PRICES.interest, PRICES.life
     left = 1.0
     for _ in range(int(life)):
-        left = left * (1.0 + rate) - PRICES.annuity
+        left = left * (1.0 + rate) - PRICES.annuity("fence")
     assert left == pytest.approx(0.0, abs=1e-9)
-    assert replace(PRICES, interest=0.0).annuity == pytest.approx(1.0 / life)
-    assert PRICES.annual("fence") == pytest.approx(PRICES.annuity + 0.015)
+    assert replace(PRICES, interest=0.0).annuity("fence") == pytest.approx(1.0 / life)
+    assert PRICES.annual("fence") == pytest.approx(PRICES.annuity("fence") + 0.015)
 
 
 def test_concrete_is_paid_by_the_cubic_metre():
@@ -122,7 +122,7 @@ def test_a_layout_costs_a_year_what_its_parts_cost():
     each = sum(FLAT.capital((b,)) * PRICES.annual(b.kind) for b in layout)
     assert FLAT.annual(layout) == pytest.approx(each)
     assert FLAT.capital(()) == FLAT.annual(()) == 0.0
-    assert FLAT.shed() == pytest.approx(25_000.0 * (PRICES.annuity + 0.005))
+    assert FLAT.shed() == pytest.approx(25_000.0 * (PRICES.annuity("shed") + 0.005))
 
 
 def test_harm_is_closure_by_days_and_clearing():

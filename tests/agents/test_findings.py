@@ -36,7 +36,7 @@ def test_what_costs_as_little_a_year_and_less_to_build_is_named(problem: DesignP
 def test_nothing_pays_only_if_nothing_that_was_verified_does(problem: DesignProblem) -> None:
     nothing = problem.evaluate((), seeds=range(4))
     dear, bare = replace(nothing, ci=(900.0, 920.0)), replace(nothing, ci=(900.0, 920.0))
-    result = DesignResult(problem.site, (), bare, History(()), 10, "start", (), 0.0)
+    result = DesignResult(problem.site, (), bare, History(()), 10, "start", (), 0.0, ())
 
     def told(other: Evaluation) -> str:
         return findings.limits(result, [("nothing", bare), ("rule", other), ("found", bare)], "")

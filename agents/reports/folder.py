@@ -6,6 +6,7 @@ from pathlib import Path
 
 import rigdda
 from rigdda import Layout, Site
+from rigdda.agents import archive
 from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import findings, pictures
@@ -17,7 +18,8 @@ from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
 
 FILES = (
-    "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png", "episode.rrd",
+    "evaluations.csv", "evaluations.jsonl", archive.FILE, "layout.toml", "section.png", "cost.png",
+    "episode.rrd",
 )  # fmt: skip
 
 

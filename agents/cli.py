@@ -474,7 +474,7 @@ def _pose(
 
 def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
-    from rigdda.agents.reports import findings, tables
+    from rigdda.agents.reports import findings, frontier_report, tables
     from rigdda.agents.reports.folder import FILES
     from rigdda.agents.reports.wording import order
 
@@ -490,6 +490,11 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         show(chances)
     else:
         click.echo("the site has no design events (design = true)")
+    tried = len({one.layout for one in result.tried} | {c.evaluation.layout for c in done.cases})
+    for line in findings.frontier(done, done.frontier, tried, done.replaced):
+        click.echo(line)
+    if done.frontier:
+        show(frontier_report.table(done.frontier))
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
     click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
     for barrier in chosen.layout:
@@ -507,8 +512,71 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
         f"verification: {verify:,} new releases of each layout{resumed}\n"
-        f"{', '.join(FILES)} are in {folder}"
+        f"{', '.join((*FILES, *(frontier_report.FILES if done.frontier else ())))} are in {folder}"
     )
+
+
+@cli.command()
+@click.argument("results", metavar="RESULTS", type=click.Path(path_type=Path))
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE",
+              help="New value of a key of the site file, such as consequences.closure=20000. May "
+              "be repeated.")  # fmt: skip
+@click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable probability that rock of a design event reaches the "
+              "road.  [default: that of the design]")  # fmt: skip
+@click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable probability that a barrier fails in a design event.  "
+              "[default: that of the design]")  # fmt: skip
+@click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
+              help="Largest capital cost of a layout in EUR per metre of road.  [default: that of "
+              "the design]")  # fmt: skip
+@out_option("reprice-RESULTS")
+def reprice(
+    results: Path,
+    settings: tuple[str, ...],
+    target: float | None,
+    failure: float | None,
+    max_cost: float | None,
+    out: Path | None,
+) -> None:
+    """Answer for other prices, rates, targets or caps from the folder RESULTS of a design.
+
+    Nothing is simulated: the outcomes of all releases of the design are evaluated with the new
+    values. The last row of the table is the best of all layouts that the search evaluated. Keys
+    on which the motion of rock depends are refused.
+
+    Writes costs.csv, site.toml (the site with the new values), layout.toml (the best layout),
+    cost.png and, if a target is missed, frontier.csv and frontier.png.
+    """
+    from rigdda.agents import reprice as job
+    from rigdda.agents.reports import findings, frontier_report, reprice_report, tables
+    from rigdda.agents.reports.wording import order
+
+    done = job.reprice(results, job.parse_all(settings), job.other_targets(target, failure),
+                       max_cost)  # fmt: skip
+    files = (*reprice_report.FILES, *frontier_report.FILES)
+    folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
+    if folder.resolve() == results.resolve():
+        raise click.UsageError("--out is the folder of the design: name another folder")
+    with kept(folder):
+        reprice_report.write(done, folder)
+    for change in done.changes:
+        click.echo(reprice_report.changed(change))
+    show(tables.costs(done))
+    chances = tables.chances(done)
+    if chances is not None:
+        show(chances)
+    for line in findings.frontier(done, done.frontier, done.tried, False):
+        click.echo(line)
+    if done.frontier:
+        show(frontier_report.table(done.frontier))
+    chosen = done.chosen.evaluation.layout
+    click.echo("layout:" if chosen else "layout: no barrier")
+    for barrier in chosen:
+        click.echo(f"  {order(barrier, done.problem.site)}")
+    for line in reprice_report.sentences(done):
+        click.echo(line)
+    click.echo(f"nothing was simulated; the results are in {folder}")
 
 
 @cli.command()

@@ -32,9 +32,9 @@ from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.cost import account, judge
 from rigdda.envs.ensemble import Ensemble, statistics
 from rigdda.envs.intervals import Estimate, estimate
-from rigdda.envs.problem import MISSED, Targets
+from rigdda.envs.problem import MISSED, Targets, read_targets
 
-BEST = "best of the search"
+BEST = "best of search"
 """Name of the layout that is best for the new values."""
 
 Value = bool | int | float | str | Mapping[str, Any]
@@ -79,6 +79,29 @@ def parse(text: str) -> tuple[str, Value]:
     return path, found["value"]
 
 
+def parse_all(texts: Sequence[str]) -> dict[str, Value]:
+    """Return settings by path; see `parse`.
+
+    Raises
+    ------
+    BadInput
+        If one has another form, or two have the same path.
+    """
+    found: dict[str, Value] = {}
+    for text in texts:
+        path, value = parse(text)
+        if path in found:
+            raise BadInput("--set", text, "set each key once")
+        found[path] = value
+    return found
+
+
+def other_targets(reach: float | None, failure: float | None) -> dict[str, float] | None:
+    """Return the targets that replace those of the design; None if both are None."""
+    given = {"reach": reach, "failure": failure}
+    return {name: value for name, value in given.items() if value is not None} or None
+
+
 def with_settings(site: Site, settings: Mapping[str, Value]) -> tuple[Site, tuple[Change, ...]]:
     """Return a site with other values and the changes.
 
@@ -97,37 +120,37 @@ def with_settings(site: Site, settings: Mapping[str, Value]) -> tuple[Site, tupl
     """
     changes = []
     for path, value in settings.items():
-        changes.append(Change(path, _present(site, path), value))
+        changes.append(Change(path, _present(site, path, value), value))
         site = _with(site, path, value)
     return site, tuple(changes)
 
 
-def _table_of(site: Site, path: str) -> tuple[str, list[str]]:
+def _table_of(site: Site, path: str, value: Value) -> tuple[str, list[str]]:
     """Return the table of a path that may be changed, and the keys within it."""
     top, *keys = path.split(".")
     names = type(site).__struct_fields__
     if top not in names:
         near = difflib.get_close_matches(top, names, 1)
         mend = f"did you mean {near[0]}?" if near else "give a key such as consequences.closure"
-        raise BadInput("--set", path, f"there is no such key: {mend}")
+        raise BadInput(path, value, f"there is no such key: {mend}")
     if top in MOTION:
-        raise _needs_simulation(path)
+        raise _needs_simulation(path, value)
     if top == "barrier_zone":
         mend = "a search in another zone tries other layouts: run `rigdda design` for this"
-        raise BadInput("--set", path, mend)
+        raise BadInput(path, value, mend)
     if top in LABELS:
-        raise BadInput("--set", path, "leave it out: no result depends on it")
+        raise BadInput(path, value, "leave it out: no result depends on it")
     if not keys:
-        raise BadInput("--set", path, f"add a key of the table, such as {top}.KEY=VALUE")
+        raise BadInput(path, value, f"add a key of the table, such as {top}.KEY=VALUE")
     return top, keys
 
 
-def _needs_simulation(path: str) -> BadInput:
+def _needs_simulation(path: str, value: Value) -> BadInput:
     mend = "releases depend on it: change it in the site file and run `rigdda design`"
-    return BadInput("--set", path, mend)
+    return BadInput(path, value, mend)
 
 
-def _named(site: Site, path: str, top: str) -> tuple[int, list[str]]:
+def _named(site: Site, path: str, value: Value, top: str) -> tuple[int, list[str]]:
     """Return the index of a named table in a list, and the keys within it.
 
     Names may contain dots. The longest name with which the path begins is meant.
@@ -137,24 +160,24 @@ def _named(site: Site, path: str, top: str) -> tuple[int, list[str]]:
     found = [name for name in names if rest == name or rest.startswith(f"{name}.")]
     if not found:
         known = ", ".join(names) or f"none: the site has no {top}"
-        raise BadInput("--set", path, f"give the name of one of the {top}: {known}")
+        raise BadInput(path, value, f"give the name of one of the {top}: {known}")
     name = max(found, key=len)
     keys = rest[len(name) + 1 :].split(".") if rest != name else []
     if not keys:
-        raise BadInput("--set", path, f"add a key, such as {top}.{name}.KEY=VALUE")
+        raise BadInput(path, value, f"add a key, such as {top}.{name}.KEY=VALUE")
     if top == "events":
         known_keys = type(site.events[0]).__struct_fields__
         if keys[0] in known_keys and keys[0] not in EVENT_KEYS:
-            raise _needs_simulation(path)
+            raise _needs_simulation(path, value)
     return names.index(name), keys
 
 
-def _present(site: Site, path: str) -> Any:
-    """Return the present value of a path, or None if it has none."""
-    top, keys = _table_of(site, path)
+def _present(site: Site, path: str, value: Value) -> Any:
+    """Return the present value of a path, or None if it has none; `value` is the new one."""
+    top, keys = _table_of(site, path, value)
     table: Any = getattr(site, top)
     if isinstance(table, tuple):
-        index, keys = _named(site, path, top)
+        index, keys = _named(site, path, value, top)
         table = table[index]
     found = msgspec.to_builtins(table)
     for key in keys:
@@ -164,11 +187,11 @@ def _present(site: Site, path: str) -> Any:
 
 def _with(site: Site, path: str, value: Value) -> Site:
     """Return a site with one other value."""
-    top, keys = _table_of(site, path)
+    top, keys = _table_of(site, path, value)
     table: Any = getattr(site, top)
     if not isinstance(table, tuple):
         return msgspec.structs.replace(site, **{top: _changed(table, path, top, keys, value)})
-    index, keys = _named(site, path, top)
+    index, keys = _named(site, path, value, top)
     where = f"{top}.{table[index].name}"
     new = _changed(table[index], path, where, keys, value)
     return msgspec.structs.replace(site, **{top: (*table[:index], new, *table[index + 1 :])})
@@ -185,7 +208,7 @@ def _changed(
     for key in keys[:-1]:
         inner = inner.setdefault(key, {})
         if not isinstance(inner, dict):
-            raise BadInput("--set", path, f"shorten it: {key} has no further keys")
+            raise BadInput(path, value, f"shorten it: {key} has no further keys")
     inner[keys[-1]] = value
     return fields.read(type(table), found, where)
 
@@ -237,8 +260,7 @@ class Candidate:
     verified : bool
         Whether it was verified.
     upper : float
-        Estimate of Z plus 1.645 standard errors, which is about the upper end of the one-sided 95 %
-        interval [EUR per metre of road and year].
+        Estimate of Z plus two standard errors [EUR per metre of road and year].
     tried : TriedLayout or None
         Its cost and probabilities; None if the site has no design events.
     over, least : float
@@ -294,7 +316,7 @@ def reprice(
     settings : mapping, optional
         New values by path in the site file, see `with_settings`.
     targets : Targets or mapping, optional
-        Other targets; by default those of the design.
+        Other targets; those that are not given are as in the design.
     max_cost : float, optional
         Another largest capital cost [EUR per metre of road]; by default that of the design.
 
@@ -305,16 +327,15 @@ def reprice(
     """
     kept = archive.read(Path(results))
     site, changes = with_settings(kept.site, settings or {})
-    asked: Any = kept.targets if targets is None else targets
+    asked = targets if isinstance(targets, Targets) else _merged(kept.targets, targets or {})
     most = kept.max_cost if max_cost is None else max_cost
     problem = ArchivedProblem(kept, site, asked, most)
     found = _candidates(problem, kept)
-    best = choose(problem, list(found.values()))
+    best, evaluation = choose(problem, list(found.values()), kept)
     cases = []
     for name, tables in zip(kept.names, kept.layouts, strict=True):
         layout = archive.layout_of(tables)
         cases.append(VerifiedLayout(name, judged(problem, found[layout], kept)))
-    evaluation = judged(problem, best, kept)
     cases.append(VerifiedLayout(BEST, evaluation))
     tried = [c for c in found.values() if problem.place.too_expensive(c.layout) is None]
     front: tuple[TriedLayout, ...] = ()
@@ -333,6 +354,12 @@ def reprice(
         tried=len(tried),
         frontier=front,
     )
+
+
+def _merged(before: Targets, given: Mapping[str, float | None]) -> Targets:
+    """Return targets of which some are replaced."""
+    read_targets(given)
+    return replace(before, **given)
 
 
 def judged(problem: DesignProblem, candidate: Candidate, kept: Archive) -> Evaluation:
@@ -377,8 +404,8 @@ def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, Candida
 FEW = 8
 """Number of releases of an event to which the mean without barriers complements fewer releases."""
 
-ONE_SIDED = 1.645
-"""Quantile of the normal distribution for a one-sided 95 % limit [-]."""
+ERRORS = 2.0
+"""Number of standard errors above an estimate of Z at which layouts are compared first [-]."""
 
 
 def _candidate(
@@ -413,7 +440,7 @@ def _candidate(
     if chances:
         reach, failure = (worst(seen) for seen in zip(*chances.values(), strict=True))
         tried = TriedLayout(layout, site.capital(layout), reach, failure)
-    upper = value + ONE_SIDED * math.sqrt(variance)
+    upper = value + ERRORS * math.sqrt(variance)
     return Candidate(layout, outcomes, verified, upper, tried, over, least)
 
 
@@ -426,18 +453,28 @@ def _excess(targets: Targets, chances: Mapping[str, tuple[Estimate, Estimate]], 
     return max(over)
 
 
-def choose(problem: DesignProblem, candidates: Sequence[Candidate]) -> Candidate:
-    """Return the best candidate that may be built.
+SHORTLIST = 40
+"""Number of layouts whose intervals of Z are computed to choose the best."""
 
-    It is the one with the lowest upper limit of Z among those that meet the targets, so that no
-    layout is chosen because it has few releases and was lucky. If none meets the targets, it is the
-    one that misses them least. If others with at least half as many releases are not shown to miss
-    them by more, it is the one with the lowest upper limit of Z of these.
+
+def choose(
+    problem: DesignProblem, candidates: Sequence[Candidate], kept: Archive
+) -> tuple[Candidate, Evaluation]:
+    """Return the best candidate that may be built, and its evaluation.
+
+    Among those that meet the targets, it is the one with the lowest upper end of the 95 % interval
+    of Z, so that no layout is chosen because it has few releases and was lucky. If none meets the
+    targets, it is the one that misses them least. If others with at least half as many releases are
+    not shown to miss them by more, it is chosen among these in the same way.
     """
     may = [c for c in candidates if problem.place.too_expensive(c.layout) is None]
     first = min(may, key=lambda c: (c.over, c.upper))
-    if first.over <= 0.0:
-        return first
     enough = 0.5 * len(first.outcomes)
-    alike = [c for c in may if c.least <= first.over and len(c.outcomes) >= enough]
-    return min(alike, key=lambda c: c.upper)
+    if first.over <= 0.0:
+        field = [c for c in may if c.over <= 0.0]
+    else:
+        field = [c for c in may if c.least <= first.over and len(c.outcomes) >= enough]
+    order = sorted(field, key=lambda c: c.upper)
+    short = [*order[:SHORTLIST], *(c for c in order[SHORTLIST:] if c.verified)]
+    judgements = [(c, judged(problem, c, kept)) for c in short]
+    return min(judgements, key=lambda pair: pair[1].ci[1])

@@ -9,7 +9,7 @@ from rigdda import Layout, Site
 from rigdda.agents import archive
 from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.reports import findings, pictures
+from rigdda.agents.reports import findings, frontier_report, pictures
 from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
 from rigdda.agents.reports.simulation_folder import along
 from rigdda.agents.reports.wording import euros, span
@@ -37,6 +37,7 @@ def write(done: DesignStudy, out: Path, seed: int) -> None:
     """
     rigdda.save_layout(done.chosen.evaluation.layout, out / "layout.toml")
     _section(done, out / "section.png", seed)
+    frontier_report.write(out, done.problem, done.frontier)
     tried = [entry.evaluation for entry in done.result.history.stage("search")]
     points = [pictures.Point.of(case.name, case.evaluation) for case in done.cases]
     reference = pictures.Point(SHED, done.problem.site.shed(), 0.0, (0.0, 0.0))

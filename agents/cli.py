@@ -588,23 +588,36 @@ def study(file: str, seed: int, out: Path | None) -> None:
     """Compare the layouts of STUDY.toml on the same releases.
 
     The file gives a `site`, the number of `releases` of each event, and `layouts`. Each layout has
-    a `name` and either `barriers`, as in a layout file, or the name of a layout `file`. Writes one
-    row for each release to study.csv. An interrupted study continues from study.csv.
+    a `name` and either `barriers`, as in a layout file, or the name of a layout `file`.
+
+    Writes study.csv (one row for each release), layouts.csv (Z and its parts), events.csv
+    (probabilities and energies), differences.csv (of each pair of layouts, on common releases),
+    sections.png and costs.png. An interrupted study continues from study.csv.
     """
     from rigdda.agents import studies
-    from rigdda.agents.reports import findings
+    from rigdda.agents.reports import findings, study_report
 
     asked = studies.load(file)
-    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
+    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.FILES)
     with kept(folder), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
+        tick(asked.size, "tables and pictures")
+        found = studies.results(asked, folder / "study.csv")
+        study_report.write(folder, found, seed)
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
-    show(studies.table(asked, folder / "study.csv"))
+    show(study_report.costs(found))
+    click.echo(
+        "probabilities with 95 % upper bounds in brackets; largest energies on the road and of a\n"
+        "hit: 95 % quantiles of the releases with one, in kJ per metre of width"
+    )
+    show(study_report.events(found))
+    for line in study_report.sentences(found):
+        click.echo(line)
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):
             note(f"the layout {name!r} {words}")
     words = f", {resumed} from an earlier run" if resumed else ""
-    click.echo(f"{asked.size:,} releases{words}; study.csv is in {folder}")
+    click.echo(f"{asked.size:,} releases{words}; tables and pictures are in {folder}")
 
 
 @cli.command()

@@ -462,10 +462,11 @@ def choose(
 ) -> tuple[Candidate, Evaluation]:
     """Return the best candidate that may be built, and its evaluation.
 
-    Among those that meet the targets, it is the one with the lowest upper end of the 95 % interval
-    of Z, so that no layout is chosen because it has few releases and was lucky. If none meets the
-    targets, it is the one that misses them least. If others with at least half as many releases are
-    not shown to miss them by more, it is chosen among these in the same way.
+    Among those that meet the targets, it is the one with the lowest Z. A layout that was not
+    verified counts with the upper end of the 95 % interval of Z instead, so that none is chosen
+    because it has few releases and was lucky. If none meets the targets, it is the one that misses
+    them least. If others with at least half as many releases are not shown to miss them by more, it
+    is chosen among these in the same way.
     """
     may = [c for c in candidates if problem.place.too_expensive(c.layout) is None]
     first = min(may, key=lambda c: (c.over, c.upper))
@@ -477,4 +478,4 @@ def choose(
     order = sorted(field, key=lambda c: c.upper)
     short = [*order[:SHORTLIST], *(c for c in order[SHORTLIST:] if c.verified)]
     judgements = [(c, judged(problem, c, kept)) for c in short]
-    return min(judgements, key=lambda pair: pair[1].ci[1])
+    return min(judgements, key=lambda p: p[1].objective if p[0].verified else p[1].ci[1])

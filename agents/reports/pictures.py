@@ -378,6 +378,50 @@ def section(
         save(figure, path)
 
 
+COLUMNS = 3
+"""Largest number of slopes side by side."""
+
+
+def slopes(
+    path: str | os.PathLike[str], site: Site, zone: BarrierZone, panels: Sequence[Panel]
+) -> None:
+    """Write a PNG picture of several slopes to the same scale, without envelopes.
+
+    Parameters
+    ----------
+    path : path
+        The PNG file.
+    site : Site
+        The site.
+    zone : BarrierZone
+        The zone in which barriers may be built.
+    panels : sequence of Panel
+        The slopes, up to `COLUMNS` side by side.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    window = _window(site, panels)
+    left, right, bottom, top = window
+    columns = min(COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    tall = min(13.0 / columns * (top - bottom) / (right - left), 7.0) + 0.6
+    with rc_context(FONT):
+        figure = Figure((13.0, rows * tall + 1.2), dpi=DPI, layout="constrained")
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        drawn = list(zip(grid.flat, panels, strict=False))
+        labels = [_slope(axes, site, zone, panel, window) for axes, panel in drawn]
+        for axes, _ in drawn:
+            axes.set(xlim=(left, right), ylim=(bottom, top))
+            axes.label_outer()
+        for axes in grid.flat[len(panels) :]:
+            axes.set_visible(False)
+        _key(figure, site, [])
+        for (axes, _), own in zip(drawn, labels, strict=True):
+            write_labels(axes, own)
+        save(figure, path)
+
+
 def released(path: str | os.PathLike[str], passing: Passing, layout: Layout, rows: Rows) -> None:
     """Write a PNG picture of releases with a layout.
 

@@ -490,8 +490,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         show(chances)
     else:
         click.echo("the site has no design events (design = true)")
-    tried = len({one.layout for one in result.tried} | {c.evaluation.layout for c in done.cases})
-    for line in findings.frontier(done, done.frontier, tried, done.replaced):
+    for line in findings.frontier(done, done.frontier, len(result.tried), done.replaced):
         click.echo(line)
     if done.frontier:
         show(frontier_report.table(done.frontier))
@@ -499,14 +498,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
     for barrier in chosen.layout:
         click.echo(f"  {order(barrier, done.problem.site)}")
-    cases = [(case.name, case.evaluation) for case in done.cases]
-    lines = [findings.limits(result, cases, done.left)]
-    lines += [
-        *findings.cheaper(cases),
-        *findings.failing(done.problem.site, chosen),
-        findings.undecided(done.problem, chosen),
-    ]
-    for line in filter(None, lines):
+    for line in findings.of_design(done):
         click.echo(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
     click.echo(

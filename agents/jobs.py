@@ -154,7 +154,7 @@ def study(
     """Design a layout, then verify it and the layouts for comparison on `releases` new releases.
 
     If the layout misses a target, the layouts of the frontier are verified as well, see
-    `verified_frontier`, and the best of all verified layouts is taken.
+    `with_verified_frontier`, and the best of all verified layouts is taken.
 
     `evaluations.csv` and the store `evaluations.jsonl` are written into `out` during the search,
     and the archive of all outcomes at the end. A study that was interrupted reads the evaluations
@@ -190,7 +190,8 @@ def study(
                 file.add(Entry(result.simulations, "frontier", evaluation))
                 return evaluation
 
-            front = verified_frontier(problem, result.tried, cases, check)
+            known = with_verified_frontier(problem, result.tried, cases, check)
+            result, front = replace(result, tried=known), frontier(known)
             if name not in SEARCHLESS:
                 seen = [one.verified for one in front if one.verified is not None]
                 best = best_of_finals(problem, [*(case.evaluation for case in cases), *seen])
@@ -219,17 +220,17 @@ MOST_VERIFIED = 8
 """Largest number of layouts of a frontier that are verified in addition to the others."""
 
 
-def verified_frontier(
+def with_verified_frontier(
     problem: DesignProblem,
     tried: Sequence[TriedLayout],
     cases: Sequence[VerifiedLayout],
     check: Callable[[Layout], Evaluation],
 ) -> tuple[TriedLayout, ...]:
-    """Return the frontier of all layouts that were tried, with verified layouts as far as possible.
+    """Return all layouts that were tried, with those of their frontier verified if possible.
 
     The layout of the frontier with the lowest P(reach) that is not verified is verified, and then
-    the frontier is determined again with its new probabilities, up to `MOST_VERIFIED` times. No
-    layout that was tried dominates one of the result, see `rigdda.agents.designers.frontier`.
+    the frontier is determined again with its new probabilities, up to `MOST_VERIFIED` times. What
+    the verification says of a layout replaces what the search said.
 
     Parameters
     ----------
@@ -258,7 +259,7 @@ def verified_frontier(
             break
         layout = min(open_, key=lambda one: one.level).layout
         known[layout] = TriedLayout.of(problem.site, check(layout))
-    return frontier(known.values())
+    return tuple(known.values())
 
 
 def _with_layout(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigdda import BadInput, Layout, Mesh, Site
-from rigdda.agents.design_study import ComparedLayouts, design_events
+from rigdda.agents.design_study import ComparedLayouts, DesignStudy, design_events
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
 from rigdda.agents.reports.wording import at_most, euros, percent, span
@@ -206,6 +206,19 @@ def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
         if other.cost < chosen.cost and euros(other.cost) != euros(chosen.cost)
         if RANK[other.targets] <= RANK[chosen.targets]
     ]
+
+
+def of_design(done: DesignStudy) -> list[str]:
+    """Return all lines on the layout of a design, its limits, failures and targets."""
+    chosen = done.chosen.evaluation
+    cases = [(case.name, case.evaluation) for case in done.cases]
+    lines = [
+        limits(done.result, cases, done.left),
+        *cheaper(cases),
+        *failing(done.problem.site, chosen),
+        undecided(done.problem, chosen),
+    ]
+    return [line for line in lines if line]
 
 
 def left_over(evaluation: Evaluation) -> str:

@@ -118,7 +118,7 @@ def costs(results: StudyResults) -> Table:
     on common releases.
     """
     best = results.cheapest()
-    head = ("layout", "Z (95 %)", "capital", "harm", "repair", "to build", "more than the best")
+    head = ("layout", "Z (95 %)", "capital", "harm", "repair", "to build", "above best")
     out = empty_table(head)
     for one in results.layouts:
         z, low, high = results.objective(one)
@@ -141,7 +141,7 @@ def events(results: StudyResults) -> Table:
         for i, one in enumerate(results.layouts):
             fails = bounded(one.chance(event, failed=True)) if one.layout else "-"
             energies = [one.energy(event), one.energy(event, hit=True)]
-            words = ["-" if np.isnan(e) else f"{e:,.3g}" for e in energies]
+            words = ["-" if np.isnan(e) else euros(e) for e in energies]
             reach = bounded(one.chance(event))
             out.add_row("" if i else event, one.name, reach, fails, *words)
         out.add_section()

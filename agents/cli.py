@@ -1,4 +1,4 @@
-"""The command line: `rigdda sites | simulate | design | study | train | evaluate | ...`.
+"""The command line: `rigdda sites | simulate | design | reprice | study | train | ...`.
 
 Each command imports its modules when it runs, so that `--help` is fast.
 """
@@ -435,9 +435,12 @@ def design(
     search did not use. The best layout has the least cost Z. Z is the sum of capital and upkeep,
     expected harm on the road and expected repair, in EUR per metre of road and year.
 
-    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. An interrupted run
-    continues from evaluations.jsonl. A folder that contains the design of another problem
-    (problem.json) is refused.
+    If the layout misses a target, the cheapest layout for each level of P(reach) is reported and
+    written to frontier.csv and frontier.png.
+
+    Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd and the outcomes of all
+    releases, for `rigdda reprice`. An interrupted run continues from evaluations.jsonl. A folder
+    that contains the design of another problem (problem.json) is refused.
     """
     from rigdda.agents import jobs
     from rigdda.agents.designers.store import FILE, claim

@@ -263,8 +263,8 @@ class Candidate:
         Estimate of Z plus two standard errors [EUR per metre of road and year].
     tried : TriedLayout or None
         Its cost and probabilities; None if the site has no design events.
-    over, least : float
-        Largest excess over a target, of upper and of lower bounds [-].
+    over, share, least : float
+        Largest excess over a target, of upper bounds, of probabilities and of lower bounds [-].
     """
 
     layout: Layout
@@ -273,6 +273,7 @@ class Candidate:
     upper: float
     tried: TriedLayout | None
     over: float
+    share: float
     least: float
 
 
@@ -435,21 +436,27 @@ def _candidate(
         if event.design:
             counts = int(own.reached[which].sum()), int(own.failed[which].sum())
             chances[event.name] = estimate(counts[0], n), estimate(counts[1], n)
-    over, least = (_excess(problem.targets, chances, end) for end in ("bound", "floor"))
+    ends = ("bound", "probability", "floor")
+    over = [_excess(problem.targets, chances, end) for end in ends]
     tried = None
     if chances:
         reach, failure = (worst(seen) for seen in zip(*chances.values(), strict=True))
         tried = TriedLayout(layout, site.capital(layout), reach, failure)
     upper = value + ERRORS * math.sqrt(variance)
-    return Candidate(layout, outcomes, verified, upper, tried, over, least)
+    return Candidate(layout, outcomes, verified, upper, tried, *over)
 
 
 def _excess(targets: Targets, chances: Mapping[str, tuple[Estimate, Estimate]], end: str) -> float:
-    """Return the largest excess of a bound over its target [-]; 0 if there is none."""
+    """Return the largest excess over a target [-]; 0 if there is none.
+
+    `end` names the number of an estimate that is compared. A probability without releases counts as
+    1.
+    """
     over = [0.0]
     for which, wanted in enumerate((targets.reach, targets.failure)):
         if wanted is not None:
-            over += [getattr(pair[which], end) - wanted for pair in chances.values()]
+            found = [getattr(pair[which], end) for pair in chances.values()]
+            over += [(1.0 if math.isnan(value) else value) - wanted for value in found]
     return max(over)
 
 
@@ -464,17 +471,22 @@ def choose(
 
     Among those that meet the targets, it is the one with the lowest Z. A layout that was not
     verified counts with the upper end of the 95 % interval of Z instead, so that none is chosen
-    because it has few releases and was lucky. If none meets the targets, it is the one that misses
-    them least. If others with at least half as many releases are not shown to miss them by more, it
-    is chosen among these in the same way.
+    because it has few releases and was lucky.
+
+    If none meets the targets, the choice is among the verified layouts with barriers, or among all
+    if there are none. It is the one that misses the targets least. If the probabilities of none of
+    them are within the targets, others that are not shown to miss them by more and have at least
+    half as many releases compete with it by Z, see `protocol.best_of_finals`.
     """
     may = [c for c in candidates if problem.place.too_expensive(c.layout) is None]
-    first = min(may, key=lambda c: (c.over, c.upper))
-    enough = 0.5 * len(first.outcomes)
-    if first.over <= 0.0:
-        field = [c for c in may if c.over <= 0.0]
-    else:
+    field = [c for c in may if c.over <= 0.0]
+    if not field:
+        may = [c for c in may if c.verified and c.layout] or may
+        first = min(may, key=lambda c: (c.over, c.upper))
+        enough = 0.5 * len(first.outcomes)
         field = [c for c in may if c.least <= first.over and len(c.outcomes) >= enough]
+        if any(c.share <= 0.0 for c in may):
+            field = [first]
     order = sorted(field, key=lambda c: c.upper)
     short = [*order[:SHORTLIST], *(c for c in order[SHORTLIST:] if c.verified)]
     judgements = [(c, judged(problem, c, kept)) for c in short]

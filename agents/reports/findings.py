@@ -170,7 +170,8 @@ def frontier(
     known = sum(one.verified is not None for one in front)
     words = "all of them are verified"
     if known < len(front):
-        words = f"{known} of its {len(front)} layouts {'is' if known == 1 else 'are'} verified, and the others have few releases"
+        verb = "is" if known == 1 else "are"
+        words = f"{known} of its {len(front)} layouts {verb} verified; the others have few releases"
     least = min(front, key=lambda one: one.level)
     lines = [
         f"a target is missed; the table shows the cheapest layout to build for each level of "

@@ -74,13 +74,17 @@ def sentences(done: Repriced) -> list[str]:
     cases = [(case.name, case.evaluation) for case in done.cases]
     found, chosen = done.cases[-2].evaluation, done.chosen.evaluation
     if chosen.layout == found.layout:
-        line = f"the layout of the design, {done.cases[-2].name!r}, remains the best of "
+        line = f"the layout of the design, {done.cases[-2].name!r}, remains the choice among "
         line += f"{done.tried:,} layouts that were evaluated"
     elif done.verified:
-        line = f"{BEST!r} is the best of {done.tried:,} layouts that were evaluated; the design "
+        line = (
+            f"{BEST!r} is the choice among {done.tried:,} layouts that were evaluated; the design "
+        )
         line += "verified it"
     else:
-        line = f"{BEST!r} is the best of {done.tried:,} layouts that were evaluated, but was not "
+        line = (
+            f"{BEST!r} is the choice among {done.tried:,} layouts that were evaluated, but was not "
+        )
         line += f"verified: Z is the mean of the {chosen.releases:,} releases of the search by "
         line += "which it was chosen, and probably too low; `rigdda design` with site.toml "
         line += "searches and verifies again"

@@ -73,21 +73,15 @@ def sentences(done: Repriced) -> list[str]:
     """Return what the answer says beyond its numbers."""
     cases = [(case.name, case.evaluation) for case in done.cases]
     found, chosen = done.cases[-2].evaluation, done.chosen.evaluation
+    among = f"the choice among {done.tried:,} layouts that were evaluated"
     if chosen.layout == found.layout:
-        line = f"the layout of the design, {done.cases[-2].name!r}, remains the choice among "
-        line += f"{done.tried:,} layouts that were evaluated"
+        line = f"the layout of the design, {done.cases[-2].name!r}, remains {among}"
     elif done.verified:
-        line = (
-            f"{BEST!r} is the choice among {done.tried:,} layouts that were evaluated; the design "
-        )
-        line += "verified it"
+        line = f"{BEST!r} is {among}; the design verified it"
     else:
-        line = (
-            f"{BEST!r} is the choice among {done.tried:,} layouts that were evaluated, but was not "
-        )
-        line += f"verified: Z is the mean of the {chosen.releases:,} releases of the search by "
-        line += "which it was chosen, and probably too low; `rigdda design` with site.toml "
-        line += "searches and verifies again"
+        line = f"{BEST!r} is {among}, but was not verified: Z is the mean of the "
+        line += f"{chosen.releases:,} releases of the search by which it was chosen, and probably "
+        line += "too low; `rigdda design` with site.toml searches and verifies again"
     lines = [line]
     lines += findings.over_the_cap(done.problem, cases)
     lines.append(findings.pays(cases))

@@ -39,6 +39,23 @@ FLAT = replace(
 """A plane slope with level ground at its toe."""
 
 
+def test_a_kind_has_a_life_of_its_own():
+    prices = replace(PRICES, lives={"fence": 25.0})
+    i = prices.interest
+    assert prices.annuity("fence") == pytest.approx(i / (1.0 - (1.0 + i) ** -25.0))
+    assert prices.annuity("ditch") == PRICES.annuity("ditch")
+    # a fence that is bought again every 25 years costs as much as its annuity paid for ever
+    bought = sum((1.0 + i) ** (-25.0 * n) for n in range(60))
+    assert bought == pytest.approx(prices.annuity("fence") / i, rel=1e-6)
+
+
+def test_access_is_one_and_a_half_per_sixty_metres():
+    site = Site.load("quick")
+    for x in (12.0, 20.0, 30.0, 34.0):
+        h = max(site.profile.height(x) - site.profile.height(site.road.start), 0.0)
+        assert site.access(x) == pytest.approx(1.0 + 1.5 * h / 60.0)
+
+
 def test_annuity_pays_back_a_loan():
     rate, life = PRICES.interest, PRICES.life
     left = 1.0

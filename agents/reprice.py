@@ -248,7 +248,7 @@ class ArchivedProblem(DesignProblem):
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class ScoredLayout:
     """A layout of the search and what its releases say at the new values.
 
     Parameters
@@ -363,7 +363,7 @@ def _merged(before: Targets, given: Mapping[str, float | None]) -> Targets:
     return replace(before, **given)
 
 
-def judged(problem: DesignProblem, candidate: Candidate, kept: Archive) -> Evaluation:
+def judged(problem: DesignProblem, candidate: ScoredLayout, kept: Archive) -> Evaluation:
     """Return the evaluation of a candidate.
 
     An event that was not released with the layout costs as much as without barriers.
@@ -386,7 +386,7 @@ def judged(problem: DesignProblem, candidate: Candidate, kept: Archive) -> Evalu
 VERIFICATION = STREAMS.index("verification")
 
 
-def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, Candidate]:
+def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, ScoredLayout]:
     """Return every layout of the archive with what its releases say at the new values."""
     bare = account(problem.site, (), kept.bare)
     spent = {
@@ -415,7 +415,7 @@ def _candidate(
     outcomes: tuple[Outcome, ...],
     verified: bool,
     spent: Mapping[str, np.ndarray],
-) -> Candidate:
+) -> ScoredLayout:
     """Return a layout with what its releases say.
 
     The sample of each event is extended by one release that deviates from the mean by the standard
@@ -443,7 +443,7 @@ def _candidate(
         reach, failure = (worst(seen) for seen in zip(*chances.values(), strict=True))
         tried = TriedLayout(layout, site.capital(layout), reach, failure)
     upper = value + ERRORS * math.sqrt(variance)
-    return Candidate(layout, outcomes, verified, upper, tried, *over)
+    return ScoredLayout(layout, outcomes, verified, upper, tried, *over)
 
 
 def _excess(targets: Targets, chances: Mapping[str, tuple[Estimate, Estimate]], end: str) -> float:
@@ -465,8 +465,8 @@ SHORTLIST = 40
 
 
 def choose(
-    problem: DesignProblem, candidates: Sequence[Candidate], kept: Archive
-) -> tuple[Candidate, Evaluation]:
+    problem: DesignProblem, candidates: Sequence[ScoredLayout], kept: Archive
+) -> tuple[ScoredLayout, Evaluation]:
     """Return the best candidate that may be built, and its evaluation.
 
     Among those that meet the targets, it is the one with the lowest Z. A layout that was not

@@ -42,7 +42,7 @@ def test_nothing_pays_only_if_nothing_that_was_verified_does(problem: DesignProb
         return findings.limits(result, [("nothing", bare), ("rule", other), ("found", bare)], "")
 
     assert told(dear).startswith("none of the verified layouts costs less per year")
-    assert told(replace(dear, ci=(700.0, 720.0))).startswith(
+    assert told(replace(dear, objective=90.0, ci=(700.0, 720.0))).startswith(
         "the layout 'rule' costs less per year"
     )
 

@@ -1,4 +1,4 @@
-"""The command line: `rigdda sites | simulate | design | study | train | evaluate | ...`.
+"""The command line: `rigdda sites | simulate | design | reprice | study | train | ...`.
 
 Each command imports its modules when it runs, so that `--help` is fast.
 """
@@ -423,6 +423,8 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that a barrier fails in a design "
               "event.")  # fmt: skip
+@click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
+              help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
 @click.option("--zone", type=float, nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m].  [default: the zone of "
               "the site]")  # fmt: skip
@@ -437,6 +439,7 @@ def design(
     kinds: Kinds,
     target: float | None,
     failure: float | None,
+    max_cost: float | None,
     zone: tuple[float, float] | None,
     budget: int,
     verify: int,
@@ -449,15 +452,18 @@ def design(
     search did not use. The best layout has the least cost Z. Z is the sum of capital and upkeep,
     expected harm on the road and expected repair, in EUR per metre of road and year.
 
-    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. An interrupted run
-    continues from evaluations.jsonl. A folder that contains the design of another problem
-    (problem.json) is refused.
+    If the layout misses a target, the cheapest layout for each level of P(reach) is reported and
+    written to frontier.csv and frontier.png.
+
+    Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd and the outcomes of all
+    releases, for `rigdda reprice`. An interrupted run continues from evaluations.jsonl. A folder
+    that contains the design of another problem (problem.json) is refused.
     """
     from rigdda.agents import jobs
     from rigdda.agents.designers.store import FILE, claim
     from rigdda.agents.reports.folder import FILES, write
 
-    problem = _pose(site, kinds, target, failure, zone)
+    problem = _pose(site, kinds, target, failure, max_cost, zone)
     folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
     claim(folder, problem, *FILES)
     with kept(folder, problem.site):
@@ -474,13 +480,14 @@ def _pose(
     kinds: Kinds,
     target: float | None,
     failure: float | None,
+    max_cost: float | None,
     zone: tuple[float, float] | None,
 ) -> DesignProblem:
     """Return the design problem that the options describe."""
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
-    asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None}
+    asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None, "max_cost": max_cost}
     if target is not None or failure is not None:
         asked["targets"] = Targets(target, failure)
     return DesignProblem(site, **asked)
@@ -488,7 +495,7 @@ def _pose(
 
 def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
-    from rigdda.agents.reports import findings, tables
+    from rigdda.agents.reports import findings, frontier_report, tables
     from rigdda.agents.reports.folder import FILES
     from rigdda.agents.reports.wording import order
 
@@ -504,24 +511,21 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         show(chances)
     else:
         click.echo("the site has no design events (design = true)")
+    for line in findings.frontier(done, done.frontier, len(result.tried), done.replaced):
+        finding(line)
+    if done.frontier:
+        show(frontier_report.table(done.frontier))
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
     click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
     for barrier in chosen.layout:
         click.echo(f"  {order(barrier, done.problem.site)}")
-    cases = [(case.name, case.evaluation) for case in done.cases]
-    lines = [findings.limits(result, cases, done.left)]
-    lines += [
-        *findings.cheaper(cases),
-        *findings.failing(done.problem.site, chosen),
-        findings.undecided(done.problem, chosen),
-    ]
-    for line in lines:
+    for line in findings.of_design(done):
         finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
         f"verification: {verify:,} new releases of each layout{resumed}\n"
-        f"{', '.join(FILES)} are in {folder}"
+        f"{', '.join((*FILES, *(frontier_report.FILES if done.frontier else ())))} are in {folder}"
     )
 
 
@@ -560,6 +564,69 @@ def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) 
 
 
 @cli.command()
+@click.argument("results", metavar="RESULTS", type=click.Path(path_type=Path))
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE",
+              help="New value of a key of the site file, such as consequences.closure=20000. May "
+              "be repeated.")  # fmt: skip
+@click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable probability that rock of a design event reaches the "
+              "road.  [default: that of the design]")  # fmt: skip
+@click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable probability that a barrier fails in a design event.  "
+              "[default: that of the design]")  # fmt: skip
+@click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
+              help="Largest capital cost of a layout in EUR per metre of road.  [default: that of "
+              "the design]")  # fmt: skip
+@out_option("reprice-RESULTS")
+def reprice(
+    results: Path,
+    settings: tuple[str, ...],
+    target: float | None,
+    failure: float | None,
+    max_cost: float | None,
+    out: Path | None,
+) -> None:
+    """Answer for other prices, rates, targets or caps from the folder RESULTS of a design.
+
+    Nothing is simulated: the outcomes of all releases of the design are evaluated with the new
+    values. The last row of the table is the best of all layouts that the search evaluated. Keys
+    on which the motion of rock depends are refused.
+
+    Writes costs.csv, site.toml (the site with the new values), layout.toml (the best layout),
+    cost.png and, if a target is missed, frontier.csv and frontier.png.
+    """
+    from rigdda.agents import reprice as job
+    from rigdda.agents.reports import findings, frontier_report, reprice_report, tables
+    from rigdda.agents.reports.wording import order
+
+    done = job.reprice(results, job.parse_all(settings), job.other_targets(target, failure),
+                       max_cost)  # fmt: skip
+    files = (*reprice_report.FILES, *frontier_report.FILES)
+    folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
+    if folder.resolve() == results.resolve():
+        raise click.UsageError("--out is the folder of the design: name another folder")
+    with kept(folder, done.problem.site):
+        reprice_report.write(done, folder)
+    for change in done.changes:
+        click.echo(reprice_report.changed(change))
+    show(tables.costs(done))
+    chances = tables.chances(done)
+    if chances is not None:
+        show(chances)
+    for line in findings.frontier(done, done.frontier, done.tried, False):
+        finding(line)
+    if done.frontier:
+        show(frontier_report.table(done.frontier))
+    chosen = done.chosen.evaluation.layout
+    click.echo("layout:" if chosen else "layout: no barrier")
+    for barrier in chosen:
+        click.echo(f"  {order(barrier, done.problem.site)}")
+    for line in reprice_report.sentences(done):
+        finding(line)
+    click.echo(f"nothing was simulated; the results are in {folder}")
+
+
+@cli.command()
 @click.argument("file", metavar="STUDY.toml")
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("study-NAME")
@@ -568,23 +635,36 @@ def study(file: str, seed: int, out: Path | None) -> None:
     """Compare the layouts of STUDY.toml on the same releases.
 
     The file gives a `site`, the number of `releases` of each event, and `layouts`. Each layout has
-    a `name` and either `barriers`, as in a layout file, or the name of a layout `file`. Writes one
-    row for each release to study.csv. An interrupted study continues from study.csv.
+    a `name` and either `barriers`, as in a layout file, or the name of a layout `file`.
+
+    Writes study.csv (one row for each release), layouts.csv (Z and its parts), events.csv
+    (probabilities and energies), differences.csv (of each pair of layouts, on common releases),
+    sections.png and costs.png. An interrupted study continues from study.csv.
     """
     from rigdda.agents import studies
-    from rigdda.agents.reports import findings
+    from rigdda.agents.reports import findings, study_report
 
     asked = studies.load(file)
-    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
+    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.FILES)
     with kept(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
+        tick(asked.size, "tables and pictures")
+        found = studies.results(asked, folder / "study.csv")
+        study_report.write(folder, found, seed)
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
-    show(studies.table(asked, folder / "study.csv"))
+    show(study_report.costs(found))
+    click.echo(
+        "probabilities with 95 % upper bounds in brackets; largest energies on the road and of a\n"
+        "hit: 95 % quantiles of the releases with one, in kJ per metre of width"
+    )
+    show(study_report.events(found))
+    for line in study_report.sentences(found):
+        finding(line)
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):
             note(f"the layout {name!r} {words}")
     words = f", {resumed} from an earlier run" if resumed else ""
-    click.echo(f"{asked.size:,} releases{words}; study.csv is in {folder}")
+    click.echo(f"{asked.size:,} releases{words}; tables and pictures are in {folder}")
 
 
 @cli.command()

@@ -203,6 +203,8 @@ class Catalogue:
         Reduction of the harm of each release by each barrier [EUR].
     annual : (J,) array
         Annual cost of each barrier including its expected repair [EUR per m].
+    capital : (J,) array
+        Capital cost of each barrier [EUR per m].
     span : (J, 2) array
         Chainages of the start and the end of each barrier [m].
     """
@@ -212,6 +214,7 @@ class Catalogue:
     base: Floats
     relief: Floats
     annual: Floats
+    capital: Floats
     span: Floats
 
     @property
@@ -223,8 +226,8 @@ class Catalogue:
         """Return the catalogue of the barriers with the given indices."""
         i = np.asarray(chosen, dtype=np.int64)
         barriers = [self.barriers[j] for j in i.tolist()]
-        relief, annual = self.relief[:, i], self.annual[i]
-        return Catalogue(barriers, self.weight, self.base, relief, annual, self.span[i])
+        own = self.relief[:, i], self.annual[i], self.capital[i], self.span[i]
+        return Catalogue(barriers, self.weight, self.base, *own)
 
 
 def tabulate(
@@ -235,14 +238,14 @@ def tabulate(
     weight = ensemble.weights([site.rate(name, ()) for name in site.event_names])
     effects = Effects(site, ensemble)
     relief = np.zeros((len(weight), len(barriers)))
-    annual = np.zeros(len(barriers))
+    annual, capital = np.zeros((2, len(barriers)))
     for j, barrier in enumerate(barriers):
         harm, mended = effects.of(barrier)
         relief[:, j] = effects.base - harm
-        capital = site.capital((barrier,)) if mended.any() else 0.0
-        annual[j] = site.annual((barrier,)) + capital * float(weight @ mended)
+        capital[j] = site.capital((barrier,))
+        annual[j] = site.annual((barrier,)) + capital[j] * float(weight @ mended)
     span = np.array([[b.x, b.x + b.extent] for b in barriers]).reshape(-1, 2)
-    return Catalogue(barriers, weight, effects.base, relief, annual, span)
+    return Catalogue(barriers, weight, effects.base, relief, annual, capital, span)
 
 
 def whole(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Catalogue:

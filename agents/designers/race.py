@@ -30,7 +30,7 @@ from rigdda.agents.designers.catalogue import Catalogue, CrossingEnsemble, ensem
 from rigdda.agents.designers.convex import offered, unsearched
 from rigdda.agents.designers.menu import FINEST, Menu, spread
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, search
-from rigdda.agents.designers.racing import Arm, Track, error
+from rigdda.agents.designers.racing import Arm, Track, best_of_ends, error
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem
 
@@ -336,13 +336,14 @@ def simplest(ends: Sequence[Arm], nothing: Arm) -> Layout:
     """Return the best layout, or one that is nearly as good and has fewer barriers (at least 1)."""
     if not ends:
         return ()
-    most = ends[0].objective() + AS_GOOD * nothing.objective()
+    best = best_of_ends(ends)
+    most = best.objective() + AS_GOOD * nothing.objective()
     as_good = [
         arm
         for arm in ends
-        if arm.layout and arm.shortfall() <= ends[0].shortfall() and arm.objective() < most
+        if arm.layout and arm.shortfall() <= best.shortfall() and arm.objective() < most
     ]
-    return min([*ends[:1], *as_good], key=lambda arm: len(arm.layout)).layout
+    return min([best, *as_good], key=lambda arm: len(arm.layout)).layout
 
 
 def foretold(

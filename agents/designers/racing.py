@@ -8,7 +8,7 @@ behind the best are dropped at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from rigdda import Fence, Layout
 from rigdda.agents.designers.protocol import Ledger
 from rigdda.agents.designers.store import Release
 from rigdda.envs import DesignProblem
-from rigdda.envs.intervals import CONFIDENCE, upper_bound
+from rigdda.envs.intervals import CONFIDENCE, lower_bound, upper_bound
 
 Floats = NDArray[np.float64]
 
@@ -109,6 +109,13 @@ class Arm:
         The excess is that of the estimate or, if `strict`, of its upper bound. The upper bound is 1
         without releases.
         """
+        return self.excess(upper_bound if self.strict else _share)
+
+    def excess(self, of: Callable[[int, int], float]) -> float:
+        """Return the largest excess of a design event over a target [-], 0 if there is none.
+
+        `of` returns the number to compare with a target from a count and the number of releases.
+        """
         targets = self.problem.targets
         over = [0.0]
         for event in self.problem.site.events:
@@ -117,13 +124,30 @@ class Arm:
                 for wanted, which in ((targets.reach, "reached"), (targets.failure, "failed")):
                     if wanted is not None:
                         count = sum(getattr(r, which) for r in own)
-                        share = upper_bound(count, len(own)) if self.strict else count / len(own)
-                        over.append(share - wanted)
+                        over.append(of(count, len(own)) - wanted)
         return max(over)
 
     def key(self) -> tuple[float, float]:
         """Return the sort key of candidates: the amount by which a target is missed, then Z."""
         return self.shortfall(), self.objective()
+
+
+def _share(count: int, releases: int) -> float:
+    return count / releases if releases else 1.0
+
+
+def best_of_ends(ends: Sequence[Arm]) -> Arm:
+    """Return the best arm of a final, as `protocol.best_of_finals` does.
+
+    Parameters
+    ----------
+    ends : sequence of Arm
+        The arms, by their keys.
+    """
+    if any(arm.excess(_share) <= 0.0 for arm in ends):
+        return ends[0]
+    most = ends[0].shortfall()
+    return min((a for a in ends if a.excess(lower_bound) <= most), key=lambda a: a.objective())
 
 
 def error(arm: Arm, nothing: Arm) -> float:

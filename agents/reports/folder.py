@@ -6,9 +6,10 @@ from pathlib import Path
 
 import rigdda
 from rigdda import Layout, Site
+from rigdda.agents import archive
 from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.reports import findings, layout_tables, pictures
+from rigdda.agents.reports import findings, frontier_report, layout_tables, pictures
 from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
 from rigdda.agents.reports.simulation_folder import along
 from rigdda.agents.reports.tables import write_rows
@@ -18,8 +19,8 @@ from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
 
 FILES = (
-    "evaluations.csv", "evaluations.jsonl", "layouts.csv", "chances.csv", "layout.toml",
-    "section.png", "cost.png", "episode.rrd",
+    "evaluations.csv", "evaluations.jsonl", archive.FILE, "layouts.csv", "chances.csv",
+    "layout.toml", "section.png", "cost.png", "episode.rrd",
 )  # fmt: skip
 
 
@@ -39,6 +40,7 @@ def write(done: DesignStudy, out: Path, seed: int) -> None:
     write_rows(out / "chances.csv", layout_tables.chances(done))
     rigdda.save_layout(done.chosen.evaluation.layout, out / "layout.toml")
     _section(done, out / "section.png", seed)
+    frontier_report.write(out, done.problem, done.frontier)
     tried = [entry.evaluation for entry in done.result.history.stage("search")]
     points = [pictures.Point.of(case.name, case.evaluation) for case in done.cases]
     reference = pictures.Point(SHED, done.problem.site.shed(), 0.0, (0.0, 0.0))

@@ -23,9 +23,9 @@ from rigdda import (
     Points,
     Site,
 )
-from rigdda.agents.design_study import SHED, DesignStudy, design_events
+from rigdda.agents.design_study import SHED, ComparedLayouts, design_events
 from rigdda.agents.designers.protocol import Entry
-from rigdda.agents.reports.wording import euros, percent, span
+from rigdda.agents.reports.wording import at_most, euros, percent, span
 from rigdda.barriers import Earthwork, standing, to_tables
 from rigdda.envs.intervals import Estimate, estimate, mid_p, student_interval
 from rigdda.files import atomic
@@ -261,7 +261,7 @@ def points(found: Points) -> Table:
     return out
 
 
-def costs(study: DesignStudy) -> Table:
+def costs(study: ComparedLayouts) -> Table:
     """Return the table of the costs of each layout, at most 80 characters wide.
 
     Costs are in EUR per metre of road and year, except "to build", which is in EUR per metre.
@@ -287,7 +287,7 @@ def costs(study: DesignStudy) -> Table:
     return table
 
 
-def chances(study: DesignStudy) -> Table | None:
+def chances(study: ComparedLayouts) -> Table | None:
     """Return the table of probabilities in each design event, or None if the site has none.
 
     Each probability is followed by its one-sided 95 % upper bound.
@@ -300,15 +300,15 @@ def chances(study: DesignStudy) -> Table | None:
         for i, case in enumerate(study.cases):
             e = case.evaluation
             reach = e.reach[event]
-            fails = _chance(e.failure[event]) if e.layout else "-"
+            fails = bounded(e.failure[event]) if e.layout else "-"
             name = "" if i else event
-            table.add_row(name, case.name, _chance(reach), fails, f"{reach.releases:,}")
+            table.add_row(name, case.name, bounded(reach), fails, f"{reach.releases:,}")
         table.add_section()
     return table
 
 
-def _chance(estimate: Estimate) -> str:
-    """Return a probability with its upper bound as text."""
+def bounded(estimate: Estimate) -> str:
+    """Return a probability with its upper bound, rounded up, as text; "-" without releases."""
     if not estimate.releases:
         return "-"
-    return f"{percent(estimate.probability)} (<= {percent(estimate.bound)})"
+    return f"{percent(estimate.probability)} (<= {at_most(estimate.bound)})"

@@ -24,8 +24,8 @@ from rigdda.barriers import to_tables
 
 TINY = ("--budget", "400", "--verify", "40")
 COMMANDS = (
-    "sites", "new", "check", "simulate", "design", "reprice", "study", "corridor", "report", "train",
-    "evaluate", "fidelity", "validate", "replay", "repeat",
+    "sites", "new", "check", "simulate", "design", "reprice", "report", "study", "corridor",
+    "train", "evaluate", "fidelity", "validate", "replay", "repeat",
 )  # fmt: skip
 FILES = (
     "evaluations.csv", "evaluations.jsonl", "outcomes.msgpack.gz", "layouts.csv", "chances.csv",

@@ -1,4 +1,4 @@
-"""The command line: `rigdda sites | simulate | design | study | train | evaluate | ...`.
+"""The command line: `rigdda sites | simulate | design | reprice | study | train | ...`.
 
 Each command imports its modules when it runs, so that `--help` is fast.
 """
@@ -18,9 +18,12 @@ import click
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.agents.limits import SEED
 from rigdda.agents.terminal import (
+    Folder,
     Stopped,
     count_option,
+    executor_option,
     fail,
+    finding,
     folder_for,
     kept,
     layout_option,
@@ -55,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with warnings.catch_warnings():
             warnings.showwarning = once()
-            return cli.main(argv, prog_name="rigdda", standalone_mode=False) or 0
+            return _run(sys.argv[1:] if argv is None else argv)
     except click.Abort:
         return fail("interrupted", 130)
     except click.ClickException as error:
@@ -71,6 +74,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not isinstance(error, Error):
             raise
         return fail(str(error), 2 if isinstance(error, BadInput) else 1)
+
+
+def _run(argv: Sequence[str]) -> int:
+    """Run a command; its arguments are the object of the context, from which they are recorded."""
+    typed = list(argv)
+    return cli.main(typed, prog_name="rigdda", standalone_mode=False, obj=list(typed)) or 0
 
 
 def _version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -163,20 +172,27 @@ def check(site: str, seed: int, out: Path | None) -> None:
 
     where = rigdda.Site.load(site)
     folder = folder_for(out, f"check-{where.name}", "site.png")
-    with kept(folder):
+    with kept(folder, where):
         site_check.draw(folder / "site.png", where)
         trials = site_check.try_releases(where, seed)
     for line in site_check.facts(where):
         click.echo(line)
     show(site_check.table(where, trials))
     click.echo(site_check.time_of(where, trials))
-    if count := site_check.placeholders(site):
-        note(f"the file marks {count} values as placeholders to replace")
+    _warn_of_placeholders(site)
     odd = site_check.oddities(where, trials)
     for line in odd:
-        click.echo(f"odd: {line}")
+        finding(f"odd: {line}")
     words = f"{len(odd)} things look odd" if len(odd) != 1 else "1 thing looks odd"
     click.echo(f"{words if odd else 'nothing looks odd'}; site.png is in {folder}")
+
+
+def _warn_of_placeholders(site: str) -> None:
+    """Print a note if a site file still has placeholders of `rigdda new`."""
+    from rigdda.agents import site_check
+
+    if count := site_check.placeholders(site):
+        note(f"the site file marks {count} values as placeholders to replace")
 
 
 @cli.command()
@@ -213,6 +229,7 @@ def schema(file: str) -> None:
               "it is fast but cannot simulate barriers that stand on the ground.")  # fmt: skip
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("simulate-SITE")
+@executor_option
 def simulate(
     site: str,
     layout: str | None,
@@ -249,7 +266,8 @@ def simulate(
             raise click.UsageError("--station is for --model blocks")
         points = rigdda.lumped(where, barriers, seeds, event)
         folder = folder_for(out, f"simulate-{where.name}", "points.csv")
-        tables.write_points(folder / "points.csv", seeds, points)
+        with kept(folder, where):
+            tables.write_points(folder / "points.csv", seeds, points)
         show(tables.points(points))
         note(findings.unfitted(where))
         note(findings.of_layout(where, barriers, event))
@@ -258,7 +276,7 @@ def simulate(
     where.realise(barriers, seed, event)  # report an impossible layout before making a folder
     asked = check_stations(where, at or (where.road.start,))
     folder = folder_for(out, f"simulate-{where.name}", *simulation_folder.files(asked.tolist()))
-    with kept(folder), progress(releases) as tick:
+    with kept(folder, where), progress(releases) as tick:
         lines = simulation_folder.lines(where, asked)
         found = jobs.simulate(where, barriers, seeds, event, lines.tolist(), folder, tick)
         tick(releases, "tables and pictures")
@@ -273,6 +291,7 @@ def simulate(
         show(table)
     click.echo("intervals: 95 %; ?: too few blocks for this end; height: of the centre of a block")
     note(findings.of_layout(where, barriers, event))
+    _warn_of_placeholders(site)
     note(stations.undecided(passing))
     if passing.not_drawn:
         names = ", ".join(passing.not_drawn)
@@ -297,7 +316,7 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
 
     where = DesignProblem(site).site
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
-    with kept(folder), progress(6 * releases) as tick:
+    with kept(folder, where), progress(6 * releases) as tick:
         found = fidelity_bias.compare(where, releases, seed, tick)
     fidelity_bias.write(folder / "fidelity.csv", where, found)
     show(fidelity_bias.table(found))
@@ -339,7 +358,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     where, barriers = rigdda.Site.load(target), read_layout(layout)
     where.realise(barriers, seed, event)
     folder = folder_for(out, f"replay-{where.name}", "episode.rrd")
-    with kept(folder):
+    with kept(folder, where):
         run, outcome = rigdda.release(where, barriers, seed, event)
     came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
     notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
@@ -407,6 +426,8 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--target-risk", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable individual risk of a commuter [1/year]. The site must have "
               "a table [traffic].")  # fmt: skip
+@click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
+              help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
 @click.option("--zone", type=float, nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m], as in the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
@@ -414,6 +435,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the search and of its releases.", SEED)
 @out_option("design-SITE")
+@executor_option
 def design(
     site: str,
     designer: str,
@@ -421,6 +443,7 @@ def design(
     target: float | None,
     failure: float | None,
     target_risk: float | None,
+    max_cost: float | None,
     zone: tuple[float, float] | None,
     budget: int,
     verify: int,
@@ -433,23 +456,27 @@ def design(
     search did not use. The best layout has the least cost Z. Z is the sum of capital and upkeep,
     expected harm on the road and expected repair, in EUR per metre of road and year.
 
-    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. An interrupted run
-    continues from evaluations.jsonl. A folder that contains the design of another problem
-    (problem.json) is refused.
+    If the layout misses a target, the cheapest layout for each level of P(reach) is reported and
+    written to frontier.csv and frontier.png.
+
+    Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd and the outcomes of all
+    releases, for `rigdda reprice`. An interrupted run continues from evaluations.jsonl. A folder
+    that contains the design of another problem (problem.json) is refused.
     """
     from rigdda.agents import jobs
     from rigdda.agents.designers.store import FILE, claim
     from rigdda.agents.reports.folder import FILES, write
 
-    problem = _pose(site, kinds, (target, failure, target_risk), zone)
+    problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone)
     folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
     claim(folder, problem, *FILES)
-    with kept(folder):
+    with kept(folder, problem.site):
         with progress(budget + CASES * verify) as tick:
             done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
             tick(budget + CASES * verify, "pictures")
             write(done, folder, seed)
     _tell(done, store, verify, folder)
+    _warn_of_placeholders(site)
 
 
 TRAFFIC = (
@@ -464,6 +491,7 @@ def _pose(
     site: str,
     kinds: Kinds,
     targets: tuple[float | None, float | None, float | None],
+    max_cost: float | None,
     zone: tuple[float, float] | None,
 ) -> DesignProblem:
     """Return the design problem that the options describe.
@@ -473,7 +501,7 @@ def _pose(
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
-    asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None}
+    asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None, "max_cost": max_cost}
     if any(target is not None for target in targets):
         asked["targets"] = Targets(*targets)
     return DesignProblem(site, **asked)
@@ -481,7 +509,7 @@ def _pose(
 
 def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
-    from rigdda.agents.reports import findings, tables
+    from rigdda.agents.reports import findings, frontier_report, tables
     from rigdda.agents.reports.folder import FILES
     from rigdda.agents.reports.wording import order, unchanged
 
@@ -501,6 +529,10 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     if risks is not None:
         click.echo(TRAFFIC.format(done.problem.site.traffic))
         show(risks)
+    for line in findings.frontier(done, done.frontier, len(result.tried), done.replaced):
+        finding(line)
+    if done.frontier:
+        show(frontier_report.table(done.frontier))
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
     site = done.problem.site
     click.echo(f"layout{from_start}:" if chosen.layout else f"layout: {unchanged(site)}")
@@ -508,52 +540,212 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         click.echo(f"  {order(barrier, site)}")
     for line in findings.kept(site, chosen.layout):
         click.echo(f"  {line}")
-    cases = [(case.name, case.evaluation) for case in done.cases]
-    lines = [findings.limits(result, cases, done.left)]
-    lines += [
-        *findings.cheaper(cases),
-        *findings.failing(done.problem.site, chosen),
-        findings.undecided(done.problem, chosen),
-    ]
-    for line in filter(None, lines):
-        click.echo(line)
+    for line in findings.of_design(done):
+        finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
         f"verification: {verify:,} new releases of each layout{resumed}\n"
-        f"{', '.join(FILES)} are in {folder}"
+        f"{', '.join((*FILES, *(frontier_report.FILES if done.frontier else ())))} are in {folder}"
     )
+
+
+@cli.command()
+@click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=Folder(file_okay=False, path_type=Path),
+              help="Folder to write into.  [default: the first of RESULTS]")  # fmt: skip
+@click.option("--pdf", is_flag=True, help="Print the report to report.pdf as well. Needs Chromium, "
+              "Chrome or Edge.")  # fmt: skip
+@click.option("--serve", is_flag=True, help="Serve the report on this machine beside the replay "
+              "of RESULTS, which begins at the first impact. Ctrl-C ends it.")  # fmt: skip
+def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) -> None:
+    """Write one report of results folders: report.html.
+
+    RESULTS are folders that design, simulate, study, check or fit wrote. The page holds everything
+    in itself, so that it opens without a network and prints on A4: a summary, the site, the
+    assumptions with their sources, what comes down, the layouts compared, the limits of the method,
+    and the commands, seeds and versions to repeat the results.
+    """
+    from rigdda.agents import browser
+    from rigdda.agents.reports import report_page, results_folder
+
+    folders = results_folder.open_all(results)
+    program = browser.find() if pdf else None
+    replay = results_folder.replay_of(folders) if serve else None
+    page = report_page.compose(folders)
+    files = (report_page.FILE, "report.pdf") if pdf else (report_page.FILE,)
+    file = report_page.write(page, folder_for(out or results[0], "", *files))
+    click.echo(file)
+    if program is not None:
+        click.echo(browser.print_pdf(program, file))
+    if replay is not None:
+        from rigdda.agents.report_server import serve as show_both
+
+        show_both(file, replay, click.echo)
+
+
+@cli.command()
+@click.argument("results", metavar="RESULTS", type=click.Path(path_type=Path))
+@click.option("--set", "settings", multiple=True, metavar="PATH=VALUE",
+              help="New value of a key of the site file, such as consequences.closure=20000. May "
+              "be repeated.")  # fmt: skip
+@click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable probability that rock of a design event reaches the "
+              "road.  [default: that of the design]")  # fmt: skip
+@click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable probability that a barrier fails in a design event.  "
+              "[default: that of the design]")  # fmt: skip
+@click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
+              help="Largest capital cost of a layout in EUR per metre of road.  [default: that of "
+              "the design]")  # fmt: skip
+@out_option("reprice-RESULTS")
+def reprice(
+    results: Path,
+    settings: tuple[str, ...],
+    target: float | None,
+    failure: float | None,
+    max_cost: float | None,
+    out: Path | None,
+) -> None:
+    """Answer for other prices, rates, targets or caps from the folder RESULTS of a design.
+
+    Nothing is simulated: the outcomes of all releases of the design are evaluated with the new
+    values. The last row of the table is the best of all layouts that the search evaluated. Keys
+    on which the motion of rock depends are refused.
+
+    Writes costs.csv, site.toml (the site with the new values), layout.toml (the best layout),
+    cost.png and, if a target is missed, frontier.csv and frontier.png.
+    """
+    from rigdda.agents import reprice as job
+    from rigdda.agents.reports import findings, frontier_report, reprice_report, tables
+    from rigdda.agents.reports.wording import order
+
+    done = job.reprice(results, job.parse_all(settings), job.other_targets(target, failure),
+                       max_cost)  # fmt: skip
+    files = (*reprice_report.FILES, *frontier_report.FILES)
+    folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
+    if folder.resolve() == results.resolve():
+        raise click.UsageError("--out is the folder of the design: name another folder")
+    with kept(folder, done.problem.site):
+        reprice_report.write(done, folder)
+    for change in done.changes:
+        click.echo(reprice_report.changed(change))
+    show(tables.costs(done))
+    chances = tables.chances(done)
+    if chances is not None:
+        show(chances)
+    for line in findings.frontier(done, done.frontier, done.tried, False):
+        finding(line)
+    if done.frontier:
+        show(frontier_report.table(done.frontier))
+    chosen = done.chosen.evaluation.layout
+    click.echo("layout:" if chosen else "layout: no barrier")
+    for barrier in chosen:
+        click.echo(f"  {order(barrier, done.problem.site)}")
+    for line in reprice_report.sentences(done):
+        finding(line)
+    click.echo(f"nothing was simulated; the results are in {folder}")
 
 
 @cli.command()
 @click.argument("file", metavar="STUDY.toml")
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
 @out_option("study-NAME")
+@executor_option
 def study(file: str, seed: int, out: Path | None) -> None:
     """Compare the layouts of STUDY.toml on the same releases.
 
     The file gives a `site`, the number of `releases` of each event, and `layouts`. Each layout has
-    a `name` and either `barriers`, as in a layout file, or the name of a layout `file`. Writes one
-    row for each release to study.csv. An interrupted study continues from study.csv.
+    a `name` and either `barriers`, as in a layout file, or the name of a layout `file`.
+
+    Writes study.csv (one row for each release), layouts.csv (Z and its parts), events.csv
+    (probabilities and energies), differences.csv (of each pair of layouts, on common releases),
+    sections.png and costs.png. An interrupted study continues from study.csv.
     """
     from rigdda.agents import studies
-    from rigdda.agents.reports import findings
+    from rigdda.agents.reports import findings, study_report
 
     asked = studies.load(file)
-    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv")
-    with kept(folder), progress(asked.size) as tick:
+    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.FILES)
+    with kept(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
+        tick(asked.size, "tables and pictures")
+        found = studies.results(asked, folder / "study.csv")
+        study_report.write(folder, found, seed)
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
-    show(studies.table(asked, folder / "study.csv"))
-    risks = studies.risks(asked, folder / "study.csv")
+    show(study_report.costs(found))
+    click.echo(
+        "probabilities with 95 % upper bounds in brackets; largest energies on the road and of a\n"
+        "hit: 95 % quantiles of the releases with one, in kJ per metre of width"
+    )
+    show(study_report.events(found))
+    risks = study_report.risks(found)
     if risks is not None:
         click.echo(TRAFFIC.format(asked.site.traffic))
         show(risks)
+    for line in study_report.sentences(found):
+        finding(line)
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):
             note(f"the layout {name!r} {words}")
     words = f", {resumed} from an earlier run" if resumed else ""
-    click.echo(f"{asked.size:,} releases{words}; study.csv is in {folder}")
+    click.echo(f"{asked.size:,} releases{words}; tables and pictures are in {folder}")
+
+
+@cli.command()
+@click.argument("file", metavar="CORRIDOR")
+@click.option("--budget", "budgets", type=click.FloatRange(0.0, 1e12), multiple=True, metavar="EUR",
+              help="Budget for construction. May be repeated.  [default: those of the "
+              "file]")  # fmt: skip
+@count_option("--releases", 200, 4_000, "Number of releases per section.")
+@click.option("--robust", is_flag=True, help="Choose by the mean of the worst fifth of what the "
+              "cost of the layouts may be (conditional value at risk).")  # fmt: skip
+@seed_option("Seed of the searches and of their releases.", SEED)
+@out_option("corridor-NAME")
+@executor_option
+def corridor(
+    file: str, budgets: tuple[float, ...], releases: int, robust: bool, seed: int, out: Path | None
+) -> None:
+    """Choose the barriers of all sections of CORRIDOR within a common budget.
+
+    CORRIDOR is a TOML file or a built-in corridor (corridor-12, corridor-50). Every section is
+    searched for layouts from the cheapest to the best, and an integer programme chooses one layout
+    for each section and budget. The choice is compared with the same money for every metre of road,
+    with the worst section first and with the greatest saving per cost.
+
+    Writes budgets.csv, sections.csv, fronts.csv (all layouts), priorities.csv (what should be built
+    next), the folder layouts, and pictures: gain.png (gain against budget) and strip.png (what is
+    built where). An interrupted run continues where it stopped.
+    """
+    from msgspec.structs import replace
+
+    import rigdda
+    from rigdda.agents.corridor.planning import Planner
+    from rigdda.agents.reports import corridor_folder as report
+    from rigdda.envs import CorridorProblem
+
+    where = rigdda.Corridor.load(file)
+    if budgets:
+        where = replace(where, budgets=budgets)
+    problem = CorridorProblem(where)
+    folder = folder_for(out, f"corridor-{where.name}", *report.FILES)
+    stored = folder / "evaluations"
+    stored.mkdir(exist_ok=True)
+    with kept(folder), progress(releases * len(where.sections)) as tick:
+        plan = Planner(problem, releases, seed, robust, stored, tick).plan()
+        report.write(plan, folder)
+    click.echo(
+        "EUR and EUR per year; share: of the gain of unlimited money, also for the same money for\n"
+        "every metre, the worst section first and the greatest saving per cost"
+    )
+    show(report.table_of_budgets(plan))
+    for own in plan.plans[:-1][-1:]:
+        click.echo(f"budget {own.budget:,.0f} EUR:")
+        show(report.table_of_sections(plan, own))
+    click.echo(
+        f"{len(where.sections)} sections, {where.length:,.0f} m, {plan.releases:,} releases; "
+        f"{', '.join(report.FILES)} and layouts are in {folder}"
+    )
 
 
 @cli.command()
@@ -568,6 +760,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 @count_option("--releases", 10, 150, "Number of releases of each event for each parameter set.")
 @seed_option("Seed of the search and of the first release.", SEED)
 @out_option("fit-SITE")
+@executor_option
 def fit(
     site: str,
     observed: Path,
@@ -592,7 +785,7 @@ def fit(
     where = rigdda.Site.load(site)
     seen, parameters = job.read(observed, where), [job.parse(name) for name in names]
     folder = folder_for(out, f"fit-{where.name}", "site.toml", "fit.csv", "fit.png")
-    with kept(folder), progress(budget) as tick:
+    with kept(folder, where), progress(budget) as tick:
         found = job.fit(where, seen, parameters, budget, releases, seed, tick, model)
         found.site.save(folder / "site.toml")
         job.write(folder / "fit.csv", found, seen)
@@ -644,6 +837,7 @@ def train(sites: int, episodes: int, seed: int, out: Path | None) -> None:
 @count_option("--verify", 10, 2_000, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("evaluate")
+@executor_option
 def evaluate(
     names: tuple[str, ...],
     policy: str | None,

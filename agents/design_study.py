@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rigdda import Site
+from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
 from rigdda.envs import DesignProblem, Evaluation
 
@@ -31,25 +32,19 @@ class VerifiedLayout:
 
 
 @dataclass(frozen=True, slots=True)
-class DesignStudy:
-    """A designed layout and the layouts with which it is compared.
+class ComparedLayouts:
+    """Layouts of a design problem that are compared.
 
     Parameters
     ----------
     problem : DesignProblem
         The design problem.
-    result : DesignResult
-        Result of the designer.
     cases : tuple of VerifiedLayout
-        No barrier, the rule, the constant and, as the last, the layout found.
-    left : str
-        Text on the risk that remains with the layout found.
+        The layouts. The first is no barrier, and the last is the layout that is recommended.
     """
 
     problem: DesignProblem
-    result: DesignResult
     cases: tuple[VerifiedLayout, ...]
-    left: str
 
     @property
     def nothing(self) -> VerifiedLayout:
@@ -58,8 +53,33 @@ class DesignStudy:
 
     @property
     def chosen(self) -> VerifiedLayout:
-        """The case with the layout found."""
+        """The case with the layout that is recommended."""
         return self.cases[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class DesignStudy(ComparedLayouts):
+    """A designed layout and the layouts with which it is compared.
+
+    The cases are no barrier, the rule, the constant and, as the last, the layout found.
+
+    Parameters
+    ----------
+    result : DesignResult
+        Result of the designer.
+    left : str
+        Text on the risk that remains with the layout found.
+    frontier : tuple of TriedLayout
+        If the layout of the designer misses a target: the cheapest layout for each level of
+        P(reach) among all that were evaluated.
+    replaced : bool
+        Whether the layout found is one of the frontier, which is better than that of the designer.
+    """
+
+    result: DesignResult
+    left: str
+    frontier: tuple[TriedLayout, ...] = ()
+    replaced: bool = False
 
 
 def design_events(site: Site) -> tuple[str, ...]:

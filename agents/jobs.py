@@ -6,6 +6,7 @@ import hashlib
 import shutil
 import zipfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ import numpy as np
 
 import rigdda
 from rigdda import Barrier, Layout, Outcome, Run, Site
-from rigdda.agents import designers
+from rigdda.agents import archive, designers
 from rigdda.agents.design_study import (
     AS_IT_STANDS,
     CONSTANT,
@@ -22,15 +23,24 @@ from rigdda.agents.design_study import (
     RULE,
     DesignStudy,
     VerifiedLayout,
+    design_events,
 )
-from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import DesignResult, Entry, release_seeds, verify
+from rigdda.agents.designers.frontier import TriedLayout, frontier
+from rigdda.agents.designers.menu import Menu, on_bound
+from rigdda.agents.designers.protocol import (
+    DesignResult,
+    Entry,
+    best_of_finals,
+    release_seeds,
+    verify,
+)
 from rigdda.agents.designers.store import Store
 from rigdda.agents.reports import findings
 from rigdda.agents.reports.tables import EvaluationsFile
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.envelope import largest
 from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.problem import MISSED
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
 from rigdda.passages import Passages, passages
@@ -144,16 +154,22 @@ def study(
 ) -> tuple[DesignStudy, Store]:
     """Design a layout, then verify it and the layouts for comparison on `releases` new releases.
 
-    `evaluations.csv` and the store `evaluations.jsonl` are written into `out` during the search.
-    A study that was interrupted reads the evaluations that it needs again from the store.
+    If the layout misses a target, the layouts of the frontier are verified as well, see
+    `with_verified_frontier`, and the best of all verified layouts is taken.
+
+    `evaluations.csv` and the store `evaluations.jsonl` are written into `out` during the search,
+    and the archive of all outcomes at the end. A study that was interrupted reads the evaluations
+    that it needs again from the store.
 
     Raises
     ------
     BadInput, Diverged
         The same errors as the designer.
     """
-    store = Store(out / "evaluations.jsonl")
+    store = Store(out / "evaluations.jsonl", outcomes=True)
     tick(0, "simulating releases without barriers")
+    front: tuple[TriedLayout, ...] = ()
+    replaced = False
     with EvaluationsFile(out / "evaluations.csv", problem.site) as file:
 
         def progress(entry: Entry) -> None:
@@ -167,9 +183,105 @@ def study(
             evaluation = verify(problem, layout, releases, seed, store)
             file.add(Entry(result.simulations, "verification", evaluation))
             cases.append(VerifiedLayout(case, evaluation))
+        if cases[-1].evaluation.targets == MISSED and design_events(problem.site):
+            tick(simulations + releases * len(cases), "verifying the frontier")
+
+            def check(layout: Layout) -> Evaluation:
+                evaluation = verify(problem, layout, releases, seed, store)
+                file.add(Entry(result.simulations, "frontier", evaluation))
+                return evaluation
+
+            known = with_verified_frontier(problem, result.tried, cases, check)
+            result, front = replace(result, tried=known), frontier(known)
+            if name not in SEARCHLESS:
+                seen = [one.verified for one in front if one.verified is not None]
+                best = best_of_finals(problem, [*(case.evaluation for case in cases), *seen])
+                replaced = best.layout != result.layout
+                result = _with_layout(problem, result, best, [c.evaluation for c in cases[:-1]])
+                cases[-1] = VerifiedLayout(cases[-1].name, best)
     tick(simulations + releases * len(cases), "analysing the remaining risk")
-    left = _left(problem, [case.evaluation for case in cases], seed)
-    return DesignStudy(problem, result, tuple(cases), left), store
+    left = _left(problem, [case.evaluation for case in cases], result.tried, seed)
+    layouts = [(case.name, case.evaluation.layout) for case in cases]
+    archive.write(out / archive.FILE, archive.archive(problem, seed, layouts, store))
+    done = DesignStudy(
+        problem=problem,
+        cases=tuple(cases),
+        result=result,
+        left=left,
+        frontier=front,
+        replaced=replaced,
+    )
+    return done, store
+
+
+SEARCHLESS = ("rule", "constant")
+"""Designers whose layout is not replaced by a better one, because it is asked for itself."""
+
+MOST_VERIFIED = 8
+"""Largest number of layouts of a frontier that are verified in addition to the others."""
+
+
+def with_verified_frontier(
+    problem: DesignProblem,
+    tried: Sequence[TriedLayout],
+    cases: Sequence[VerifiedLayout],
+    check: Callable[[Layout], Evaluation],
+) -> tuple[TriedLayout, ...]:
+    """Return all layouts that were tried, with those of their frontier verified if possible.
+
+    The layout of the frontier with the lowest P(reach) that is not verified is verified, and then
+    the frontier is determined again with its new probabilities, up to `MOST_VERIFIED` times. What
+    the verification says of a layout replaces what the search said.
+
+    Parameters
+    ----------
+    problem : DesignProblem
+        The problem; its site has design events.
+    tried : sequence of TriedLayout
+        All layouts of the search.
+    cases : sequence of VerifiedLayout
+        Layouts that are verified already.
+    check : callable
+        Function that verifies a layout and returns its evaluation.
+
+    Raises
+    ------
+    BadInput, Diverged
+        The same errors as `check`.
+    """
+    known = {one.layout: one for one in tried}
+    for case in cases:
+        if problem.fits(case.evaluation.layout):
+            one = TriedLayout.of(problem.site, case.evaluation)
+            known[one.layout] = one
+    for _ in range(MOST_VERIFIED):
+        open_ = [one for one in frontier(known.values()) if one.verified is None]
+        if not open_:
+            break
+        layout = min(open_, key=lambda one: one.level).layout
+        known[layout] = TriedLayout.of(problem.site, check(layout))
+    return tuple(known.values())
+
+
+def _with_layout(
+    problem: DesignProblem,
+    result: DesignResult,
+    verified: Evaluation,
+    compared: Sequence[Evaluation],
+) -> DesignResult:
+    """Return a result with another layout and its verified evaluation.
+
+    The layout is one of the search or one of those that are `compared` with it.
+    """
+    if verified.layout == result.layout:
+        return result
+    return replace(
+        result,
+        layout=verified.layout,
+        evaluation=verified,
+        origin="start" if verified in compared else "search",
+        on_bound=on_bound(problem, verified.layout),
+    )
 
 
 def _compared(
@@ -191,13 +303,24 @@ def _compared(
     return [*out, (words, result.layout)]
 
 
-def _left(problem: DesignProblem, verified: Sequence[Evaluation], seed: int) -> str:
+def _left(
+    problem: DesignProblem,
+    verified: Sequence[Evaluation],
+    tried: Sequence[TriedLayout],
+    seed: int,
+) -> str:
     """Return a text on the risk that remains with the last of the verified layouts.
 
-    The text also says if no barrier stops the event that causes most of this risk.
+    The text also says if none of the largest barriers stops the event that causes most of this
+    risk.
     """
     words, most = findings.left_over(verified[-1]), findings.worst(verified[-1])
     if most is None or any(e.reach[most].probability <= HOLDS for e in verified):
+        return words
+    if most in design_events(problem.site) and any(
+        len(one.layout) == 1 and one.reach.releases and one.reach.probability <= HOLDS
+        for one in tried
+    ):
         return words
     held = unheld(problem, most, seed)
     return f"{held}: {words}" if held else words
@@ -239,9 +362,10 @@ def tried(problem: DesignProblem) -> tuple[Layout, ...]:
 
 
 def unheld(problem: DesignProblem, event: str, seed: int) -> str:
-    """Return a text that says that no single barrier stops an event.
+    """Return a text that says that none of the largest single barriers stops an event.
 
-    The text is empty if one of the largest barriers stops the event, or if none may be built.
+    The text is empty if one of them stops the event in half of the releases or more, or if none may
+    be built.
 
     Raises
     ------
@@ -258,8 +382,8 @@ def unheld(problem: DesignProblem, event: str, seed: int) -> str:
         return ""
     volume = _volume(problem, event, seeds[event][0])
     return (
-        f"no single barrier that may be built here stops the event {event!r} "
-        f"({volume:.2g} m3 per metre), however large it is"
+        f"none of {len(layouts)} large single barriers that were tried stops the event {event!r} "
+        f"({volume:.2g} m3 per metre) in at least half of {RELEASES} releases"
     )
 
 

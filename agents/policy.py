@@ -188,7 +188,8 @@ def decide(network: Network, problem: DesignProblem) -> Layout:
         mend = "allow a kind that policies build: " + ", ".join(SLOTS.kinds)
         raise BadInput("kinds", problem.kinds, mend)
     site = replace(problem.site, barrier_zone=problem.zone)  # the observation covers this zone
-    posed = DesignProblem(site, min(problem.max_barriers, SLOTS.count), kinds)
+    slots = min(problem.max_barriers, SLOTS.count)
+    posed = DesignProblem(site, slots, kinds, max_cost=problem.max_cost)
     seen = features(observe(posed))
     numbers = np.clip(ANCHOR + network(seen), -1.0, 1.0)
     return SLOTS.decode(posed, numbers[: posed.max_barriers * SLOTS.width])

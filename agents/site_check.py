@@ -284,7 +284,7 @@ def table(site: Site, trials: Sequence[Trial]) -> Table:
     found = empty_table(("event", "1/year", "years", "blocks", "m3", "t", "steps", "ms"))
     for event, trial in zip(site.events, trials, strict=True):
         source = site.source(event.source)
-        number, areas = _blocks(event, source)
+        number, areas = blocks_of(event, source)
         volumes = [area**1.5 for area in areas]
         masses = [volume * source.density / 1e3 for volume in volumes]
         found.add_row(
@@ -292,15 +292,15 @@ def table(site: Site, trials: Sequence[Trial]) -> Table:
             f"{event.rate:.3g}",
             f"{1.0 / event.rate:.3g}" if event.rate > 0.0 else "never",
             number,
-            _range(volumes),
-            _range(masses),
+            range_of(volumes),
+            range_of(masses),
             f"{trial.steps:,}",
             f"{1e3 * trial.seconds:.3g}",
         )
     return found
 
 
-def _blocks(event: Event, source: Source) -> tuple[str, tuple[float, float]]:
+def blocks_of(event: Event, source: Source) -> tuple[str, tuple[float, float]]:
     """Return the number of blocks of an event, and the least and greatest area of one [m2]."""
     low, high = event.number
     number = f"{low}" if low == high else f"{low} to {high}"
@@ -318,7 +318,7 @@ def _figures(value: float) -> str:
     return f"{value:.2g}" if value < 99.5 else f"{value:,.0f}"
 
 
-def _range(values: Sequence[float]) -> str:
+def range_of(values: Sequence[float]) -> str:
     """Return the least and the greatest of some numbers, in words."""
     low, high = _figures(min(values)), _figures(max(values))
     return low if low == high else f"{low} to {high}"
@@ -449,7 +449,7 @@ def _odd_traffic(site: Site) -> Iterator[str]:
 def _size(site: Site, event: Event) -> float:
     """Return the length of the largest block of an event [m]."""
     source = site.source(event.source)
-    _, (_, most) = _blocks(event, source)
+    _, (_, most) = blocks_of(event, source)
     return math.sqrt(most * (source.aspect[1] if source.band is not None else 1.0))
 
 
@@ -582,7 +582,7 @@ def _draw_ground(axes: Axes, site: Site, bottom: float) -> None:
                       solid_capstyle="round", zorder=1.5)  # fmt: skip
         else:
             axes.fill([a[0], b[0], b[0], a[0]], [a[1], b[1], bottom, bottom],
-                      facecolor=colours[name], edgecolor=colours[name], linewidth=0.3,
+                      facecolor=colours[name], edgecolor=colours[name], linewidth=0.8,
                       label=label)  # fmt: skip
     axes.plot(*np.array(points).T, color="#333333", linewidth=1.0, zorder=2)
     axes.plot(*np.array(site.slope.points).T, ".", color="#333333", markersize=4, zorder=2.1,

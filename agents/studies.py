@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -19,24 +19,13 @@ from numpy.typing import NDArray
 import rigdda
 from rigdda import BadInput, Layout, Outcome, Site, check
 from rigdda.agents import limits
-from rigdda.agents.reports.tables import (
-    HIT,
-    OUTCOME,
-    empty_table,
-    outcome_row,
-    risk_table,
-    write_rows,
-)
-from rigdda.agents.reports.wording import euros, span
+from rigdda.agents.reports.study_report import StudiedLayout, StudyResults
+from rigdda.agents.reports.tables import HIT, OUTCOME, outcome_row, write_rows
 from rigdda.barriers import from_table
-from rigdda.envs.cost import Account, Facts, learn, stratified
+from rigdda.envs.cost import Account, Facts, learn
 from rigdda.envs.outcome_cache import mechanics
-from rigdda.envs.traffic_risk import Risk
 from rigdda.fields import about, checked, parse
 from rigdda.files import read
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,15 +79,16 @@ def load(path: str | os.PathLike[str]) -> Study:
     near = file.parent / data.site
     site = Site.load(near if near.suffix == ".toml" else data.site)
     layouts: dict[str, Layout] = {}
+    faults: list[BadInput] = []
     for i, table in enumerate(data.layouts):
         if table.name in layouts or not table.name:
-            raise BadInput(f"layouts[{i}].name", table.name, "give each layout a name of its own")
-        try:
-            layouts[table.name] = _layout(table, file.parent)
-            site.realise(layouts[table.name])  # report an impossible layout at once
-            check.number("capital", site.capital(layouts[table.name]))
-        except BadInput as bad:
-            raise BadInput(f"layouts.{table.name}.{bad.field}", bad.value, bad.mend) from None
+            mend = "give each layout a name of its own"
+            faults.append(BadInput(f"layouts[{i}].name", table.name, mend))
+            continue
+        layouts[table.name], found = _layout(site, table, file.parent)
+        faults += [BadInput(f"layouts.{table.name}.{f.field}", f.value, f.mend) for f in found]
+    if faults:
+        raise _together(faults)
     if not layouts:
         raise BadInput("layouts", 0, "give at least one table [[layouts]]")
     most = limits.RELEASES // len(layouts) // len(site.events)
@@ -106,13 +96,48 @@ def load(path: str | os.PathLike[str]) -> Study:
     return Study(site, releases, layouts)
 
 
-def _layout(table: _LayoutTable, folder: Path) -> Layout:
-    """Return the layout of one table."""
-    if table.file is None:
-        return tuple(from_table(f"barriers[{i}]", row) for i, row in enumerate(table.barriers))
-    if table.barriers:
-        raise BadInput("file", table.file, "give either a file or barriers, not both")
-    return rigdda.load_layout(folder / table.file)
+def _layout(site: Site, table: _LayoutTable, folder: Path) -> tuple[Layout, list[BadInput]]:
+    """Return the layout of one table and all reasons why it cannot be simulated."""
+    try:
+        if table.file is not None:
+            if table.barriers:
+                raise BadInput("file", table.file, "give either a file or barriers, not both")
+            layout, faults = rigdda.load_layout(folder / table.file), list[BadInput]()
+        else:
+            layout, faults = _barriers(table.barriers)
+    except BadInput as bad:
+        return (), [bad]
+    return layout, faults or _impossible(site, layout)
+
+
+def _impossible(site: Site, layout: Layout) -> list[BadInput]:
+    """Return an error for each barrier that cannot be simulated, or for all of them together."""
+    faults: list[BadInput] = []
+    for part in (*((barrier,) for barrier in layout), layout):
+        try:
+            site.realise(part)
+            check.number("capital", site.capital(part))
+        except BadInput as bad:
+            if part != layout or not faults:
+                faults.append(bad)
+    return faults
+
+
+def _barriers(rows: Sequence[dict[str, Any]]) -> tuple[Layout, list[BadInput]]:
+    """Return the barriers of some tables, and an error for each table that has no barrier."""
+    found, faults = [], []
+    for i, row in enumerate(rows):
+        try:
+            found.append(from_table(f"barriers[{i}]", row))
+        except BadInput as bad:
+            faults.append(bad)
+    return tuple(found), faults
+
+
+def _together(faults: Sequence[BadInput]) -> BadInput:
+    """Return one error that names all faults."""
+    first, *others = faults
+    return BadInput(first.field, first.value, "; also ".join([first.mend, *map(str, others)]))
 
 
 Tick = Callable[[int, str], None]
@@ -271,33 +296,27 @@ def _number(text: str) -> float:
         return math.nan
 
 
-def table(study: Study, path: Path) -> Table:
-    """Return the table of the costs of each layout [EUR per metre of road and year]."""
+def results(study: Study, path: Path) -> StudyResults:
+    """Return the results of a study from its complete CSV file."""
     rows, site = _read(path, _fields(study)), study.site
-    out = empty_table(("layout", "Z (95 %)", "capital", "harm", "repair", "to build"))
-    facts = _facts(site, rows)
+    layouts = []
     for name, layout in study.layouts.items():
-        own = _account(site, [row for row in rows if row["layout"] == name])
-        sums, annual = stratified(site, layout, own, facts), site.annual(layout)
-        ends = [annual + end for end in sums.both.interval]
-        words = f"{euros(annual + sums.both.value)} ({span(ends)})"
-        parts = map(euros, (annual, sums.harm.value, sums.repair.value, site.capital(layout)))
-        out.add_row(name, words, *parts)
-    return out
+        own = [row for row in rows if row["layout"] == name]
+        on_road = np.array([_number(row["max_energy_on_road"]) for row in own])
+        hit = np.array([_hit(row) for row in own])
+        bills = _account(site, own)
+        layouts.append(StudiedLayout(name, layout, bills, 1e-3 * on_road, 1e-3 * hit))
+    return StudyResults(site, tuple(layouts), _facts(site, rows))
 
 
-def risks(study: Study, path: Path) -> Table | None:
-    """Return the table of the risk of each layout to the traffic, or None without traffic."""
-    site = study.site
-    if site.traffic is None:
-        return None
-    rows = _read(path, _fields(study))
-    facts, found = _facts(site, rows), []
-    for name, layout in study.layouts.items():
-        own = _account(site, [row for row in rows if row["layout"] == name])
-        toll = stratified(site, layout, own, facts).toll
-        found.append((name, Risk.of(site.traffic, toll)))
-    return risk_table(found)
+def _hit(row: dict[str, str]) -> float:
+    """Return the largest energy of a hit on any barrier in a release [J/m]."""
+    found = [
+        _number(text)
+        for name, text in row.items()
+        if name.startswith("barrier_") and name.endswith("_max_energy") and text
+    ]
+    return max(found, default=0.0)
 
 
 def _account(site: Site, rows: Sequence[dict[str, str]]) -> Account:

@@ -17,7 +17,8 @@ import click
 from rigdda.agents.limits import RELEASES
 
 if TYPE_CHECKING:
-    from rigdda import Layout
+    from rigdda import Layout, Site
+    from rigdda.agents.run_record import RunRecord
 
 layout_option = click.option(
     "--layout",
@@ -54,6 +55,24 @@ def seed_option(words: str, most: int | None = None) -> Callable[..., Any]:
     """Return the option --seed with a help text; `most` is the largest seed that is accepted."""
     kind = click.IntRange(0, most)
     return click.option("--seed", type=kind, default=0, show_default=True, help=words)
+
+
+def _connect(context: click.Context, _: click.Parameter, address: str | None) -> None:
+    """Compute the releases of a command on the workers of a scheduler, if one is given."""
+    if address is not None and not context.resilient_parsing:
+        from rigdda.distribution import connected
+
+        context.with_resource(connected(address))
+
+
+executor_option = click.option(
+    "--executor",
+    metavar="dask://HOST:PORT",
+    callback=_connect,
+    expose_value=False,
+    help="Compute releases on the workers of a Dask scheduler (extra `dask`).  [default: threads "
+    "of this process]",
+)
 
 
 def count_option(name: str, least: int, default: int, words: str) -> Callable[..., Any]:
@@ -106,9 +125,28 @@ def fail(message: str, code: int) -> int:
 
 
 def note(words: str) -> None:
-    """Print a note as one line, or nothing if the text is empty."""
+    """Print a note as one line, or nothing if the text is empty, and keep it in the run record."""
     if words:
-        click.echo("note: " + " ".join(words.split()))
+        click.echo("note: " + _found(words))
+
+
+def finding(words: str) -> None:
+    """Print a finding as one line, or nothing if it is empty, and keep it in the run record."""
+    if words:
+        click.echo(_found(words))
+
+
+FOUND = "rigdda.findings"
+"""Key of the findings of a command in the data of its click context."""
+
+
+def _found(words: str) -> str:
+    """Return a text as one line and add it to the findings of the command."""
+    line = " ".join(words.split())
+    context = click.get_current_context(silent=True)
+    if context is not None:
+        context.meta.setdefault(FOUND, []).append(line)
+    return line
 
 
 def warn(
@@ -168,8 +206,15 @@ def _part(name: str) -> str:
 
 
 @contextmanager
-def kept(folder: Path) -> Iterator[None]:
-    """Report the files that a run has written if a simulation diverges or the user interrupts it.
+def kept(folder: Path, site: Site | None = None) -> Iterator[None]:
+    """Record a run in `run.json`, and report its files if it diverges or the user interrupts it.
+
+    Parameters
+    ----------
+    folder : path
+        The results folder.
+    site : Site, optional
+        The site of the run, for its record.
 
     Raises
     ------
@@ -180,7 +225,7 @@ def kept(folder: Path) -> Iterator[None]:
 
     before = _stamps(folder)
     try:
-        with _alone(folder):
+        with _alone(folder), _recorded(folder, site, before):
             yield
     except (Diverged, KeyboardInterrupt) as error:
         if isinstance(error, Diverged) and error.run is not None:
@@ -190,6 +235,42 @@ def kept(folder: Path) -> Iterator[None]:
         names = ", ".join(sorted(written)) or "nothing"
         raise Stopped(f"{reason}; kept in {folder}: {names}", code) from None
 
+
+@contextmanager
+def _recorded(folder: Path, site: Site | None, before: set[Stamp]) -> Iterator[None]:
+    """Write the record of the command into its folder, and complete it when the command ends."""
+    from rigdda.agents.run_record import RunRecord, read
+
+    context = click.get_current_context(silent=True)
+    if context is None:  # a function that is called from Python has no command to record
+        yield
+        return
+    command, typed = str(context.info_name), context.find_root().obj or []
+    record = RunRecord.begin(command, list(typed), context.params, site)
+    earlier = _earlier(read(folder), command)
+    record.write(folder)
+    yield
+    written = {name for name, _ in _stamps(folder) - before}
+    record.end(sorted(written | {name for name in earlier if (folder / name).exists()}))
+    record.write(folder)
+    context.call_on_close(lambda: _add_findings(record, folder, context))
+
+
+def _earlier(known: dict[str, RunRecord], command: str) -> list[str]:
+    """Return the files that earlier runs of the same command wrote into a folder."""
+    return known[command].files if command in known else []
+
+
+def _add_findings(record: RunRecord, folder: Path, context: click.Context) -> None:
+    """Add the findings that a command printed to its record."""
+    record.findings = context.meta.get(FOUND, [])
+    if record.findings:
+        with suppress(OSError):  # the results are complete without them
+            record.write(folder)
+
+
+Stamp = tuple[str, tuple[int, int, int]]
+"""Name of a file with its inode, size and time of modification."""
 
 LOCK = ".lock"
 """File in an output folder that is locked by the process which writes into the folder."""
@@ -219,9 +300,12 @@ def _alone(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def _stamps(folder: Path) -> set[tuple[str, tuple[int, int, int]]]:
-    """Return the names in a folder, each with its inode, size and time of modification."""
-    found = ((file.name, file.lstat()) for file in folder.iterdir() if file.name != LOCK)
+def _stamps(folder: Path) -> set[Stamp]:
+    """Return the names of the files in a folder that hold results, each with its stamp."""
+    from rigdda.agents.run_record import FILE
+
+    found = ((file.name, file.lstat()) for file in folder.iterdir())
+    found = ((name, s) for name, s in found if name not in (LOCK, FILE))
     return {(name, (s.st_ino, s.st_size, s.st_mtime_ns)) for name, s in found}
 
 

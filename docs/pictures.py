@@ -39,6 +39,18 @@ def placement(path: Path) -> None:
     _write(path, env)
 
 
+def corridor(path: Path) -> None:
+    """Draw what `rigdda/Corridor-v0` renders after its first section."""
+    env = gymnasium.make("rigdda/Corridor-v0", site=["verge", "quick"], budget=2000.0,
+                         render_mode="rgb_array")  # fmt: skip
+    env.reset(seed=3)
+    problem = env.unwrapped.problem  # type: ignore[attr-defined]
+    ditch = Ditch(problem.site.slope.toe, 1.5, 4.0)
+    slots = env.unwrapped.slots  # type: ignore[attr-defined]
+    env.step(slots.encode(problem, problem.check((ditch,))).astype("float32"))
+    _write(path, env)
+
+
 def tutorial(path: Path) -> None:
     """Draw what the first command of the tutorial for the engineer draws."""
     page = (DOCS / "tutorials/engineer.md").read_text(encoding="utf-8")
@@ -60,6 +72,7 @@ def main() -> None:
     """Draw them all."""
     design(DOCS / "environments/design.png")
     placement(DOCS / "environments/placement.png")
+    corridor(DOCS / "environments/corridor.png")
     tutorial(DOCS / "tutorials/section.png")
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rigdda.envs.comparison import Difference, compare
+from rigdda.envs.corridor_problem import CorridorEvaluation, CorridorProblem
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.registration import register
@@ -16,7 +17,16 @@ from rigdda.envs.registration import register
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
-__all__ = ["DesignProblem", "Difference", "Evaluation", "Targets", "compare", "sb3_vec_env"]
+__all__ = [
+    "CorridorEvaluation",
+    "CorridorProblem",
+    "DesignProblem",
+    "Difference",
+    "Evaluation",
+    "Targets",
+    "compare",
+    "sb3_vec_env",
+]
 
 
 def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:

@@ -94,6 +94,25 @@ def difference(
         If an event with a non-zero rate has fewer than `LEAST` releases.
     """
     one, two = (account(site, a, b) for a, b in zip(layouts, outcomes, strict=True))
+    return difference_of_accounts(site, layouts, (one, two), facts)
+
+
+def difference_of_accounts(
+    site: Site,
+    layouts: tuple[Layout, Layout],
+    accounts: tuple[Account, Account],
+    facts: Mapping[str, Facts],
+) -> Difference:
+    """Return the difference in Z between two layouts from the costs of their releases.
+
+    The arguments are those of `difference`, with an account instead of outcomes for each layout.
+
+    Raises
+    ------
+    BadInput
+        If an event with a non-zero rate has fewer than `LEAST` releases.
+    """
+    one, two = accounts
     value = site.annual(layouts[0]) - site.annual(layouts[1])
     below, above, differ = 0.0, 0.0, 0
     for name in site.event_names:

@@ -4,7 +4,8 @@ A vector has one slot per barrier: presence (a barrier exists if it is above 0),
 zone, height, size and, if there are several kinds, one score per kind. The kind with the largest
 score is chosen; ties go to the first. Every vector decodes to a feasible layout, so optimisers need
 no constraints. A barrier that is not feasible at its station moves to the nearest feasible place,
-or is dropped if there is none. Barriers of earlier slots take precedence and keep their places.
+or is dropped if there is none. Barriers of earlier slots take precedence and keep their places. A
+barrier that would exceed the largest capital cost of the problem is dropped.
 
 ============  ===================================  =============================================
 kind          height                               size
@@ -105,22 +106,26 @@ def built_and_dropped(
         if kind == "mesh":
             if any(isinstance(barrier, Mesh) for barrier in built):
                 dropped.append(f"slot {number}: mesh: an earlier slot already has a mesh")
-            else:
-                built.append(place.mesh(_part(size, len(place.site.meshes))))
-            continue
-        if kind == "removal":
-            removal = place.removals[_part(size, len(place.removals))]
-            if removal in built:
+                continue
+            barrier: Barrier = place.mesh(_part(size, len(place.site.meshes)))
+            room: list[Span] = []
+        elif kind == "removal":
+            barrier, room = place.removals[_part(size, len(place.removals))], []
+            if barrier in built:
                 dropped.append(f"slot {number}: removal: an earlier slot already removes it")
-            else:
-                built.append(removal)
-            continue
-        found = place.nearest(make(place.zone, kind, station, height, size), taken)
-        if found is None:
-            dropped.append(f"slot {number}: {kind}: no feasible place for it in the zone")
+                continue
         else:
-            built.append(found[0])
-            taken.append(found[1])
+            found = place.nearest(make(place.zone, kind, station, height, size), taken)
+            if found is None:
+                dropped.append(f"slot {number}: {kind}: no feasible place for it in the zone")
+                continue
+            barrier, room = found[0], [found[1]]
+        excess = place.too_expensive([*built, barrier])
+        if excess is not None:
+            dropped.append(f"slot {number}: {kind}: the layout would cost {', '.join(excess)}")
+            continue
+        built.append(barrier)
+        taken += room
     return built, dropped
 
 

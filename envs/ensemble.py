@@ -24,6 +24,9 @@ envelopes use seeds from 2**32."""
 FIRST, ALL = 32, 2048
 """Number of releases of each event in the first round, and total number in both rounds together."""
 
+FIRST_SEEDS = range(SEEDS, SEEDS + FIRST)
+"""Seeds of the first round."""
+
 FLOOR = 0.2
 """Minimum share of an event of single blocks relative to an equal share; events with more blocks
 have a lower minimum because they take longer to simulate. It ensures that events which are rare or
@@ -89,7 +92,7 @@ def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
 def _simulate(site: Site, executor: Executor | None) -> Ensemble:
     """Simulate an equal number of releases of each event, then more where they reduce variance."""
     names = site.event_names
-    first = _releases(site, {name: range(SEEDS, SEEDS + FIRST) for name in names}, executor)
+    first = _releases(site, dict.fromkeys(names, FIRST_SEEDS), executor)
     wanted = _shared(_shares(site, _facts(site, first)), ALL)
     more = {name: range(SEEDS + FIRST, SEEDS + max(wanted[name], FIRST)) for name in names}
     both = first + _releases(site, more, executor)
@@ -106,13 +109,33 @@ def _releases(site: Site, seeds: Mapping[str, range], executor: Executor | None)
 
 def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:
     """Return the statistics of each event from releases without barriers."""
+    blocks = {
+        name: float(np.mean([len(site.draw(seed, name).blocks) for seed in FIRST_SEEDS]))
+        for name in site.event_names
+    }
+    return statistics(site, outcomes, blocks)
+
+
+def statistics(
+    site: Site, outcomes: Sequence[Outcome], blocks: Mapping[str, float]
+) -> dict[str, Facts]:
+    """Return the statistics of each event from releases without barriers.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    outcomes : sequence of Outcome
+        The outcomes.
+    blocks : mapping of str to float
+        Mean number of blocks in a release of each event.
+    """
     found, out = account(site, (), outcomes), {}
     released = np.array([o.released_volume for o in outcomes])
     widths = np.array([o.width for o in outcomes])
     for name in site.event_names:
         own = found.event == name
-        blocks = [len(site.draw(seed, name).blocks) for seed in range(SEEDS, SEEDS + FIRST)]
-        out[name] = learn(site, found.of(own), released[own], widths[own], float(np.mean(blocks)))
+        out[name] = learn(site, found.of(own), released[own], widths[own], blocks[name])
     return out
 
 

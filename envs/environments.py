@@ -166,13 +166,14 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         kinds: Sequence[str] | None = None,
         releases: int = 4,
         targets: Targets | Mapping[str, float | None] | None = None,
+        max_cost: float | None = None,
         fidelity: str = "full",
         flat: bool = False,
         record: str | os.PathLike[str] | None = None,
         record_trigger: Trigger | None = None,
         render_mode: str | None = None,
     ):
-        self.venue = Venue(site, max_barriers, kinds, fidelity, targets)
+        self.venue = Venue(site, max_barriers, kinds, fidelity, targets, max_cost)
         self.problem, self.slots = self.venue.first, self.venue.slots
         self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
         if record is None and record_trigger is not None:
@@ -332,6 +333,7 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
             kinds=list(self.slots.kinds),
             releases=self.releases,
             targets=self.venue.targets,
+            max_cost=self.venue.max_cost,
             fidelity=self.venue.fidelity,
             site=self.problem.site,
             episode=self._episode,
@@ -407,9 +409,10 @@ class BarrierDesign(BarrierEnv):
         As for `DesignProblem`; "train", "validation" or "test" draws another site of the split in
         every episode; "random" is the same as "train". `reset(options={"site": ...})` takes the
         same values.
-    max_barriers, kinds, targets, fidelity
-        See `DesignProblem`. If every episode draws its site, the default is all kinds; mesh is not
-        available on sites without mesh options.
+    max_barriers, kinds, targets, max_cost, fidelity
+        See `DesignProblem`. A barrier that would exceed `max_cost` is not built. If every episode
+        draws its site, the default is all kinds; mesh is not available on sites without mesh
+        options.
     releases : int
         Number of random releases over which an episode averages.
     flat : bool
@@ -467,7 +470,9 @@ class BarrierPlacement(BarrierEnv):
 
     Parameters
     ----------
-    site, max_barriers, kinds, releases, targets, fidelity, flat, record_trigger, render_mode
+    site, max_barriers, kinds, releases, targets, max_cost, fidelity, flat
+        See `BarrierDesign`.
+    record_trigger, render_mode
         See `BarrierDesign`.
     record : path, optional
         Folder for a replay of each episode, which shows the representative release of the final

@@ -229,6 +229,11 @@ def checked_targets(site: Site, given: Targets | Mapping[str, float | None] | No
     return targets
 
 
+def checked_cost(max_cost: float | None) -> float | None:
+    """Return the validated largest capital cost of a layout [EUR/m]; None for no limit."""
+    return None if max_cost is None else check.number("max_cost", max_cost, 0.0, unit="EUR/m")
+
+
 def checked_seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int, ...]:
     """Return seeds as a tuple of at least `least` distinct whole numbers."""
     try:
@@ -323,6 +328,9 @@ class DesignProblem:
     zone : (start, end), optional
         Chainages between which barriers may stand [m], within the barrier zone of the site. The
         attribute `zone` is the barrier zone limited to them.
+    max_cost : float, optional
+        Largest capital cost of a layout [EUR per metre of road]. Layouts that cost more are not
+        feasible.
 
     Raises
     ------
@@ -336,6 +344,7 @@ class DesignProblem:
     targets: Targets
     fidelity: str
     zone: BarrierZone
+    max_cost: float | None
     place: Room = field(compare=False, repr=False)
     key: bytes = field(compare=False, repr=False)
 
@@ -347,9 +356,10 @@ class DesignProblem:
         targets: Targets | Mapping[str, float | None] | None = None,
         fidelity: str = "full",
         zone: tuple[float, float] | None = None,
+        max_cost: float | None = None,
     ):
         where = checked_site(site, fidelity)
-        limits = checked_zone(where, zone)
+        limits, most = checked_zone(where, zone), checked_cost(max_cost)
         values = {
             "site": where,
             "max_barriers": check.integer("max_barriers", max_barriers, 1, MOST_BARRIERS),
@@ -357,14 +367,16 @@ class DesignProblem:
             "targets": checked_targets(where, targets),
             "fidelity": fidelity,
             "zone": limits,
-            "place": Room(where, limits),
+            "max_cost": most,
+            "place": Room(where, limits, most),
             "key": fingerprint(where),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def __hash__(self) -> int:
-        return hash((self.key, self.max_barriers, self.kinds, self.targets, self.zone))
+        own = self.max_barriers, self.kinds, self.targets, self.zone, self.max_cost
+        return hash((self.key, *own))
 
     @property
     def size(self) -> int:
@@ -417,7 +429,7 @@ class DesignProblem:
         ------
         BadInput
             If barriers are too many, of other kinds or too large, outside the zone, on ground that
-            is too steep, or too close to the road or to each other.
+            is too steep, or too close to the road or to each other, or cost more than `max_cost`.
         """
         return self.place.check_layout(layout, self.kinds, self.max_barriers)
 
@@ -450,7 +462,7 @@ class DesignProblem:
     @property
     def nothing(self) -> Evaluation:
         """Evaluation of the empty layout, computed once per site; its outcomes are not kept."""
-        return replace(self._known.nothing, targets=self._state(self._known.nothing))
+        return replace(self._known.nothing, targets=self.state(self._known.nothing))
 
     def evaluate(
         self,
@@ -533,7 +545,7 @@ class DesignProblem:
             found,
             seeds=tuple(seeds),
             debris_share=found.debris / without if without else 0.0,
-            targets=self._state(found),
+            targets=self.state(found),
             simulated=getattr(outcomes, "simulated", len(outcomes)),
             seconds=getattr(outcomes, "seconds", 0.0),
         )
@@ -569,7 +581,8 @@ class DesignProblem:
     def _design_events(self) -> list[str]:
         return [event.name for event in self.site.events if event.design]
 
-    def _state(self, found: Evaluation) -> str | None:
+    def state(self, found: Evaluation) -> str | None:
+        """Return whether an evaluation meets the targets; None without targets."""
         return self.targets.state(self._design_events, found.reach, found.failure, found.risk)
 
     def individual_risk(self, layout: Layout, fatalities: Mapping[str, Sequence[float]]) -> Mean:

@@ -13,6 +13,10 @@ ENVIRONMENTS = {
         "rigdda.envs.environments:BarrierPlacement",
         "rigdda.envs.vector:BarrierPlacementVector",
     ),
+    "rigdda/Corridor-v0": (
+        "rigdda.envs.corridor_environment:CorridorDesign",
+        "rigdda.envs.vector:CorridorDesignVector",
+    ),
 }
 """Entry points of each environment, single and vectorised; they are imported on first use."""
 

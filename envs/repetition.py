@@ -65,6 +65,7 @@ def _environment(record: EpisodeRecord) -> environments.BarrierEnv:
         kinds=tuple(record.kinds),
         releases=record.releases,
         targets=record.targets,
+        max_cost=record.max_cost,
     )
     return made
 

@@ -49,7 +49,7 @@ class EpisodeRecord(msgspec.Struct, frozen=True, tag="episode", forbid_unknown_f
     ----------
     environment : str
         Registered name of the environment.
-    max_barriers, kinds, releases, targets
+    max_barriers, kinds, releases, targets, max_cost
         Keywords of the environment.
     fidelity : str
         Fidelity at which `site` was derived.
@@ -75,6 +75,7 @@ class EpisodeRecord(msgspec.Struct, frozen=True, tag="episode", forbid_unknown_f
     kinds: list[str]
     releases: int
     targets: Targets
+    max_cost: float | None
     fidelity: str
     site: Site
     episode: int

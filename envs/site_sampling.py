@@ -13,10 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from rigdda import BadInput, Layout, Site, check, sites
+from rigdda import BadInput, Barrier, Layout, Site, check, sites
 from rigdda.barriers import KINDS as ALL
-from rigdda.envs.encoding import NUMBERS, Floats, encode, slot_size
-from rigdda.envs.problem import FIDELITIES, DesignProblem, Targets, read_targets
+from rigdda.envs.encoding import NUMBERS, Floats, built_and_dropped, encode, slot_size
+from rigdda.envs.problem import (
+    FIDELITIES,
+    DesignProblem,
+    Targets,
+    checked_cost,
+    read_targets,
+)
 from rigdda.envs.problem import USUAL_KINDS as USUAL
 
 Place = str | os.PathLike[str] | Site
@@ -76,6 +82,11 @@ class Slots:
         """Return the barriers that the first slots request but that are not built, with reasons."""
         return problem.dropped(self._vector(problem, numbers))
 
+    def built(self, problem: DesignProblem, numbers: Floats) -> tuple[list[Barrier], list[str]]:
+        """Return the barriers in the order of the slots, and the dropped ones with reasons."""
+        vector = self._vector(problem, numbers)
+        return built_and_dropped(problem.place, vector, problem.kinds)
+
     def _vector(self, problem: DesignProblem, numbers: Floats) -> Floats:
         """Return the vector of the problem for the first slots; the others are empty."""
         used = numbers.reshape(-1, self.width)
@@ -131,6 +142,7 @@ def pose(
     kinds: Sequence[str] | None,
     fidelity: str,
     targets: Targets | None = None,
+    max_cost: float | None = None,
 ) -> DesignProblem:
     """Return the design problem of a site; problems of named sites are cached.
 
@@ -140,15 +152,20 @@ def pose(
         As `DesignProblem` does.
     """
     if isinstance(site, str) and not os.path.exists(site) and isinstance(kinds, tuple | None):
-        return _named(site, slots, kinds, fidelity, targets)
-    return DesignProblem(site, slots, kinds, targets, fidelity)
+        return _named(site, slots, kinds, fidelity, targets, max_cost)
+    return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost)
 
 
 @lru_cache(MOST_POSED)
 def _named(
-    site: str, slots: int, kinds: tuple[str, ...] | None, fidelity: str, targets: Targets | None
+    site: str,
+    slots: int,
+    kinds: tuple[str, ...] | None,
+    fidelity: str,
+    targets: Targets | None,
+    max_cost: float | None,
 ) -> DesignProblem:
-    return DesignProblem(site, slots, kinds, targets, fidelity)
+    return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost)
 
 
 class Venue:
@@ -158,7 +175,7 @@ class Venue:
     ----------
     site : Place
         A site or a split.
-    max_barriers, kinds, fidelity, targets
+    max_barriers, kinds, fidelity, targets, max_cost
         As for `DesignProblem`; if every episode draws its site, the default is all kinds.
 
     Attributes
@@ -183,8 +200,9 @@ class Venue:
         kinds: Sequence[str] | None,
         fidelity: str,
         targets: Targets | Mapping[str, float | None] | None = None,
+        max_cost: float | None = None,
     ):
-        self.targets = read_targets(targets)
+        self.targets, self.max_cost = read_targets(targets), checked_cost(max_cost)
         self.fidelity = check.one_of("fidelity", fidelity, FIDELITIES)
         self.home: DesignProblem | None = None
         self._drawn = drawn_from(site)
@@ -192,7 +210,8 @@ class Venue:
             self.slots = Slots(named(KINDS if kinds is None else kinds), max_barriers)
             self.first = self.pose(self._drawn[0])
         else:
-            self.first = self.home = pose(site, max_barriers, kinds, fidelity, self.targets)
+            limits = self.targets, self.max_cost
+            self.first = self.home = pose(site, max_barriers, kinds, fidelity, *limits)
             self.slots = Slots(self.first.kinds, max_barriers)
 
     def pose(self, site: Place) -> DesignProblem:
@@ -200,7 +219,7 @@ class Venue:
         count = self.slots.count
         whole = pose(site, count, None, self.fidelity)
         kinds = self.slots.shared(whole.site)
-        return pose(site, count, kinds, self.fidelity, self.targets)
+        return pose(site, count, kinds, self.fidelity, self.targets, self.max_cost)
 
     def settle(self, site: Place) -> None:
         """Change the site or split from the next episode on."""

@@ -1,4 +1,4 @@
-"""Siting rules: where barriers may stand on a site, their sizes and clear distances.
+"""Rules for layouts: where barriers may stand on a site, their sizes, distances and cost.
 
 `Rules` checks layouts, and `Room` finds the nearest feasible places.
 """
@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -19,24 +19,19 @@ from rigdda.barriers.spacing import MIN_GAP, Span, meet, room
 from rigdda.model.barrier_zone import BarrierZone
 
 
-def check_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> None:
-    """Check that no two barriers are too close to each other.
+def narrow_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> Iterator[BadInput]:
+    """Yield an error for each barrier that is too close to the one uphill of it.
 
     Parameters
     ----------
     rooms : sequence of (str, Barrier, (start, end))
         Name in messages, barrier and occupied chainages [m] of each.
-
-    Raises
-    ------
-    BadInput
-        If two barriers are too close.
     """
     ordered = sorted(rooms, key=lambda item: item[2])
     for (_, before, one), (where, barrier, two) in pairwise(ordered):
         if meet(one, two):
             mend = f"give at least {one[1] + MIN_GAP:g}: {MIN_GAP:g} m clear of the {before.words}"
-            raise BadInput(f"{where}.x", barrier.x, mend)
+            yield BadInput(f"{where}.x", barrier.x, mend)
 
 
 Floats = NDArray[np.float64]
@@ -47,14 +42,16 @@ this total width, uphill and downhill, must adjoin the works."""
 
 
 class Rules:
-    """Siting rules for the ground of a site.
+    """Rules for layouts on a site.
 
     Parameters
     ----------
     site : Site
-        Provides the ground, the road and the sources.
+        Provides the ground, the road, the sources and the prices.
     zone : BarrierZone
         Where barriers may stand, and how large they may be.
+    max_cost : float, optional
+        Largest capital cost of a layout [EUR per metre of road].
 
     Attributes
     ----------
@@ -69,8 +66,8 @@ class Rules:
         If there are no such parts.
     """
 
-    def __init__(self, site: Site, zone: BarrierZone):
-        self.site, self.zone = site, zone
+    def __init__(self, site: Site, zone: BarrierZone, max_cost: float | None = None):
+        self.site, self.zone, self.max_cost = site, zone, max_cost
         cut = [(max(low, zone.start), min(high, zone.end)) for low, high in site.rooms]
         self.parts = [(low, high) for low, high in cut if low < high]
         if not self.parts:
@@ -118,24 +115,56 @@ class Rules:
             If it is not feasible.
         """
         barriers = tuple(sorted(as_layout(layout), key=lambda barrier: barrier.x))
+        for fault in self.violations(barriers, kinds, most):
+            raise fault
+        return barriers
+
+    def violations(
+        self, layout: Sequence[Barrier], kinds: Sequence[str], most: int
+    ) -> Iterator[BadInput]:
+        """Yield an error for each rule that a layout of given kinds and size violates."""
+        barriers = as_layout(layout)
         if len(barriers) > most:
-            raise BadInput("layout", f"{len(barriers)} barriers", f"give at most {most}")
-        rooms = []
+            yield BadInput("layout", f"{len(barriers)} barriers", f"give at most {most}")
+        rooms: list[tuple[str, Barrier, Span]] = []
         for i, barrier in enumerate(barriers):
             where = f"layout[{i}]"
-            check.one_of(f"{where}.kind", barrier.kind, kinds)
-            if isinstance(barrier, Mesh):
-                self.check_mesh(where, barrier)
-            elif isinstance(barrier, Removal):
-                self._check_removal(where, barrier, barriers[:i])
-            else:
-                rooms.append((where, barrier, room(barrier, self.check(where, barrier))))
+            try:
+                check.one_of(f"{where}.kind", barrier.kind, kinds)
+                if isinstance(barrier, Mesh):
+                    self.check_mesh(where, barrier)
+                elif isinstance(barrier, Removal):
+                    self._check_removal(where, barrier, barriers[:i])
+            except BadInput as bad:
+                yield bad
+            if not isinstance(barrier, Mesh | Removal):
+                works = yield from self._faults(where, barrier)
+                if works is not None:
+                    rooms.append((where, barrier, room(barrier, works)))
         if sum(isinstance(barrier, Mesh) for barrier in barriers) > 1:
-            raise BadInput("layout", "several meshes", "give at most one")
-        check_gaps(rooms)
+            yield BadInput("layout", "several meshes", "give at most one")
+        yield from narrow_gaps(rooms)
         for where, barrier, span in rooms:
-            self._check_existing(where, barrier, span)
-        return barriers
+            yield from self._near_existing(where, barrier, span)
+        if len(rooms) == sum(not isinstance(barrier, Mesh | Removal) for barrier in barriers):
+            excess = self.too_expensive(barriers)
+            if excess is not None:
+                yield BadInput("layout", *excess)
+
+    def too_expensive(self, layout: Sequence[Barrier]) -> tuple[str, str] | None:
+        """Return the excessive capital cost of a layout and the remedy; None if it is affordable.
+
+        It is also None if the layout has no price, because it is not feasible for another reason.
+        """
+        if self.max_cost is None:
+            return None
+        try:
+            cost = self.site.capital(layout)
+        except BadInput:
+            return None
+        if cost <= self.max_cost * (1.0 + TOLERANCE):
+            return None
+        return f"{cost:,.0f} EUR/m", f"spend at most max_cost = {self.max_cost:,.0f} EUR/m"
 
     def check_mesh(self, where: str, mesh: Mesh) -> None:
         """Check that mesh is an option of the site and lies over the rock that it holds.
@@ -158,15 +187,15 @@ class Rules:
         if removal in before:
             raise BadInput(f"{where}.x", removal.x, "remove it only once")
 
-    def _check_existing(self, where: str, barrier: Barrier, span: Span) -> None:
-        """Check that a barrier is clear of those that stand already and may not be removed."""
+    def _near_existing(self, where: str, barrier: Barrier, span: Span) -> Iterator[BadInput]:
+        """Yield an error for each barrier that stands already, may not be removed and is close."""
         for words, taken in self.fixed:
             if meet(span, taken):
                 mend = (
                     f"keep it, with its elongation up to {span[1]:g}, {MIN_GAP:g} m clear of the "
                     f"existing {words} at {taken[0]:g} to {taken[1]:g}"
                 )
-                raise BadInput(f"{where}.x", barrier.x, mend)
+                yield BadInput(f"{where}.x", barrier.x, mend)
 
     def check(self, where: str, barrier: Barrier) -> Span:
         """Return the works of a barrier after checking that it is feasible where it stands.
@@ -176,9 +205,39 @@ class Rules:
         BadInput
             If it is not feasible; the message begins with `where`.
         """
-        self._check_size(where, barrier)
-        start, end = self.works(barrier)
-        self._check_place(where, barrier, start, end)
+        faults = self._faults(where, barrier)
+        try:
+            fault = next(faults)
+        except StopIteration as end:
+            works: Span = end.value
+            return works
+        raise fault
+
+    def _faults(self, where: str, barrier: Barrier) -> Generator[BadInput, None, Span | None]:
+        """Yield an error for each rule that a barrier violates; return its works if it can stand.
+
+        The barrier is not a mesh.
+        """
+        yield from self._wrong_sizes(where, barrier)
+        try:
+            start, end = self.works(barrier)
+        except BadInput as bad:
+            yield bad
+            return None
+        yield from self._misplaced(where, barrier, start, end)
+        yield from self._on_steep_ground(where, barrier, start, end)
+        if isinstance(barrier, Earthwork):
+            try:
+                earthworks(self.site.profile, (barrier,), self.site.soil)
+            except BadInput as bad:
+                yield BadInput(f"{where}: {bad.field}", bad.value, bad.mend)
+                return None
+        return start, end
+
+    def _on_steep_ground(
+        self, where: str, barrier: Barrier, start: float, end: float
+    ) -> Iterator[BadInput]:
+        """Yield errors if the ground under or beside a barrier is too steep."""
         steepest = barrier.steepest
         if steepest is not None:
             angle, most = self.inclination(start, end), steepest
@@ -186,42 +245,42 @@ class Rules:
                 angle, most = self.foundation(start, end, steepest)
             if angle > most + TOLERANCE:
                 mend = f"put it where the ground is at most {most:g} deg steep, not {angle:.1f}"
-                raise BadInput(f"{where}.x", barrier.x, mend)
+                yield BadInput(f"{where}.x", barrier.x, mend)
             beside = float(self.beside(np.array([start]), np.array([end]), steepest)[0])
             if beside < MACHINE - TOLERANCE:
                 mend = (
                     f"put it where {MACHINE:g} m beside it are free for a machine, not {beside:.1f}"
                 )
-                raise BadInput(f"{where}.x", barrier.x, mend)
-        if isinstance(barrier, Earthwork):
-            try:
-                earthworks(self.site.profile, (barrier,), self.site.soil)
-            except BadInput as bad:
-                raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
-        return start, end
+                yield BadInput(f"{where}.x", barrier.x, mend)
 
-    def _check_size(self, where: str, barrier: Barrier) -> None:
+    def _wrong_sizes(self, where: str, barrier: Barrier) -> Iterator[BadInput]:
+        """Yield an error for each size that is out of range, and for an unsuitable design."""
         for length in barrier.lengths:
             value, (low, high) = getattr(barrier, length.field), length.limits(self.zone)
             slack = TOLERANCE * max(1.0, high)
             if not low - slack <= value <= high + slack:
                 mend = f"give a number of at least {low:g} and at most {high:g}"
-                raise BadInput(f"{where}.{length.field}", value, mend)
-        barrier.check_design(where, self.site)
+                yield BadInput(f"{where}.{length.field}", value, mend)
+        try:
+            barrier.check_design(where, self.site)
+        except BadInput as bad:
+            yield bad
 
-    def _check_place(self, where: str, barrier: Barrier, start: float, end: float) -> None:
-        """Check that a barrier lies within a part of the zone, and its distance from the road."""
+    def _misplaced(
+        self, where: str, barrier: Barrier, start: float, end: float
+    ) -> Iterator[BadInput]:
+        """Yield errors if a barrier is outside the zone or too close to the road."""
         slack = TOLERANCE * max(1.0, abs(self.zone.end))
         if not any(low - slack <= start and end <= high + slack for low, high in self.parts):
             rooms = " or ".join(f"{low:g} to {high:g} m" for low, high in self.parts)
             mend = f"keep all of it, up to {end:g} m, within {rooms}"
-            raise BadInput(f"{where}.x", barrier.x, mend)
+            yield BadInput(f"{where}.x", barrier.x, mend)
         road = self.site.road.start
         give = barrier.deflection
         if give > 0.0 and end + give > road + slack:
             most = road - give - barrier.extent
             mend = f"give at most {most:g}: it deflects by up to {give:g} m"
-            raise BadInput(f"{where}.x", barrier.x, f"{mend}, and the road begins at {road:g}")
+            yield BadInput(f"{where}.x", barrier.x, f"{mend}, and the road begins at {road:g}")
 
     def inclination(self, start: float, end: float) -> float:
         """Return the mean inclination of the ground between two chainages [deg]."""
@@ -251,7 +310,7 @@ NEAR_ZERO = 1e-3
 
 
 class Room(Rules):
-    """Siting rules of a site, and the search for feasible places.
+    """Rules for layouts on a site, and the search for feasible places.
 
     The parameters are those of `Rules`.
     """

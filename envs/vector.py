@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rigdda import BadInput, check
 from rigdda.envs import encoding
+from rigdda.envs.corridor_environment import CorridorDesign
 from rigdda.envs.environments import (
     BarrierDesign,
     BarrierEnv,
@@ -138,7 +139,7 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
     """
 
     metadata: dict[str, Any] = BarrierEnv.metadata | {"autoreset_mode": AutoresetMode.SAME_STEP}
-    single: ClassVar[type[BarrierEnv]]
+    single: ClassVar[type[BarrierEnv] | type[CorridorDesign]]
 
     def __init__(
         self,
@@ -287,3 +288,9 @@ class BarrierPlacementVector(BarrierVector):
     """Vectorised `BarrierPlacement`."""
 
     single = BarrierPlacement
+
+
+class CorridorDesignVector(BarrierVector):
+    """Vectorised `CorridorDesign`."""
+
+    single = CorridorDesign

@@ -21,6 +21,7 @@ from .errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
 from .lumped_mass import Points, lumped
 from .model import grounds
 from .model.block import Block
+from .model.corridor import Corridor, CorridorSection
 from .model.existing import Existing
 from .model.loads import BodyForce, Bolt, FixedPoint, LineLoad, PointLoad
 from .model.outcome import BarrierOutcome, Outcome
@@ -46,6 +47,8 @@ __all__ = [
     "BodyForce",
     "Bolt",
     "Consequences",
+    "Corridor",
+    "CorridorSection",
     "Ditch",
     "Diverged",
     "DoubtfulInput",

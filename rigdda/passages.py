@@ -6,7 +6,6 @@ the station. Nothing depends on the interval of recorded frames.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,15 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check
-from rigdda.barriers import Barrier, as_layout
+from rigdda import check, distribution
+from rigdda.barriers import Barrier, Layout, as_layout
 from rigdda.dynamics.monitors import CROSSING
 from rigdda.dynamics.simulation import Simulation
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
 from rigdda.measurement import AT_REST
 from rigdda.model.site import Site
-from rigdda.releases import Batch, as_site
+from rigdda.releases import SENT, Batch, as_site
 
 PASSAGE = np.dtype(
     [
@@ -177,7 +176,7 @@ def passages(
     stations : sequence of float
         Chainages of the stations [m].
     threads : int, optional
-        Number of threads; by default one per core.
+        Number of threads; by default one per core, or the executor in use.
 
     Raises
     ------
@@ -188,7 +187,23 @@ def passages(
     """
     site, built = as_site(site), as_layout(layout)
     lines = check_stations(site, stations)
-    threads = os.cpu_count() or 1 if threads is None else check.integer("threads", threads, 1)
+    if threads is None and distribution.current() is not None:
+        pieces = [releases[r.start : r.stop] for r in distribution.parts(len(releases), SENT)]
+        sent = [(site, built, lines, piece) for piece in pieces]
+        return Passages.join([_none(lines), *distribution.mapped(_sent, sent)])
+    usual = distribution.threads()
+    count = usual if threads is None else check.integer("threads", threads, 1)
+    return _in_threads(site, built, lines, releases, count)
+
+
+def _in_threads(
+    site: Site,
+    built: Layout,
+    lines: NDArray[np.float64],
+    releases: Sequence[Release],
+    threads: int,
+) -> Passages:
+    """Return the passages of releases, computed in threads of this process."""
     places = range(0, len(releases), max(1, min(TOGETHER, len(releases) // (4 * threads))))
     queue = iter([(at, releases[at : at + places.step]) for at in places])
 
@@ -200,6 +215,11 @@ def passages(
         done = [pair for found in pool.map(work, range(threads)) for pair in found]
     done.sort(key=lambda pair: pair[0])
     return Passages.join([_none(lines), *(found for _, found in done)])
+
+
+def _sent(sent: tuple[Site, Layout, NDArray[np.float64], Sequence[Release]]) -> Passages:
+    """Return the passages of releases that were sent to this worker."""
+    return _in_threads(*sent, distribution.threads())
 
 
 def _none(lines: NDArray[np.float64]) -> Passages:

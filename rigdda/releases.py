@@ -8,7 +8,6 @@ the positions of barriers and the interface properties are prepared once.
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,7 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import check
+from rigdda import check, distribution
 from rigdda.barriers import (
     Barrier,
     Built,
@@ -236,6 +235,9 @@ Result = TypeVar("Result")
 
 Job = tuple[Site, Sequence[Barrier], int, str | None]
 """A site, a layout, a seed and the name of an event, or None for an event drawn by the seed."""
+
+CheckedJob = tuple[Site, Layout, int, str | None]
+"""A job whose layout was checked."""
 
 
 def as_site(site: Site) -> Site:
@@ -461,7 +463,7 @@ def release_outcome(
     return Batch(site, layout).outcome(seed, event)
 
 
-def _job(i: int, job: Job) -> tuple[Site, Layout, int, str | None]:
+def _job(i: int, job: Job) -> CheckedJob:
     if not isinstance(job, tuple | list) or len(job) != 4:
         raise BadInput(f"jobs[{i}]", job, "give (site, layout, seed, event)")
     site, layout, seed, event = job
@@ -469,17 +471,18 @@ def _job(i: int, job: Job) -> tuple[Site, Layout, int, str | None]:
 
 
 def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcome]:
-    """Return the outcomes of many releases (site, layout, seed, event), computed in threads.
+    """Return the outcomes of many releases (site, layout, seed, event).
 
-    Each outcome equals that of `release`. Releases of a site with a layout share everything that
-    does not depend on the seed.
+    They are computed in threads, or in the executor of `rigdda.distribution.using`. Each outcome
+    equals that of `release`. Releases of a site with a layout share everything that does not depend
+    on the seed.
 
     Parameters
     ----------
     jobs : sequence of (Site, sequence of Barrier, int, str or None)
         The releases.
     threads : int, optional
-        Number of threads; by default one per core.
+        Number of threads; by default one per core, or the executor in use.
 
     Raises
     ------
@@ -494,23 +497,49 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     if not isinstance(jobs, Sequence):
         raise BadInput("jobs", jobs, "give a sequence of (site, layout, seed, event)")
     each = [_job(i, job) for i, job in enumerate(jobs)]
-    threads = os.cpu_count() or 1 if threads is None else check.integer("threads", threads, 1)
+    if threads is None and distribution.current() is not None:
+        found = _distributed(each)
+    else:
+        usual = distribution.threads()
+        count = usual if threads is None else check.integer("threads", threads, 1)
+        found = _in_threads(each, count)
+    for outcome in found:
+        if isinstance(outcome, Error):
+            raise outcome
+    good = [outcome for outcome in found if isinstance(outcome, Outcome)]
+    cut = [each[place][0] for place, outcome in enumerate(good) if outcome.cut_off]
+    if len(cut) > max(1.0, MANY * len(good)):
+        _doubt_duration(cut[0])
+    return good
+
+
+def _in_threads(jobs: Sequence[CheckedJob], threads: int) -> list[Outcome | Error]:
+    """Return the outcome or the error of each job, computed in threads of this process."""
     groups: dict[tuple[int, Layout], list[int]] = {}
-    for place, (site, layout, _, _) in enumerate(each):
+    for place, (site, layout, _, _) in enumerate(jobs):
         groups.setdefault((id(site), layout), []).append(place)
-    threads = max(1, min(threads, len(each)))
-    most = max(1, min(TOGETHER, len(each) // (8 * threads)))
+    threads = max(1, min(threads, len(jobs)))
+    most = max(1, min(TOGETHER, len(jobs) // (8 * threads)))
     queue = iter(
         [group[i : i + most] for group in groups.values() for i in range(0, len(group), most)]
     )
     with ThreadPoolExecutor(threads) as pool:
-        parts = list(pool.map(lambda _: outcomes(each, queue), range(threads)))
-    found = sorted((pair for part in parts for pair in part), key=lambda pair: pair[0])
-    for _, outcome in found:
-        if isinstance(outcome, Error):
-            raise outcome
-    good = [outcome for _, outcome in found if isinstance(outcome, Outcome)]
-    cut = [each[place][0] for place, o in found if isinstance(o, Outcome) and o.cut_off]
-    if len(cut) > max(1.0, MANY * len(good)):
-        _doubt_duration(cut[0])
-    return good
+        done = list(pool.map(lambda _: outcomes(jobs, queue), range(threads)))
+    found = sorted((pair for part in done for pair in part), key=lambda pair: pair[0])
+    return [outcome for _, outcome in found]
+
+
+SENT = 64
+"""Maximum number of releases that are sent to a worker at a time."""
+
+
+def _distributed(jobs: Sequence[CheckedJob]) -> list[Outcome | Error]:
+    """Return the outcome or the error of each job, computed by the workers of the executor."""
+    places = distribution.parts(len(jobs), SENT)
+    done = distribution.mapped(_sent, [jobs[part.start : part.stop] for part in places])
+    return [outcome for part in done for outcome in part]
+
+
+def _sent(jobs: Sequence[CheckedJob]) -> list[Outcome | Error]:
+    """Return the outcomes of jobs that were sent to this worker."""
+    return _in_threads(jobs, distribution.threads())

@@ -103,7 +103,7 @@ def test_removing_it_costs_once_and_saves_the_upkeep(site: Site) -> None:
     gone = (Removal(20.0),)
     assert site.standing(gone) == ()
     assert site.capital(gone) == 60.0
-    assert site.annual(gone) == pytest.approx(60.0 * site.prices.annuity, rel=1e-14)
+    assert site.annual(gone) == pytest.approx(60.0 * site.prices.annuity("removal"), rel=1e-14)
     for seed in range(4):
         assert release(site, gone, seed)[1] == release(rigdda.sites.load("quick"), (), seed)[1]
 
@@ -112,7 +112,7 @@ def test_a_barrier_in_its_place_replaces_it(site: Site) -> None:
     bare = rigdda.sites.load("quick")
     assert site.standing((REPLACING,)) == (REPLACING,)
     assert site.capital((REPLACING,)) == pytest.approx(bare.capital((REPLACING,)) + 60.0)
-    expected = bare.annual((REPLACING,)) + 60.0 * site.prices.annuity
+    expected = bare.annual((REPLACING,)) + 60.0 * site.prices.annuity("removal")
     assert site.annual((REPLACING,)) == pytest.approx(expected, rel=1e-14)
     both = (Removal(20.0), REPLACING)
     assert site.capital(both) == pytest.approx(site.capital((REPLACING,)), rel=1e-14)

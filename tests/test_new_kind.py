@@ -62,7 +62,7 @@ def test_it_stops_rock_and_has_a_price(problem: DesignProblem, tmp_path: Path) -
     wall = Gabions(zone.end - 1.5, zone.max_height)
     assert site.capital((wall,)) == pytest.approx(150.0 * wall.height * site.access(wall.x))
     assert site.annual((wall,)) == pytest.approx(
-        site.capital((wall,)) * (site.prices.annuity + 0.01)
+        site.capital((wall,)) * (site.prices.annuity("gabions") + 0.01)
     )
     assert problem.check((wall,)) == (wall,)
     kinds = DesignProblem(site, kinds=("wall",))

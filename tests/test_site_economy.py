@@ -39,14 +39,31 @@ FLAT = replace(
 """A plane slope with level ground at its toe."""
 
 
+def test_a_kind_has_a_life_of_its_own():
+    prices = replace(PRICES, lives={"fence": 25.0})
+    i = prices.interest
+    assert prices.annuity("fence") == pytest.approx(i / (1.0 - (1.0 + i) ** -25.0))
+    assert prices.annuity("ditch") == PRICES.annuity("ditch")
+    # a fence that is bought again every 25 years costs as much as its annuity paid for ever
+    bought = sum((1.0 + i) ** (-25.0 * n) for n in range(60))
+    assert bought == pytest.approx(prices.annuity("fence") / i, rel=1e-6)
+
+
+def test_access_is_one_and_a_half_per_sixty_metres():
+    site = Site.load("quick")
+    for x in (12.0, 20.0, 30.0, 34.0):
+        h = max(site.profile.height(x) - site.profile.height(site.road.start), 0.0)
+        assert site.access(x) == pytest.approx(1.0 + 1.5 * h / 60.0)
+
+
 def test_annuity_pays_back_a_loan():
     rate, life = PRICES.interest, PRICES.life
     left = 1.0
     for _ in range(int(life)):
-        left = left * (1.0 + rate) - PRICES.annuity
+        left = left * (1.0 + rate) - PRICES.annuity("fence")
     assert left == pytest.approx(0.0, abs=1e-9)
-    assert replace(PRICES, interest=0.0).annuity == pytest.approx(1.0 / life)
-    assert PRICES.annual("fence") == pytest.approx(PRICES.annuity + 0.015)
+    assert replace(PRICES, interest=0.0).annuity("fence") == pytest.approx(1.0 / life)
+    assert PRICES.annual("fence") == pytest.approx(PRICES.annuity("fence") + 0.015)
 
 
 def test_concrete_is_paid_by_the_cubic_metre():
@@ -122,7 +139,7 @@ def test_a_layout_costs_a_year_what_its_parts_cost():
     each = sum(FLAT.capital((b,)) * PRICES.annual(b.kind) for b in layout)
     assert FLAT.annual(layout) == pytest.approx(each)
     assert FLAT.capital(()) == FLAT.annual(()) == 0.0
-    assert FLAT.shed() == pytest.approx(25_000.0 * (PRICES.annuity + 0.005))
+    assert FLAT.shed() == pytest.approx(25_000.0 * (PRICES.annuity("shed") + 0.005))
 
 
 def test_harm_is_closure_by_days_and_clearing():

@@ -205,6 +205,8 @@ class Catalogue:
     annual : (J,) array
         Annual cost of each barrier including its expected repair, in addition to the upkeep of
         existing barriers [EUR per m].
+    capital : (J,) array
+        Capital cost of each barrier [EUR per m].
     span : (J, 2) array
         Chainages of the start and the end of each barrier [m].
     """
@@ -214,6 +216,7 @@ class Catalogue:
     base: Floats
     relief: Floats
     annual: Floats
+    capital: Floats
     span: Floats
 
     @property
@@ -225,8 +228,8 @@ class Catalogue:
         """Return the catalogue of the barriers with the given indices."""
         i = np.asarray(chosen, dtype=np.int64)
         barriers = [self.barriers[j] for j in i.tolist()]
-        relief, annual = self.relief[:, i], self.annual[i]
-        return Catalogue(barriers, self.weight, self.base, relief, annual, self.span[i])
+        own = self.relief[:, i], self.annual[i], self.capital[i], self.span[i]
+        return Catalogue(barriers, self.weight, self.base, *own)
 
 
 def tabulate(
@@ -237,14 +240,15 @@ def tabulate(
     weight = ensemble.weights([site.rate(name, ()) for name in site.event_names])
     effects, standing = Effects(site, ensemble), site.annual(())
     relief = np.zeros((len(weight), len(barriers)))
-    annual = np.zeros(len(barriers))
+    annual, capital = np.zeros((2, len(barriers)))
     for j, barrier in enumerate(barriers):
         harm, mended = effects.of(barrier)
         relief[:, j] = effects.base - harm
-        capital = site.capital((barrier,)) if mended.any() else 0.0
-        annual[j] = site.annual((barrier,)) - standing + capital * float(weight @ mended)
+        capital[j] = site.capital((barrier,))
+        repair = capital[j] * float(weight @ mended)
+        annual[j] = site.annual((barrier,)) - standing + repair
     span = np.array([[b.x, b.x + b.extent] for b in barriers]).reshape(-1, 2)
-    return Catalogue(barriers, weight, effects.base, relief, annual, span)
+    return Catalogue(barriers, weight, effects.base, relief, annual, capital, span)
 
 
 def whole(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Catalogue:

@@ -6,7 +6,7 @@ harm of release r,
 
     minimise    annual.z + weight.h
     subject to  h_r >= base_r - sum_j relief[r, j] z[j],  h_r >= 0
-                sum z <= max_barriers, and barriers do not overlap
+                sum z <= max_barriers, capital.z <= max_cost, and barriers do not overlap
 
 The sum of the reliefs overestimates the joint effect of two barriers. Therefore further programmes
 scale the reliefs down. The estimate also neglects the effect of a barrier on the motion farther
@@ -64,7 +64,9 @@ class Choice:
     bound: float
 
 
-def choose(catalogue: Catalogue, slots: int, share: float = 1.0) -> Choice:
+def choose(
+    catalogue: Catalogue, slots: int, share: float = 1.0, max_cost: float | None = None
+) -> Choice:
     """Return the best choice of at most `slots` barriers from a catalogue.
 
     Parameters
@@ -75,17 +77,21 @@ def choose(catalogue: Catalogue, slots: int, share: float = 1.0) -> Choice:
         Largest number of barriers.
     share : float
         Factor on all reliefs [-].
+    max_cost : float, optional
+        Largest capital cost [EUR per m].
     """
     if not catalogue.barriers:
         nothing = float(catalogue.weight @ catalogue.base)
         return Choice((), nothing, nothing)
-    bound, _ = _solve(catalogue, slots, share, boolean=False)
-    value, z = _solve(catalogue, slots, share, boolean=True)
+    bound, _ = _solve(catalogue, slots, share, max_cost, boolean=False)
+    value, z = _solve(catalogue, slots, share, max_cost, boolean=True)
     built = [catalogue.barriers[j] for j in np.flatnonzero(z > 0.5).tolist()]
     return Choice(tuple(sorted(built, key=lambda b: b.x)), value, min(bound, value))
 
 
-def _solve(catalogue: Catalogue, slots: int, share: float, boolean: bool) -> tuple[float, Floats]:
+def _solve(
+    catalogue: Catalogue, slots: int, share: float, max_cost: float | None, boolean: bool
+) -> tuple[float, Floats]:
     """Return the least objective and its z (J,), with integers or values between 0 and 1."""
     import cvxpy as cp
 
@@ -97,6 +103,8 @@ def _solve(catalogue: Catalogue, slots: int, share: float, boolean: bool) -> tup
     part = share * catalogue.relief[useful] / catalogue.base[useful, None]
     goal = (catalogue.annual / scale) @ z + weigh @ left
     rules = [left >= 1.0 - part @ z, cp.sum(z) <= slots, z >= 0, z <= 1]
+    if max_cost is not None:
+        rules.append(catalogue.capital @ z <= max_cost)
     clashes = _clashes(catalogue)
     if len(clashes):
         rules.append(clashes @ z <= 1)
@@ -180,7 +188,7 @@ def best_choices(
     catalogue = promising(whole(problem, ensemble, menu))
     found: dict[Layout, Choice] = {}
     for slots, share in _ladder(problem):
-        choice = choose(catalogue, slots, share)
+        choice = choose(catalogue, slots, share, problem.max_cost)
         if problem.fits(choice.layout):
             found.setdefault(choice.layout, choice)
     return tuple(found.values())

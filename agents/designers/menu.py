@@ -53,9 +53,10 @@ class Menu:
     def lone(self, kind: str) -> list[Barrier]:
         """Return all barriers of a kind that may be built, at all stations and of all sizes."""
         if kind == "mesh":
-            return [self.room.mesh(i) for i in range(len(self.problem.site.meshes))]
+            options = (self.room.mesh(i) for i in range(len(self.problem.site.meshes)))
+            return [mesh for mesh in options if self.problem.fits((mesh,))]
         if kind == "removal":
-            return list(self.problem.site.removals)
+            return [one for one in self.problem.site.removals if self.problem.fits((one,))]
         found = []
         for barrier in KINDS[kind].catalogue(self.zone):
             places = [*self.stations, *self._ends(barrier)]

@@ -21,10 +21,12 @@ from rigdda import (
     check,
     display,
 )
+from rigdda.agents.designers.frontier import Tally, TriedLayout, frontier
 from rigdda.agents.designers.menu import on_bound
 from rigdda.agents.designers.store import Store, StoredEvaluation
 from rigdda.agents.limits import RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.intervals import Estimate, Mean
 from rigdda.envs.problem import excess
 
 STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
@@ -83,11 +85,25 @@ def final_score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, 
     return shortfall(problem, evaluation), evaluation.objective
 
 
-def shortfall(problem: DesignProblem, evaluation: Evaluation) -> float:
-    """Return the largest excess of an upper bound over its target [-].
+End = Literal["upper", "value", "lower"]
+"""Upper bound of a number, its estimate, or its lower bound."""
+
+
+def of_chance(chance: Estimate, end: End) -> float:
+    """Return a probability or a one-sided 95 % bound of it."""
+    return {"upper": chance.bound, "value": chance.probability, "lower": chance.floor}[end]
+
+
+def of_mean(mean: Mean, end: End) -> float:
+    """Return a mean or an end of its 95 % interval."""
+    return {"upper": mean.high, "value": mean.value, "lower": mean.low}[end]
+
+
+def shortfall(problem: DesignProblem, evaluation: Evaluation, end: End = "upper") -> float:
+    """Return the largest excess over a target [-].
 
     Targets are those of all design events and of the individual risk, see
-    `rigdda.envs.problem.excess`.
+    `rigdda.envs.problem.excess`. The excess is that of upper bounds, estimates or lower bounds.
     """
     design = [event.name for event in problem.site.events if event.design]
     over = [0.0]
@@ -96,11 +112,28 @@ def shortfall(problem: DesignProblem, evaluation: Evaluation) -> float:
         (problem.targets.failure, evaluation.failure),
     ):
         if wanted is not None:
-            over += [found[name].bound - wanted for name in design]
+            over += [of_chance(found[name], end) - wanted for name in design]
     wanted = problem.targets.individual
     if wanted is not None and evaluation.risk is not None:
-        over.append(excess(evaluation.risk.individual.high, wanted))
+        over.append(excess(of_mean(evaluation.risk.individual, end), wanted))
     return max(over)
+
+
+def best_of_finals(problem: DesignProblem, evaluations: Sequence[Evaluation]) -> Evaluation:
+    """Return the best of some evaluations with many releases each.
+
+    It is the first by `final_score` if the probabilities of any layout are within the targets. If
+    all layouts miss a target, differences in the excess may be due to chance, and a layout that
+    costs a multiple should not be preferred because of them. Then it is the layout with the lowest
+    Z among those that are not shown to miss the targets by more than the first: the lower bounds of
+    their excesses are not above the upper bound of the excess of the first.
+    """
+    first = min(evaluations, key=lambda e: final_score(problem, e))
+    if any(shortfall(problem, e, "value") <= 0.0 for e in evaluations):
+        return first
+    most = shortfall(problem, first)
+    alike = [e for e in evaluations if shortfall(problem, e, "lower") <= most]
+    return min(alike, key=lambda e: e.objective)
 
 
 def value(problem: DesignProblem, evaluation: Evaluation) -> float:
@@ -183,6 +216,9 @@ class DesignResult:
         barrier or of the list of energy classes.
     seconds : float
         Processor time on all cores [s]; it is ignored when results are compared.
+    tried : tuple of TriedLayout
+        What the search found out about every layout that it evaluated; empty if the site has no
+        design events.
     """
 
     site: Site = field(compare=False, repr=False)
@@ -193,6 +229,15 @@ class DesignResult:
     origin: Origin
     on_bound: tuple[str, ...]
     seconds: float = field(compare=False)
+    tried: tuple[TriedLayout, ...] = field(repr=False)
+
+    @property
+    def frontier(self) -> tuple[TriedLayout, ...]:
+        """The cheapest layout for each level of P(reach) among all that the search evaluated.
+
+        See `rigdda.agents.designers.frontier`.
+        """
+        return frontier(self.tried)
 
     def _repr_html_(self) -> str:
         """Return a picture of the layout and the table of its evaluation for notebooks."""
@@ -251,6 +296,7 @@ class Ledger:
         self.starts: set[Layout] = {()}
         self.known: tuple[Layout, ...] = ()
         self.entries: list[Entry] = []
+        self._tally = Tally(problem.site)
         self._progress = progress
         self._store = store or Store()
         self._begun = time.process_time()
@@ -265,6 +311,11 @@ class Ledger:
         seeds = release_seeds(stage, self.seed, releases)
         evaluation = self._store.evaluate(self.problem, layout, seeds)
         self.used += releases
+        counts = {
+            name: (chance.releases, chance.count, evaluation.failure[name].count)
+            for name, chance in evaluation.reach.items()
+        }
+        self._tally.add(layout, evaluation.cost, stage, counts, more=False)
         self._enter(stage, evaluation)
         return evaluation
 
@@ -290,6 +341,11 @@ class Ledger:
         }
         batch = self._store.sample(self.problem, layout, seeds)
         self.used += sum(drawn.values())
+        found = {
+            name: (len(own), sum(r.reached for r in own), sum(r.failed for r in own))
+            for name, own in batch.releases.items()
+        }
+        self._tally.add(layout, batch.evaluation.cost, stage, found, more=True)
         self._enter(stage, batch.evaluation)
         return batch
 
@@ -313,6 +369,7 @@ class Ledger:
             origin=origin or ("start" if layout in self.starts else "search"),
             on_bound=on_bound(self.problem, layout),
             seconds=time.process_time() - self._begun,
+            tried=self._tally.tried(),
         )
 
 
@@ -427,7 +484,7 @@ def finish(ledger: Ledger, plan: Plan, choose: Choose = best) -> DesignResult:
         found = [layout for layout in searched if layout not in known]
         layouts = [*found[: max(1, plan.finalists - len(known))], *known][: plan.finalists]
         left = [ledger.evaluate(layout, "final", plan.final_releases) for layout in layouts]
-        winner = min(left, key=lambda e: final_score(problem, e))
+        winner = best_of_finals(problem, left)
     else:
         winner = choose(problem, left, 1)[0]
     return ledger.result(ledger.evaluate(winner.layout, "report", min(plan.report, ledger.left)))

@@ -30,7 +30,7 @@ from rigdda.agents.designers.catalogue import Catalogue, CrossingEnsemble, ensem
 from rigdda.agents.designers.convex import offered, unsearched
 from rigdda.agents.designers.menu import FINEST, Menu, spread
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, search
-from rigdda.agents.designers.racing import Arm, Track, error
+from rigdda.agents.designers.racing import Arm, Track, best_of_ends, error
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem
 
@@ -109,17 +109,22 @@ BOLD = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Kind:
-    """All barriers of a kind with their annual costs and the surrogate of their remaining risk."""
+    """All barriers of a kind with their costs and the surrogate of their remaining risk."""
 
     barriers: list[Barrier]
     annual: list[float]
+    capital: list[float]
     surface: KindSurrogate
     order: list[int]
 
-    def believed(self, hope: float) -> list[tuple[float, Barrier]]:
-        """Return Z of every barrier at `hope` standard deviations below its mean."""
+    def believed(self, hope: float, price: float = 0.0) -> list[tuple[float, Barrier]]:
+        """Return Z of every barrier at `hope` standard deviations below its mean.
+
+        `price` is an additional annual cost per capital cost [1/year], as scarce money has it.
+        """
         left = self.surface.mean - hope * self.surface.deviation
-        return list(zip((np.array(self.annual) + left).tolist(), self.barriers, strict=True))
+        costs = np.array(self.annual) + price * np.array(self.capital)
+        return list(zip((costs + left).tolist(), self.barriers, strict=True))
 
 
 def scout(
@@ -129,8 +134,22 @@ def scout(
     known: Sequence[Layout],
     budget: int,
     first: int,
-) -> list[Arm]:
-    """Evaluate single barriers and the `known` layouts; return them by estimate, the best first."""
+    prices: Sequence[float] = (0.0,),
+) -> tuple[list[Arm], list[Kind]]:
+    """Evaluate single barriers and the `known` layouts.
+
+    Parameters
+    ----------
+    prices : sequence of float
+        Prices of capital [1/year] for which promising barriers are sought, see `Kind.believed`.
+
+    Returns
+    -------
+    arms : list of Arm
+        The evaluated layouts by their estimated Z, the best first.
+    kinds : list of Kind
+        The barriers of each kind with the estimates of the surrogates.
+    """
     problem = track.problem
     lists = {kind: menu.lone(kind) for kind in problem.kinds}
     kinds = [_kind(track, menu, ensemble, barriers) for barriers in lists.values() if barriers]
@@ -140,7 +159,9 @@ def scout(
     for i in range(BATCHES):
         _learn(kinds, arms, track.nothing)
         each = (track.ledger.left - end) // (BATCHES - i)
-        wanted = _promising(kinds, arms, max(1, each // first), track.nothing)
+        wanted = _promising(
+            kinds, arms, max(1, each // first), track.nothing, prices[i % len(prices)]
+        )
         more = track.look(wanted, first, track.ledger.left - end)
         arms += more
     _learn(kinds, arms, track.nothing)
@@ -149,7 +170,8 @@ def scout(
         left = arm.objective() - arm.annual
         if left > 0.0 and arm.layout in value:
             arm.scale = max(0.0, value[arm.layout] - arm.annual) / left
-    return sorted(arms, key=lambda arm: (arm.shortfall(), value.get(arm.layout, arm.objective())))
+    arms.sort(key=lambda arm: (arm.shortfall(), value.get(arm.layout, arm.objective())))
+    return arms, kinds
 
 
 def _kind(track: Track, menu: Menu, ensemble: CrossingEnsemble, barriers: list[Barrier]) -> Kind:
@@ -166,9 +188,9 @@ def _kind(track: Track, menu: Menu, ensemble: CrossingEnsemble, barriers: list[B
     expected = nothing * (trust * share + 1.0 - trust)
     length = menu.zone.end - menu.zone.start
     order = np.argsort(table.objective, kind="stable").tolist()
-    return Kind(
-        barriers, annual.tolist(), KindSurrogate(barriers, expected, nothing, length), order
-    )
+    capital = [problem.site.capital((b,)) for b in barriers]
+    surface = KindSurrogate(barriers, expected, nothing, length)
+    return Kind(barriers, annual.tolist(), capital, surface, order)
 
 
 def _apart(track: Track, kinds: Sequence[Kind], n: int) -> list[Layout]:
@@ -212,8 +234,10 @@ def _seen(kind: Kind, arms: Sequence[Arm], nothing: Arm) -> list[tuple[Barrier, 
     ]
 
 
-def _promising(kinds: Sequence[Kind], arms: Sequence[Arm], n: int, nothing: Arm) -> list[Layout]:
-    """Return the `n` most promising barriers.
+def _promising(
+    kinds: Sequence[Kind], arms: Sequence[Arm], n: int, nothing: Arm, price: float
+) -> list[Layout]:
+    """Return the `n` most promising barriers at a price of capital.
 
     After each choice, the surrogate is updated as if the barrier had its expected value.
     """
@@ -225,7 +249,7 @@ def _promising(kinds: Sequence[Kind], arms: Sequence[Arm], n: int, nothing: Arm)
         offers = [
             (z, i, k)
             for k, kind in enumerate(kinds)
-            for i, (z, b) in enumerate(kind.believed(BOLD))
+            for i, (z, b) in enumerate(kind.believed(BOLD, price))
             if (b,) not in taken
         ]
         if not offers:
@@ -292,7 +316,7 @@ def design(
     menu, track = Menu(problem), Track(ledger)
     ensemble = ensemble_for(ledger, menu.stations)
     known = unsearched(problem, ensemble, menu)
-    lone = scout(track, menu, ensemble, known, int(SINGLES * simulations), first)
+    lone, _ = scout(track, menu, ensemble, known, int(SINGLES * simulations), first)
     ledger.starts |= {arm.layout for arm in lone}
     pairs = foretold(problem, lone, lone, track.nothing, int(PAIRS * simulations / first))
     seen = [arm.layout for arm in lone if arm.layout]
@@ -313,22 +337,29 @@ def simplest(ends: Sequence[Arm], nothing: Arm) -> Layout:
     """Return the best layout, or one that is nearly as good and has fewer barriers (at least 1)."""
     if not ends:
         return ()
-    most = ends[0].objective() + AS_GOOD * nothing.objective()
+    best = best_of_ends(ends)
+    most = best.objective() + AS_GOOD * nothing.objective()
     as_good = [
         arm
         for arm in ends
-        if arm.layout and arm.shortfall() <= ends[0].shortfall() and arm.objective() < most
+        if arm.layout and arm.shortfall() <= best.shortfall() and arm.objective() < most
     ]
-    return min([*ends[:1], *as_good], key=lambda arm: len(arm.layout)).layout
+    return min([best, *as_good], key=lambda arm: len(arm.layout)).layout
 
 
 def foretold(
-    problem: DesignProblem, arms: Sequence[Arm], others: Sequence[Arm], nothing: Arm, n: int
+    problem: DesignProblem,
+    arms: Sequence[Arm],
+    others: Sequence[Arm],
+    nothing: Arm,
+    n: int,
+    price: float = 0.0,
 ) -> list[Layout]:
     """Return at most `n` combinations of two arms, with the lowest predicted Z first.
 
     The mean bill of an event with both is predicted as the product of their mean bills divided by
     the bill without barriers. At most a third of the combinations have the same kinds of barriers.
+    `price` is an additional annual cost per capital cost [1/year].
     """
     firsts, seconds = _first_of_kinds(arms, BEST_OF), _first_of_kinds(others, BEST_OF)
     found: dict[Layout, float] = {}
@@ -337,6 +368,7 @@ def foretold(
         if both in found or len(both) > problem.max_barriers or not problem.fits(both):
             continue
         value = one.annual + two.annual - nothing.annual
+        value += price * problem.site.capital(both) if price else 0.0
         for name in problem.site.event_names:
             base = nothing.mean(name)
             both_pass = one.scale * one.mean(name) * two.scale * two.mean(name)

@@ -8,16 +8,16 @@ behind the best are dropped at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Fence, Layout
-from rigdda.agents.designers.protocol import Ledger
+from rigdda.agents.designers.protocol import End, Ledger, of_mean
 from rigdda.agents.designers.store import Release
 from rigdda.envs import DesignProblem
-from rigdda.envs.intervals import CONFIDENCE, upper_bound
+from rigdda.envs.intervals import CONFIDENCE, lower_bound, upper_bound
 from rigdda.envs.problem import excess
 
 Floats = NDArray[np.float64]
@@ -110,6 +110,15 @@ class Arm:
         The excess is that of the estimate or, if `strict`, of its upper bound. The upper bound of a
         probability is 1 without releases.
         """
+        return self.excess("upper" if self.strict else "value")
+
+    def excess(self, end: End) -> float:
+        """Return the largest excess over a target [-], 0 if there is none.
+
+        It is that of upper bounds, estimates or lower bounds of the probabilities in design events
+        and of the individual risk.
+        """
+        of = OF_COUNTS[end]
         targets = self.problem.targets
         over = [0.0]
         for event in self.problem.site.events:
@@ -118,17 +127,42 @@ class Arm:
                 for wanted, which in ((targets.reach, "reached"), (targets.failure, "failed")):
                     if wanted is not None:
                         count = sum(getattr(r, which) for r in own)
-                        share = upper_bound(count, len(own)) if self.strict else count / len(own)
-                        over.append(share - wanted)
+                        over.append(of(count, len(own)) - wanted)
         if targets.individual is not None:
             killed = {name: [r.fatalities for r in own] for name, own in self.releases.items()}
             risk = self.problem.individual_risk(self.layout, killed)
-            over.append(excess(risk.high if self.strict else risk.value, targets.individual))
+            over.append(excess(of_mean(risk, end), targets.individual))
         return max(over)
 
     def key(self) -> tuple[float, float]:
         """Return the sort key of candidates: the amount by which a target is missed, then Z."""
         return self.shortfall(), self.objective()
+
+
+def _share(count: int, releases: int) -> float:
+    return count / releases if releases else 1.0
+
+
+OF_COUNTS: dict[End, Callable[[int, int], float]] = {
+    "upper": upper_bound,
+    "value": _share,
+    "lower": lower_bound,
+}
+"""Functions of a count and the number of releases that return a probability or a bound of it."""
+
+
+def best_of_ends(ends: Sequence[Arm]) -> Arm:
+    """Return the best arm of a final, as `protocol.best_of_finals` does.
+
+    Parameters
+    ----------
+    ends : sequence of Arm
+        The arms, by their keys.
+    """
+    if any(arm.excess("value") <= 0.0 for arm in ends):
+        return ends[0]
+    most = ends[0].shortfall()
+    return min((a for a in ends if a.excess("lower") <= most), key=lambda a: a.objective())
 
 
 def error(arm: Arm, nothing: Arm) -> float:

@@ -9,15 +9,18 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
-from rigdda import BadInput, Layout, Outcome, __version__
+from rigdda import BadInput, Layout, Outcome, __version__, distribution
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.intervals import estimate
 from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import atomic
 
@@ -65,6 +68,7 @@ def posed(problem: DesignProblem) -> dict[str, Any]:
         "zone": [problem.zone.start, problem.zone.end],
         "targets": msgspec.to_builtins(problem.targets),
         "max_barriers": problem.max_barriers,
+        "max_cost": problem.max_cost,
         "fidelity": problem.fidelity,
         "content": hashlib.sha256(msgspec.json.encode(problem.site)).hexdigest()[:16],
     }
@@ -100,6 +104,10 @@ LENT = (0, 1)
 """Seeds of releases without barriers that are used for an event without releases."""
 
 
+Ask = tuple[DesignProblem, Layout, Sequence[int]]
+"""A layout to evaluate on release seeds."""
+
+
 class Release(NamedTuple):
     """Stored values of a release.
 
@@ -116,10 +124,42 @@ class Release(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class StoredEvaluation:
-    """Releases of a layout by event, and their joint evaluation."""
+    """Releases of a layout by event, and their joint evaluation.
+
+    `outcomes` holds the packed outcomes of the releases, see `pack`; it is empty in a store that
+    does not keep them.
+    """
 
     evaluation: Evaluation
     releases: dict[str, tuple[Release, ...]]
+    outcomes: bytes = b""
+
+
+def pack(outcomes: Sequence[Outcome]) -> bytes:
+    """Return outcomes in compressed form, about 100 bytes each."""
+    return zlib.compress(msgspec.msgpack.encode(list(outcomes)))
+
+
+def unpack(packed: bytes) -> list[Outcome]:
+    """Return the outcomes of their compressed form; numbers are exact.
+
+    Raises
+    ------
+    ValueError
+        If the bytes are damaged.
+    """
+    try:
+        return msgspec.msgpack.decode(zlib.decompress(packed), type=list[Outcome])
+    except (zlib.error, msgspec.MsgspecError) as error:
+        raise ValueError(f"damaged outcomes ({error})") from None
+
+
+class KeptReleases(NamedTuple):
+    """Releases of a layout, in the order of their packed outcomes."""
+
+    layout: Layout
+    seeds: tuple[int, ...]
+    outcomes: bytes
 
 
 class Store:
@@ -136,6 +176,8 @@ class Store:
         A file with one JSON line per evaluation, which is appended at once. An incomplete last
         line, as an interruption leaves it, is cut off. Lines with a wrong checksum are skipped. If
         None, evaluations are kept in memory only.
+    outcomes : bool
+        Whether the outcomes of all releases are kept, for `rigdda reprice`.
 
     Attributes
     ----------
@@ -143,8 +185,10 @@ class Store:
         Number of releases simulated so far, and number of releases taken from the file.
     """
 
-    def __init__(self, path: str | os.PathLike[str] | None = None):
+    def __init__(self, path: str | os.PathLike[str] | None = None, outcomes: bool = False):
         self.path = None if path is None else Path(path)
+        self._keeps = outcomes
+        self._asked: dict[str, tuple[Layout, tuple[int, ...]]] = {}
         self.simulated = self.resumed = 0
         self._known: dict[str, StoredEvaluation] = {}
         self._kept: set[str] = set()
@@ -176,10 +220,28 @@ class Store:
         drawn = tuple(seeds)
 
         def simulate() -> StoredEvaluation:
-            return StoredEvaluation(problem.evaluate(layout, drawn), {})
+            return _evaluated((problem, layout, drawn), self._keeps)
 
-        found = self._recall(_key(problem, layout, drawn), len(drawn), simulate)
+        found = self._recall(_key(problem, layout, drawn), layout, drawn, simulate)
         return replace(found.evaluation, layout=layout, seeds=drawn)
+
+    def evaluate_many(self, asks: Sequence[Ask]) -> Iterator[Evaluation]:
+        """Yield the evaluations of several layouts, each on release seeds of its own.
+
+        Those that are not in the store are computed by the executor in use, see
+        `rigdda.distribution`, each by one worker.
+
+        Raises
+        ------
+        BadInput, Diverged
+            The same errors as `DesignProblem.evaluate`.
+        """
+        keys = [_key(problem, layout, tuple(seeds)) for problem, layout, seeds in asks]
+        new = [ask for key, ask in zip(keys, asks, strict=True) if self._stored(key) is None]
+        found = distribution.mapped(partial(_evaluated, keeps=self._keeps), new)
+        for key, (_, layout, seeds) in zip(keys, asks, strict=True):
+            kept = self._recall(key, layout, tuple(seeds), lambda: next(found))
+            yield replace(kept.evaluation, layout=layout, seeds=tuple(seeds))
 
     def sample(
         self, problem: DesignProblem, layout: Layout, seeds: Mapping[str, Sequence[int]]
@@ -193,8 +255,8 @@ class Store:
         layout : Layout
             The layout.
         seeds : mapping of str to sequence of int
-            Release seeds by name of event, any number for each event. The evaluation uses releases
-            without barriers for an event that has no seeds.
+            Release seeds by name of event, any number for each event. The costs in the evaluation
+            use releases without barriers for an event that has no seeds.
 
         Raises
         ------
@@ -212,29 +274,61 @@ class Store:
             missing = {name: LENT for name in problem.site.event_names if not asked.get(name)}
             sample = problem.sample((), missing) if missing else ()
             lent = [replace(outcome, barriers=()) for outcome in sample]  # existing barriers
-            return StoredEvaluation(problem.judge(layout, (*outcomes, *lent)), kept)
+            judged = problem.judge(layout, (*outcomes, *lent))
+            unknown = dict.fromkeys(missing, estimate(0, 0))
+            judged = replace(judged, reach=judged.reach | unknown, failure=judged.failure | unknown)
+            judged = replace(judged, targets=problem.state(judged))
+            return StoredEvaluation(judged, kept, pack(outcomes) if self._keeps else b"")
 
-        count = sum(map(len, asked.values()))
-        found = self._recall(_key(problem, layout, sorted(asked.items())), count, simulate)
+        drawn = tuple(seed for own in asked.values() for seed in own)
+        key = _key(problem, layout, sorted(asked.items()))
+        found = self._recall(key, layout, drawn, simulate)
         return replace(found, evaluation=replace(found.evaluation, layout=layout))
 
+    def kept(self) -> Iterator[KeptReleases]:
+        """Yield the releases of each evaluation in the order in which they were requested.
+
+        Only a store with `outcomes` keeps them. A release can be in several evaluations.
+        """
+        for key, (layout, drawn) in self._asked.items():
+            yield KeptReleases(layout, drawn, self._known[key].outcomes)
+
+    def _stored(self, key: str) -> StoredEvaluation | None:
+        """Return the stored evaluation with a key, with its outcomes if the store keeps them."""
+        known = self._known.get(key)
+        return known if known is None or known.outcomes or not self._keeps else None
+
     def _recall(
-        self, key: str, count: int, simulate: Callable[[], StoredEvaluation]
+        self,
+        key: str,
+        layout: Layout,
+        drawn: tuple[int, ...],
+        simulate: Callable[[], StoredEvaluation],
     ) -> StoredEvaluation:
         """Return the stored evaluation with a key, or simulate and store it."""
-        if key in self._known:
-            self.resumed += count if key in self._kept else 0
-            return self._known[key]
+        if self._keeps:
+            self._asked.setdefault(key, (layout, drawn))
+        known = self._stored(key)
+        if known is not None:
+            self.resumed += len(drawn) if key in self._kept else 0
+            return known
         batch = simulate()
         bare = replace(batch.evaluation, layout=(), seeds=(), outcomes=(), simulated=0, seconds=0.0)
         self._known[key] = replace(batch, evaluation=bare)
-        self.simulated += count
+        self.simulated += len(drawn)
         if self.path is not None:
             data = msgspec.to_builtins(self._known[key])
             line = json.dumps({"key": key, "sum": _sum(key, data), "batch": data})
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(line + "\n")
         return self._known[key]
+
+
+def _evaluated(ask: Ask, keeps: bool) -> StoredEvaluation:
+    """Return the evaluation of a layout, with packed outcomes if they are kept."""
+    problem, layout, seeds = ask
+    found = problem.evaluate(layout, seeds)
+    return StoredEvaluation(replace(found, outcomes=()), {}, pack(found.outcomes) if keeps else b"")
 
 
 def _release(problem: DesignProblem, layout: Layout, outcome: Outcome) -> Release:

@@ -5,21 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigdda import BadInput, Layout, Mesh, Site
-from rigdda.agents.design_study import design_events
+from rigdda.agents.design_study import ComparedLayouts, DesignStudy, design_events
+from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
-from rigdda.agents.reports.wording import before, euros, percent, span
+from rigdda.agents.reports.wording import at_most, before, euros, percent, span
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.problem import MET, MISSED, UNDECIDED
 from rigdda.envs.siting import Room
 
 
 def unbuildable(site: Site, layout: Layout) -> str:
-    """Return a text that says why a layout may not be built, or an empty text if it may."""
-    try:
-        Room(site, site.barrier_zone).check_layout(layout, list(KINDS), len(layout))
-    except BadInput as error:
-        return f"is simulated as given but may not be built: {error}"
-    return ""
+    """Return a text with all reasons why a layout may not be built; empty if it may."""
+    found = violations(site, layout)
+    if not found:
+        return ""
+    return f"is simulated as given but may not be built: {'; '.join(map(str, found))}"
+
+
+def violations(site: Site, layout: Layout) -> list[BadInput]:
+    """Return an error for each siting rule that a layout violates."""
+    return list(Room(site, site.barrier_zone).violations(layout, list(KINDS), len(layout)))
 
 
 def of_layout(site: Site, layout: Layout, event: str | None) -> str:
@@ -82,27 +88,116 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
         Text on the remaining risk.
     """
     chosen = cases[-1][1]
-    cheap = [name for name, other in cases[1:-1] if other.ci[1] < chosen.ci[0]]
-    parts = [] if cheap and not chosen.layout else [_pays(result.site, cases[0][1], chosen)]
-    parts += [
-        f"the layout {name!r} costs less per year than the optimised one: use a larger --budget"
-        for name in cheap
-    ]
+    parts = [pays(result.site, cases)]
+    parts += [_costs_less(name, other, cases[-1]) for name, other in cases[1:-1]]
     if chosen.layout and result.on_bound:
         parts.append(f"the layout lies on a bound of the search: {', '.join(result.on_bound)}")
     return "; ".join(filter(None, [*parts, left]))
 
 
-def _pays(site: Site, nothing: Evaluation, chosen: Evaluation) -> str:
-    """Return a text if no layout pays or if this is not shown; otherwise an empty text."""
-    if not chosen.layout:
-        return "no layout was found that saves more per year than it costs"
-    if chosen.ci[1] < nothing.ci[0]:
+RANK = {None: 0, MET: 0, UNDECIDED: 1, MISSED: 2}
+"""Ranks of the states of targets, the best first."""
+
+
+def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> str:
+    """Return a text if a layout costs less per year than the last one; otherwise an empty text."""
+    words, chosen = best
+    if not other.ci[1] < chosen.ci[0]:
         return ""
+    line = f"the layout {name!r} costs less per year than {words!r}"
+    if RANK[other.targets] > RANK[chosen.targets]:
+        return f"{line}, but its targets are {other.targets} and not {chosen.targets}"
+    if RANK[other.targets] == RANK[MISSED]:
+        return f"{line}, and misses the targets, too"
+    return f"{line}: use a larger --budget"
+
+
+def pays(site: Site, cases: Sequence[tuple[str, Evaluation]]) -> str:
+    """Return a text if no layout pays or if this is not shown; otherwise an empty text.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    cases : sequence of (str, Evaluation)
+        Verified layouts; the first is no barrier, and the last is the layout found.
+    """
+    status = "the slope as it stands" if site.existing else "no barrier"
+    nothing, chosen = cases[0][1], cases[-1][1]
+    if chosen.layout:
+        if chosen.ci[1] < nothing.ci[0]:
+            return ""
+        if chosen.ci[0] > nothing.ci[1]:
+            return (
+                f"the layout costs more per year than it saves: Z is {span(chosen.ci)} with it and "
+                f"{span(nothing.ci)} {before(site)}"
+            )
+        return (
+            f"{chosen.releases:,} releases do not show that the layout saves more than it costs: Z "
+            f"is {span(chosen.ci)} with the layout and {span(nothing.ci)} {before(site)}"
+        )
+    lower = [(name, e) for name, e in cases[1:-1] if e.objective < nothing.objective]
+    if not lower:
+        return f"none of the verified layouts costs less per year than {status}"
+    open_ = [name for name, e in lower if e.ci[1] >= nothing.ci[0]]
+    if not open_:
+        return ""  # `limits` names the layouts that cost less
+    names = " and ".join(map(repr, open_))
     return (
-        f"{chosen.releases:,} releases do not show that the layout saves more than it costs: Z is "
-        f"{span(chosen.ci)} with the layout and {span(nothing.ci)} {before(site)}"
+        f"{names} may cost less per year than {status}, but {nothing.releases:,} releases do "
+        "not show it"
     )
+
+
+def over_the_cap(problem: DesignProblem, cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
+    """Return lines on the verified layouts that cost more to build than is allowed."""
+    most = problem.max_cost
+    if most is None:
+        return []
+    return [
+        f"{name!r} costs {euros(e.cost)} EUR per metre to build, more than the {euros(most)} that "
+        "may be spent"
+        for name, e in cases[1:]
+        if problem.place.too_expensive(e.layout) is not None
+    ]
+
+
+def frontier(
+    done: ComparedLayouts, front: Sequence[TriedLayout], tried: int, replaced: bool
+) -> list[str]:
+    """Return lines on the frontier of a missed target; empty if there is no frontier.
+
+    Parameters
+    ----------
+    done : ComparedLayouts
+        The compared layouts.
+    front : sequence of TriedLayout
+        The frontier.
+    tried : int
+        Number of layouts among which the frontier was determined.
+    replaced : bool
+        Whether the layout of the search was replaced by one of the frontier.
+    """
+    if not front:
+        return []
+    known = sum(one.verified is not None for one in front)
+    words = "all of them are verified"
+    if known < len(front):
+        verb = "is" if known == 1 else "are"
+        words = f"{known} of its {len(front)} layouts {verb} verified; the others have few releases"
+    least = min(front, key=lambda one: one.level)
+    lines = [
+        f"a target is missed; the table shows the cheapest layout to build for each level of "
+        f"P(reach) among {tried:,} layouts, compared by the upper bound: {words}",
+        f"the lowest upper bound of P(reach) is {at_most(least.level)}, for {euros(least.cost)} "
+        "EUR per metre to build",
+    ]
+    if replaced:
+        lines.append(
+            f"the layout of the search missed the targets by more, or costs more per year; "
+            f"{done.chosen.name!r} was chosen among the verified layouts on the same releases"
+        )
+    return lines
 
 
 def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
@@ -113,16 +208,29 @@ def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
     cases : sequence of (str, Evaluation)
         Verified layouts; the first is no barrier, and the last is the layout found.
     """
-    chosen = cases[-1][1]
-    order = {None: 0, "met": 0, "undecided": 1, "missed": 2}
+    words, chosen = cases[-1]
     return [
-        f"the layout {name!r} may cost as little per year ({span(other.ci)}, optimised "
+        f"the layout {name!r} may cost as little per year ({span(other.ci)}, {words} "
         f"{span(chosen.ci)}) and is cheaper to build: {euros(other.cost)} instead of "
         f"{euros(chosen.cost)} EUR per metre"
         for name, other in cases[1:-1]
         if other.ci[0] <= chosen.ci[1] and chosen.ci[0] <= other.ci[1]
-        if other.cost < chosen.cost and order[other.targets] <= order[chosen.targets]
+        if other.cost < chosen.cost and euros(other.cost) != euros(chosen.cost)
+        if RANK[other.targets] <= RANK[chosen.targets]
     ]
+
+
+def of_design(done: DesignStudy) -> list[str]:
+    """Return all lines on the layout of a design, its limits, failures and targets."""
+    chosen = done.chosen.evaluation
+    cases = [(case.name, case.evaluation) for case in done.cases]
+    lines = [
+        limits(done.result, cases, done.left),
+        *cheaper(cases),
+        *failing(done.problem.site, chosen),
+        undecided(done.problem, chosen),
+    ]
+    return [line for line in lines if line]
 
 
 def left_over(evaluation: Evaluation) -> str:
@@ -135,7 +243,7 @@ def left_over(evaluation: Evaluation) -> str:
     if len(left) == 1:
         return words
     if left[most] < PART * total:
-        return f"{words}; no event contributes more than {percent(left[most] / total)}"
+        return f"{words}; no event contributes more than {at_most(left[most] / total)}"
     return f"{words}; {euros(left[most])} of this is from the event {most!r}"
 
 
@@ -147,7 +255,7 @@ def failing(site: Site, evaluation: Evaluation) -> list[str]:
         if chance.releases and chance.bound > SURE:
             lines.append(
                 f"a barrier fails in {percent(chance.probability)} of the releases of the design "
-                f"event {event!r} (95 % upper bound {percent(chance.bound)})"
+                f"event {event!r} (95 % upper bound {at_most(chance.bound)})"
             )
     return lines
 

@@ -6,17 +6,20 @@ from pathlib import Path
 
 import rigdda
 from rigdda import Layout, Site
+from rigdda.agents import archive
 from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.reports import findings, pictures
+from rigdda.agents.reports import findings, frontier_report, layout_tables, pictures
 from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
 from rigdda.agents.reports.simulation_folder import along
+from rigdda.agents.reports.tables import known_risks, write_risks, write_rows
 from rigdda.agents.reports.wording import before, euros, span, unchanged
 from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
 
 FILES = (
-    "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png", "episode.rrd",
+    "evaluations.csv", "evaluations.jsonl", archive.FILE, "layouts.csv", "chances.csv",
+    "layout.toml", "section.png", "cost.png", "episode.rrd",
 )  # fmt: skip
 
 
@@ -25,15 +28,19 @@ SEEN = 50
 
 
 def write(done: DesignStudy, out: Path, seed: int) -> None:
-    """Write `layout.toml`, `section.png`, `cost.png` and `episode.rrd` of a study into `out`.
+    """Write the tables of the layouts, `layout.toml`, pictures and `episode.rrd` into `out`.
 
     Raises
     ------
     Diverged
         If a simulation diverges.
     """
+    write_rows(out / "layouts.csv", layout_tables.layouts(done))
+    write_rows(out / "chances.csv", layout_tables.chances(done))
+    write_risks(out, known_risks(done))
     rigdda.save_layout(done.chosen.evaluation.layout, out / "layout.toml")
     _section(done, out / "section.png", seed)
+    frontier_report.write(out, done.problem, done.frontier)
     tried = [entry.evaluation for entry in done.result.history.stage("search")]
     points = [pictures.Point.of(case.name, case.evaluation) for case in done.cases]
     reference = pictures.Point(SHED, done.problem.site.shed(), 0.0, (0.0, 0.0))

@@ -10,6 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -251,9 +252,10 @@ def cost(
         figure = Figure((9.0, 6.2), dpi=DPI, layout="constrained")
         axes = figure.subplots()
         _equal(axes, right, top)
-        axes.plot([e.capital for e in tried], [e.harm + e.repair for e in tried], ".", color=TRIED,
-                  markersize=4, alpha=0.6, zorder=2,
-                  label=_searched(tried))  # fmt: skip
+        if tried:
+            axes.plot([e.capital for e in tried], [e.harm + e.repair for e in tried], ".",
+                      color=TRIED, markersize=4, alpha=0.6, zorder=2,
+                      label=_searched(tried))  # fmt: skip
         for i, point in enumerate(near):
             _named(axes, point, MARKERS[i % len(MARKERS)], EVENTS[i % len(EVENTS)])
         for point in points:
@@ -276,8 +278,6 @@ def _searched(tried: Sequence[Evaluation]) -> str:
     The estimate of the best of many layouts is too low by about this amount.
     """
     words = f"{len(tried):,} layouts of the search, few releases each"
-    if not tried:
-        return words
     half = float(np.median([0.5 * (e.ci[1] - e.ci[0]) for e in tried]))
     return f"{words}, ± {half:,.0f}"
 
@@ -309,10 +309,19 @@ def _named(axes: Axes, point: Point, marker: str, colour: str) -> None:
                   label=f"{point.name}: Z = {point.capital + point.risk:,.0f}")  # fmt: skip
 
 
+VECTOR: dict[Any, Any] = {"svg.hashsalt": "rigdda", "svg.fonttype": "path"}
+"""Settings of vector pictures: the same figure gives the same file, and letters are outlines, so
+that no font is needed."""
+
+
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure as PNG atomically."""
+    """Write a figure as PNG and, beside it, as SVG for reports; each atomically."""
+    from matplotlib import rc_context
+
     with atomic(path) as part:
         figure.savefig(part, format="png")
+    with rc_context(VECTOR), atomic(Path(path).with_suffix(".svg")) as part:
+        figure.savefig(part, format="svg", metadata={"Date": None})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -373,8 +382,52 @@ def section(
         for axes in (heights, energies):
             axes.axvspan(zone.start, zone.end, color=ZONE, alpha=0.25, lw=0)
         _envelopes(heights, energies, site, panels[-1].layout, envelopes, words)
-        _key(lower, site, envelopes)
+        _key(lower, site, [own.event for own in envelopes])
         for axes, own in zip(grid.flat, labels, strict=True):
+            write_labels(axes, own)
+        save(figure, path)
+
+
+COLUMNS = 3
+"""Largest number of slopes side by side."""
+
+
+def slopes(
+    path: str | os.PathLike[str], site: Site, zone: BarrierZone, panels: Sequence[Panel]
+) -> None:
+    """Write a PNG picture of several slopes to the same scale, without envelopes.
+
+    Parameters
+    ----------
+    path : path
+        The PNG file.
+    site : Site
+        The site.
+    zone : BarrierZone
+        The zone in which barriers may be built.
+    panels : sequence of Panel
+        The slopes, up to `COLUMNS` side by side.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    window = _window(site, panels)
+    left, right, bottom, top = window
+    columns = 2 if len(panels) == 4 else min(COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    tall = min(13.0 / columns * (top - bottom) / (right - left), 7.0) + 0.6
+    with rc_context(FONT):
+        figure = Figure((13.0, rows * tall + 1.2), dpi=DPI, layout="constrained")
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        drawn = list(zip(grid.flat, panels, strict=False))
+        labels = [_slope(axes, site, zone, panel, window) for axes, panel in drawn]
+        for axes, _ in drawn:
+            axes.set(xlim=(left, right), ylim=(bottom, top))
+            axes.label_outer()
+        for axes in grid.flat[len(panels) :]:
+            axes.set_visible(False)
+        _key(figure, site, site.event_names, envelopes=False)
+        for (axes, _), own in zip(drawn, labels, strict=True):
             write_labels(axes, own)
         save(figure, path)
 
@@ -542,15 +595,15 @@ RATIO = 1e4
 """Greatest ratio of the ends of a logarithmic axis."""
 
 
-def _key(figure: FigureBase, site: Site, found: Sequence[PassageEnvelope]) -> None:
-    """Draw the legend below the picture."""
+def _key(figure: FigureBase, site: Site, events: Sequence[str], envelopes: bool = True) -> None:
+    """Draw the legend below the picture, with or without the entries for envelopes."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     lines: list[Any] = []
-    for own in found:
-        label = f"{own.event}, {site.event(own.event).rate:g} a year per 100 m"
-        lines.append(Line2D([], [], color=colour_of(site, own.event), linewidth=2, label=label))
+    for name in events:
+        label = f"{name}, {site.event(name).rate:g} a year per 100 m"
+        lines.append(Line2D([], [], color=colour_of(site, name), linewidth=2, label=label))
     lines += [Patch(color=colour, label=name) for name, colour in materials(site).items()]
     lines += [
         Line2D([], [], color="black", linewidth=3, label="rock source"),
@@ -558,12 +611,15 @@ def _key(figure: FigureBase, site: Site, found: Sequence[PassageEnvelope]) -> No
         Line2D([], [], color=ROAD, linewidth=6, label="road"),
         Line2D([], [], color=BARRIER, marker="D", linewidth=4, label="barrier: height, class"),
         Patch(color=BARRIER, alpha=STRETCH, lw=0, label="elongation of a fence"),
-        Patch(color="black", alpha=0.2, lw=0, label="95 % interval"),
-        Line2D([], [], color="black", linewidth=0.7, label="too few blocks for one"),
     ]
     if site.existing:
         lines.append(
             Line2D([], [], color=OLD, linestyle=DASHED, linewidth=4, label="existing barrier")
         )
+    if envelopes:
+        lines += [
+            Patch(color="black", alpha=0.2, lw=0, label="95 % interval"),
+            Line2D([], [], color="black", linewidth=0.7, label="too few blocks for one"),
+        ]
     figure.legend(handles=lines, loc="outside lower center", ncols=min(4, len(lines)),
                   frameon=False)  # fmt: skip

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rigdda import Layout, Site
 from rigdda.agents.reports.tables import empty_table, write_rows
-from rigdda.agents.reports.wording import survey_place
+from rigdda.agents.reports.wording import figure, survey_place
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
 from rigdda.envs.quantiles import BlockSample, Quantile, mean, quantiles
 from rigdda.files import atomic
@@ -364,13 +364,6 @@ def _words(row: dict[str, Any], name: str) -> str:
     if math.isnan(row[name]):
         return "-"
     if name == "q50":
-        return _figure(row[name])
-    low, high = (_figure(row[f"{name}_{end}"]) for end in ("low", "high"))
-    return f"{_figure(row[name])} ({low} to {high})"
-
-
-def _figure(value: float) -> str:
-    """Return a number with three figures, ? if there is none."""
-    if math.isnan(value):
-        return "?"
-    return f"{value:,.0f}" if abs(value) >= 99.95 else f"{value:.3g}"
+        return figure(row[name])
+    low, high = (figure(row[f"{name}_{end}"]) for end in ("low", "high"))
+    return f"{figure(row[name])} ({low} to {high})"

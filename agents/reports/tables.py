@@ -23,11 +23,18 @@ from rigdda import (
     Points,
     Site,
 )
-from rigdda.agents.design_study import SHED, DesignStudy, design_events
+from rigdda.agents.design_study import SHED, ComparedLayouts, design_events
 from rigdda.agents.designers.protocol import Entry
-from rigdda.agents.reports.wording import euros, percent, span, survey_place, surveyed
+from rigdda.agents.reports.wording import (
+    at_most,
+    euros,
+    percent,
+    span,
+    survey_place,
+    surveyed,
+)
 from rigdda.barriers import Earthwork, to_tables
-from rigdda.envs.intervals import Estimate, estimate, mid_p, student_interval
+from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
 from rigdda.envs.traffic_risk import Risk
 from rigdda.files import atomic
 
@@ -280,7 +287,7 @@ def points(found: Points) -> Table:
     return out
 
 
-def costs(study: DesignStudy) -> Table:
+def costs(study: ComparedLayouts) -> Table:
     """Return the table of the costs of each layout, at most 80 characters wide.
 
     Costs are in EUR per metre of road and year, except "to build", which is in EUR per metre.
@@ -306,7 +313,7 @@ def costs(study: DesignStudy) -> Table:
     return table
 
 
-def chances(study: DesignStudy) -> Table | None:
+def chances(study: ComparedLayouts) -> Table | None:
     """Return the table of probabilities in each design event, or None if the site has none.
 
     Each probability is followed by its one-sided 95 % upper bound.
@@ -320,16 +327,16 @@ def chances(study: DesignStudy) -> Table | None:
             e = case.evaluation
             reach = e.reach[event]
             standing = study.problem.site.standing(e.layout)
-            fails = _chance(e.failure[event]) if standing else "-"
+            fails = bounded(e.failure[event]) if standing else "-"
             name = "" if i else event
-            table.add_row(name, case.name, _chance(reach), fails, f"{reach.releases:,}")
+            table.add_row(name, case.name, bounded(reach), fails, f"{reach.releases:,}")
         table.add_section()
     return table
 
 
-def risks(study: DesignStudy) -> Table | None:
+def risks(study: ComparedLayouts) -> Table | None:
     """Return the table of the risk of each layout to the traffic, or None without traffic."""
-    found = [(c.name, c.evaluation.risk) for c in study.cases if c.evaluation.risk is not None]
+    found = known_risks(study)
     return risk_table(found) if found else None
 
 
@@ -346,8 +353,34 @@ def risk_table(found: Sequence[tuple[str, Risk]]) -> Table:
     return table
 
 
-def _chance(estimate: Estimate) -> str:
-    """Return a probability with its upper bound as text."""
+RISKS = "risk.csv"
+"""File with the risk of each layout to the traffic."""
+
+
+def write_risks(folder: Path, found: Sequence[tuple[str, Risk]]) -> None:
+    """Write the risk of named layouts to `risk.csv`, or remove an old file if there is none."""
+    if found:
+        write_rows(folder / RISKS, [{"layout": name, **_risk_row(risk)} for name, risk in found])
+    else:
+        (folder / RISKS).unlink(missing_ok=True)
+
+
+def _risk_row(risk: Risk) -> dict[str, float]:
+    """Return the columns with a risk, each mean followed by the ends of its 95 % interval."""
+    row = {}
+    for name in ("hit", "run_into", "fatalities", "per_km", "individual"):
+        mean: Mean = getattr(risk, name)
+        row |= {name: mean.value, f"{name}_low": mean.low, f"{name}_high": mean.high}
+    return row
+
+
+def known_risks(study: ComparedLayouts) -> list[tuple[str, Risk]]:
+    """Return the risk of each layout to the traffic; empty without traffic."""
+    return [(c.name, c.evaluation.risk) for c in study.cases if c.evaluation.risk is not None]
+
+
+def bounded(estimate: Estimate) -> str:
+    """Return a probability with its upper bound, rounded up, as text; "-" without releases."""
     if not estimate.releases:
         return "-"
-    return f"{percent(estimate.probability)} (<= {percent(estimate.bound)})"
+    return f"{percent(estimate.probability)} (<= {at_most(estimate.bound)})"

@@ -51,6 +51,7 @@ Price = Annotated[float, about(ge=0.0, le=MOST)]
 EnergyClass = Annotated[str, about(choices=FENCES)]
 Upkeep = Annotated[float, about(ge=0.0, le=0.5)]
 Protection = Annotated[str, about(choices=UPKEEP)]
+Life = Annotated[float, about(ge=1.0, le=1000.0)]
 
 
 @documented
@@ -87,7 +88,9 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     access: Annotated[
         float,
         about(
-            "Share by which prices increase per 60 m of height above the road.",
+            "Surcharge for access. Prices are multiplied by 1 + access h / 60, where h is the "
+            "height of the barrier above the road in metres: by 2.5 at 60 m with the default, and "
+            "by 1 at or below the road.",
             "-",
             ge=0.0,
             le=20.0,
@@ -96,7 +99,18 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     interest: Annotated[
         float, about("Real rate of interest, after inflation.", "1/year", ge=0.0, le=0.5)
     ] = 0.03
-    life: Annotated[float, about("Service life of barriers.", "years", ge=1.0, le=1000.0)] = 50.0
+    life: Annotated[
+        Life,
+        about("Service life of barriers. They are then replaced at their capital cost.", "years"),
+    ] = 50.0
+    lives: Annotated[
+        dict[Protection, Life],
+        about(
+            "Service life by kind of barrier. A kind that is not in the table has the general "
+            "`life`.",
+            "years",
+        ),
+    ] = {}
     upkeep: Annotated[
         dict[Protection, Upkeep],
         about(
@@ -114,19 +128,22 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         fields.check(self, "prices.")
 
-    @property
-    def annuity(self) -> float:
-        """Annual payment as a share of the capital cost [1/year]."""
+    def annuity(self, kind: str) -> float:
+        """Return the annual payment for a kind of barrier as a share of its capital cost [1/year].
+
+        It is paid without end, because a barrier is replaced at the end of its service life.
+        """
+        life = self.lives.get(kind, self.life)
         if self.interest < 1e-9:
-            return 1.0 / self.life
-        return self.interest / -np.expm1(-self.life * np.log1p(self.interest))
+            return 1.0 / life
+        return float(self.interest / -np.expm1(-life * np.log1p(self.interest)))
 
     def annual(self, kind: str, usual: float = 0.0) -> float:
         """Return the annual cost of a kind of barrier as a share of its capital cost [1/year].
 
         `usual` is the upkeep of a kind that is neither in the table `upkeep` nor built-in.
         """
-        return float(self.annuity + self.upkeep_of(kind, usual))
+        return float(self.annuity(kind) + self.upkeep_of(kind, usual))
 
     def upkeep_of(self, kind: str, usual: float = 0.0) -> float:
         """Return the annual upkeep of a kind of barrier as a share of its capital cost [1/year]."""

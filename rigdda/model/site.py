@@ -457,7 +457,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             kept = (b for b in self.standing(barriers) if b in old)
             annual += sum(worth[b] * self.prices.upkeep_of(b.kind, b.upkeep) for b in kept)
             gone = existing.replaced(self.existing, self.profile, barriers)
-            annual += float(self.prices.annuity * sum(gone.values()))
+            annual += float(self.prices.annuity("removal") * sum(gone.values()))
         return annual
 
     def bill(self, layout: Sequence[Barrier], outcome: Outcome) -> Bill:

@@ -24,12 +24,13 @@ from rigdda.barriers import to_tables
 
 TINY = ("--budget", "400", "--verify", "40")
 COMMANDS = (
-    "sites", "new", "check", "simulate", "design", "study", "train", "evaluate", "fidelity",
-    "validate", "replay", "repeat",
+    "sites", "new", "check", "simulate", "design", "reprice", "report", "study", "corridor",
+    "train", "evaluate", "fidelity", "validate", "replay", "repeat",
 )  # fmt: skip
 FILES = (
-    "evaluations.csv", "evaluations.jsonl", "layout.toml", "section.png", "cost.png",
-    "episode.rrd", "problem.json",
+    "evaluations.csv", "evaluations.jsonl", "outcomes.msgpack.gz", "layouts.csv", "chances.csv",
+    "layout.toml", "section.png", "section.svg", "cost.png", "cost.svg", "episode.rrd",
+    "problem.json", "run.json",
 )  # fmt: skip
 NUMBERS = ("objective", "objective_low", "objective_high", "capital", "harm", "repair", "cost")
 
@@ -149,6 +150,7 @@ def test_a_killed_design_goes_on(designed: tuple[Path, str], tmp_path: Path) -> 
     assert (tmp_path / "layout.toml").read_bytes() == (folder / "layout.toml").read_bytes()
     again, before = (without_time(f / "evaluations.csv") for f in (tmp_path, folder))
     assert again == before
+    assert (tmp_path / FILES[-1]).read_bytes() == (folder / FILES[-1]).read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -157,6 +159,7 @@ def test_a_killed_design_goes_on(designed: tuple[Path, str], tmp_path: Path) -> 
         (("verge",), ("site", "'quick'")),
         (("quick", "--kinds", "ditch"), ("kinds",)),
         (("quick", "--target", "0.1"), ("targets",)),
+        (("quick", "--max-cost", "900"), ("max_cost",)),
         (("quick", "--zone", "12", "30"), ("zone",)),
     ],
 )
@@ -168,6 +171,34 @@ def test_a_design_of_another_problem_is_left_alone(
     line = refused("design", *change, *TINY, "--out", folder, folder=folder)
     assert all(word in line for word in ("--out", "another folder", *named)), line
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_design_is_answered_for_other_prices(designed: tuple[Path, str], tmp_path: Path) -> None:
+    folder, told = designed
+    words = run("reprice", folder, "--out", "same", folder=tmp_path)
+    before = [line for line in told.splitlines() if line.startswith((" nothing", " constant"))]
+    assert before and all(
+        line.split() in [w.split() for w in words.splitlines()] for line in before
+    )
+    words = run("reprice", folder, "--set", "prices.removal=0", "--out", "o", folder=tmp_path)
+    assert "prices.removal = 0 (was 100)" in words
+    table = rows(tmp_path / "o/costs.csv")
+    assert table[0]["layout"] == "nothing" and len(table) == 5
+
+
+def test_a_cap_and_a_missed_target_are_told(tmp_path: Path) -> None:
+    options = ("--max-cost", 500, "--target", 0.001, "--out", "o")
+    words = run("design", "quick", *TINY, *options, folder=tmp_path)
+    layout = rigdda.load_layout(tmp_path / "o/layout.toml")
+    assert Site.load("quick").capital(layout) <= 500.0
+    assert all(float(row["cost"]) <= 500.0 for row in rows(tmp_path / "o/evaluations.csv"))
+    assert (
+        "a target is missed; the table shows the cheapest layout to build for each level" in words
+    )
+    assert "frontier.csv, frontier.png are in o" in words
+    assert png_size(tmp_path / "o/frontier.png")[0] > 900
+    costs = [float(row["cost"]) for row in rows(tmp_path / "o/frontier.csv")]
+    assert costs == sorted(costs) and costs[0] == 0.0
 
 
 def test_a_refusal_is_the_exit_code_of_a_process(tmp_path: Path) -> None:
@@ -287,7 +318,7 @@ def test_every_command_explains_itself(command: str, tmp_path: Path) -> None:
     words = run(command, "--help", folder=tmp_path)
     assert words.startswith(f"Usage: rigdda {command}")
     if command not in ("sites", "new", "repeat"):
-        assert "--seed" in words and "--out" in words
+        assert ("--seed" in words or command in ("reprice", "report")) and "--out" in words
     assert list(tmp_path.iterdir()) == []
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -23,13 +24,15 @@ from rigdda.agents.designers.menu import Menu
 from rigdda.envs import DesignProblem
 
 
-def least_by_trying_all(table: Catalogue, slots: int) -> float:
+def least_by_trying_all(table: Catalogue, slots: int, cost: float) -> float:
     """Return the least objective over every choice of barriers that do not meet."""
     best = np.inf
     for n in range(slots + 1):
         for chosen in itertools.combinations(range(len(table.barriers)), n):
             spans = sorted(table.span[list(chosen)].tolist())
             if any(b[0] < a[1] + 0.5 for a, b in itertools.pairwise(spans)):
+                continue
+            if table.capital[list(chosen)].sum() > cost:
                 continue
             left = np.maximum(table.base - table.relief[:, list(chosen)].sum(axis=1), 0.0)
             best = min(best, table.annual[list(chosen)].sum() + table.weight @ left)
@@ -46,10 +49,12 @@ def test_the_programme_finds_the_best_choice(seed: int) -> None:
         base=rng.uniform(1e4, 5e4, 12),
         relief=rng.uniform(0.0, 3e4, (12, 7)),
         annual=rng.uniform(10.0, 1000.0, 7),
+        capital=rng.uniform(300.0, 1500.0, 7),
         span=np.array([[at, at + 0.2] for at in x]),
     )
-    for slots in (1, 2, 3):
-        choice, best = choose(table, slots), least_by_trying_all(table, slots)
+    for slots, cost in ((1, None), (2, None), (3, None), (2, 2_000.0), (3, 1_200.0)):
+        choice = choose(table, slots, max_cost=cost)
+        best = least_by_trying_all(table, slots, math.inf if cost is None else cost)
         assert best * (1.0 - 1e-6) <= choice.objective <= best * (1.0 + 1.1 * GAP)
         assert choice.bound <= choice.objective + 1e-6
         assert len(choice.layout) <= slots
@@ -59,7 +64,7 @@ def test_where_nothing_helps_nothing_is_built() -> None:
     barrier = Fence(10.0, 1.0, energy_class=100)
     weight, base = np.ones(4), np.full(4, 0.3)
     span = np.array([[10.0, 10.2]])
-    table = Catalogue([barrier], weight, base, np.zeros((4, 1)), np.ones(1), span)
+    table = Catalogue([barrier], weight, base, np.zeros((4, 1)), np.ones(1), np.ones(1), span)
     assert choose(table, 2).layout == ()
     assert choose(table.take([]), 2).layout == ()
 

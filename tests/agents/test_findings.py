@@ -36,13 +36,13 @@ def test_what_costs_as_little_a_year_and_less_to_build_is_named(problem: DesignP
 def test_nothing_pays_only_if_nothing_that_was_verified_does(problem: DesignProblem) -> None:
     nothing = problem.evaluate((), seeds=range(4))
     dear, bare = replace(nothing, ci=(900.0, 920.0)), replace(nothing, ci=(900.0, 920.0))
-    result = DesignResult(problem.site, (), bare, History(()), 10, "start", (), 0.0)
+    result = DesignResult(problem.site, (), bare, History(()), 10, "start", (), 0.0, ())
 
     def told(other: Evaluation) -> str:
         return findings.limits(result, [("nothing", bare), ("rule", other), ("found", bare)], "")
 
-    assert told(dear).startswith("no layout was found that saves")
-    assert told(replace(dear, ci=(700.0, 720.0))).startswith(
+    assert told(dear).startswith("none of the verified layouts costs less per year")
+    assert told(replace(dear, objective=90.0, ci=(700.0, 720.0))).startswith(
         "the layout 'rule' costs less per year"
     )
 
@@ -57,7 +57,9 @@ def test_what_a_single_barrier_holds_is_not_said_to_be_held_by_none(name: str, k
 
 def test_what_nothing_holds_is_said() -> None:
     assert unheld(Valley(SITE), "block", 0) == ""
-    assert "no single barrier" in unheld(Barren(SITE), "block", 0)
+    assert "large single barriers that were tried stops the event 'block'" in unheld(
+        Barren(SITE), "block", 0
+    )
 
 
 def test_every_kind_that_may_be_built_is_tried() -> None:

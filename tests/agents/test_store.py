@@ -11,7 +11,7 @@ from valley import SITE, Valley
 
 import rigdda.agents
 from rigdda import Fence, Layout
-from rigdda.agents.designers.store import Release, Store
+from rigdda.agents.designers.store import Release, Store, unpack
 from rigdda.envs import DesignProblem
 from rigdda.envs.problem import Targets
 
@@ -109,3 +109,35 @@ def test_a_killed_search_goes_on_where_it_stopped(
     again = Store(file)
     assert design(valley, 150, store=again) == whole
     assert again.simulated == 0
+
+
+def test_an_event_that_was_not_released_is_not_known(problem: DesignProblem) -> None:
+    """Releases without barriers complement the cost, not the probabilities."""
+    targets = DesignProblem(problem.site, targets={"reach": 0.1})
+    first, second = problem.site.event_names[:2]
+    found = Store().sample(targets, (), {second: range(8)}).evaluation
+    assert found.reach[first].releases == 0 and found.reach[second].releases == 8
+    assert found.targets == "undecided"
+    assert found.objective > 0.0
+
+
+def test_a_store_keeps_outcomes_exactly(problem: DesignProblem, tmp_path: Path) -> None:
+    layout = (Fence(17.0, 3.0, energy_class=1000),)
+    store = Store(tmp_path / "kept.jsonl", outcomes=True)
+    evaluation = problem.evaluate(layout, range(12))
+    store.evaluate(problem, layout, range(12))
+    again = Store(tmp_path / "kept.jsonl", outcomes=True)
+    again.evaluate(problem, layout, range(12))
+    assert (again.simulated, again.resumed) == (0, 12)
+    for one in (store, again):
+        (kept,) = one.kept()
+        assert (kept.layout, kept.seeds) == (layout, tuple(range(12)))
+        assert tuple(unpack(kept.outcomes)) == evaluation.outcomes
+    without = Store(tmp_path / "bare.jsonl")
+    without.evaluate(problem, layout, range(12))
+    assert [*without.kept()] == []
+    more = Store(tmp_path / "bare.jsonl", outcomes=True)
+    more.evaluate(problem, layout, range(12))
+    assert (more.simulated, more.resumed) == (12, 0)
+    with pytest.raises(ValueError, match="damaged"):
+        unpack(b"not packed")

@@ -10,12 +10,14 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from test_command_line import refused, rig, rows, run
+from test_command_line import png_size, refused, rig, rows, run
 
 import rigdda
 from rigdda import Site
 from rigdda.agents import studies
+from rigdda.agents.reports import findings, study_report
 from rigdda.agents.reports.tables import _interval, write_rows
+from rigdda.envs.comparison import difference
 from rigdda.envs.cost import stratified
 from rigdda.envs.intervals import upper_bound
 
@@ -133,7 +135,7 @@ def test_a_damaged_row_is_simulated_again(column: str, value: str, folder: Path)
     write_rows(file, table)
     assert studies.run(asked, 0, file, lambda *_: None) == asked.size - 1
     assert file.read_bytes() == whole
-    studies.table(asked, file)
+    studies.results(asked, file)
 
 
 def test_a_file_that_an_editor_has_saved_keeps_its_rows(folder: Path) -> None:
@@ -142,7 +144,7 @@ def test_a_file_that_an_editor_has_saved_keeps_its_rows(folder: Path) -> None:
     asked, file = studies.load(folder / "study.toml"), folder / "study.csv"
     assert studies.run(asked, 0, file, lambda *_: None) == 0
     whole = file.read_bytes()
-    studies.table(asked, file)
+    studies.results(asked, file)
     assert studies.run(asked, 0, file, lambda *_: None) == asked.size
     file.write_bytes(whole.replace(b"\r\n", b"\n"))
     assert studies.run(asked, 0, file, lambda *_: None) == asked.size
@@ -206,7 +208,7 @@ def test_a_study_s_table_is_what_the_problem_says(folder: Path, site: Site) -> N
         site.rate(name, layout) * sum(float(r["harm"]) + float(r["repair"]) for r in found) / 6
         for name, found in bills.items()
     )
-    cells = studies.table(asked, file).columns[1]._cells
+    cells = study_report.costs(studies.results(asked, file)).columns[1]._cells
     assert float(str(cells[1]).split()[0].replace(",", "")) == pytest.approx(z, rel=0.01)
 
 
@@ -220,6 +222,90 @@ def test_the_example_in_python_says_that_stronger_fences_fail_less() -> None:
 def test_the_example_by_file_is_sound() -> None:
     asked = studies.load(EXAMPLES / "study.toml")
     assert len(asked.layouts) == 4 and asked.size == 4 * 3 * 40
+
+
+def test_a_study_tells_differences_on_common_releases(folder: Path, site: Site) -> None:
+    words = run("study", "study.toml", "--out", "o", folder=folder)
+    asked = studies.load(folder / "study.toml")
+    found = studies.results(asked, folder / "o/study.csv")
+    pairs = {(row["one"], row["two"]): row for row in rows(folder / "o/differences.csv")}
+    assert list(pairs) == [("nothing", "one"), ("nothing", "from a file"), ("one", "from a file")]
+    by_name = {one.name: one for one in found.layouts}
+    for (one, two), row in pairs.items():
+        a, b = by_name[one], by_name[two]
+        apart = found.objective(a)[0] - found.objective(b)[0]
+        assert float(row["difference"]) == pytest.approx(apart)
+        assert float(row["low"]) <= apart <= float(row["high"])
+        jobs = [
+            (site, layout, int(r["seed"]), r["event"])
+            for layout, name in ((a.layout, one), (b.layout, two))
+            for r in rows(folder / "o/study.csv")
+            if r["layout"] == name
+        ]
+        outcomes = rigdda.release_many(jobs)
+        half = len(outcomes) // 2
+        parts = outcomes[:half], outcomes[half:]
+        again = difference(site, (a.layout, b.layout), parts, found.facts)
+        assert float(row["difference"]) == pytest.approx(again.value, rel=1e-12)
+        assert float(row["low"]) == pytest.approx(again.ci[0], rel=1e-9)
+    best = min(rows(folder / "o/layouts.csv"), key=lambda row: float(row["objective"]))
+    assert f"{best['layout']!r} has the lowest Z" in words
+    for row in rows(folder / "o/layouts.csv"):
+        total = sum(float(row[part]) for part in ("capital", "harm", "repair"))
+        assert float(row["objective"]) == pytest.approx(total)
+    for name in ("sections.png", "costs.png"):
+        assert png_size(folder / "o" / name)[0] > 900
+
+
+def test_events_of_a_study_are_those_of_its_releases(folder: Path) -> None:
+    run("study", "study.toml", "--out", "o", folder=folder)
+    every = rows(folder / "o/study.csv")
+    for row in rows(folder / "o/events.csv"):
+        own = [r for r in every if (r["layout"], r["event"]) == (row["layout"], row["event"])]
+        assert int(row["releases"]) == len(own) == 6
+        reached = sum(r["reached"] == "True" for r in own)
+        assert float(row["reach"]) == pytest.approx(reached / 6)
+        assert float(row["reach_bound"]) == pytest.approx(upper_bound(reached, 6))
+        energies = [1e-3 * float(r["max_energy_on_road"]) for r in own]
+        dear = [e for e in energies if e > 0.0]
+        if dear:
+            assert float(row["energy_on_road_95"]) == pytest.approx(np.quantile(dear, 0.95))
+        else:
+            assert row["energy_on_road_95"] == ""
+
+
+def test_every_violation_of_every_layout_is_named_at_once(folder: Path) -> None:
+    text = STUDY.replace("x = 18.0, height = 2.0, energy_class = 500", "x = 500.0, height = -2.0")
+    text += """
+[[layouts]]
+name = "two"
+barriers = [
+    { kind = "ditch", x = 20.0, depth = 1.0, width = 2.0, colour = 3 },
+    { kind = "fence", x = 15.0, height = 2.0, energy_class = 7 },
+]
+
+[[layouts]]
+name = "far"
+barriers = [{ kind = "wall", x = 400.0, height = 2.0 }, { kind = "wall", x = 500.0, height = 2.0 }]
+"""
+    (folder / "study.toml").write_text(text)
+    line = refused("study", "study.toml", folder=folder)
+    for words in ("layouts.one.barriers[0].height = -2.0", "layouts.two.barriers[0].colour = 3",
+                  "layouts.two.barriers[1].energy_class = 7", "= 400.0", "= 500.0"):  # fmt: skip
+        assert words in line, (words, line)
+
+
+def test_a_layout_that_may_not_be_built_is_told_all_reasons(site: Site) -> None:
+    layout = (
+        rigdda.Fence(17.0, 2.0, energy_class=500),
+        rigdda.Fence(17.1, 5.8, energy_class=8500),
+        rigdda.GravityWall(16.0, 9.0, 1.0),
+        rigdda.Ditch(6.0, 1.0, 2.0),
+    )
+    words = findings.unbuildable(site, layout)
+    for part in ("layout[1].height = 5.8", "layout[1].x = 17.1", "layout[2].height = 9.0"):
+        assert part in words
+    assert words.count("layout[3]") >= 2
 
 
 def test_none_of_a_few_releases_is_not_never() -> None:

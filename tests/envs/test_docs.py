@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rigdda.envs import corridor_environment
 from rigdda.envs.observation import BOUND, FIELDS, LOOKED
 
 DOCS = Path(__file__).parents[2] / "docs/environments"
@@ -17,7 +18,12 @@ SIZES = {0: "size of all slots", -1: "`max_barriers`"}
 
 
 @pytest.mark.parametrize(
-    "page, fields", [("BarrierDesign-v0", FIELDS), ("BarrierPlacement-v0", LOOKED)]
+    "page, fields",
+    [
+        ("BarrierDesign-v0", FIELDS),
+        ("BarrierPlacement-v0", LOOKED),
+        ("Corridor-v0", corridor_environment.FIELDS),
+    ],
 )
 def test_every_array_is_documented(page: str, fields: dict) -> None:
     told = ROW.findall((DOCS / f"{page}.md").read_text())

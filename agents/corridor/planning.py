@@ -1,0 +1,561 @@
+"""Planning of a corridor: fronts, releases where they change the choice, and one choice a budget.
+
+The plan is made in four stages.
+
+1. Every section is searched for a front of layouts (`rigdda.agents.designers.front`).
+2. The layouts of all fronts are evaluated on the same number of new releases.
+3. Further releases go to the sections in which a wrong choice is likely and expensive. With the
+   shadow price of each budget, the choice of a section is that of the option with the least total
+   cost plus price x construction cost. The expected opportunity cost of this choice follows from
+   the differences between options and their standard errors (Chick and Inoue 2001, Operations
+   Research 49, 732-743). Each batch of releases goes to the section where it reduces this cost
+   most, relative to the number of releases.
+4. For every budget, an integer programme and the simple methods choose from the fronts. All chosen
+   layouts are evaluated on releases that did not affect any choice, so that gains are unbiased.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from scipy.stats import norm
+
+from rigdda import BadInput, Corridor, Layout, __version__, check, distribution
+from rigdda.agents.corridor import programme
+from rigdda.agents.corridor.programme import METHODS, Choice, Increment, Options
+from rigdda.agents.designers import front
+from rigdda.agents.designers.protocol import Entry, release_seeds
+from rigdda.agents.designers.store import Store
+from rigdda.agents.limits import SEED
+from rigdda.barriers import from_table, to_tables
+from rigdda.envs import CorridorEvaluation, CorridorProblem, DesignProblem, Evaluation
+from rigdda.envs.intervals import Estimate, Mean, estimate, total
+from rigdda.envs.outcome_cache import mechanics
+from rigdda.files import atomic
+
+Floats = np.ndarray
+
+SEARCH, CHOICE, MARGIN = 0.5, 0.15, 0.15
+"""Shares of the releases for the search of the fronts, for the first evaluation of their layouts
+and for the sections at the margin [-]. The rest is for the report."""
+
+BATCH = 100
+"""Number of releases of each layout in a batch."""
+
+ROUNDS = 4
+"""Number of rounds after which the shadow prices are computed again."""
+
+LEAST, MOST = 100, 5_000
+"""Least and largest number of releases for the report of a layout."""
+
+SCENARIOS = 400
+"""Number of scenarios of the robust choice."""
+
+DEVIATIONS = 1.96
+"""Distance between a mean and a limit of its 95 % interval, in standard errors."""
+
+CHOICES = "final"
+"""Stream of the releases that affect choices."""
+
+OPTIMUM = "integer programme"
+"""Name of the choice by the integer programme."""
+
+Tick = Callable[[int, str], None]
+"""Called with the number of releases so far and a description of the activity."""
+
+
+@dataclass(slots=True)
+class Option:
+    """A layout of a section with its evaluations in one or more batches of releases.
+
+    Attributes
+    ----------
+    layout : Layout
+        The layout.
+    cost, annual : float
+        Construction cost [EUR/m] and annual cost [EUR/m and year].
+    batches : list of Evaluation
+        Evaluations that affect choices.
+    report : Evaluation or None
+        Evaluation on releases that do not affect any choice.
+    """
+
+    layout: Layout
+    cost: float
+    annual: float
+    batches: list[Evaluation] = field(default_factory=list)
+    report: Evaluation | None = None
+
+    @property
+    def releases(self) -> int:
+        """Number of releases of the batches."""
+        return sum(evaluation.releases for evaluation in self.batches)
+
+    def value(self) -> Mean:
+        """Return Z from all batches [EUR/m and year]."""
+        return joined(self.batches)
+
+    @property
+    def error(self) -> float:
+        """Standard error of Z [EUR/m and year]."""
+        mean = self.value()
+        return (mean.high - mean.low) / (2.0 * DEVIATIONS)
+
+    def missed(self, problem: DesignProblem) -> float:
+        """Return the largest excess of an upper bound of a probability over its target [-]."""
+        over, targets = [0.0], problem.targets
+        for event in problem.site.events:
+            if event.design:
+                for wanted, name in ((targets.reach, "reach"), (targets.failure, "failure")):
+                    if wanted is not None:
+                        seen = [getattr(e, name)[event.name] for e in self.batches]
+                        over.append(_joined(seen).bound - wanted)
+        return max(over)
+
+
+def joined(evaluations: Sequence[Evaluation]) -> Mean:
+    """Return Z from independent evaluations of a layout, weighted by their releases."""
+    whole = sum(evaluation.releases for evaluation in evaluations)
+    return total(Mean(e.objective, *e.ci).times(e.releases / whole) for e in evaluations)
+
+
+def _joined(seen: Sequence[Estimate]) -> Estimate:
+    """Return a probability from several samples."""
+    return estimate(sum(one.count for one in seen), sum(one.releases for one in seen))
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetPlan:
+    """The choice for one budget and those of the simple methods.
+
+    Parameters
+    ----------
+    budget : float
+        Budget for construction [EUR].
+    evaluation : CorridorEvaluation
+        Evaluation of the chosen layouts on releases that did not affect any choice.
+    methods : dict of str to CorridorEvaluation
+        Evaluations of the choices of the simple methods, on the same releases.
+    shadow_price : float
+        Saving per year of one more euro of the budget [1/year].
+    following : tuple of Increment
+        Next steps of the sections that would pay if there were more money, the best first.
+    missed : tuple of float
+        Amount by which each section misses its targets [-].
+    """
+
+    budget: float
+    evaluation: CorridorEvaluation
+    methods: dict[str, CorridorEvaluation]
+    shadow_price: float
+    following: tuple[Increment, ...]
+    missed: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CorridorPlan:
+    """Plans of a corridor for several budgets.
+
+    Parameters
+    ----------
+    problem : CorridorProblem
+        The problem.
+    fronts : tuple of tuples of Option
+        Options of each section, the cheapest first.
+    plans : tuple of BudgetPlan
+        A plan for each budget; the last one is for unlimited money.
+    releases : int
+        Number of releases that were used.
+    """
+
+    problem: CorridorProblem
+    fronts: tuple[tuple[Option, ...], ...]
+    plans: tuple[BudgetPlan, ...]
+    releases: int
+
+    @property
+    def unlimited(self) -> BudgetPlan:
+        """The plan without a limit on the budget."""
+        return self.plans[-1]
+
+
+class Planner:
+    """Plans a corridor.
+
+    Parameters
+    ----------
+    problem : CorridorProblem
+        The problem.
+    releases : int
+        Number of releases per section, of which those at the margin may go to other sections.
+    seed : int
+        Seed of the searches and of all releases.
+    robust : bool
+        Whether choices minimise the conditional value at risk instead of the expected cost.
+    folder : path, optional
+        Folder in which evaluations are stored, so that an interrupted plan can continue.
+    tick : callable, optional
+        Called with the number of releases and a description.
+    margin : bool
+        Whether the releases of stage 3 go to the sections at the margin, instead of evenly to all.
+
+    Raises
+    ------
+    BadInput
+        If a number is outside its range.
+    """
+
+    def __init__(
+        self,
+        problem: CorridorProblem,
+        releases: int = 4_000,
+        seed: int = 0,
+        robust: bool = False,
+        folder: Path | None = None,
+        tick: Tick | None = None,
+        margin: bool = True,
+    ):
+        self.problem = problem
+        self.releases = check.integer("releases", releases, 200, 10**7)
+        self.seed = check.integer("seed", seed, 0, SEED)
+        self.robust, self.margin = robust, margin
+        self.used = 0
+        self._tick = tick or (lambda done, words: None)
+        self._folder = folder
+        self._store = Store(None if folder is None else folder / "evaluations.jsonl")
+        self.fronts: list[list[Option]] = []
+
+    def plan(self) -> CorridorPlan:
+        """Return the plans for all budgets of the corridor.
+
+        Raises
+        ------
+        Diverged
+            If a simulation diverges.
+        """
+        self._search()
+        self._first()
+        self._at_margin()
+        return self._choose()
+
+    def _file(self, kind: str, *asked: object) -> Path | None:
+        """Return the file of stored results that depend on some values, None without a folder."""
+        if self._folder is None:
+            return None
+        key = msgspec.json.encode([__version__, mechanics(), *asked])
+        return self._folder / f"{kind}-{hashlib.sha256(key).hexdigest()[:16]}.json"
+
+    def _seed(self, s: int) -> int:
+        """Return the seed of the releases of a section."""
+        return int(np.random.SeedSequence([self.seed, s]).generate_state(1)[0])
+
+    def _name(self, s: int) -> str:
+        return self.problem.corridor.sections[s].name
+
+    def _search(self) -> None:
+        """Search the front of every section."""
+        budget = int(SEARCH * self.releases)
+        asks = [(problem, budget, self._seed(s)) for s, problem in enumerate(self.problem.problems)]
+        files = [self._file("front", p.site, p.kinds, p.max_barriers, *ask) for p, *ask in asks]
+        found = [_read(file) for file in files]
+        new = distribution.mapped(
+            self._searched if distribution.current() is None else _searched,
+            [(s, *ask) for s, ask in enumerate(asks) if found[s] is None],
+        )
+        for s, problem in enumerate(self.problem.problems):
+            self._tick(self.used, f"searching {self._name(s)}")
+            layouts = found[s]
+            if layouts is None:
+                layouts = next(new)
+                _write(files[s], layouts)
+            site = problem.site
+            options = [Option(own, site.capital(own), site.annual(own)) for own in layouts]
+            self.fronts.append(options)
+            self.used += budget
+
+    def _searched(self, ask: tuple[int, DesignProblem, int, int]) -> tuple[Layout, ...]:
+        """Return the front of a section; report progress and store evaluations."""
+        s, problem, budget, seed = ask
+        begun, words = self.used, f"searching {self._name(s)}"
+
+        def told(entry: Entry) -> None:
+            self._tick(begun + entry.simulations, words)
+
+        path = None if self._folder is None else self._folder / f"search-{s + 1:04d}.jsonl"
+        return front.layouts(problem, budget, seed, told, Store(path))
+
+    def _evaluate(self, stream: str, wanted: Sequence[tuple[int, int, int]]) -> list[Evaluation]:
+        """Evaluate options on releases of a stream.
+
+        `wanted` gives the section, the option and the number of releases. In the stream of choices,
+        releases follow those of earlier batches.
+        """
+        asks = []
+        for s, k, count in wanted:
+            option = self.fronts[s][k]
+            start = option.releases if stream == CHOICES else 0
+            seeds = release_seeds(stream, self._seed(s), count, start)
+            asks.append((self.problem.problems[s], option.layout, seeds))
+        found = []
+        for (s, _, count), evaluation in zip(wanted, self._store.evaluate_many(asks), strict=True):
+            found.append(evaluation)
+            self.used += count
+            self._tick(self.used, f"evaluating {self._name(s)}")
+        return found
+
+    def _add(self, wanted: Sequence[tuple[int, int, int]]) -> None:
+        """Evaluate options on further releases that affect choices."""
+        found = self._evaluate(CHOICES, wanted)
+        for (s, k, _), evaluation in zip(wanted, found, strict=True):
+            self.fronts[s][k].batches.append(evaluation)
+
+    def _first(self) -> None:
+        """Evaluate the options of all sections on the same number of releases."""
+        self._add(self._evenly(CHOICE, BATCH // 2))
+
+    def _evenly(self, share: float, least: int) -> list[tuple[int, int, int]]:
+        """Return a share of the releases of each section, divided evenly between its options."""
+        return [
+            (s, k, max(least, int(share * self.releases / len(options))))
+            for s, options in enumerate(self.fronts)
+            for k in range(len(options))
+        ]
+
+    def _at_margin(self) -> None:
+        """Spend further releases where they reduce the expected opportunity cost most."""
+        whole = int(MARGIN * self.releases * len(self.fronts))
+        if not self.margin:
+            self._add(self._evenly(MARGIN, 1))
+            return
+        spent = 0
+        for done in range(ROUNDS):
+            counts = self._batches(self._prices(), whole * (done + 1) // ROUNDS - spent)
+            wanted = [(s, k, n * BATCH) for (s, k), n in counts.items()]
+            self._add(wanted)
+            spent += sum(count for _, _, count in wanted)
+
+    def _prices(self) -> list[float]:
+        """Return the different shadow prices of all budgets [1/year]."""
+        options = self.options()
+        found = [programme.shadow_price(options, b) for b in self.problem.corridor.budgets]
+        return sorted({*found, 0.0})
+
+    def _batches(self, prices: Sequence[float], releases: int) -> dict[tuple[int, int], int]:
+        """Return the number of batches of each option for a number of releases."""
+        tables = [_Table.of(own, length) for own, length in
+                  zip(self.fronts, self.problem.lengths.tolist(), strict=True)]  # fmt: skip
+        worth = [table.worth(prices) for table in tables]
+        out: dict[tuple[int, int], int] = {}
+        while True:
+            s = max(range(len(worth)), key=lambda i: worth[i][0])
+            rate, contenders = worth[s]
+            if rate <= 0.0 or len(contenders) * BATCH > releases:
+                return out
+            for k in contenders:
+                out[s, k] = out.get((s, k), 0) + 1
+                tables[s].releases[k] += BATCH
+                releases -= BATCH
+            worth[s] = tables[s].worth(prices)
+
+    def options(self) -> Options:
+        """Return the options of all sections as they are known from the batches."""
+        lengths = self.problem.lengths
+        rows = list(zip(lengths.tolist(), self.fronts, self.problem.problems, strict=True))
+        return Options(
+            lengths,
+            [length * np.array([o.cost for o in own]) for length, own, _ in rows],
+            [length * np.array([o.annual for o in own]) for length, own, _ in rows],
+            [length * np.array([o.value().value for o in own]) for length, own, _ in rows],
+            [length * np.array([o.missed(p) for o in own]) for length, own, p in rows],
+        )
+
+    def _choose(self) -> CorridorPlan:
+        """Choose for every budget, and evaluate what was chosen on new releases."""
+        corridor, options = self.problem.corridor, self.options()
+        unlimited = math.fsum(float(own.max()) for own in options.costs)
+        budgets = [*corridor.budgets, unlimited]
+        scenarios = self._scenarios() if self.robust else None
+        choices: list[dict[str, Choice]] = []
+        for budget in budgets:
+            self._tick(self.used, "choosing")
+            best = programme.optimum(options, budget, corridor.yearly_budget, scenarios)
+            others = {name: method(options, budget) for name, method in METHODS.items()}
+            choices.append({OPTIMUM: best, **others})
+        self._report({(s, k) for own in choices for c in own.values() for s, k in enumerate(c)})
+        plans = []
+        for budget, own in zip(budgets, choices, strict=True):
+            best = own[OPTIMUM]
+            plans.append(
+                BudgetPlan(
+                    budget=budget,
+                    evaluation=self._judged(best),
+                    methods={name: self._judged(own[name]) for name in METHODS},
+                    shadow_price=programme.shadow_price(options, budget),
+                    following=_following(options, best),
+                    missed=tuple(
+                        float(table[k] / length) for table, k, length in
+                        zip(options.missed, best, options.lengths, strict=True)
+                    ),
+                )
+            )  # fmt: skip
+        fronts = tuple(map(tuple, self.fronts))
+        return CorridorPlan(self.problem, fronts, tuple(plans), self.used)
+
+    def _report(self, chosen: set[tuple[int, int]]) -> None:
+        """Evaluate chosen options on releases that did not affect any choice."""
+        built = sorted((s, k) for s, k in chosen if k > 0)
+        share = 1.0 - SEARCH - CHOICE - MARGIN
+        each = int(share * self.releases * len(self.fronts) / max(1, len(built)))
+        count = min(MOST, max(LEAST, each))
+        found = self._evaluate("report", [(s, k, count) for s, k in built])
+        for (s, k), evaluation in zip(built, found, strict=True):
+            self.fronts[s][k].report = evaluation
+
+    def _judged(self, choice: Choice) -> CorridorEvaluation:
+        """Return the evaluation of a choice from the reports of its options."""
+        found = []
+        for s, k in enumerate(choice):
+            report = self.fronts[s][k].report
+            found.append(report if report is not None else self.problem.problems[s].nothing)
+        return self.problem.judge(found)
+
+    def _scenarios(self) -> list[Floats]:
+        """Return possible total costs of each option, drawn from their uncertainty."""
+        rng = np.random.default_rng(self.seed)
+        out = []
+        for length, own in zip(self.problem.lengths.tolist(), self.fronts, strict=True):
+            value = np.array([o.value().value for o in own])
+            error = np.array([o.error for o in own])
+            drawn = value + error * rng.standard_normal((SCENARIOS, len(own)))
+            out.append(length * np.maximum(drawn, 0.0))
+        return out
+
+
+def _searched(ask: tuple[int, DesignProblem, int, int]) -> tuple[Layout, ...]:
+    """Return the front of a section that was sent to this worker."""
+    _, problem, budget, seed = ask
+    return front.layouts(problem, budget, seed)
+
+
+def _read(file: Path | None) -> tuple[Layout, ...] | None:
+    """Return the stored layouts of a front, None if there are none or they are damaged."""
+    if file is None or not file.is_file():
+        return None
+    try:
+        rows = msgspec.json.decode(file.read_bytes())
+        return tuple(tuple(from_table("front", row) for row in layout) for layout in rows)
+    except (msgspec.MsgspecError, BadInput, TypeError):
+        return None
+
+
+def _write(file: Path | None, layouts: Sequence[Layout]) -> None:
+    """Store the layouts of a front."""
+    if file is not None:
+        with atomic(file) as part:
+            part.write_bytes(msgspec.json.encode([to_tables(layout) for layout in layouts]))
+
+
+@dataclass(slots=True)
+class _Table:
+    """Estimates of the options of a section: values, variances of one release, and releases."""
+
+    length: float
+    cost: Floats
+    value: Floats
+    variance: Floats
+    releases: Floats
+
+    @classmethod
+    def of(cls, options: Sequence[Option], length: float) -> _Table:
+        """Return the table of the options of a section of a given length [m]."""
+        releases = np.array([float(option.releases) for option in options])
+        error = np.array([option.error for option in options])
+        return cls(
+            length,
+            np.array([option.cost for option in options]),
+            np.array([option.value().value for option in options]),
+            error**2 * releases,
+            releases,
+        )
+
+    def worth(self, prices: Sequence[float]) -> tuple[float, list[int]]:
+        """Return the reduction of the opportunity cost per release, and the options to evaluate.
+
+        Both are those of one more batch for the two options between which the choice is the most
+        uncertain for one of the prices.
+        """
+        best: tuple[float, list[int]] = 0.0, []
+        for price in prices:
+            goal = self.value + price * self.cost
+            first = int(np.argmin(goal))
+            now = self._opportunity(goal, first, self.releases)
+            if not now.any():
+                continue
+            second = int(np.argmax(now))
+            after = self.releases.copy()
+            after[[first, second]] += BATCH
+            saved = now[second] - self._opportunity(goal, first, after)[second]
+            if saved * self.length / (2 * BATCH) > best[0]:
+                best = saved * self.length / (2 * BATCH), [first, second]
+        return best
+
+    def _opportunity(self, goal: Floats, first: int, releases: Floats) -> Floats:
+        """Return the expected loss if each option was better than the first after all [EUR/m]."""
+        error = np.sqrt((self.variance / releases)[first] + self.variance / releases)
+        error = np.maximum(error, 1e-12)
+        z = (goal - goal[first]) / error
+        loss = error * (norm.pdf(z) - z * norm.sf(z))
+        loss[first] = 0.0
+        return loss
+
+
+def _following(options: Options, choice: Choice) -> tuple[Increment, ...]:
+    """Return the next step of each section from its choice that would pay, the best first.
+
+    The next step is that with the greatest saving per additional construction cost.
+    """
+    found = []
+    for s, k in enumerate(choice):
+        cost, value = (
+            options.costs[s] - options.costs[s][k],
+            options.values[s][k] - options.values[s],
+        )
+        better = [j for j in range(len(cost)) if cost[j] > 0.0 and value[j] > 0.0]
+        if better:
+            j = max(better, key=lambda i: value[i] / cost[i])
+            found.append(Increment(s, k, j, float(cost[j]), float(value[j])))
+    return tuple(sorted(found, key=lambda step: -step.saving / step.cost))
+
+
+def plan(
+    corridor: Corridor | CorridorProblem,
+    releases: int = 4_000,
+    seed: int = 0,
+    robust: bool = False,
+) -> CorridorPlan:
+    """Return the plan of a corridor for all its budgets.
+
+    Parameters
+    ----------
+    corridor : Corridor or CorridorProblem
+        The corridor.
+    releases : int
+        Number of releases per section.
+    seed : int
+        Seed of the searches and of all releases.
+    robust : bool
+        Whether choices minimise the conditional value at risk instead of the expected cost.
+
+    Raises
+    ------
+    BadInput, Diverged
+        If an argument is outside its range; if a simulation diverges.
+    """
+    problem = corridor if isinstance(corridor, CorridorProblem) else CorridorProblem(corridor)
+    return Planner(problem, releases, seed, robust).plan()

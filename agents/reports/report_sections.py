@@ -1,0 +1,376 @@
+"""Sections of a report: what each says besides the exhibits of the results folders."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import rigdda
+from rigdda import BadInput, Site
+from rigdda.agents.reports import assumptions
+from rigdda.agents.reports.exhibits import EXHIBITS, RAW, Exhibit
+from rigdda.agents.reports.html_blocks import (
+    Block,
+    Figures,
+    Heading,
+    Items,
+    Listing,
+    Paragraph,
+    Row,
+    listed,
+    picture,
+    plain,
+    table,
+)
+from rigdda.agents.reports.results_folder import FIELD, ResultsFolder
+from rigdda.agents.reports.stations import RATE
+from rigdda.agents.reports.wording import euros, figure, order, percent, span
+from rigdda.agents.run_record import RunRecord
+
+Folders = Sequence[ResultsFolder]
+
+
+@dataclass(frozen=True, slots=True)
+class ReportSection:
+    """A section: its name in `EXHIBITS`, its title, and what it says besides the exhibits."""
+
+    name: str
+    title: str
+    opening: Callable[[Folders], Iterable[Block]] = lambda folders: ()
+
+
+LIMITS = (
+    "The section is two-dimensional. Blocks do not leave its plane, and channels or ridges that "
+    "gather or spread rock along the road are not seen.",
+    "A block is as long along the road as the root of its cross-section. Volumes, masses and "
+    "energies of whole blocks rest on this.",
+    "Blocks are rigid and do not break. A block that shatters loses energy, and its fragments may "
+    "fly farther.",
+    "Trees, snow and water are neglected.",
+    "The loss of energy at the ground is the least certain input. Where it was not fitted to "
+    "observed run-outs, deposits or impacts, results may change by more than their intervals.",
+    "Intervals describe the random variation of the releases only. They do not cover errors of the "
+    "profile, the ground, the rates of events, the sizes of blocks or the prices.",
+    "Rates of events are inputs. Costs and rates of passage are proportional to them.",
+    "Barriers are idealised: a fence yields until its elongation is used up, a wall slides or "
+    "overturns as a rigid body, a ditch fills up. Foundations, anchors and the stability of the "
+    "slope itself are not designed.",
+    "The program supports a decision. The engineer who signs it is responsible for it.",
+)
+"""Limits of the method."""
+
+
+def _titled(blocks: list[Block], title: str, many: bool) -> list[Block]:
+    """Return blocks below a heading if there are several folders, and any blocks at all."""
+    return [Heading(title), *blocks] if many and blocks else blocks
+
+
+def exhibits(section: str, folders: Folders) -> list[Block]:
+    """Return the tables and pictures of all folders that a section shows."""
+    many, found = len(folders) > 1, list[Block]()
+    for k, folder in enumerate(folders):
+        own = [e for e in EXHIBITS if e.section == section]
+        blocks = [
+            block for i, e in enumerate(own) for block in _show(e, folder, f"{section}{k}{i}")
+        ]
+        found += _titled(blocks, f"Results in {folder.label}", many)
+    return found
+
+
+def _show(exhibit: Exhibit, folder: ResultsFolder, mark: str) -> Iterator[Block]:
+    """Yield an exhibit for each file of a folder that matches it."""
+    before, _, after = exhibit.files.partition("*")
+    for i, name in enumerate(folder.files(exhibit.files, exhibit.command)):
+        title = exhibit.title.format(part=name.removeprefix(before).removesuffix(after))
+        if name.endswith(".csv"):
+            yield table(folder, name, title, exhibit.words, exhibit.columns, exhibit.shown)
+        else:
+            yield picture(folder.picture(name), title, exhibit.words, f"{mark}{i}")
+
+
+def summary(folders: Folders) -> Iterator[Block]:
+    """Yield the answer first: what to build and what it is worth, or what comes down."""
+    designs = [folder for folder in folders if folder.files("layouts.csv", "design")]
+    for folder in designs:
+        yield from _titled([*_design(folder)], f"Design in {folder.label}", len(designs) > 1)
+    passing = [block for f in folders if f.files("stations.csv") for block in _passing(f)]
+    yield from _titled(passing, "What comes down", bool(designs))
+    site = _site(folders)
+    lines = [f"{line}" for folder in folders for line in _findings(folder, len(folders) > 1)]
+    if site is not None and designs:
+        lines += assumptions.defaults(site)
+    if lines:
+        yield Heading("What limits this answer")
+        yield Items(lines)
+
+
+def _findings(folder: ResultsFolder, many: bool) -> Iterator[str]:
+    """Yield the findings of the commands in a folder, which they printed."""
+    for record in folder.records.values():
+        for line in record.findings:
+            text = line[0].upper() + line[1:] + ("" if line.endswith((".", "?", "!")) else ".")
+            yield f"{folder.label}: {text}" if many else text
+
+
+def _design(folder: ResultsFolder) -> Iterator[Block]:
+    """Yield what to build, where, and what it costs and is worth."""
+    _, rows = folder.table("layouts.csv", ("chosen", "objective_low", "objective_high"))
+    chosen = next((row for row in rows if row["chosen"] == "True"), None)
+    if chosen is None:
+        mend = "no row is the chosen one: run the command that made it again"
+        raise BadInput(FIELD, str(folder.path / "layouts.csv"), mend)
+    site, targets = folder.site, chosen["targets"]
+    layout = rigdda.load_layout(folder.path / "layout.toml")
+    if layout and site is not None:
+        built = [_place(order(barrier, site), barrier.x, site) for barrier in layout]
+        yield Paragraph(f"Build: {'; '.join(built)}.", "answer")
+    else:
+        yield Paragraph("Build nothing: no layout was found that is worth its cost.", "answer")
+    if targets:
+        asked = _asked(folder)
+        mood = "good" if targets == "met" else "warning"
+        yield Paragraph(_verdict(targets, asked), mood)
+    z, nothing = _money_of(chosen), _money_of(rows[0])
+    if layout and (doubt := _doubt(chosen, rows[0], bool(targets))):
+        yield Paragraph(doubt, "warning")
+    yield Figures([
+        ("To build", f"{euros(float(chosen['cost']))} EUR", "per metre of road"),
+        ("Annual cost Z", f"{z} EUR", f"per metre and year with it ({_ends_of(chosen)})"),
+        ("Without barriers", f"{nothing} EUR", f"per metre and year ({_ends_of(rows[0])})"),
+        *_chances(folder, chosen["layout"], rows[0]["layout"]),
+    ])  # fmt: skip
+
+
+def _doubt(chosen: Row, nothing: Row, targets: bool) -> str:
+    """Return a warning if a layout costs more than it saves, or is not shown to save anything."""
+    if float(chosen["objective_low"]) > float(nothing["objective_high"]):
+        reason = ", and only the target is a reason to build it" if targets else ""
+        return (
+            f"A year costs {_money_of(chosen)} EUR per metre of road with this layout and "
+            f"{_money_of(nothing)} EUR without barriers: it costs more than it saves{reason}."
+        )
+    if float(chosen["objective_high"]) >= float(nothing["objective_low"]):
+        return (
+            f"{int(chosen['releases']):,} releases do not show that this layout saves more than it "
+            "costs: verify it with more."
+        )
+    return ""
+
+
+def _place(text: str, x: float, site: Site) -> str:
+    """Return the order of a barrier with its place on the survey, if the survey has another."""
+    origin = site.origin
+    if not (origin.chainage or origin.elevation or origin.reversed):
+        return text
+    level = site.profile.height(x) + origin.elevation
+    return (
+        f"{text} (chainage {origin.chainage_of(x):,.1f} m of the survey, ground at elevation "
+        f"{level:,.1f} m)"
+    )
+
+
+def _asked(folder: ResultsFolder) -> str:
+    """Return the targets of a design in words."""
+    options = folder.records["design"].options
+    pairs = (
+        ("target", "a block of a design event reaches the road"),
+        ("failure", "a barrier fails in a design event"),
+    )
+    said = [
+        f"{what} with a probability of at most {percent(float(options[name]))}"
+        for name, what in pairs
+        if options.get(name) is not None
+    ]
+    return " and that ".join(said)
+
+
+def _verdict(state: str, asked: str) -> str:
+    """Return whether the targets are met, in words."""
+    goal = f"the target that {asked}"
+    if state == "met":
+        return f"This layout meets {goal}."
+    if state == "missed":
+        return f"This layout does not meet {goal}."
+    return f"The releases do not decide whether this layout meets {goal}: verify with more."
+
+
+def _money_of(row: Row) -> str:
+    return euros(float(row["objective"]))
+
+
+def _ends_of(row: Row) -> str:
+    return span((float(row["objective_low"]), float(row["objective_high"])))
+
+
+def _chances(folder: ResultsFolder, name: str, without: str) -> Iterator[tuple[str, str, str]]:
+    """Yield the probabilities of the design events with a layout, and without barriers."""
+    _, rows = folder.table("chances.csv") if folder.files("chances.csv") else ([], [])
+    for row in rows:
+        if row["design"] == "True" and row["layout"] == name:
+            before = next(r for r in rows if r["event"] == row["event"] and r["layout"] == without)
+            reach, bound = float(row["reach"]), float(row["reach_bound"])
+            rest = f"at most {percent(bound)}; without barriers {percent(float(before['reach']))}"
+            yield f"“{row['event']}” reaches the road", percent(reach), rest
+            fails, bound = float(row["failure"]), float(row["failure_bound"])
+            if name != without:
+                yield f"A barrier fails in “{row['event']}”", percent(fails), (
+                    f"at most {percent(bound)}"
+                )  # fmt: skip
+
+
+def _passing(folder: ResultsFolder) -> Iterator[Block]:
+    """Yield what passes the stations of a simulation, in sentences."""
+    _, rows = folder.table("stations.csv")
+    last = rows[-1]["event"] if rows else ""
+    record = folder.records.get("simulate")
+    layout = record.options.get("layout") if record else None
+    what = f"with the layout of {layout}" if layout else "without barriers"
+    lines = []
+    for row in rows:
+        if row["event"] == last and row["quantity"] == RATE:
+            own = {r["quantity"]: r for r in rows if r["x_m"] == row["x_m"] and r["event"] == last}
+            lines.append(_station(row, own, what))
+    if lines:
+        yield Items(lines)
+
+
+def _station(rate: Row, own: dict[str, Row], what: str) -> str:
+    """Return a sentence on what passes a station."""
+    where = f"At x = {plain(float(rate['x_m']))} m, {what}, "
+    if int(rate["n"]) == 0:
+        return f"{where}no block passes in {int(rate['releases']):,} releases."
+    energy, height = own["energy"], own["height"]
+    return (
+        f"{where}{figure(float(rate['mean']))} releases a year pass on 100 m of road; 95 % of the "
+        f"{int(rate['n']):,} passing blocks have less than {figure(float(energy['q95']))} kJ, and "
+        f"the centres of 95 % are lower than {figure(float(height['q95']))} m above the ground."
+    )
+
+
+def _site(folders: Folders) -> Site | None:
+    return next((folder.site for folder in folders if folder.site is not None), None)
+
+
+def site(folders: Folders) -> Iterator[Block]:
+    """Yield the site, and how the sites of other folders differ from it."""
+    first = _site(folders)
+    if first is None:
+        return
+    yield from assumptions.the_site(first)
+    for folder in folders:
+        if folder.site is not None and folder.site != first:
+            yield Paragraph(f"The site of {folder.label} differs from this one:")
+            yield Items(assumptions.differences(first, folder.site))
+
+
+def assumed(folders: Folders) -> Iterator[Block]:
+    """Yield the assumptions of the site."""
+    first = _site(folders)
+    if first is not None:
+        yield from assumptions.assumptions(first)
+
+
+def limits(_: Folders) -> Iterator[Block]:
+    """Yield the limits of the method."""
+    yield Items(LIMITS)
+
+
+def repeat(folders: Folders) -> Iterator[Block]:
+    """Yield commands, seeds and versions, with which the results can be repeated."""
+    yield Paragraph(
+        "On one machine, the same version gives the same numbers bit for bit. The results folders "
+        "hold the site as it was used and all options in run.json."
+    )
+    records = [(folder, record) for folder in folders for record in folder.records.values()]
+    commands = [shlex.join(["rigdda", *record.arguments]) for _, record in records]
+    yield Listing("\n".join(commands))
+    head = ("results", "command", "began (UTC)", "ended (UTC)", "seed", "rigdda", "mechanics")
+    rows = [_run(folder, record) for folder, record in records]
+    yield listed("Runs", "mechanics: hash of all sources that affect a result.", head, rows)
+    versions = dict.fromkeys(record.versions for _, record in records)
+    names = ("rigdda", "kernels", "numba", "numpy", "python", "machine")
+    yield listed("Versions", "", names, [[getattr(v, name) for name in names] for v in versions])
+    rest = [_options(record) for _, record in records]
+    yield listed("Options", "All options, also those that were not typed.", ("command", "options"),
+                 rest)  # fmt: skip
+
+
+def _run(folder: ResultsFolder, record: RunRecord) -> list[str]:
+    seed = record.options.get("seed")
+    began, ended = (time[:19].replace("T", " ") for time in (record.started, record.ended))
+    return [folder.label, record.command, began, ended, "-" if seed is None else str(seed),
+            record.versions.rigdda, record.mechanics]  # fmt: skip
+
+
+def _options(record: RunRecord) -> list[str]:
+    said = [f"{name} = {'-' if v is None else v}" for name, v in record.options.items()]
+    return [record.command, ", ".join(said)]
+
+
+SMALL = 40
+"""Rows up to which a table without an exhibit is shown as a whole."""
+
+WIDE = 12
+"""Columns up to which a table without an exhibit is shown as a whole."""
+
+
+def appendix(folders: Folders) -> Iterator[Block]:
+    """Yield the tables that are in no section: small ones as a whole, others by name."""
+    rows = []
+    for folder in folders:
+        shown = {name for e in EXHIBITS for name in folder.files(e.files, e.command)}
+        for name in (name for name in folder.others() if name not in shown):
+            head, found = folder.table(name)
+            if name not in RAW and len(found) <= SMALL and len(head) <= WIDE:
+                yield table(folder, name, f"{folder.label}/{name}", "All rows of the file.")
+            else:
+                what = RAW.get(name, f"columns: {', '.join(head)}")
+                rows.append((f"{folder.label}/{name}", what, f"{len(found):,}"))
+    if rows:
+        names = ("file", "what it holds", "rows")
+        yield listed("Tables that are too long to show", "", names, rows, ("rows",))
+    sites: dict[str, list[str]] = {}
+    for folder in folders:
+        for text in dict.fromkeys(record.site for record in folder.records.values()):
+            sites.setdefault(text, []).append(folder.label)
+    for text, labels in sites.items():
+        if text:
+            yield Listing(compact(text), f"Site file of {', '.join(labels)}, with all defaults")
+
+
+NUMBERS = re.compile(r"\[\s+((?:[-+.\de]+,\s+)+)\]")
+"""A list of numbers in TOML, one on each line."""
+
+
+def compact(text: str) -> str:
+    """Return a TOML text with each list of numbers on one line."""
+    short = NUMBERS.sub(lambda found: f"[{', '.join(found[1].replace(',', ' ').split())}]", text)
+    return short if tomllib.loads(short) == tomllib.loads(text) else text
+
+
+SECTIONS = (
+    ReportSection("summary", "Summary", summary),
+    ReportSection("site", "Site", site),
+    ReportSection("assumptions", "Assumptions and their sources", assumed),
+    ReportSection("passing", "What comes down"),
+    ReportSection("layouts", "Layouts compared"),
+    ReportSection("corridor", "Corridor"),
+    ReportSection("checks", "Checks"),
+    ReportSection("risk", "Risk to life and traffic"),
+    ReportSection("sureness", "How sure the answer is"),
+    ReportSection("frontier", "What other targets cost"),
+    ReportSection("limits", "Limits of the method", limits),
+    ReportSection("repeat", "How to repeat the results", repeat),
+    ReportSection("appendix", "Appendix", appendix),
+)
+"""Sections of a report in their order. One without content is left out."""
+
+
+def filled(folders: Folders) -> list[tuple[ReportSection, list[Block]]]:
+    """Return the sections that have content, with their blocks."""
+    shown = {s.name: exhibits(s.name, folders) for s in SECTIONS}  # first, as they check the files
+    found = [(s, [*s.opening(folders), *shown[s.name]]) for s in SECTIONS]
+    return [(section, blocks) for section, blocks in found if blocks]

@@ -1,0 +1,130 @@
+"""Record of the commands that wrote a results folder: `run.json`.
+
+A folder of results says what made it: the command as it was typed, every option, the seed, the
+versions and the site as it was used. With the record, the command can be repeated, and
+`rigdda report` can document its results.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from rigdda import BadInput, Site
+from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.replay_record import Versions
+from rigdda.files import atomic
+
+FILE = "run.json"
+"""Name of the file in a results folder."""
+
+
+class RunRecord(msgspec.Struct, kw_only=True):
+    """Record of one command that wrote into a results folder.
+
+    Parameters
+    ----------
+    command : str
+        Name of the command, such as "design".
+    arguments : list of str
+        Arguments as they were typed, without the name of the program.
+    options : dict
+        Value of every argument and option of the command, also of those with their defaults.
+    started, ended : str
+        Date and time in UTC, ISO 8601; `ended` is empty while the command runs and after an
+        interruption.
+    versions : Versions
+        Versions of the programs.
+    mechanics : str
+        Hash of all sources that affect a result.
+    site : str
+        The site as it was used, as TOML with all defaults; empty if the command has no site.
+    files : list of str
+        Names of the files that the command wrote into the folder.
+    findings : list of str
+        Findings and notes that the command printed, one sentence or more each.
+    """
+
+    command: str
+    arguments: list[str]
+    options: dict[str, Any]
+    started: str
+    ended: str = ""
+    versions: Versions
+    mechanics: str
+    site: str = ""
+    files: list[str] = []
+    findings: list[str] = []
+
+    @classmethod
+    def begin(
+        cls, command: str, arguments: list[str], options: dict[str, Any], site: Site | None
+    ) -> RunRecord:
+        """Return the record of a command that begins now."""
+        return cls(
+            command=command,
+            arguments=arguments,
+            options={name: _plain(value) for name, value in options.items()},
+            started=_now(),
+            versions=Versions.of_today(),
+            mechanics=mechanics(),
+            site="" if site is None else as_toml(site),
+        )
+
+    def end(self, files: list[str]) -> None:
+        """Note the time at which the command ended and the files that it wrote."""
+        self.ended, self.files = _now(), files
+
+    def write(self, folder: Path) -> None:
+        """Write the record into a results folder, beside those of other commands."""
+        try:
+            known = read(folder)
+        except BadInput:  # damaged or of another version: it is replaced
+            known = {}
+        text = msgspec.json.format(msgspec.json.encode(known | {self.command: self}), indent=2)
+        with atomic(folder / FILE) as part:
+            part.write_bytes(text + b"\n")
+
+
+def read(folder: Path) -> dict[str, RunRecord]:
+    """Return the records in a results folder by command; empty if there is no record.
+
+    Raises
+    ------
+    BadInput
+        If the file is damaged or was written by another version.
+    """
+    file = folder / FILE
+    if not file.is_file():
+        return {}
+    try:
+        return msgspec.json.decode(file.read_bytes(), type=dict[str, RunRecord])
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        mend = f"run the command that made this folder again: the file is damaged ({error})"
+        raise BadInput("RESULTS", str(file), mend) from None
+
+
+def as_toml(site: Site) -> str:
+    """Return a site as the text of a site file, with all defaults; empty if TOML cannot hold it."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "site.toml"
+        try:
+            site.save(file)
+        except BadInput:
+            return ""
+        return file.read_text(encoding="utf-8")
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _plain(value: Any) -> Any:
+    """Return the value of an option as JSON can hold it."""
+    if isinstance(value, tuple | list):
+        return [_plain(one) for one in value]
+    return value if isinstance(value, str | int | float | bool | None) else str(value)

@@ -1,0 +1,221 @@
+"""Design of the barriers of a corridor: one layout for each section within a common budget.
+
+The objective is the annual cost of all sections [EUR per year]: the sum of length times Z, see
+`rigdda.envs.problem`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import BadInput, Barrier, Corridor, Layout
+from rigdda.envs.cost import Evaluation
+from rigdda.envs.intervals import Interval, Mean, total
+from rigdda.envs.problem import DesignProblem
+
+ROUNDING = 1e-9
+"""Relative excess of a budget that is attributed to rounding [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class CorridorEvaluation:
+    """Evaluation of one layout for each section.
+
+    Parameters
+    ----------
+    sections : tuple of Evaluation
+        The evaluations of the sections, per metre of road.
+    objective : float
+        Sum of length times Z [EUR/year].
+    ci : (float, float)
+        Its 95 % interval.
+    gain : float
+        Reduction of the objective relative to no barriers anywhere [EUR/year].
+    gain_ci : (float, float)
+        Its 95 % interval.
+    cost : float
+        Construction cost [EUR].
+    annual : float
+        Annual cost of the barriers, annuities and upkeep [EUR/year].
+    """
+
+    sections: tuple[Evaluation, ...]
+    objective: float
+    ci: Interval
+    gain: float
+    gain_ci: Interval
+    cost: float
+    annual: float
+
+    @property
+    def layouts(self) -> tuple[Layout, ...]:
+        """The layouts of the sections."""
+        return tuple(evaluation.layout for evaluation in self.sections)
+
+
+@dataclass(frozen=True, slots=True, init=False)
+class CorridorProblem:
+    """Design problems of the sections of a corridor.
+
+    Parameters
+    ----------
+    corridor : Corridor, str or path
+        The corridor, the name of a built-in one, or a TOML file.
+    max_barriers : int
+        Number of slots for barriers in each section.
+    kinds : sequence of str, optional
+        Kinds of barrier to choose from in each section. By default, all that are usual on its site.
+    fidelity : {"full", "fast"}
+        "fast" simulates cheaper approximations of the sites.
+
+    Raises
+    ------
+    BadInput
+        If there is no such corridor, or an argument is outside its range.
+    """
+
+    corridor: Corridor
+    problems: tuple[DesignProblem, ...] = field(repr=False)
+
+    def __init__(
+        self,
+        corridor: Corridor | str | os.PathLike[str],
+        max_barriers: int = 3,
+        kinds: Sequence[str] | None = None,
+        fidelity: str = "full",
+    ):
+        whole = corridor if isinstance(corridor, Corridor) else Corridor.load(corridor)
+        problems = []
+        for section in whole.sections:
+            targets = {"reach": section.reach, "failure": section.failure}
+            try:
+                problems.append(DesignProblem(section.site, max_barriers, kinds, targets, fidelity))
+            except BadInput as bad:
+                raise BadInput(
+                    f"sections.{section.name}.{bad.field}", bad.value, bad.mend
+                ) from None
+        object.__setattr__(self, "corridor", whole)
+        object.__setattr__(self, "problems", tuple(problems))
+
+    @property
+    def lengths(self) -> NDArray[np.float64]:
+        """Lengths of the sections, (S,) [m]."""
+        return np.array([section.length for section in self.corridor.sections])
+
+    @property
+    def nothing(self) -> float:
+        """Objective without barriers anywhere [EUR/year]."""
+        found = zip(self.lengths.tolist(), self.problems, strict=True)
+        return math.fsum(length * problem.nothing.objective for length, problem in found)
+
+    def cost(self, layouts: Sequence[Sequence[Barrier]]) -> float:
+        """Return the construction cost of one layout for each section [EUR].
+
+        Raises
+        ------
+        BadInput
+            If there is not one feasible layout for each section.
+        """
+        checked = self.check(layouts)
+        rows = zip(self.lengths.tolist(), self.problems, checked, strict=True)
+        return math.fsum(length * problem.site.capital(own) for length, problem, own in rows)
+
+    def check(self, layouts: Sequence[Sequence[Barrier]]) -> tuple[Layout, ...]:
+        """Return feasible layouts, one for each section.
+
+        Raises
+        ------
+        BadInput
+            If their number is wrong, or one is not feasible.
+        """
+        if not isinstance(layouts, Sequence) or len(layouts) != len(self.problems):
+            raise BadInput("layouts", layouts, f"give {len(self.problems)}, one for each section")
+        found = []
+        for section, problem, layout in zip(
+            self.corridor.sections, self.problems, layouts, strict=True
+        ):
+            try:
+                found.append(problem.check(layout))
+            except BadInput as bad:
+                raise BadInput(
+                    f"sections.{section.name}.{bad.field}", bad.value, bad.mend
+                ) from None
+        return tuple(found)
+
+    def affordable(self, layouts: Sequence[Sequence[Barrier]], budget: float) -> bool:
+        """Return whether the construction cost of layouts is within a budget [EUR]."""
+        return self.cost(layouts) <= budget * (1.0 + ROUNDING)
+
+    def evaluate(
+        self,
+        layouts: Sequence[Sequence[Barrier]],
+        seeds: Sequence[int],
+        executor: Executor | None = None,
+    ) -> CorridorEvaluation:
+        """Evaluate one layout for each section by simulating one release per seed in each.
+
+        Parameters
+        ----------
+        layouts : sequence of layouts
+            A feasible layout for each section.
+        seeds : sequence of int
+            Distinct seeds of the releases.
+        executor : Executor, optional
+            Where to run the simulations; by default in threads on all cores.
+
+        Raises
+        ------
+        BadInput
+            If there is not one feasible layout for each section, or the seeds are invalid.
+        Diverged
+            If a simulation diverges.
+        """
+        checked = self.check(layouts)
+        found = [
+            problem.evaluate(layout, seeds, executor)
+            for problem, layout in zip(self.problems, checked, strict=True)
+        ]
+        return self.judge(found)
+
+    def judge(self, evaluations: Sequence[Evaluation]) -> CorridorEvaluation:
+        """Return the evaluation of the corridor from those of its sections.
+
+        Sections without barriers do not contribute to the gain or to its interval.
+        """
+        lengths = self.lengths.tolist()
+        rows = list(zip(lengths, self.problems, evaluations, strict=True))
+        whole = total(Mean(e.objective, *e.ci).times(length) for length, _, e in rows)
+        built = [row for row in rows if row[2].layout]
+        after = total(Mean(e.objective, *e.ci).times(length) for length, _, e in built)
+        before = total(
+            Mean(p.nothing.objective, *p.nothing.ci).times(length) for length, p, _ in built
+        )
+        return CorridorEvaluation(
+            sections=tuple(evaluations),
+            objective=whole.value,
+            ci=whole.interval,
+            gain=before.value - after.value,
+            gain_ci=difference(before, after),
+            cost=math.fsum(length * e.cost for length, _, e in rows),
+            annual=math.fsum(length * e.capital for length, _, e in rows),
+        )
+
+
+def difference(one: Mean, other: Mean) -> Interval:
+    """Return the 95 % interval of the difference of two independent means (MOVER)."""
+    value = one.value - other.value
+    below = math.hypot(one.value - one.low, other.high - other.value)
+    above = math.hypot(one.high - one.value, other.value - other.low)
+    return value - below, value + above
+
+
+def _of_section(name: str, bad: BadInput) -> BadInput:
+    """Return an error about a section with the name of the section."""
+    return BadInput(f"sections.{name}.{bad.field}", bad.value, bad.mend)

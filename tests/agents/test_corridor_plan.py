@@ -1,0 +1,272 @@
+"""The choice of layouts for a budget, and `rigdda corridor` as users meet it."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_command_line import png_size, refused, rig, rows, run
+
+from rigdda import BadInput, Corridor, load_layout
+from rigdda.agents.corridor import planning, programme
+from rigdda.agents.corridor.programme import METHODS, Options
+from rigdda.envs import CorridorProblem
+from rigdda.model import corridor as corridors
+
+Row = list[tuple[float, float]]
+
+
+def options(fronts: list[Row], missed: list[list[float]] | None = None) -> Options:
+    """Return options of sections from pairs of cost and value."""
+    arrays = [np.array([(0.0, 100.0), *row]) for row in fronts]
+    none = [np.zeros(len(own)) for own in arrays]
+    return Options(
+        np.ones(len(arrays)),
+        [own[:, 0] for own in arrays],
+        [0.05 * own[:, 0] for own in arrays],
+        [own[:, 1] for own in arrays],
+        none if missed is None else [np.array(own) for own in missed],
+    )
+
+
+def enumerated(given: Options, budget: float, yearly: float = math.inf) -> float:
+    """Return the least total cost of all choices within the budgets."""
+    found = []
+    for choice in itertools.product(*(range(len(own)) for own in given.values)):
+        within = given.total(choice, given.costs) <= budget * (1.0 + 1e-9)
+        if within and given.total(choice, given.annual) <= yearly * (1.0 + 1e-9):
+            found.append(given.total(choice, given.values))
+    return min(found)
+
+
+number = st.floats(1.0, 100.0).map(lambda value: round(value, 3))
+fronts = st.lists(st.lists(st.tuples(number, number), max_size=4), min_size=1, max_size=4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(fronts, st.floats(0.0, 300.0), st.floats(0.5, 20.0))
+def test_the_optimum_is_that_of_an_enumeration(
+    rows: list[Row], budget: float, yearly: float
+) -> None:
+    given = options(rows)
+    choice = programme.optimum(given, budget, yearly)
+    assert given.total(choice, given.costs) <= budget * (1.0 + 1e-6) + 1e-6
+    best = enumerated(given, budget, yearly)
+    assert given.total(choice, given.values) == pytest.approx(best, rel=1e-5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(fronts, st.floats(0.0, 300.0))
+def test_simple_methods_stay_within_the_budget_and_are_not_better(
+    rows: list[Row], budget: float
+) -> None:
+    given = options(rows)
+    best = enumerated(given, budget)
+    for method in METHODS.values():
+        choice = method(given, budget)
+        assert given.total(choice, given.costs) <= budget * (1.0 + 1e-6) + 1e-6
+        assert given.total(choice, given.values) >= best - 1e-6
+
+
+@settings(max_examples=40, deadline=None)
+@given(fronts, st.floats(1.0, 300.0))
+def test_the_shadow_price_is_the_slope_of_the_linear_relaxation(
+    rows: list[Row], budget: float
+) -> None:
+    given = options(rows)
+
+    def relaxed(money: float) -> float:
+        total = given.total(given.nothing, given.values)
+        for step in programme.increments(given):
+            part = min(1.0, money / step.cost)
+            total -= part * step.saving
+            money -= part * step.cost
+            if money <= 0.0:
+                break
+        return total
+
+    price, step = programme.shadow_price(given, budget), 1e-6 * budget
+    before, after = relaxed(budget - step), relaxed(budget + step)
+    low, high = sorted((relaxed(budget) - after, before - relaxed(budget)))
+    assert low / step - 1e-3 <= price <= high / step + 1e-3
+    slopes = [step.saving / step.cost for step in programme.increments(given)]
+    assert slopes == sorted(slopes, reverse=True) and all(slope > 0.0 for slope in slopes)
+
+
+def test_missed_targets_come_before_cost() -> None:
+    given = options([[(10.0, 120.0), (30.0, 50.0)]], [[0.2, 0.0, 0.1]])
+    assert programme.optimum(given, 100.0) == (1,)
+    assert programme.optimum(given, 5.0) == (0,)
+
+
+def test_a_robust_choice_avoids_what_may_be_bad() -> None:
+    given = options([[(10.0, 40.0), (10.0, 42.0)]])
+    rng = np.random.default_rng(0)
+    risky = 40.0 + 30.0 * rng.standard_normal(500)
+    scenarios = [np.column_stack([np.full(500, 100.0), risky, np.full(500, 42.0)])]
+    assert programme.optimum(given, 20.0) == (1,)
+    assert programme.optimum(given, 20.0, scenarios=scenarios) == (2,)
+
+
+def test_releases_go_to_the_section_whose_choice_is_uncertain() -> None:
+    def table(gap: float) -> planning._Table:
+        two = np.array([0.0, 100.0])
+        return planning._Table(
+            100.0, two, np.array([50.0, 50.0 - gap]), np.full(2, 2500.0), np.full(2, 100.0)
+        )
+
+    clear, close = table(40.0).worth([0.0]), table(1.0).worth([0.0])
+    assert close[0] > 100.0 * clear[0] and close[1] == [1, 0]
+    priced = table(40.0).worth([0.4])  # 100 EUR/m at .4 a year cost as much as they save
+    assert priced[0] > 100.0 * clear[0]
+
+
+TEXT = """name = "pass"
+budget = [4_000, 12_000]
+[[sections]]
+site = "verge"
+length = 100.0
+name = "km 1.2"
+[[sections]]
+site = "quick"
+length = 50.0
+"""
+SMALL = ("--releases", 300)
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    folder = tmp_path_factory.mktemp("pass")
+    (folder / "pass.toml").write_text(TEXT)
+    words = run("corridor", "pass.toml", *SMALL, "--out", "o", folder=folder)
+    return folder / "o", words
+
+
+def test_the_command_writes_what_its_tables_say(planned: tuple[Path, str]) -> None:
+    out, words = planned
+    budgets = rows(out / "budgets.csv")
+    assert [row["budget"] for row in budgets[::4]] == ["4000.0", "12000.0", "unlimited"]
+    sections = rows(out / "sections.csv")
+    for row in budgets:
+        if row["budget"] != "unlimited":
+            assert float(row["spent"]) <= float(row["budget"]) * (1.0 + 1e-9)
+        low, gain, high = (float(row[name]) for name in ("gain_low", "gain", "gain_high"))
+        assert low <= gain <= high
+    for i, budget in enumerate(("4000.0", "12000.0")):
+        own = [row for row in sections if row["budget"] == budget]
+        best = budgets[4 * i]
+        assert math.fsum(float(row["cost"]) for row in own) == pytest.approx(float(best["spent"]))
+        assert math.fsum(float(row["gain"]) for row in own) == pytest.approx(float(best["gain"]))
+        problem = CorridorProblem(Corridor.load(out.parent / "pass.toml"))
+        names = (out / f"layouts/budget-{i + 1}/section-{s + 1}.toml" for s in range(2))
+        layouts = [load_layout(name) for name in names]
+        assert problem.cost(layouts) == pytest.approx(float(best["spent"]))
+    assert png_size(out / "gain.png")[0] > 500 and png_size(out / "strip.png")[0] > 500
+    assert "km 1.2" in words and "unlimited" in words
+
+
+def test_a_killed_plan_goes_on_and_ends_the_same(planned: tuple[Path, str], tmp_path: Path) -> None:
+    whole, _ = planned
+    (tmp_path / "pass.toml").write_text(TEXT)
+    count = _lines(whole / "evaluations")
+    for least in (count // 4, count // 2):
+        out = tmp_path / f"killed-{least}"
+        killed = rig("corridor", "pass.toml", *SMALL, "--out", out.name, folder=tmp_path)
+        while _lines(out / "evaluations") < least:
+            assert killed.poll() is None
+            time.sleep(0.02)
+        killed.kill()
+        killed.communicate()
+        run("corridor", "pass.toml", *SMALL, "--out", out.name, folder=tmp_path)
+        for name in ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv"):
+            assert (out / name).read_bytes() == (whole / name).read_bytes()
+
+
+def _lines(folder: Path) -> int:
+    """Return the number of stored evaluations."""
+    return sum(file.read_bytes().count(b"\n") for file in folder.glob("*.jsonl"))
+
+
+def test_a_corridor_is_saved_and_read_back(tmp_path: Path) -> None:
+    (tmp_path / "pass.toml").write_text(TEXT)
+    one = Corridor.load(tmp_path / "pass.toml")
+    assert Corridor.load(one.save(tmp_path / "copy")) == one
+
+
+def test_sections_may_stand_in_a_table_and_share_prices(tmp_path: Path) -> None:
+    with (tmp_path / "s.csv").open("w", newline="") as file:
+        csv.writer(file).writerows(
+            [("name", "site", "length", "reach"), ("a", "verge", 10, ""), ("b", "quick", 20, 0.1)]
+        )
+    text = 'name = "t"\nbudget = 1000\ntable = "s.csv"\n[consequences]\nclosure = 7000.0\n'
+    (tmp_path / "t.toml").write_text(text + "[prices]\ninterest = 0.01\n")
+    found = Corridor.load(tmp_path / "t.toml")
+    assert [s.length for s in found.sections] == [10.0, 20.0]
+    assert [s.reach for s in found.sections] == [None, 0.1]
+    assert all(s.site.consequences.closure == 7000.0 for s in found.sections)
+    assert all(s.site.prices.interest == 0.01 for s in found.sections)
+
+
+def test_built_in_corridors_are_valid() -> None:
+    assert corridors.names() == ["corridor-12", "corridor-50"]
+    assert [len(Corridor.load(name).sections) for name in corridors.names()] == [12, 50]
+
+
+@pytest.mark.parametrize(
+    "change, named",
+    [
+        (("budget = [4_000, 12_000]", "budget = []"), ("budget", "at least one")),
+        (("budget = [4_000, 12_000]", "budget = -1"), ("budget", "-1")),
+        (("budget = [4_000, 12_000]", 'budget = "much"'), ("budget", "much")),
+        (("budget = [4_000, 12_000]", ""), ("budget", "no default")),
+        (("length = 50.0", "length = 0"), ("length", "0")),
+        (("length = 50.0", "lenght = 5"), ("lenght", "did you mean length")),
+        (('site = "quick"', 'site = "nowhere"'), ("site", "nowhere")),
+        (('site = "quick"', 'site = "gone.toml"'), ("site", "gone.toml")),
+        (('name = "km 1.2"', 'name = "quick"'), ("sections.name", "quick")),
+        (("length = 50.0", "length = 50.0\nreach = 2"), ("reach", "2")),
+        (('name = "pass"', 'name = "pass"\ntable = "x.csv"'), ("sections", "table")),
+        (('name = "pass"', 'name = "pass"\nyearly_budget = -2'), ("yearly_budget", "-2")),
+        (('name = "pass"', 'name = "pass"\nprices = {interest = 9}'), ("prices.interest", "9")),
+        (('name = "pass"', 'name = "pass"\nprices = {fenze = 9}'), ("prices.fenze", "fence")),
+    ],
+)
+def test_malformed_corridors_are_one_line(
+    change: tuple[str, str], named: tuple[str, ...], tmp_path: Path
+) -> None:
+    assert change[0] in TEXT
+    (tmp_path / "pass.toml").write_text(TEXT.replace(*change))
+    line = refused("corridor", "pass.toml", folder=tmp_path)
+    assert all(word in line for word in named), line
+
+
+@pytest.mark.parametrize(
+    "text, named",
+    [
+        ("", "row"),
+        ("name,site,length\n", "row"),
+        ("name,site,length\na,quick\n", "cells"),
+        ("name,site,metres\na,quick,3\n", "metres"),
+        ("name,site,length\na,quick,far\n", "far"),
+        ("name,site,length\na,quick,-3\n", "-3"),
+    ],
+)
+def test_malformed_tables_are_told(text: str, named: str, tmp_path: Path) -> None:
+    (tmp_path / "s.csv").write_text(text)
+    (tmp_path / "t.toml").write_text('name = "t"\nbudget = 1\ntable = "s.csv"\n')
+    with pytest.raises(BadInput, match=named):
+        Corridor.load(tmp_path / "t.toml")
+
+
+def test_unknown_corridors_and_options(tmp_path: Path) -> None:
+    assert "corridor-12" in refused("corridor", "corridor-13", folder=tmp_path)
+    assert "--budget" in refused("corridor", "corridor-12", "--budget", -1, folder=tmp_path)
+    assert "--releases" in refused("corridor", "corridor-12", "--releases", 5, folder=tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,162 @@
+"""The environment of corridors: money, rewards, order of sections and replays."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rigdda.envs.repetition
+import rigdda.envs.replay_record
+from rigdda import BadInput, Corridor, CorridorSection, Ditch, Site
+from rigdda.envs import CorridorProblem
+from rigdda.envs.corridor_environment import FIELDS
+
+NAMES = ("quick", "verge")
+
+
+def make(**keywords: object) -> gymnasium.Env:
+    terms = {"site": list(NAMES), "releases": 2, "kinds": ("ditch", "embankment")} | keywords
+    return gymnasium.make("rigdda/Corridor-v0", **terms).unwrapped
+
+
+def played(env: gymnasium.Env, seed: int, actions: object = None) -> tuple[list, list]:
+    """Play an episode with random actions; return rewards and infos."""
+    env.reset(seed=seed)
+    env.action_space.seed(seed)
+    rewards, infos, done = [], [], False
+    while not done:
+        action = env.action_space.sample() if actions is None else actions
+        seen, reward, done, _, info = env.step(action)
+        assert seen in env.observation_space
+        rewards.append(reward)
+        infos.append(info)
+    return rewards, infos
+
+
+def test_every_section_is_seen_once_and_rewards_add_up() -> None:
+    env = make(budget=500.0)
+    rewards, infos = played(env, 3)
+    assert sorted(info["section"] for info in infos) == sorted(NAMES)
+    before = math.fsum(s.length * s.problem.nothing.objective for s in env.placed)
+    after = math.fsum(info["length"] * info["objective"] for info in infos)
+    assert sum(rewards) == pytest.approx((before - after) / before)
+    assert infos[-1]["gain"] == pytest.approx(before - after)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10**6), budget=st.floats(1.0, 3000.0))
+def test_what_is_spent_never_exceeds_the_budget(seed: int, budget: float) -> None:
+    env = MONEY
+    env.reset(seed=seed, options={"budget": budget})
+    env.action_space.seed(seed)
+    left, done = env.budget, False
+    while not done:
+        *_, done, _, info = env.step(env.action_space.sample())
+        assert info["money"] >= -1e-6 * env.budget
+        assert info["money"] == pytest.approx(left - info["length"] * info["cost"])
+        left = info["money"]
+        assert not info["layout"] or info["cost"] > 0.0
+    assert info["spent"] + info["money"] == pytest.approx(env.budget)
+
+
+MONEY = make(releases=1)
+MIDDLE = np.tile([1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 3)
+"""A ditch or an embankment of medium size in the middle of the zone, and two more."""
+
+
+def test_barriers_beyond_the_money_are_told() -> None:
+    env = make(budget=1.0)
+    _, infos = played(env, 0, MIDDLE)
+    assert all(info["layout"] == () for info in infos)
+    assert all("EUR are left" in " ".join(info["dropped"]) for info in infos)
+
+
+def test_the_same_seed_gives_the_same_episode() -> None:
+    env = make()
+    first, second = played(env, 5), played(env, 5)
+    assert first[0] == second[0]
+    assert [info["layout"] for info in first[1]] == [info["layout"] for info in second[1]]
+
+
+def test_copies_step_as_if_alone() -> None:
+    batch = gymnasium.make_vec("rigdda/Corridor-v0", 2, site=list(NAMES), releases=1)
+    seen, _ = batch.reset(seed=7)
+    alone = [gymnasium.make("rigdda/Corridor-v0", site=list(NAMES), releases=1) for _ in range(2)]
+    starts = [env.reset(seed=7 + i)[0] for i, env in enumerate(alone)]
+    actions = np.zeros((2, *alone[0].action_space.shape), dtype=np.float32) + 0.5
+    for name in FIELDS:
+        assert (seen[name] == np.stack([start[name] for start in starts])).all()
+    _, rewards, *_ = batch.step(actions)
+    assert rewards.tolist() == [env.step(actions[i])[1] for i, env in enumerate(alone)]
+
+
+def test_every_entry_of_the_corridor_changes() -> None:
+    env = make(site=["quick", "verge", "bench"], budget=(50.0, 500.0), flat=False)
+    seen = {name: [] for name in FIELDS}
+    for seed in range(6):
+        first, _ = env.reset(seed=seed)
+        for now in (first, env.step(-np.ones(18))[0]):
+            for name in FIELDS:
+                seen[name].append(now[name])
+    for name, values in seen.items():
+        assert (np.ptp(np.stack(values), axis=0) > 0.0).all(), name
+
+
+def test_replays_show_the_sections_with_barriers(tmp_path: Path) -> None:
+    env = make(record=tmp_path, budget=2000.0)
+    _, infos = played(env, 1, MIDDLE)
+    built = [i + 1 for i, info in enumerate(infos) if info["layout"]]
+    files = sorted(file.name for file in (tmp_path / "episode-000000").iterdir())
+    assert files == [f"section-{i:04d}.rrd" for i in built] and files
+    found = rigdda.envs.replay_record.load(tmp_path / "episode-000000" / files[0])
+    assert rigdda.envs.repetition.repeat(found).same
+
+
+def test_sections_of_a_corridor_are_all_played() -> None:
+    quick = Site.load("quick")
+    sections = tuple(CorridorSection(quick, 10.0 * (i + 1), f"km {i}") for i in range(3))
+    env = make(site=Corridor("small", sections, (1e4, 2e4)))
+    _, infos = played(env, 0)
+    assert sorted(info["section"] for info in infos) == ["km 0", "km 1", "km 2"]
+    assert env.budget in (pytest.approx(1e4), pytest.approx(2e4))
+
+
+@pytest.mark.parametrize(
+    "keywords, named",
+    [
+        ({"site": []}, "site"),
+        ({"site": "nowhere"}, "nowhere"),
+        ({"sections": 3}, "sections"),
+        ({"budget": -1.0}, "budget"),
+        ({"budget": (5.0, 1.0)}, "budget"),
+        ({"lengths": (0.0, 1.0)}, "lengths"),
+        ({"releases": 0}, "releases"),
+    ],
+)
+def test_malformed_keywords(keywords: dict[str, object], named: str) -> None:
+    with pytest.raises(BadInput, match=named):
+        make(**keywords)
+
+
+def test_the_objective_of_a_corridor_is_that_of_its_sections() -> None:
+    quick = Site.load("quick")
+    sections = tuple(CorridorSection(quick, 50.0 * (i + 1), f"km {i}") for i in range(2))
+    problem = CorridorProblem(Corridor("two", sections, (1e5,)))
+    ditch = (Ditch(quick.slope.toe, 1.0, 3.0),)
+    found = problem.evaluate([(), ditch], range(60))
+    parts = [
+        problem.problems[0].evaluate((), range(60)),
+        problem.problems[1].evaluate(ditch, range(60)),
+    ]
+    assert found.objective == pytest.approx(50.0 * parts[0].objective + 100.0 * parts[1].objective)
+    assert found.cost == pytest.approx(100.0 * quick.capital(ditch))
+    nothing = problem.problems[0].nothing.objective
+    assert found.gain == pytest.approx(100.0 * (nothing - parts[1].objective))
+    assert found.gain_ci[0] < found.gain < found.gain_ci[1]
+    assert problem.affordable([(), ditch], found.cost) and not problem.affordable([(), ditch], 1.0)

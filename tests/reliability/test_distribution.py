@@ -1,0 +1,174 @@
+"""Releases on the workers of a real Dask scheduler equal those of this process."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rigdda
+from rigdda import BadInput, Ditch, Site, distribution
+from rigdda.agents import cli
+from rigdda.passages import passages
+
+pytest.importorskip("distributed")
+
+ROOT = Path(rigdda.__file__).parents[1]
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "DASK_DISTRIBUTED__ADMIN__LOG_LENGTH": "0"}
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+def started(*arguments: object) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "dask", *map(str, arguments)]
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen(command, env=ENVIRONMENT, stdout=quiet, stderr=quiet)
+
+
+def worker(address: str) -> subprocess.Popen[bytes]:
+    return started("worker", address, "--nthreads", 1, "--no-dashboard", "--no-nanny")
+
+
+def wait_for(count: int, address: str) -> None:
+    from distributed import Client
+
+    with Client(f"tcp://{address}", timeout=60) as client:
+        client.wait_for_workers(count, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of a scheduler with two workers."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"127.0.0.1:{port}"
+    made = [started("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")]
+    try:
+        made += [worker(address), worker(address)]
+        wait_for(2, address)
+        yield address
+    finally:
+        for process in made:
+            process.kill()
+            process.wait()
+
+
+def jobs(count: int) -> list[tuple[Site, tuple[Ditch, ...], int, str]]:
+    site = Site.load("quick")
+    layouts = [(), (Ditch(site.slope.toe, 1.0, 3.0),)]
+    return [(site, layouts[i % 2], i, site.event_names[i % 2]) for i in range(count)]
+
+
+def test_outcomes_equal_those_of_threads(scheduler: str) -> None:
+    asked = jobs(200)
+    here = rigdda.release_many(asked)
+    with distribution.connected(f"dask://{scheduler}"):
+        there = rigdda.release_many(asked)
+    assert here == there
+    assert distribution.current() is None
+
+
+def test_passages_equal_those_of_threads(scheduler: str) -> None:
+    site = Site.load("quick")
+    releases = [(seed, "block") for seed in range(150)]
+    here = passages(site, (), releases, [20.0, 30.0])
+    with distribution.connected(f"dask://{scheduler}"):
+        there = passages(site, (), releases, [20.0, 30.0])
+    assert (here.table == there.table).all() and (here.stops == there.stops).all()
+    assert here.seed == there.seed and np.array_equal(here.event, there.event)
+
+
+def test_errors_of_a_worker_are_those_of_this_process(scheduler: str) -> None:
+    site = Site.load("quick")
+    asked = [(site, (Ditch(-1e3, 1.0, 3.0),), 0, "block")]
+    with pytest.raises(BadInput) as here:
+        rigdda.release_many(asked)
+    with distribution.connected(f"dask://{scheduler}"), pytest.raises(BadInput) as there:
+        rigdda.release_many(asked)
+    assert str(here.value) == str(there.value)
+
+
+def test_a_worker_that_dies_loses_nothing(scheduler: str) -> None:
+    asked = jobs(600)
+    here = rigdda.release_many(asked)
+    third = worker(scheduler)
+    try:
+        wait_for(3, scheduler)
+        with distribution.connected(f"dask://{scheduler}"):
+            found = []
+            for start in range(0, len(asked), 200):
+                found += rigdda.release_many(asked[start : start + 200])
+                third.kill()
+    finally:
+        third.kill()
+        third.wait()
+    assert found == here
+
+
+CORRIDOR = """name = "pass"
+budget = 4_000
+[[sections]]
+site = "quick"
+length = 50.0
+[[sections]]
+site = "verge"
+length = 20.0
+"""
+
+
+@pytest.mark.slow
+def test_commands_write_the_same_tables(scheduler: str, tmp_path: Path) -> None:
+    (tmp_path / "pass.toml").write_text(CORRIDOR)
+    where = f"dask://{scheduler}"
+    commands = {
+        "simulate": (["verge", "--releases", "60"], "outcomes.csv"),
+        "design": (["quick", "--budget", "400", "--verify", "40"], "evaluations.csv"),
+        "corridor": ([str(tmp_path / "pass.toml"), "--releases", "200"], "sections.csv"),
+    }
+    for name, (arguments, table) in commands.items():
+        for folder, extra in (("here", []), ("there", ["--executor", where])):
+            out = tmp_path / f"{name}-{folder}"
+            assert cli.main([name, *arguments, "--out", str(out), *extra]) == 0
+        here, there = (tmp_path / f"{name}-{folder}" / table for folder in ("here", "there"))
+        assert here.read_bytes() == there.read_bytes(), name
+
+
+def test_processes_are_an_executor_too() -> None:
+    asked = jobs(100)
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool, distribution.using(pool):
+        found = rigdda.release_many(asked)
+    assert found == rigdda.release_many(asked)
+
+
+@pytest.mark.parametrize(
+    "address, named",
+    [
+        ("localhost:8786", "dask://HOST:PORT"),
+        ("dask://here", "dask://HOST:PORT"),
+        ("tcp://127.0.0.1:1", "dask://HOST:PORT"),
+        ("dask://127.0.0.1:1", "start the scheduler"),
+    ],
+)
+def test_bad_addresses_are_one_line(
+    address: str, named: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(distribution, "PATIENCE", 0.5)
+    begun = time.monotonic()
+    assert cli.main(["simulate", "quick", "--executor", address]) == 2
+    assert time.monotonic() - begun < 30.0
+    words = capsys.readouterr().err
+    assert named in words and words.count("\n") == 1
+
+
+def test_what_is_no_executor_is_refused() -> None:
+    with pytest.raises(BadInput, match="executor"), distribution.using(3):  # type: ignore[arg-type]
+        pass

@@ -37,7 +37,7 @@ from rigdda.agents.terminal import (
 )
 
 if TYPE_CHECKING:
-    from rigdda.agents.design_study import DesignStudy
+    from rigdda.agents.design_study import ComparedLayouts, DesignStudy
     from rigdda.agents.designers.store import Store
     from rigdda.envs import DesignProblem
 
@@ -525,10 +525,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         show(chances)
     else:
         click.echo("the site has no design events (design = true)")
-    risks = tables.risks(done)
-    if risks is not None:
-        click.echo(TRAFFIC.format(done.problem.site.traffic))
-        show(risks)
+    _show_risks(done)
     for line in findings.frontier(done, done.frontier, len(result.tried), done.replaced):
         finding(line)
     if done.frontier:
@@ -543,11 +540,23 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     for line in findings.of_design(done):
         finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
+    files = [*FILES, *(frontier_report.FILES if done.frontier else ())]
+    files += [tables.RISKS] if site.traffic is not None else []
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
         f"verification: {verify:,} new releases of each layout{resumed}\n"
-        f"{', '.join((*FILES, *(frontier_report.FILES if done.frontier else ())))} are in {folder}"
+        f"{', '.join(files)} are in {folder}"
     )
+
+
+def _show_risks(done: ComparedLayouts) -> None:
+    """Print the risk of each layout to the traffic, if the site has traffic."""
+    from rigdda.agents.reports import tables
+
+    risks = tables.risks(done)
+    if risks is not None:
+        click.echo(TRAFFIC.format(done.problem.site.traffic))
+        show(risks)
 
 
 @cli.command()
@@ -595,6 +604,9 @@ def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) 
 @click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that a barrier fails in a design event.  "
               "[default: that of the design]")  # fmt: skip
+@click.option("--target-risk", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable individual risk of a commuter [1/year].  [default: that of "
+              "the design]")  # fmt: skip
 @click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.  [default: that of "
               "the design]")  # fmt: skip
@@ -604,6 +616,7 @@ def reprice(
     settings: tuple[str, ...],
     target: float | None,
     failure: float | None,
+    target_risk: float | None,
     max_cost: float | None,
     out: Path | None,
 ) -> None:
@@ -618,10 +631,10 @@ def reprice(
     """
     from rigdda.agents import reprice as job
     from rigdda.agents.reports import findings, frontier_report, reprice_report, tables
-    from rigdda.agents.reports.wording import order
+    from rigdda.agents.reports.wording import order, unchanged
 
-    done = job.reprice(results, job.parse_all(settings), job.other_targets(target, failure),
-                       max_cost)  # fmt: skip
+    asked = job.other_targets(target, failure, target_risk)
+    done = job.reprice(results, job.parse_all(settings), asked, max_cost)
     files = (*reprice_report.FILES, *frontier_report.FILES)
     folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
     if folder.resolve() == results.resolve():
@@ -634,14 +647,17 @@ def reprice(
     chances = tables.chances(done)
     if chances is not None:
         show(chances)
+    _show_risks(done)
     for line in findings.frontier(done, done.frontier, done.tried, False):
         finding(line)
     if done.frontier:
         show(frontier_report.table(done.frontier))
-    chosen = done.chosen.evaluation.layout
-    click.echo("layout:" if chosen else "layout: no barrier")
+    chosen, site = done.chosen.evaluation.layout, done.problem.site
+    click.echo("layout:" if chosen else f"layout: {unchanged(site)}")
     for barrier in chosen:
-        click.echo(f"  {order(barrier, done.problem.site)}")
+        click.echo(f"  {order(barrier, site)}")
+    for line in findings.kept(site, chosen):
+        click.echo(f"  {line}")
     for line in reprice_report.sentences(done):
         finding(line)
     click.echo(f"nothing was simulated; the results are in {folder}")

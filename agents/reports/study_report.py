@@ -146,11 +146,8 @@ def events(results: StudyResults) -> Table:
     out = empty_table(("event", "layout", "reaches road", "barrier fails", "on road", "hit"))
     for event in results.site.event_names:
         for i, one in enumerate(results.layouts):
-            fails = (
-                bounded(one.chance(event, failed=True))
-                if results.site.standing(one.layout)
-                else "-"
-            )
+            stands = results.site.standing(one.layout)
+            fails = bounded(one.chance(event, failed=True)) if stands else "-"
             energies = [one.energy(event), one.energy(event, hit=True)]
             words = ["-" if np.isnan(e) else euros(e) for e in energies]
             reach = bounded(one.chance(event))

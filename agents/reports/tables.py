@@ -367,7 +367,7 @@ def write_risks(folder: Path, found: Sequence[tuple[str, Risk]]) -> None:
 
 def _risk_row(risk: Risk) -> dict[str, float]:
     """Return the columns with a risk, each mean followed by the ends of its 95 % interval."""
-    row = {}
+    row: dict[str, float] = {}
     for name in ("hit", "run_into", "fatalities", "per_km", "individual"):
         mean: Mean = getattr(risk, name)
         row |= {name: mean.value, f"{name}_low": mean.low, f"{name}_high": mean.high}

@@ -461,7 +461,8 @@ def design(
 
     Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd and the outcomes of all
     releases, for `rigdda reprice`. An interrupted run continues from evaluations.jsonl. A folder
-    that contains the design of another problem (problem.json) is refused.
+    that contains the design of another problem (problem.json) is refused. Of a site with traffic,
+    the risk to life is written to risk.csv.
     """
     from rigdda.agents import jobs
     from rigdda.agents.designers.store import FILE, claim
@@ -627,7 +628,7 @@ def reprice(
     on which the motion of rock depends are refused.
 
     Writes costs.csv, site.toml (the site with the new values), layout.toml (the best layout),
-    cost.png and, if a target is missed, frontier.csv and frontier.png.
+    cost.png and, if a target is missed, frontier.csv and frontier.png; with traffic risk.csv.
     """
     from rigdda.agents import reprice as job
     from rigdda.agents.reports import findings, frontier_report, reprice_report, tables
@@ -676,7 +677,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
     Writes study.csv (one row for each release), layouts.csv (Z and its parts), events.csv
     (probabilities and energies), differences.csv (of each pair of layouts, on common releases),
-    sections.png and costs.png. An interrupted study continues from study.csv.
+    sections.png, costs.png and, of a site with traffic, risk.csv. An interrupted study continues from study.csv.
     """
     from rigdda.agents import studies
     from rigdda.agents.reports import findings, study_report

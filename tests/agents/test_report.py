@@ -256,7 +256,8 @@ def test_a_layout_that_does_not_pay_is_warned_of(low: float, high: float, words:
         return {name: str(value) for name, value in ends.items()}
 
     nothing = row(100.0, 95.0, 105.0)
-    found = report_sections._doubt(row(0.5 * (low + high), low, high), nothing, targets=True)
+    chosen = row(0.5 * (low + high), low, high)
+    found = report_sections._doubt(chosen, nothing, targets=True, bare="without barriers")
     assert words in found and bool(found) == bool(words)
 
 

@@ -101,6 +101,37 @@ def test_a_what_if_equals_an_evaluation_from_scratch(
     assert [case.evaluation for case in done.cases[:-1]] == wanted
 
 
+@pytest.fixture(scope="module")
+def with_traffic(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a design with a target of the individual risk."""
+    folder = tmp_path_factory.mktemp("traffic")
+    busy = msgspec.structs.replace(site, traffic=rigdda.Traffic(8000.0, 80.0, 250.0))
+    problem = DesignProblem(busy, targets={"individual": 1e-5})
+    jobs.study(problem, "race", 400, 0, VERIFIED, folder, lambda *_: None)
+    return folder
+
+
+def test_a_what_if_of_traffic_equals_an_evaluation_from_scratch(with_traffic: Path) -> None:
+    kept = archive.read(with_traffic)
+    settings = {"traffic.fatality_value": 2e6, "traffic.vehicles_per_day": 3000.0}
+    done = reprice.reprice(with_traffic, settings, {"individual": 1e-4})
+    assert done.problem.targets.individual == 1e-4
+    wanted = from_scratch(changed_by_hand(kept.site, settings), done.problem, kept)
+    assert [case.evaluation for case in done.cases[:-1]] == wanted
+    assert done.chosen.evaluation.risk is not None
+
+
+def test_a_what_if_prints_and_writes_the_risk_to_life(with_traffic: Path, tmp_path: Path) -> None:
+    words = run("reprice", with_traffic, "--target-risk", 1e-4, "--out", "o", folder=tmp_path)
+    done = reprice.reprice(with_traffic, targets={"individual": 1e-4})
+    assert "risk to the traffic on 250 m of road" in words
+    for row, case in zip(rows(tmp_path / "o/risk.csv"), done.cases, strict=True):
+        risk = case.evaluation.risk
+        assert risk is not None and row["layout"] == case.name
+        assert float(row["individual"]) == risk.individual.value
+        assert float(row["fatalities_high"]) == risk.fatalities.high
+
+
 def test_without_changes_it_is_the_table_of_the_design(designed: Path) -> None:
     done, table = reprice.reprice(designed), rows(designed / "evaluations.csv")
     verified = [row for row in table if row["stage"] in ("verification", "frontier")]
@@ -217,6 +248,7 @@ def reprice_empty(value: object) -> bool:
         ("events.block=1", ("events.block = 1", "events.block.KEY")),
         ("meshes.light.price=1", ("meshes.light.price = 1", "no meshes")),
         ("surfaces.rock.friction_deg=30", ("surfaces.rock.friction_deg = 30", "rigdda design")),
+        ("traffic.speed=50", ("traffic.speed = 50", "[traffic]", "rigdda design")),
         ("motion.dt=0.01", ("motion.dt = 0.01", "rigdda design")),
         ("barrier_zone.end=20", ("barrier_zone.end = 20", "rigdda design")),
         ("name=\"other\"", ("name = 'other'", "no result depends on it")),

@@ -15,7 +15,7 @@ import rigdda
 from rigdda import Fence, Site
 from rigdda.agents import studies
 from rigdda.agents.designers.protocol import Entry
-from rigdda.agents.reports import stations, tables
+from rigdda.agents.reports import stations, study_report, tables
 from rigdda.agents.reports.stations import Passing
 from rigdda.agents.reports.tables import EvaluationsFile
 from rigdda.agents.reports.wording import order, surveyed
@@ -109,9 +109,10 @@ def test_tables_of_risk_are_only_there_with_traffic(bare: Site, tmp_path: Path) 
     assert [{k: v for k, v in row.items() if k in plain[0] and k != "key"} for row in more] == [
         {k: v for k, v in row.items() if k != "key"} for row in plain
     ]
-    assert studies.risks(Study(bare, 4, layouts), tmp_path / "bare.csv") is None
-    study = Study(busy, 4, layouts)
-    words = printed(studies.risks(study, tmp_path / "busy.csv"))
+    found = studies.results(Study(bare, 4, layouts), tmp_path / "bare.csv")
+    assert study_report.risks(found) is None
+    found = studies.results(Study(busy, 4, layouts), tmp_path / "busy.csv")
+    words = printed(study_report.risks(found))
     outcomes = rigdda.release_many(
         [(busy, (), s, name) for name in busy.event_names for s in range(4)]
     )

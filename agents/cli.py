@@ -677,7 +677,8 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
     Writes study.csv (one row for each release), layouts.csv (Z and its parts), events.csv
     (probabilities and energies), differences.csv (of each pair of layouts, on common releases),
-    sections.png, costs.png and, of a site with traffic, risk.csv. An interrupted study continues from study.csv.
+    sections.png, costs.png and, of a site with traffic, risk.csv. An interrupted study continues
+    from study.csv.
     """
     from rigdda.agents import studies
     from rigdda.agents.reports import findings, study_report

@@ -120,26 +120,36 @@ def _source(value: float, known: Span | None) -> str:
 
 
 def prices(site: Site) -> Iterator[Block]:
-    """Yield the tables of prices and of the cost of rock on the road."""
-    yield _money("Prices of barriers", site.prices, Prices())
-    yield _money("Cost of rock on the road", site.consequences, Consequences())
+    """Yield the tables of prices, of the cost of rock on the road and of the traffic."""
+    yield _values("Prices of barriers", "price", site.prices)
+    yield _values("Cost of rock on the road", "price", site.consequences)
+    if site.traffic is not None:
+        yield _values("Traffic", "quantity", site.traffic)
 
 
-def _money(title: str, given: msgspec.Struct, usual: msgspec.Struct) -> Table:
-    """Return the table of prices, each with its unit and whether it is a default."""
+def _values(title: str, what: str, given: msgspec.Struct) -> Table:
+    """Return the table of values of a site file, each with its unit and whether it is a default."""
+    usual = {field.name: _default(field) for field in msgspec.structs.fields(given)}
     rows = []
     for field in described(type(given)):
         value = getattr(given, field.name)
         if field.name == "source" or value in ("", None):
             continue
-        same = value == getattr(usual, field.name)
+        same = value == usual[field.name]
         unit = f" [{field.unit}]" if field.unit not in ("", "-") else ""
         rows.append(
             (field.text.rstrip(".") + unit, _written(value), "default" if same else "given")
         )
     source = getattr(given, "source", "")
     words = f"Source: {source}." if source else ""
-    return listed(title, words, ("price", "value", "from"), rows)
+    return listed(title, words, (what, "value", "from"), rows)
+
+
+def _default(field: msgspec.structs.FieldInfo) -> Any:
+    """Return the default of a field; `msgspec.NODEFAULT` if it has none."""
+    if field.default_factory is not msgspec.NODEFAULT:
+        return field.default_factory()
+    return field.default
 
 
 def _written(value: Any) -> str:

@@ -530,7 +530,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     for line in findings.frontier(done, done.frontier, len(result.tried), done.replaced):
         finding(line)
     if done.frontier:
-        show(frontier_report.table(done.frontier))
+        show(frontier_report.table(done.problem.site, done.frontier))
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
     site = done.problem.site
     click.echo(f"layout{from_start}:" if chosen.layout else f"layout: {unchanged(site)}")
@@ -652,7 +652,7 @@ def reprice(
     for line in findings.frontier(done, done.frontier, done.tried, False):
         finding(line)
     if done.frontier:
-        show(frontier_report.table(done.frontier))
+        show(frontier_report.table(done.problem.site, done.frontier))
     chosen, site = done.chosen.evaluation.layout, done.problem.site
     click.echo("layout:" if chosen else f"layout: {unchanged(site)}")
     for barrier in chosen:

@@ -30,7 +30,8 @@ import numpy as np
 
 import rigdda
 from rigdda import BadInput, Error, Run
-from rigdda.barriers import from_table, standing
+from rigdda.agents.reports.wording import unchanged
+from rigdda.barriers import from_table
 from rigdda.envs import replay_record
 from rigdda.envs.replay_record import ReleaseRecord
 from rigdda.replay.recording import Marks
@@ -100,11 +101,11 @@ def record_impact(replay: Path, out: Path) -> Moment | None:
     if when is None:
         return None
     notes = {
-        "layout": "; ".join(barrier.label for barrier in layout) or "no barrier",
+        "layout": "; ".join(barrier.label for barrier in layout) or unchanged(known.site),
         "release": f"event {outcome.event}, seed {known.seed}",
         when.words: f"{when.time:.2f} s after the release; the replay begins {LEAD:g} s before",
     }
-    labels = tuple(barrier.label for barrier in standing(layout))
+    labels = known.site.labels(layout)
     _since(run, when.time - LEAD).to_rerun(out, Marks(road, notes, known.site.name, labels))
     return when
 

@@ -64,7 +64,8 @@ def _main(row: Row) -> bool:
 
 def _called(name: str, barriers: str) -> str:
     """Return the name of a layout with its barriers."""
-    return f"{name}: {barriers}" if barriers and barriers != "no barrier" else name
+    bare = ("", "no barrier", name)
+    return name if barriers in bare else f"{name}: {barriers}"
 
 
 def _barriers(text: str) -> str:
@@ -73,7 +74,7 @@ def _barriers(text: str) -> str:
         found = [from_table(f"barriers[{i}]", row) for i, row in enumerate(json.loads(text))]
     except (ValueError, TypeError, BadInput):
         return text
-    return "; ".join(map(describe, found)) or "no barrier"
+    return "; ".join(map(describe, found)) or "no new barrier"
 
 
 def _budget(text: str) -> str:

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigdda import Layout
+from rigdda import Layout, Site
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.reports import pictures
 from rigdda.agents.reports.tables import bounded, empty_table, write_rows
-from rigdda.agents.reports.wording import euros, percent
+from rigdda.agents.reports.wording import euros, percent, unchanged
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem
 
@@ -57,20 +57,21 @@ def rows(front: Sequence[TriedLayout]) -> list[dict[str, Any]]:
     return found
 
 
-def table(front: Sequence[TriedLayout]) -> Table:
+def table(site: Site, front: Sequence[TriedLayout]) -> Table:
     """Return the table of a frontier, at most 80 characters wide."""
     out = empty_table(("layout", "to build", "reaches road", "fails", "Z", "of"))
     for one in front:
         z = euros(one.verified.objective) if one.verified else "not verified"
-        fails = percent(one.failure.probability) if one.layout and one.failure.releases else "-"
+        known = site.standing(one.layout) and one.failure.releases
+        fails = percent(one.failure.probability) if known else "-"
         count = f"{one.reach.releases:,}"
-        out.add_row(brief(one.layout), euros(one.cost), bounded(one.reach), fails, z, count)
+        out.add_row(brief(site, one.layout), euros(one.cost), bounded(one.reach), fails, z, count)
     return out
 
 
-def brief(layout: Layout) -> str:
+def brief(site: Site, layout: Layout) -> str:
     """Return the kinds and chainages of a layout in words."""
-    return " + ".join(f"{b.label} at {b.x:.1f}" for b in layout) or "no barrier"
+    return " + ".join(f"{b.label} at {b.x:.1f}" for b in layout) or unchanged(site)
 
 
 def draw(path: Path, problem: DesignProblem, front: Sequence[TriedLayout]) -> None:

@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from rigdda import Site
 from rigdda.agents.design_study import SHED, DesignStudy
+from rigdda.agents.reports.wording import unchanged
 from rigdda.barriers import describe
 from rigdda.envs import Evaluation
 from rigdda.envs.intervals import Estimate
@@ -21,12 +23,12 @@ def layouts(done: DesignStudy) -> list[Row]:
 
     Z and its parts are in EUR per metre of road and year, `cost` is the price to build in EUR per
     metre, and `debris` is the volume on the road in m3 per metre and year; `debris_share` is that
-    volume divided by the one without barriers. `chosen` marks the layout found. `_low` and `_high`
+    volume divided by that of the first layout. `chosen` marks the layout found. `_low` and `_high`
     are the ends of 95 % intervals.
     """
     site, whole = done.problem.site, done.nothing.evaluation.debris
     rows = [
-        {"layout": case.name, "chosen": case is done.chosen, **_costs(case.evaluation, whole)}
+        {"layout": case.name, "chosen": case is done.chosen, **_costs(site, case.evaluation, whole)}
         for case in done.cases
     ]
     shed = {name: 0.0 for name in rows[0] if name not in ("layout", "chosen")}
@@ -35,8 +37,8 @@ def layouts(done: DesignStudy) -> list[Row]:
     return [*rows, {"layout": SHED, "chosen": False, **shed, "targets": "", "barriers": ""}]
 
 
-def _costs(e: Evaluation, whole: float) -> Row:
-    """Return the cost of a layout and its parts; `whole` is the debris without barriers."""
+def _costs(site: Site, e: Evaluation, whole: float) -> Row:
+    """Return the cost of a layout and its parts; `whole` is the debris without the layout."""
     return {
         "objective": e.objective, **_ends("objective", e.ci),
         "capital": e.capital,
@@ -47,7 +49,7 @@ def _costs(e: Evaluation, whole: float) -> Row:
         "debris_share": e.debris / whole if whole else math.nan,
         "targets": e.targets or "",
         "releases": e.releases,
-        "barriers": "; ".join(describe(barrier) for barrier in e.layout) or "no barrier",
+        "barriers": "; ".join(describe(barrier) for barrier in e.layout) or unchanged(site),
     }  # fmt: skip
 
 

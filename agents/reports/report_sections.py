@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import rigdda
 from rigdda import BadInput, Site
-from rigdda.agents.reports import assumptions
+from rigdda.agents.reports import assumptions, findings
 from rigdda.agents.reports.exhibits import EXHIBITS, RAW, Exhibit
 from rigdda.agents.reports.html_blocks import (
     Block,
@@ -130,6 +130,8 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
         yield Paragraph(f"Build: {'; '.join(built)}.", "answer")
     else:
         yield Paragraph("Build nothing: no layout was found that is worth its cost.", "answer")
+    if site is not None and site.existing:
+        yield Items(findings.kept(site, layout))
     if targets:
         asked = _asked(folder)
         mood = "good" if targets == "met" else "warning"

@@ -412,6 +412,10 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               "the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
+@click.option("--ground-samples", "grounds", type=click.IntRange(0, 1000), default=8,
+              show_default=True, help="Number of grounds within the plausible range on which the "
+              "layouts are compared at the end; 0 for none.")  # fmt: skip
+@posterior_option
 @seed_option("Seed of the search and of its releases.", SEED)
 @out_option("design-SITE")
 @executor_option
@@ -424,6 +428,8 @@ def design(
     zone: tuple[float, float] | None,
     budget: int,
     verify: int,
+    grounds: int,
+    posterior: Path | None,
     seed: int,
     out: Path | None,
 ) -> None:
@@ -431,25 +437,43 @@ def design(
 
     SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
     search did not use. The best layout has the least cost Z. Z is the sum of capital and upkeep,
-    expected harm on the road and expected repair, in EUR per metre of road and year.
+    expected harm on the road and expected repair, in EUR per metre of road and year. At the end, the
+    layouts are compared on other grounds within the plausible range.
 
-    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. An interrupted run
+    Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd, band.csv and band.png
+    (the comparison on other grounds). An interrupted run
     continues from evaluations.jsonl. A folder that contains the design of another problem
     (problem.json) is refused.
     """
-    from rigdda.agents import jobs
+    from rigdda.agents import ground_band, jobs
     from rigdda.agents.designers.store import FILE, claim
+    from rigdda.agents.parameters import read_posterior
+    from rigdda.agents.reports import band_report
     from rigdda.agents.reports.folder import FILES, write
 
     problem = _pose(site, kinds, target, failure, zone)
-    folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
+    fitted = None if posterior is None else read_posterior(posterior, problem.site)
+    folder = folder_for(out, f"design-{problem.site.name}", *FILES, *band_report.FILES, FILE)
     claim(folder, problem, *FILES)
+    band = None
     with kept(folder):
         with progress(budget + CASES * verify) as tick:
             done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
             tick(budget + CASES * verify, "pictures")
             write(done, folder, seed)
+        if grounds:
+            with progress(grounds) as tick:
+                band = ground_band.assess(done, grounds, fitted, seed, folder, tick)
+            band_report.write(folder, band)
+            ground_band.forget(folder)
     _tell(done, store, verify, folder)
+    if band is not None:
+        click.echo(
+            f"on {len(band.samples)} other grounds ({band.source}), {band.releases} releases of "
+            "each layout on each:"
+        )
+        show(band_report.table(band))
+        click.echo(f"{band_report.verdict(band)}\n{', '.join(band_report.FILES)} are in {folder}")
 
 
 def _pose(

@@ -12,7 +12,7 @@ total index ST is its share including all interactions.
 The output of a simulation is a mean over releases and therefore noisy. The variance of this noise
 in each change follows from the differences of single releases, which have the same seeds.
 `AnalysedInput.noise` is the part of an index that the noise alone would cause on average, and
-`AnalysedInput.signal` is the root mean square of the changes, divided by that of their noise.
+`AnalysedInput.signal` is the ratio of the changes to their noise.
 
 Sources: Morris, Factorial sampling plans for preliminary computational experiments, Technometrics
 33 (1991) 161-174; Campolongo, Cariboni and Saltelli, An effective screening design for sensitivity
@@ -53,6 +53,9 @@ Floats = NDArray[np.float64]
 Method = Literal["morris", "sobol"]
 Tick = Callable[[int, str], None]
 
+Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
+"""Indices of the points at the start and the end of each change of one input."""
+
 METHODS = ("morris", "sobol")
 
 SAMPLES = {"morris": 20, "sobol": 64}
@@ -70,9 +73,9 @@ ROUNDING = 1e-12
 """Changes smaller than this share of the largest value count as 0 [-]."""
 
 DISTINCT = 2.24
-"""Ratio of changes to noise from which they count as distinguishable [-]: the square of a standard
-normal number exceeds its mean by more than the square of this ratio in 2.5 % of the cases. This
-bound also holds if the noise is the same in all changes, because the releases are."""
+"""Ratio of changes to noise above which they count as distinguishable [-]. The absolute value of a
+standard normal number exceeds it in 2.5 % of cases, and there are two such ratios. It is also safe
+if the noise is the same in all changes because their releases are."""
 
 
 class Response(NamedTuple):
@@ -124,8 +127,8 @@ class AnalysedInput(NamedTuple):
     noise : float
         Value that `index` would have on average if the changes were nothing but noise.
     signal : float
-        Root mean square of the changes of the output, divided by that of their noise [-]; infinite
-        if there is no noise.
+        Ratio of the changes of the output to their noise [-]: of the root mean squares, or of the
+        average change to its standard error, if this is larger. It is infinite without noise.
     """
 
     index: float
@@ -198,8 +201,8 @@ def analyse(method: Method, cube: Floats, response: Response, seed: int) -> list
     if np.ptp(response.values) <= ROUNDING * np.abs(response.values).max():
         return [AnalysedInput(*[0.0] * 10) for _ in pairs]
     signals = [
-        _signal(response.values[pair[1]] - response.values[pair[0]], own)
-        for pair, own in zip(pairs, noisy, strict=True)
+        _signal(cube[:, i], response, pair, own)
+        for i, (pair, own) in enumerate(zip(pairs, noisy, strict=True))
     ]
     each = _morris if method == "morris" else _sobol
     return each(cube, response.values, list(zip(changes, noisy, signals, strict=True)), seed)
@@ -210,12 +213,22 @@ Pair = tuple[float, Floats, float]
 changes to noise."""
 
 
-def _signal(changes: Floats, variance: Floats) -> float:
-    """Return the root mean square of changes, divided by that of their noise."""
+def _signal(place: Floats, response: Response, pair: Pairs, variance: Floats) -> float:
+    """Return the larger one of two ratios of the changes due to an input to their noise.
+
+    One is that of the root mean squares of the changes, the other is the average change, divided by
+    its standard error.
+    """
+    first, second = pair
+    changes = response.values[second] - response.values[first]
     signal, noisy = float(np.square(changes).sum()), float(variance.sum())
-    if noisy > 0.0:
-        return math.sqrt(signal / noisy)
-    return math.inf if signal > 0.0 else 0.0
+    if noisy <= 0.0:
+        return math.inf if signal > 0.0 else 0.0
+    moved = place[second] - place[first]
+    mean = moved @ (response.terms[second] - response.terms[first])
+    error = float(np.sqrt(noise(mean[None], response.strata))[0])
+    average = abs(float(moved @ changes)) / error if error > 0.0 else 0.0
+    return max(math.sqrt(signal / noisy), average)
 
 
 def _morris(
@@ -273,9 +286,6 @@ def _sobol(
             )  # fmt: skip
         )
     return out
-
-
-Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 def _pairs(method: Method, cube: Floats, i: int) -> Pairs:

@@ -100,7 +100,7 @@ def tables(found: Sensitivity) -> list[tuple[str, Table]]:
             limits = isinstance(one, Parameter)
             table.add_row(
                 _short(one),
-                f"{_number(one.low)} to {_number(one.high)}" if isinstance(one, Parameter) else "",
+                span((one.low, one.high)) if isinstance(one, Parameter) else "",
                 _number(index.change) if limits else "",
                 f"{_number(index.index)} ({span((max(index.low, 0.0), index.high))})",
                 _number(index.noise),
@@ -166,7 +166,7 @@ def draw(path: Path, found: Sensitivity) -> None:
         for (left, right), (output, _), own in zip(grid, shown, ranked, strict=True):
             _tornado(left, output, own)
             _indices(right, found, own)
-        figure.legend(*_key(), loc="outside lower center", ncols=4, frameon=False)
+        figure.legend(*_key(), loc="outside lower center", ncols=3, frameon=False)
         save(figure, path)
 
 
@@ -188,7 +188,7 @@ def _tornado(axes: Axes, output: Output, own: Sequence[tuple[Input, AnalysedInpu
 
 def _labelled(one: Input) -> str:
     """Return the name of an input with its range."""
-    limits = f" ({one.low:.3g} to {one.high:.3g})" if isinstance(one, Parameter) else ""
+    limits = f" ({span((one.low, one.high))})" if isinstance(one, Parameter) else ""
     return _short(one) + limits
 
 

@@ -412,7 +412,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               "the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
-@click.option("--ground-samples", "grounds", type=click.IntRange(0, 1000), default=8,
+@click.option("--ground-samples", "grounds", type=click.IntRange(0, 1000), default=6,
               show_default=True, help="Number of grounds within the plausible range on which the "
               "layouts are compared at the end; 0 for none.")  # fmt: skip
 @posterior_option
@@ -437,8 +437,8 @@ def design(
 
     SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
     search did not use. The best layout has the least cost Z. Z is the sum of capital and upkeep,
-    expected harm on the road and expected repair, in EUR per metre of road and year. At the end, the
-    layouts are compared on other grounds within the plausible range.
+    expected harm on the road and expected repair, in EUR per metre of road and year. At the end,
+    the layouts are compared on other grounds within the plausible range.
 
     Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd, band.csv and band.png
     (the comparison on other grounds). An interrupted run
@@ -618,7 +618,8 @@ def corridor(
 
 @cli.command()
 @click.argument("site")
-@click.argument("observed", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("observed", type=click.Path(dir_okay=False, path_type=Path), nargs=-1,
+                required=True)  # fmt: skip
 @click.option("--parameters", "names", multiple=True, required=True, metavar="PATH[=LOW:HIGH]",
               help="Number of the site file to fit, such as surfaces.soil.restitution. May be "
               "repeated; more than four are rarely identified.")  # fmt: skip
@@ -631,7 +632,7 @@ def corridor(
 @executor_option
 def fit(
     site: str,
-    observed: Path,
+    observed: tuple[Path, ...],
     names: tuple[str, ...],
     model: Literal["blocks", "lumped"],
     budget: int,
@@ -639,27 +640,37 @@ def fit(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Fit numbers of SITE to the run-outs in OBSERVED, a CSV file.
+    """Fit numbers of SITE to the observations in OBSERVED, one or several CSV files.
 
-    The columns of the file are event and run_out_m, the chainage at which the block stopped. Prints
-    the fitted numbers with 95 % intervals, or "not identified" if the interval is nearly as long
-    as the given range. Also prints how well the fit predicts runs that were left out of it.
-    Writes site.toml (SITE with the fitted numbers), fit.csv and fit.png.
+    The columns of a file are event and one of: run_out_m, the chainage at which a block stopped;
+    start_m, end_m and share, mass_t or volume_m3, the deposit in an interval of chainage; or
+    station_m, quantity (such as velocity or height) and value, of blocks that pass a station.
+
+    Prints the fitted numbers with 95 % intervals, or "not identified" if the interval is nearly as
+    long as the given range. Also prints how well the fit predicts observations that were left out
+    of it. Writes site.toml (SITE with the fitted numbers), fit.csv, fit.png and posterior.csv,
+    which `design` and `sensitivity` can sample. A run that was interrupted continues where it
+    stopped.
     """
     import rigdda
     from rigdda.agents import fit as job
+    from rigdda.agents import observations
+    from rigdda.agents.parameters import parse
     from rigdda.agents.reports import tables
 
     where = rigdda.Site.load(site)
-    seen, parameters = job.read(observed, where), [job.parse(name) for name in names]
-    folder = folder_for(out, f"fit-{where.name}", "site.toml", "fit.csv", "fit.png")
+    seen, parameters = observations.read(observed, where), [parse(name) for name in names]
+    files = ("site.toml", "fit.csv", "fit.png", "posterior.csv")
+    folder = folder_for(out, f"fit-{where.name}", *files)
     with kept(folder), progress(budget) as tick:
-        found = job.fit(where, seen, parameters, budget, releases, seed, tick, model)
+        found = job.fit(where, seen, parameters, budget, releases, seed, tick, model, folder)
         found.site.save(folder / "site.toml")
-        job.write(folder / "fit.csv", found, seen)
-        job.draw(folder / "fit.png", found, seen)
-    show(tables.fit(job.rows(found, seen)))
-    click.echo(f"up to {budget} parameter sets; site.toml, fit.csv and fit.png are in {folder}")
+        job.write(folder / "fit.csv", found)
+        job.draw(folder / "fit.png", found)
+        tables.write_rows(folder / "posterior.csv", found.posterior.rows())
+        job.forget(folder)
+    show(tables.fit(job.rows(found, found.observed)))
+    click.echo(f"up to {budget} parameter sets; {', '.join(files)} are in {folder}")
 
 
 @cli.command()

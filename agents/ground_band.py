@@ -36,10 +36,10 @@ from rigdda.envs.cost import judge
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
 
-GROUNDS = 8
+GROUNDS = 6
 """Default number of grounds."""
 
-RELEASES = 150
+RELEASES = 120
 """Number of releases of each layout on each ground."""
 
 SURE = 1.96

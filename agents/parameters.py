@@ -210,11 +210,16 @@ def check_limits(site: Site, parameters: Sequence[Parameter]) -> None:
     """
     for parameter in parameters:
         for value in (parameter.low, parameter.high):
-            with_values(site, (parameter.path,), (value,))
+            set_numbers(site, (parameter.path,), (value,))
 
 
-def with_values(site: Site, paths: Sequence[str], values: Sequence[float]) -> Site:
-    """Return a copy of a site with other values of some numbers.
+def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[float]) -> Site:
+    """Return a copy of a site with other values of some parameters; see `set_numbers`."""
+    return set_numbers(site, [parameter.path for parameter in parameters], values)
+
+
+def set_numbers(site: Site, paths: Sequence[str], values: Sequence[float]) -> Site:
+    """Return a copy of a site with other values of the numbers with some paths.
 
     Raises
     ------
@@ -259,9 +264,11 @@ def _table(site: Site, tables: dict[str, Any], path: str) -> dict[str, Any] | No
         return next(named, None)
     table: Any = tables
     for top in tops:
-        if table is tables.get("lumped") and top in site.surfaces:
+        if not isinstance(table, dict):
+            return None
+        if table is tables["lumped"] and top in site.surfaces:
             table.setdefault(top, {})
-        table = table.get(top) if isinstance(table, dict) else None
+        table = table.get(top)
     return table if isinstance(table, dict) else None
 
 
@@ -325,7 +332,7 @@ class Posterior(NamedTuple):
 
     @classmethod
     def of(cls, paths: Sequence[str], values: Floats, weights: Floats) -> Posterior:
-        """Return samples in order, with weights that add up to 1; those of weight 0 are left out."""
+        """Return samples in order with weights that add up to 1, without those of weight 0."""
         kept = weights > 0.0
         values, weights = values[kept], weights[kept] / weights.sum()
         spread = values.std(axis=0)
@@ -385,7 +392,7 @@ def read_posterior(path: Path, site: Site) -> Posterior:
     if len(set(head)) < len(head):
         raise BadInput("--posterior", ", ".join(head), "give each column a different name")
     for ends in (table.min(axis=0), table.max(axis=0)):
-        with_values(site, head[1:], ends[1:].tolist())
+        set_numbers(site, head[1:], ends[1:].tolist())
     return Posterior.of(head[1:], table[:, 1:], table[:, 0])
 
 
@@ -397,7 +404,7 @@ def site_at(site: Site, inputs: Sequence[Input], place: Floats) -> Site:
     """Return a site with the values of inputs at a place of the unit cube, (D,)."""
     paths = [path for one in inputs for path in one.paths]
     values = [v for one, at in zip(inputs, place.tolist(), strict=True) for v in one.at(at)]
-    return with_values(site, paths, values)
+    return set_numbers(site, paths, values)
 
 
 def inputs(

@@ -5,9 +5,9 @@ site with a layout.
 
 The method of Morris (1991) changes one input at a time along random trajectories. Its index mu* is
 the mean absolute change of the output, extrapolated to the whole range of the input; sigma is the
-standard deviation of this change, which is large if the input interacts with others. The first-order
-index S1 of Sobol' is the share of the variance of the output that an input explains alone, and the
-total index ST is its share including all interactions.
+standard deviation of this change, which is large if the input interacts with others. The
+first-order index S1 of Sobol' is the share of the variance of the output that an input explains
+alone, and the total index ST is its share including all interactions.
 
 The output of a simulation is a mean over releases and therefore noisy. The variance of this noise
 in each change follows from the differences of single releases, which have the same seeds.
@@ -111,7 +111,8 @@ class Response(NamedTuple):
         return np.sqrt(noise(self.terms, self.strata))
 
 
-class AnalysedInput(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class AnalysedInput:
     """Indices of one input.
 
     Parameters
@@ -231,9 +232,7 @@ def _signal(place: Floats, response: Response, pair: Pairs, variance: Floats) ->
     return max(math.sqrt(signal / noisy), average)
 
 
-def _morris(
-    cube: Floats, values: Floats, pairs: Sequence[Pair], seed: int
-) -> list[AnalysedInput]:
+def _morris(cube: Floats, values: Floats, pairs: Sequence[Pair], seed: int) -> list[AnalysedInput]:
     """Return the indices of Morris."""
     from SALib.analyze import morris
 
@@ -249,18 +248,12 @@ def _morris(
         mean, spread = float(found["mu"][i]), float(np.nan_to_num(found["sigma"][i]))
         wide = 1.96 * spread / math.sqrt(count)
         floor = math.sqrt(2.0 / math.pi) * float(np.sqrt(variance).mean()) / step
-        out.append(
-            AnalysedInput(
-                star, star - half, star + half, mean, mean - wide, mean + wide, spread, change,
-                floor, signal,
-            )  # fmt: skip
-        )
+        ends = star - half, star + half, mean, mean - wide, mean + wide
+        out.append(AnalysedInput(star, *ends, spread, change, floor, signal))
     return out
 
 
-def _sobol(
-    cube: Floats, values: Floats, pairs: Sequence[Pair], seed: int
-) -> list[AnalysedInput]:
+def _sobol(cube: Floats, values: Floats, pairs: Sequence[Pair], seed: int) -> list[AnalysedInput]:
     """Return the indices of Sobol'."""
     from SALib.analyze import sobol
 
@@ -272,19 +265,15 @@ def _sobol(
             _problem(dimensions), values, calc_second_order=False, num_resamples=RESAMPLES,
             conf_level=CONFIDENCE, seed=seed + 1,
         )  # fmt: skip
-    ends = np.concatenate([values[:: dimensions + 2], values[dimensions + 1 :: dimensions + 2]])
+    spread = np.var([values[:: dimensions + 2], values[dimensions + 1 :: dimensions + 2]])
     out = []
     for i, (change, variance, signal) in enumerate(pairs):
-        one, all_, half, wide = (
+        one, total, half, wide = (
             float(np.nan_to_num(found[name][i])) for name in ("S1", "ST", "S1_conf", "ST_conf")
         )
-        floor = float(variance.mean()) / (2.0 * float(ends.var())) if ends.var() > 0.0 else 0.0
-        out.append(
-            AnalysedInput(
-                all_, all_ - wide, all_ + wide, one, one - half, one + half, math.nan, change,
-                floor, signal,
-            )  # fmt: skip
-        )
+        floor = float(variance.mean() / (2.0 * spread)) if spread > 0.0 else 0.0
+        ends = total - wide, total + wide, one, one - half, one + half
+        out.append(AnalysedInput(total, *ends, math.nan, change, floor, signal))
     return out
 
 
@@ -508,9 +497,7 @@ def run(plan: Plan, out: Path | None, tick: Tick) -> Sensitivity:
     return Sensitivity(plan, outputs, indices, resumed)
 
 
-def _outputs(
-    plan: Plan, priced: Sequence[Priced], strata: NDArray[np.int64]
-) -> Iterator[Output]:
+def _outputs(plan: Plan, priced: Sequence[Priced], strata: NDArray[np.int64]) -> Iterator[Output]:
     """Yield Z and, for each design event, P(reach) and, with barriers, P(failure)."""
     terms = np.array([one.terms for one in priced])
     z = np.array([one.objective for one in priced])

@@ -29,8 +29,8 @@ posterior_option = click.option(
     "--posterior",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Posterior of a fit (posterior.csv of `rigdda fit`), which replaces the plausible range of "
-    "the numbers in it.",
+    help="Posterior of a fit (posterior.csv of `rigdda fit`), which replaces the plausible ranges "
+    "of the numbers in it.",
 )
 
 

@@ -473,7 +473,9 @@ def design(
             "each layout on each:"
         )
         show(band_report.table(band))
-        click.echo(f"{band_report.verdict(band)}\n{', '.join(band_report.FILES)} are in {folder}")
+        for line in filter(None, (band_report.verdict(band), band_report.on_target(band))):
+            click.echo(line)
+        click.echo(f"{', '.join(band_report.FILES)} are in {folder}")
 
 
 def _pose(

@@ -127,9 +127,10 @@ def _values(site: Site, found: Passages, one: DataSet) -> Floats:
 def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     """Return how many independent blocks would tell as much as a deposit.
 
-    Blocks of one release push one another and start together. The number follows from the variance
-    between computed releases of the share of rock above each end of an interval, compared with that
-    of a single block; it is multiplied by the number of releases that made the deposit.
+    Blocks of one release push one another and start together, and large blocks count more than
+    small ones. The number follows from the variance between computed releases of the share of rock
+    above each end of an interval, compared with that of equal independent blocks. It is multiplied
+    by the number of releases that made the deposit.
 
     Raises
     ------
@@ -141,16 +142,17 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     found = passages(site, (), [(seed, one.event) for seed in seeds], ())
     low, high = one.values[0], one.values[-1]
     stops = found.stops[(found.stops["x"] >= low) & (found.stops["x"] <= high)]
-    shares = []
-    for release in np.unique(stops["release"]):
-        own = stops[stops["release"] == release]
-        shares.append(
-            [own["mass"][own["x"] <= end].sum() / own["mass"].sum() for end in one.values[1:-1]]
-        )
-    each = np.array(shares).reshape(len(shares), -1)
-    alone = each.mean(axis=0) * (1.0 - each.mean(axis=0)) if len(each) > 1 else np.zeros(1)
-    between = each.var(axis=0, ddof=1) if len(each) > 1 else np.zeros(1)
-    per_release = max(float(alone.sum() / between.sum()), 1.0) if between.sum() > 0.0 else 1.0
+    mass = np.zeros(len(found.seed))
+    np.add.at(mass, stops["release"], stops["mass"])
+    above = np.zeros((len(mass), len(one.values) - 2))
+    for j, end in enumerate(one.values[1:-1]):
+        own = stops[stops["x"] <= end]
+        np.add.at(above[:, j], own["release"], own["mass"])
+    share = above.sum(axis=0) / max(float(mass.sum()), 1e-12)
+    alone = float((share * (1.0 - share)).sum())
+    each = (above - share * mass[:, None]) / max(float(mass.mean()), 1e-12)
+    between = float(np.square(each).mean(axis=0).sum())
+    per_release = alone / between if between > 0.0 else 0.0
     count = round(per_release * one.releases)
     if count < LEAST:
         mend = f"a deposit of {one.releases} of these releases tells as little as {count} blocks: "

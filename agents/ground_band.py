@@ -68,11 +68,14 @@ class GroundSample:
         The layouts; the last one is the chosen layout.
     strata : (R,) array
         Event of each release.
+    targets : {"met", "missed", "undecided"} or None
+        Whether the chosen layout meets the targets of the design; None if there are none.
     """
 
     values: dict[str, float]
     cases: tuple[BandLayout, ...]
     strata: NDArray[np.int64]
+    targets: str | None
 
     @property
     def cheapest(self) -> BandLayout:
@@ -171,7 +174,7 @@ def assess(
     cube = qmc.LatinHypercube(len(asked), rng=np.random.default_rng(seed)).random(grounds)
     layouts = [case.evaluation.layout for case in done.cases]
     names = [case.name for case in done.cases]
-    seeds = _seeds(problem, seed)
+    seeds, events = _seeds(problem, seed), design_events(problem.site)
     samples = []
     for i, place in enumerate(cube):
         tick(i, f"ground {i + 1} of {grounds}")
@@ -180,10 +183,12 @@ def assess(
         pairs = zip(asked, place.tolist(), strict=True)
         values = {p: v for one, at in pairs for p, v in zip(one.paths, one.at(at), strict=True)}
         cases = tuple(map(_case, names, [site] * len(names), layouts, found))
-        samples.append(GroundSample(values, cases, found[0].strata))
+        chosen = cases[-1].evaluation
+        targets = problem.targets.state(events, chosen.reach, chosen.failure)
+        samples.append(GroundSample(values, cases, found[0].strata, targets))
     source = "plausible range of the library of grounds" if posterior is None else "posterior"
     count = sum(map(len, seeds.values()))
-    return Band(tuple(samples), count, source, design_events(problem.site))
+    return Band(tuple(samples), count, source, events)
 
 
 def _seeds(problem: DesignProblem, seed: int) -> dict[str, Sequence[int]]:

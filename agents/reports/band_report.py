@@ -12,6 +12,7 @@ from rigdda.agents.ground_band import Band
 from rigdda.agents.reports.pictures import DPI, EVENTS, FONT, MARKERS, save
 from rigdda.agents.reports.tables import empty_table, write_rows
 from rigdda.agents.reports.wording import euros, percent, span
+from rigdda.envs.problem import MET, MISSED, UNDECIDED
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -54,6 +55,16 @@ def table(band: Band) -> Table:
         cells = [_ends([e.reach[name].probability for e in own]) for name in events]
         out.add_row(case.name, euros(float(np.median(z))), span((min(z), max(z))), *cells)
     return out
+
+
+def on_target(band: Band) -> str:
+    """Return a text that says on how many grounds the targets are met; empty without targets."""
+    states = [sample.targets for sample in band.samples if sample.targets is not None]
+    if not states:
+        return ""
+    counts = {state: states.count(state) for state in (MET, UNDECIDED, MISSED)}
+    words = ", ".join(f"{state} on {count}" for state, count in counts.items() if count)
+    return f"the targets are {words} of {len(states)} grounds"
 
 
 def _ends(shares: Sequence[float]) -> str:

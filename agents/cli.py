@@ -470,7 +470,7 @@ def design(
     if band is not None:
         click.echo(
             f"on {len(band.samples)} other grounds ({band.source}), {band.releases} releases of "
-            "each layout on each:"
+            "each layout on each;\nP(reach): of the design event that reaches the road most often"
         )
         show(band_report.table(band))
         for line in filter(None, (band_report.verdict(band), band_report.on_target(band))):

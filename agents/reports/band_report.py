@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,15 +44,22 @@ def write(folder: Path, band: Band) -> None:
 
 
 def table(band: Band) -> Table:
-    """Return the table of the least, median and greatest values over the grounds."""
-    events = band.events
-    head = ("layout", "Z: median", "least to greatest", *(f"P(reach) {e}" for e in events))
+    """Return the table of the least, median and greatest values over the grounds.
+
+    P(reach) is the greatest of the design events on a ground.
+    """
+    head = ["layout", "Z: median", "least to greatest"]
+    if band.events:
+        head.append("P(reach)")
     out = empty_table(head)
     for i, case in enumerate(band.samples[0].cases):
         own = [sample.cases[i].evaluation for sample in band.samples]
         z = [e.objective for e in own]
-        cells = [_ends([e.reach[name].probability for e in own]) for name in events]
-        out.add_row(case.name, euros(float(np.median(z))), span((min(z), max(z))), *cells)
+        cells = [case.name, euros(float(np.median(z))), span((min(z), max(z)))]
+        if band.events:
+            worst = [max(e.reach[name].probability for name in band.events) for e in own]
+            cells.append(f"{percent(min(worst))} to {percent(max(worst))}")
+        out.add_row(*cells)
     return out
 
 
@@ -65,11 +71,6 @@ def on_target(band: Band) -> str:
     counts = {state: states.count(state) for state in (MET, UNDECIDED, MISSED)}
     words = ", ".join(f"{state} on {count}" for state, count in counts.items() if count)
     return f"the targets are {words} of {len(states)} grounds"
-
-
-def _ends(shares: Sequence[float]) -> str:
-    """Return the least and the greatest of some probabilities as text."""
-    return f"{percent(min(shares))} to {percent(max(shares))}"
 
 
 def verdict(band: Band) -> str:

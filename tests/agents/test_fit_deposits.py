@@ -95,7 +95,10 @@ def test_passages_and_run_outs_are_fitted_together(tmp_path: Path) -> None:
     (tmp_path / "passages.csv").write_text("\n".join(lines) + "\n")
     one = deposit(real, 7000, 40)
     lines = ["event,start_m,end_m,mass_t,releases"]
-    lines += [f"block,{a},{b},{m},40" for a, b, m in zip(EDGES, EDGES[1:], 7.0 * one.shares)]
+    lines += [
+        f"block,{a},{b},{m},40"
+        for a, b, m in zip(EDGES[:-1], EDGES[1:], 7.0 * one.shares, strict=True)
+    ]
     (tmp_path / "deposit.csv").write_text("\n".join(lines) + "\n")
     sets = read([tmp_path / "passages.csv", tmp_path / "deposit.csv"], SITE)
     names = ["block, velocity at 20 m", "block, height at 20 m", "block, deposit"]
@@ -167,7 +170,9 @@ def test_the_same_observations_in_two_files_are_refused(tmp_path: Path) -> None:
 def test_a_killed_fit_goes_on_and_its_posterior_is_sampled(tmp_path: Path) -> None:
     lines = ["event,start_m,end_m,volume_m3,releases"]
     one = deposit(SITE, 5000, 30)
-    lines += [f"block,{a},{b},{m},30" for a, b, m in zip(EDGES, EDGES[1:], one.shares)]
+    lines += [
+        f"block,{a},{b},{m},30" for a, b, m in zip(EDGES[:-1], EDGES[1:], one.shares, strict=True)
+    ]
     (tmp_path / "deposit.csv").write_text("\n".join(lines) + "\n")
     command = ("fit", "quick", "deposit.csv", "--parameters", PATHS[0], "--budget", 12)
     command = (*command, "--releases", 20, "--seed", 4, "--out")

@@ -14,6 +14,7 @@ from rigdda import Site, load_layout
 from rigdda.agents.ground_band import BandLayout, GroundSample, inputs
 from rigdda.agents.parameters import Posterior, set_numbers
 from rigdda.agents.reports import band_report
+from rigdda.agents.reports.wording import span
 from rigdda.agents.varied_sites import Priced
 from rigdda.envs.cost import judge
 
@@ -47,7 +48,7 @@ def test_every_layout_is_on_every_ground(designed: tuple[Path, str]) -> None:
     for i, name in enumerate(NAMES):
         z = [float(row["Z"]) for row in table[i::4]]
         line = [line for line in words.splitlines() if line.startswith(f" {name} ")][-1]
-        assert f"{min(z):.3g}" in line.replace(",", "") and f"{max(z):.3g}" in line
+        assert f" {span((min(z), max(z)))} " in line
 
 
 def test_a_row_equals_an_evaluation_from_scratch(designed: tuple[Path, str]) -> None:

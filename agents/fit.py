@@ -317,6 +317,8 @@ def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed
     best = places[int(np.argmin([score(place) for place in places]))]
     own = seed % (2**32 - 1) + 1  # cma replaces a seed of 0 by the current time
     options = {"bounds": [0, 1], "seed": own, "verbose": -9, "maxfevals": budget - spread}
+    if dimensions == 1:  # cma limits the standard deviation to a third, which fails for one number
+        options["maxstd_boundrange"] = math.inf
     evolution = cma.CMAEvolutionStrategy(best, 0.15, options)
     done = spread
     while budget - done >= evolution.popsize and not evolution.stop():

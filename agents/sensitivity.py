@@ -332,7 +332,7 @@ def of_function(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class SensitivityPlan:
     """A sensitivity analysis of a site with a layout.
 
     Parameters
@@ -379,7 +379,7 @@ def plan(
     samples: int | None = None,
     releases: int = 200,
     seed: int = 0,
-) -> Plan:
+) -> SensitivityPlan:
     """Return the sites that an analysis needs.
 
     Parameters
@@ -416,7 +416,7 @@ def plan(
     for moves, _ in groups.values():
         moves.built(layout, 1.0)  # larger blocks may take the room of a barrier
     found = tuple((moves, tuple(rows)) for moves, rows in groups.values())
-    return Plan(site, layout, tuple(inputs), method, cube, seeds, sites, found, seed)
+    return SensitivityPlan(site, layout, tuple(inputs), method, cube, seeds, sites, found, seed)
 
 
 def seeds_of(site: Site, releases: int, seed: int) -> Seeds:
@@ -454,19 +454,19 @@ class Output(NamedTuple):
 class Sensitivity:
     """Result of a sensitivity analysis: the outputs, and the indices of each by input."""
 
-    plan: Plan
+    plan: SensitivityPlan
     outputs: tuple[Output, ...]
     indices: tuple[tuple[AnalysedInput, ...], ...]
     resumed: int
     """Number of releases that an interrupted analysis left in the folder."""
 
 
-def run(plan: Plan, out: Path | None, tick: Tick) -> Sensitivity:
+def run(plan: SensitivityPlan, out: Path | None, tick: Tick) -> Sensitivity:
     """Simulate the sites of an analysis and return the indices.
 
     Parameters
     ----------
-    plan : Plan
+    plan : SensitivityPlan
         The analysis.
     out : path, optional
         Folder in which outcomes are kept until `forget` is called. An analysis that was killed
@@ -497,7 +497,9 @@ def run(plan: Plan, out: Path | None, tick: Tick) -> Sensitivity:
     return Sensitivity(plan, outputs, indices, resumed)
 
 
-def _outputs(plan: Plan, priced: Sequence[Priced], strata: NDArray[np.int64]) -> Iterator[Output]:
+def _outputs(
+    plan: SensitivityPlan, priced: Sequence[Priced], strata: NDArray[np.int64]
+) -> Iterator[Output]:
     """Yield Z and, for each design event, P(reach) and, with barriers, P(failure)."""
     terms = np.array([one.terms for one in priced])
     z = np.array([one.objective for one in priced])

@@ -151,3 +151,17 @@ def test_a_table_that_is_not_utf_8_is_refused(tmp_path):
     path.write_bytes("event,run_out_m\nGr\u00f6\u00dfe,5\n".encode("latin-1"))
     with pytest.raises(BadInput, match="save it as UTF-8"):
         read([path], Site.load("verge"))
+
+
+def test_one_number_is_searched_whatever_its_scores() -> None:
+    for seed in range(20):
+        rng, count = np.random.default_rng(seed), [0]
+
+        def score(
+            place: np.ndarray, rng: np.random.Generator = rng, count: list[int] = count
+        ) -> float:
+            count[0] += 1
+            return float(0.1 * rng.random() + 0.1 * (place[0] - 0.7) ** 2)
+
+        fit.explore(score, 1, 60, seed)
+        assert count[0] > 40

@@ -56,7 +56,7 @@ def test_a_synthetic_deposit_gives_back_its_damping() -> None:
 
 @pytest.mark.slow
 def test_fits_find_the_values_of_five_synthetic_deposits() -> None:
-    held = [holds(fitted(i, PATHS[:1], 60, 48, 100), i) for i in range(len(TRUE))]
+    held = [holds(fitted(i, PATHS[:1], 60, 32, 100), i) for i in range(len(TRUE))]
     assert sum(held) >= 4
 
 

@@ -102,7 +102,7 @@ def tables(found: Sensitivity) -> list[tuple[str, Table]]:
                 _short(one),
                 span((one.low, one.high)) if isinstance(one, Parameter) else "",
                 _number(index.change) if limits else "",
-                f"{_number(index.index)} ({span((max(index.low, 0.0), index.high))})",
+                f"{_number(index.index)} ({_ends(max(index.low, 0.0), index.high)})",
                 _number(index.noise),
                 "" if index.distinguishable else "?",
             )
@@ -116,6 +116,11 @@ def tables(found: Sensitivity) -> list[tuple[str, Table]]:
 def _number(value: float) -> str:
     """Return a number with two or three significant figures as text."""
     return euros(value) if abs(value) >= 1.0 or value == 0.0 else f"{value:.2g}"
+
+
+def _ends(low: float, high: float) -> str:
+    """Return an interval as text."""
+    return f"{_number(low)} to {_number(high)}"
 
 
 LONGEST = 24

@@ -192,7 +192,7 @@ def test_every_block_runs(
 def test_pages_have_code_to_run() -> None:
     found = {name(page) for page in PAGES if with_code(page)}
     assert {"README.md", "docs/tutorials/engineer.md", "docs/tutorials/researcher.md"} <= found
-    assert len([page for page in found if page.startswith("docs/howto/")]) == 10
+    assert len([page for page in found if page.startswith("docs/howto/")]) == 12
 
 
 def test_every_fence_belongs_to_a_block() -> None:

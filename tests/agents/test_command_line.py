@@ -22,15 +22,15 @@ from rigdda import Site
 from rigdda.agents import DESIGNERS, cli
 from rigdda.barriers import to_tables
 
-TINY = ("--budget", "400", "--verify", "40")
+TINY = ("--budget", "400", "--verify", "40", "--ground-samples", "1")
 COMMANDS = (
-    "sites", "new", "check", "simulate", "design", "reprice", "report", "study", "corridor",
-    "train", "evaluate", "fidelity", "validate", "replay", "repeat",
+    "sites", "new", "check", "simulate", "design", "reprice", "report", "study", "corridor", "fit",
+    "sensitivity", "train", "evaluate", "fidelity", "validate", "replay", "repeat",
 )  # fmt: skip
 FILES = (
     "evaluations.csv", "evaluations.jsonl", "outcomes.msgpack.gz", "layouts.csv", "chances.csv",
     "layout.toml", "section.png", "section.svg", "cost.png", "cost.svg", "episode.rrd",
-    "problem.json", "run.json",
+    "problem.json", "run.json", "band.csv", "band.png", "band.svg",
 )  # fmt: skip
 NUMBERS = ("objective", "objective_low", "objective_high", "capital", "harm", "repair", "cost")
 
@@ -225,7 +225,7 @@ def test_kinds_zone_and_target_are_kept_to(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("designer", [name for name in DESIGNERS if name != "race"])
 def test_every_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
-    tiny = ("--budget", 40, "--verify", 12)
+    tiny = ("--budget", 40, "--verify", 12, "--ground-samples", 1)
     words = run("design", toml, "--designer", designer, *tiny, folder=tmp_path)
     own = designer in ("rule", "constant")
     assert (designer if own else f"optimised ({designer})") in words

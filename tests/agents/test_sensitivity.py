@@ -235,7 +235,7 @@ def analysed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def test_tables_and_picture_of_an_analysis(analysed: tuple[Path, str]) -> None:
     folder, words = analysed
     assert {p.name for p in (folder / "whole").iterdir()} == {
-        "sensitivity.csv", "samples.csv", "tornado.png",
+        "sensitivity.csv", "samples.csv", "tornado.png", "tornado.svg", "run.json",
     }  # fmt: skip
     table, points = rows(folder / "whole/sensitivity.csv"), rows(folder / "whole/samples.csv")
     z = [row for row in table if row["output"] == "Z"]

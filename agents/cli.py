@@ -38,7 +38,7 @@ from rigdda.agents.terminal import (
 )
 
 if TYPE_CHECKING:
-    from rigdda.agents.design_study import DesignStudy
+    from rigdda.agents.design_study import ComparedLayouts, DesignStudy
     from rigdda.agents.designers.store import Store
     from rigdda.envs import DesignProblem
 
@@ -222,7 +222,8 @@ def schema(file: str) -> None:
 )
 @count_option("--releases", 1, 100, "Number of releases.")
 @click.option("--station", "at", type=float, multiple=True, metavar="X",
-              help="Chainage at which passing blocks are recorded [m]. May be repeated.  "
+              help="Chainage at which passing blocks are recorded [m], as in the site file, not "
+              "of its survey. May be repeated.  "
               "[default: the uphill edge of the road]")  # fmt: skip
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
               show_default=True, help="Mechanical model. 'lumped' treats each block as a point; "
@@ -285,7 +286,7 @@ def simulate(
         passing = Passing.of(where, barriers, event, found.passages)
         rows = simulation_folder.write(folder, passing, barriers, asked)
         jobs.forget(folder)
-    show(tables.outcomes(barriers, found.outcomes))
+    show(tables.outcomes(where, barriers, found.outcomes))
     for line, table in stations.tables(rows):
         click.echo(line)
         show(table)
@@ -341,7 +342,6 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     """
     import rigdda
     from rigdda.agents.reports import findings
-    from rigdda.barriers import standing
     from rigdda.envs.replay_record import release_record
     from rigdda.replay.recording import Marks
     from rigdda.replay.viewer import open_viewer
@@ -365,7 +365,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
     if words := findings.of_layout(where, barriers, event):
         notes["note"] = words
-    road, labels = (where.road.start, where.road.end), tuple(b.label for b in standing(barriers))
+    road, labels = (where.road.start, where.road.end), where.labels(barriers)
     record = release_record(where, barriers, seed, event, outcome)
     run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels, record))
     click.echo(folder / "episode.rrd")
@@ -416,19 +416,22 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--designer", type=click.Choice(DESIGNERS), default=DEFAULT, show_default=True,
               help="Search method.")  # fmt: skip
 @click.option("--kinds", callback=_kinds, metavar="KIND,...",
-              help="Allowed kinds of barrier: fence, ditch, embankment, gravity_wall, mesh, wall.  "
-              "[default: all except wall]")  # fmt: skip
+              help="Allowed kinds of barrier: fence, ditch, embankment, gravity_wall, mesh, wall, "
+              "removal (of a removable existing barrier).  [default: all except wall]")  # fmt: skip
 @click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that rock of a design event reaches the "
               "road.")  # fmt: skip
 @click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that a barrier fails in a design "
               "event.")  # fmt: skip
+@click.option("--target-risk", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable individual risk of a commuter [1/year]. The site must have "
+              "a table [traffic].")  # fmt: skip
 @click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
 @click.option("--zone", type=float, nargs=2, metavar="A B",
-              help="Place barriers between the chainages A and B [m].  [default: the zone of "
-              "the site]")  # fmt: skip
+              help="Place barriers between the chainages A and B [m], as in the site file, not of "
+              "its survey.  [default: the zone of the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
 @click.option("--ground-samples", "grounds", type=click.IntRange(0, 1000), default=6,
@@ -444,6 +447,7 @@ def design(
     kinds: Kinds,
     target: float | None,
     failure: float | None,
+    target_risk: float | None,
     max_cost: float | None,
     zone: tuple[float, float] | None,
     budget: int,
@@ -470,13 +474,11 @@ def design(
     """
     from rigdda.agents import ground_band, jobs
     from rigdda.agents.designers.store import FILE, claim
-    from rigdda.agents.parameters import read_posterior
     from rigdda.agents.reports import band_report
     from rigdda.agents.reports.folder import FILES, write
 
-    problem = _pose(site, kinds, target, failure, max_cost, zone)
-    fitted = None if posterior is None else read_posterior(posterior, problem.site)
-    folder = folder_for(out, f"design-{problem.site.name}", *FILES, *band_report.FILES, FILE)
+    problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone)
+    folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
     claim(folder, problem, *FILES)
     band = None
     with kept(folder, problem.site):
@@ -502,21 +504,31 @@ def design(
     _warn_of_placeholders(site)
 
 
+TRAFFIC = (
+    "risk to the traffic on {0.section_length:g} m of road, per year: vehicles hit by falling "
+    "rock,\nvehicles that run into debris, deaths, deaths per km, and the individual risk\n"
+    "of a person who travels it {0.commuter_trips:g} times, with the upper end of its 95 % interval"
+)
+"""Line above the table of the risk to a `Traffic`."""
+
+
 def _pose(
     site: str,
     kinds: Kinds,
-    target: float | None,
-    failure: float | None,
+    targets: tuple[float | None, float | None, float | None],
     max_cost: float | None,
     zone: tuple[float, float] | None,
 ) -> DesignProblem:
-    """Return the design problem that the options describe."""
+    """Return the design problem that the options describe.
+
+    `targets` are the greatest acceptable probabilities of reach and failure and individual risk.
+    """
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
     asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None, "max_cost": max_cost}
-    if target is not None or failure is not None:
-        asked["targets"] = Targets(target, failure)
+    if any(target is not None for target in targets):
+        asked["targets"] = Targets(*targets)
     return DesignProblem(site, **asked)
 
 
@@ -524,12 +536,12 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
     from rigdda.agents.reports import findings, frontier_report, tables
     from rigdda.agents.reports.folder import FILES
-    from rigdda.agents.reports.wording import order
+    from rigdda.agents.reports.wording import order, unchanged
 
     chosen, result = done.chosen.evaluation, done.result
     click.echo(
         "Z, capital, harm and repair in EUR per metre of road and year; to build in EUR per\n"
-        "metre; rule: UNI 11211-4; debris: rock on the road, relative to no barriers"
+        "metre; rule: UNI 11211-4; debris: rock on the road, relative to the first layout"
     )
     show(tables.costs(done))
     chances = tables.chances(done)
@@ -538,22 +550,38 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         show(chances)
     else:
         click.echo("the site has no design events (design = true)")
+    _show_risks(done)
     for line in findings.frontier(done, done.frontier, len(result.tried), done.replaced):
         finding(line)
     if done.frontier:
         show(frontier_report.table(done.frontier))
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
-    click.echo(f"layout{from_start}:" if chosen.layout else "layout: no barrier")
+    site = done.problem.site
+    click.echo(f"layout{from_start}:" if chosen.layout else f"layout: {unchanged(site)}")
     for barrier in chosen.layout:
-        click.echo(f"  {order(barrier, done.problem.site)}")
+        click.echo(f"  {order(barrier, site)}")
+    for line in findings.kept(site, chosen.layout):
+        click.echo(f"  {line}")
     for line in findings.of_design(done):
         finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
+    files = [*FILES, *(frontier_report.FILES if done.frontier else ())]
+    files += [tables.RISKS] if site.traffic is not None else []
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
         f"verification: {verify:,} new releases of each layout{resumed}\n"
-        f"{', '.join((*FILES, *(frontier_report.FILES if done.frontier else ())))} are in {folder}"
+        f"{', '.join(files)} are in {folder}"
     )
+
+
+def _show_risks(done: ComparedLayouts) -> None:
+    """Print the risk of each layout to the traffic, if the site has traffic."""
+    from rigdda.agents.reports import tables
+
+    risks = tables.risks(done)
+    if risks is not None:
+        click.echo(TRAFFIC.format(done.problem.site.traffic))
+        show(risks)
 
 
 @cli.command()
@@ -601,6 +629,9 @@ def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) 
 @click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that a barrier fails in a design event.  "
               "[default: that of the design]")  # fmt: skip
+@click.option("--target-risk", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+              help="Largest acceptable individual risk of a commuter [1/year].  [default: that of "
+              "the design]")  # fmt: skip
 @click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.  [default: that of "
               "the design]")  # fmt: skip
@@ -610,6 +641,7 @@ def reprice(
     settings: tuple[str, ...],
     target: float | None,
     failure: float | None,
+    target_risk: float | None,
     max_cost: float | None,
     out: Path | None,
 ) -> None:
@@ -624,10 +656,10 @@ def reprice(
     """
     from rigdda.agents import reprice as job
     from rigdda.agents.reports import findings, frontier_report, reprice_report, tables
-    from rigdda.agents.reports.wording import order
+    from rigdda.agents.reports.wording import order, unchanged
 
-    done = job.reprice(results, job.parse_all(settings), job.other_targets(target, failure),
-                       max_cost)  # fmt: skip
+    asked = job.other_targets(target, failure, target_risk)
+    done = job.reprice(results, job.parse_all(settings), asked, max_cost)
     files = (*reprice_report.FILES, *frontier_report.FILES)
     folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
     if folder.resolve() == results.resolve():
@@ -640,14 +672,17 @@ def reprice(
     chances = tables.chances(done)
     if chances is not None:
         show(chances)
+    _show_risks(done)
     for line in findings.frontier(done, done.frontier, done.tried, False):
         finding(line)
     if done.frontier:
         show(frontier_report.table(done.frontier))
-    chosen = done.chosen.evaluation.layout
-    click.echo("layout:" if chosen else "layout: no barrier")
+    chosen, site = done.chosen.evaluation.layout, done.problem.site
+    click.echo("layout:" if chosen else f"layout: {unchanged(site)}")
     for barrier in chosen:
-        click.echo(f"  {order(barrier, done.problem.site)}")
+        click.echo(f"  {order(barrier, site)}")
+    for line in findings.kept(site, chosen):
+        click.echo(f"  {line}")
     for line in reprice_report.sentences(done):
         finding(line)
     click.echo(f"nothing was simulated; the results are in {folder}")
@@ -685,6 +720,10 @@ def study(file: str, seed: int, out: Path | None) -> None:
         "hit: 95 % quantiles of the releases with one, in kJ per metre of width"
     )
     show(study_report.events(found))
+    risks = study_report.risks(found)
+    if risks is not None:
+        click.echo(TRAFFIC.format(asked.site.traffic))
+        show(risks)
     for line in study_report.sentences(found):
         finding(line)
     for name, layout in asked.layouts.items():

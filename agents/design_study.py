@@ -11,6 +11,9 @@ from rigdda.envs import DesignProblem, Evaluation
 
 NOTHING, RULE, CONSTANT, SHED = "nothing", "rule", "constant", "rock shed"
 
+AS_IT_STANDS = "as it stands"
+"""Name of the case without new barriers on a site with existing ones."""
+
 
 @dataclass(frozen=True, slots=True)
 class VerifiedLayout:

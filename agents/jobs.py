@@ -17,6 +17,7 @@ import rigdda
 from rigdda import Barrier, Layout, Outcome, Run, Site
 from rigdda.agents import archive, designers
 from rigdda.agents.design_study import (
+    AS_IT_STANDS,
     CONSTANT,
     NOTHING,
     RULE,
@@ -169,7 +170,7 @@ def study(
     tick(0, "simulating releases without barriers")
     front: tuple[TriedLayout, ...] = ()
     replaced = False
-    with EvaluationsFile(out / "evaluations.csv") as file:
+    with EvaluationsFile(out / "evaluations.csv", problem.site) as file:
 
         def progress(entry: Entry) -> None:
             file.add(entry)
@@ -182,7 +183,7 @@ def study(
             evaluation = verify(problem, layout, releases, seed, store)
             file.add(Entry(result.simulations, "verification", evaluation))
             cases.append(VerifiedLayout(case, evaluation))
-        if cases[-1].evaluation.targets == MISSED:
+        if cases[-1].evaluation.targets == MISSED and design_events(problem.site):
             tick(simulations + releases * len(cases), "verifying the frontier")
 
             def check(layout: Layout) -> Evaluation:
@@ -292,7 +293,8 @@ def _compared(
     store: Store,
 ) -> list[tuple[str, Layout]]:
     """Return the layouts to verify: no barrier, the rule, the constant and the designer's."""
-    out: list[tuple[str, Layout]] = [(NOTHING, ())]
+    bare = AS_IT_STANDS if problem.site.existing else NOTHING
+    out: list[tuple[str, Layout]] = [(bare, ())]
     for words, module in ((RULE, "rule"), (CONSTANT, "constant")):
         if module != name:
             found = designers.module(module).design(problem, simulations, seed, None, store)
@@ -343,13 +345,13 @@ HOLDS = 0.5
 def tried(problem: DesignProblem) -> tuple[Layout, ...]:
     """Return layouts with one of the largest barriers of each kind, at `STATIONS` places each.
 
-    Mesh is left out because it makes an event rarer but does not stop it.
+    Mesh and removals are left out because they do not stop an event.
     """
     menu, found = Menu(problem), list[Barrier]()
     for kind in problem.kinds:
         barriers = (
             [menu.put(b.thickest(menu.zone), b.x) or b for b in menu.lone(kind)]
-            if kind != "mesh"
+            if kind not in ("mesh", "removal")
             else []
         )
         least = LARGE * max((b.size for b in barriers), default=0.0)

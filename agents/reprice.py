@@ -27,12 +27,12 @@ from rigdda.agents import archive
 from rigdda.agents.archive import Archive
 from rigdda.agents.design_study import ComparedLayouts, VerifiedLayout
 from rigdda.agents.designers.frontier import TriedLayout, frontier, worst
-from rigdda.agents.designers.protocol import STREAMS
+from rigdda.agents.designers.protocol import STREAMS, End, of_chance, of_mean
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.cost import account, judge
 from rigdda.envs.ensemble import Ensemble, statistics
-from rigdda.envs.intervals import Estimate, estimate
-from rigdda.envs.problem import MISSED, Targets, read_targets
+from rigdda.envs.intervals import Estimate, Mean, estimate
+from rigdda.envs.problem import MISSED, Targets, excess, read_targets
 
 BEST = "best of search"
 """Name of the layout that is best for the new values."""
@@ -43,7 +43,7 @@ EVENT_KEYS = ("rate", "return_period", "section_length", "design")
 """Keys of an event that do not affect its releases."""
 
 MOTION = (
-    "slope", "sources", "road", "surfaces", "interfaces", "motion", "scatter", "lumped",
+    "slope", "sources", "road", "surfaces", "interfaces", "existing", "motion", "scatter", "lumped",
 )  # fmt: skip
 """Tables of a site file on which the motion of rock depends."""
 
@@ -96,9 +96,11 @@ def parse_all(texts: Sequence[str]) -> dict[str, Value]:
     return found
 
 
-def other_targets(reach: float | None, failure: float | None) -> dict[str, float] | None:
-    """Return the targets that replace those of the design; None if both are None."""
-    given = {"reach": reach, "failure": failure}
+def other_targets(
+    reach: float | None, failure: float | None, individual: float | None
+) -> dict[str, float] | None:
+    """Return the targets that replace those of the design; None if all are None."""
+    given = {"reach": reach, "failure": failure, "individual": individual}
     return {name: value for name, value in given.items() if value is not None} or None
 
 
@@ -142,6 +144,9 @@ def _table_of(site: Site, path: str, value: Value) -> tuple[str, list[str]]:
         raise BadInput(path, value, "leave it out: no result depends on it")
     if not keys:
         raise BadInput(path, value, f"add a key of the table, such as {top}.KEY=VALUE")
+    if getattr(site, top) is None:
+        mend = f"add the table [{top}] to the site file and run `rigdda design`"
+        raise BadInput(path, value, mend)
     return top, keys
 
 
@@ -370,7 +375,7 @@ def judged(problem: DesignProblem, candidate: ScoredLayout, kept: Archive) -> Ev
     """
     known = {outcome.event for outcome in candidate.outcomes}
     missing = [name for name in problem.site.event_names if name not in known]
-    lent = [outcome for outcome in kept.bare if outcome.event in missing]
+    lent = [replace(outcome, barriers=()) for outcome in kept.bare if outcome.event in missing]
     found = problem.judge(candidate.layout, (*candidate.outcomes, *lent))
     unknown = dict.fromkeys(missing, estimate(0, 0))
     found = replace(found, reach=found.reach | unknown, failure=found.failure | unknown)
@@ -436,8 +441,12 @@ def _candidate(
         if event.design:
             counts = int(own.reached[which].sum()), int(own.failed[which].sum())
             chances[event.name] = estimate(counts[0], n), estimate(counts[1], n)
-    ends = ("bound", "probability", "floor")
-    over = [_excess(problem.targets, chances, end) for end in ends]
+    risk = None
+    if problem.targets.individual is not None and own.toll is not None:
+        killed = {name: own.toll[own.event == name, 2].tolist() for name in site.event_names}
+        risk = problem.individual_risk(layout, killed)
+    ends: tuple[End, ...] = ("upper", "value", "lower")
+    over = [_excess(problem.targets, chances, risk, end) for end in ends]
     tried = None
     if chances:
         reach, failure = (worst(seen) for seen in zip(*chances.values(), strict=True))
@@ -446,17 +455,24 @@ def _candidate(
     return ScoredLayout(layout, outcomes, verified, upper, tried, *over)
 
 
-def _excess(targets: Targets, chances: Mapping[str, tuple[Estimate, Estimate]], end: str) -> float:
+def _excess(
+    targets: Targets,
+    chances: Mapping[str, tuple[Estimate, Estimate]],
+    risk: Mean | None,
+    end: End,
+) -> float:
     """Return the largest excess over a target [-]; 0 if there is none.
 
-    `end` names the number of an estimate that is compared. A probability without releases counts as
-    1.
+    It is that of upper bounds, estimates or lower bounds of the probabilities and of the individual
+    risk. A probability without releases counts as 1.
     """
     over = [0.0]
     for which, wanted in enumerate((targets.reach, targets.failure)):
         if wanted is not None:
-            found = [getattr(pair[which], end) for pair in chances.values()]
+            found = [of_chance(pair[which], end) for pair in chances.values()]
             over += [(1.0 if math.isnan(value) else value) - wanted for value in found]
+    if risk is not None and targets.individual is not None:
+        over.append(excess(of_mean(risk, end), targets.individual))
     return max(over)
 
 

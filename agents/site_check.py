@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 from rigdda import Block, Event, Site, Source
 from rigdda.agents.reports.pictures import DPI, FONT, save, sources
 from rigdda.agents.reports.tables import empty_table
+from rigdda.agents.reports.wording import surveyed
+from rigdda.barriers import Earthwork, earthworks
 from rigdda.barriers.fence import FENCE_CLASSES
-from rigdda.envs.rendering import ROAD, ROCK, Label, write_labels
+from rigdda.display import OLD
+from rigdda.envs.rendering import ROAD, ROCK, Label, draw_barrier, top_of, write_labels
 from rigdda.geometry import polygon_properties
 from rigdda.model.joints import spaced_area
 from rigdda.model.site_tables import Origin
@@ -64,6 +67,12 @@ FALLING = 10.0
 SCALED = 1.2
 """Factor on the spacings of joints that is worth a word, either way."""
 
+SLOW = 25.0
+"""Speed below which a unit is doubted [km/h]."""
+
+CHEAP = 1e5
+"""Value of a prevented fatality below which its unit is doubted [EUR]."""
+
 LEAST_ROOM = 3.0
 """Length of the zone below which there is little to choose [m]."""
 
@@ -106,10 +115,32 @@ def facts(site: Site) -> list[str]:
         "ground: " + "; ".join(_grounds(site)),
         f"barriers may stand at x = {rooms}, up to {zone.max_height:g} m high; "
         + _fences(site),
+        *_standing(site),
         *(_source(source) for source in site.sources),
         f"{total:.3g} events a year on 100 m of slope, {_period(total)}; design events: "
         + (", ".join(design) or "none (design = true), so that no target can be set"),
     ]  # fmt: skip
+
+
+def _standing(site: Site) -> Iterator[str]:
+    """Yield what stands already, and how much traffic there is."""
+    for one, barrier in zip(site.existing, site.existing_barriers, strict=True):
+        may = "it stays in every layout"
+        if one.removable:
+            may = f"it may be removed or replaced for {one.removal or 0.0:g} EUR per metre"
+        upkeep = site.prices.upkeep_of(barrier.kind, barrier.upkeep) * site.values(())[barrier]
+        yield (
+            f"existing {barrier.label} at x = {barrier.x:g} m{surveyed(site, barrier.x)}: {may}; "
+            f"upkeep {upkeep:.3g} EUR per metre and year"
+        )
+    if (traffic := site.traffic) is not None:
+        value = traffic.fatality_value
+        yield (
+            f"traffic: {traffic.vehicles_per_day:,.6g} vehicles a day at {traffic.speed:g} km/h, "
+            f"{1e3 * traffic.density:.2g} on a km of road; {traffic.stopped_late:.2g} vehicles "
+            "run into the debris of a release; fatalities are "
+            + (f"priced at {value:,.6g} EUR" if value else "not part of Z")
+        )
 
 
 def placeholders(path: str) -> int:
@@ -124,7 +155,7 @@ def placeholders(path: str) -> int:
 def _origin(site: Site) -> Iterator[str]:
     """Yield where the survey has the origin of the site."""
     origin = site.origin
-    if origin.chainage or origin.elevation or origin.reversed:
+    if origin.surveyed:
         way = "falls" if origin.reversed else "grows"
         yield (
             f"survey: x = 0 is chainage {origin.chainage:,.10g}, which {way} downhill, and y = 0 "
@@ -310,6 +341,8 @@ def oddities(site: Site, trials: Sequence[Trial] = ()) -> list[str]:
     return [
         *_odd_profile(site),
         *_odd_zone(site),
+        *_odd_existing(site),
+        *_odd_traffic(site),
         *(words for source in site.sources for words in _odd_source(site, source)),
         *(words for event in site.events for words in _odd_event(site, event)),
         *(
@@ -377,6 +410,40 @@ def _odd_zone(site: Site) -> Iterator[str]:
                 f"barrier_zone.{name} = {value:g}: the largest block is {size:.1f} m long, so that "
                 "the best barrier will lie on this bound; allow more if it can be built"
             )
+
+
+def _odd_existing(site: Site) -> Iterator[str]:
+    """Yield what is odd about barriers that stand already."""
+    for i, barrier in enumerate(site.existing_barriers):
+        end = barrier.end + barrier.deflection
+        if end > site.road.start:
+            yield (
+                f"existing[{i}].x = {barrier.x:g}: the {barrier.words} gives way by up to "
+                f"{barrier.deflection:g} m, {end - site.road.start:.1f} m onto the road; a new one "
+                "would not be allowed there"
+            )
+
+
+def _odd_traffic(site: Site) -> Iterator[str]:
+    """Yield what is odd about the traffic."""
+    traffic = site.traffic
+    if traffic is None:
+        return
+    if traffic.speed < SLOW:
+        yield (
+            f"traffic.speed = {traffic.speed:g} km/h: is it in m/s? Standing traffic is not "
+            "computed"
+        )
+    if traffic.stopped_late > 1.0:
+        yield (
+            f"traffic: {traffic.stopped_late:.2g} vehicles run into the debris of each release; "
+            "the first of them warn those that follow; give run_into instead"
+        )
+    if traffic.fatality_value is not None and traffic.fatality_value < CHEAP:
+        yield (
+            f"traffic.fatality_value = {traffic.fatality_value:g}: give EUR; values of a prevented "
+            "fatality are millions"
+        )
 
 
 def _size(site: Site, event: Event) -> float:
@@ -492,7 +559,7 @@ def draw(path: str | os.PathLike[str], site: Site) -> None:
         axes.set_title(site.name, loc="left", fontweight="bold", fontsize=12)
         _draw_survey(axes, site)
         figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=10)
-        write_labels(axes, _names(site))
+        write_labels(axes, [*_names(site), *_draw_standing(axes, site)])
         save(figure, path)
 
 
@@ -548,6 +615,20 @@ def _names(site: Site) -> list[Label]:
     return found
 
 
+def _draw_standing(axes: Axes, site: Site) -> list[Label]:
+    """Draw the barriers that stand already and return their labels."""
+    built = site.standing()
+    _, moved = earthworks(site.profile, built, site.soil)
+    labels = []
+    for barrier, words in zip(built, site.labels(), strict=True):
+        outline = (
+            moved[barrier] if isinstance(barrier, Earthwork) else barrier.outline(site.profile)
+        )
+        draw_barrier(axes, barrier, outline, colour=OLD, old=True)
+        labels.append(Label(words, top_of(outline), OLD))
+    return labels
+
+
 def _draw_places(axes: Axes, site: Site, lift: float) -> None:
     """Draw the road and the parts of the zone, and name the toe."""
     ground = site.profile
@@ -573,7 +654,7 @@ def _draw_survey(axes: Axes, site: Site) -> None:
     from matplotlib.ticker import FuncFormatter
 
     origin = site.origin
-    if not (origin.chainage or origin.elevation or origin.reversed):
+    if not origin.surveyed:
         return
     plain = FuncFormatter(lambda value, _: f"{value:,.0f}")
     if origin.chainage or origin.reversed:

@@ -21,7 +21,7 @@ from rigdda import BadInput, Layout, Outcome, Site, check
 from rigdda.agents import limits
 from rigdda.agents.reports.study_report import StudiedLayout, StudyResults
 from rigdda.agents.reports.tables import HIT, OUTCOME, outcome_row, write_rows
-from rigdda.barriers import from_table, standing
+from rigdda.barriers import from_table
 from rigdda.envs.cost import Account, Facts, learn
 from rigdda.envs.outcome_cache import mechanics
 from rigdda.fields import about, checked, parse
@@ -155,6 +155,9 @@ _NUMBERS = (
 _MONEY = ("harm", "repair")
 """Columns with the costs of a release [EUR per occurrence of its event]."""
 
+_TOLL = ("vehicles_hit", "vehicles_run_into", "fatalities")
+"""Columns with the expected consequences of a release for the traffic, if the site gives it."""
+
 
 def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
     """Simulate the releases that a CSV file does not contain yet and append them to it.
@@ -210,6 +213,8 @@ def _row(study: Study, job: Job, outcome: Outcome) -> dict[str, Any]:
     bill = study.site.bill(layout, outcome)
     row: dict[str, Any] = {"layout": job[0], "seed": job[2]}
     row |= {"capital": study.site.capital(layout), "harm": bill.harm, "repair": bill.repair}
+    if study.site.traffic is not None:
+        row |= zip(_TOLL, map(float, study.site.toll(layout, outcome)), strict=True)
     return row | outcome_row(outcome)
 
 
@@ -222,9 +227,15 @@ def _key(study: Study, name: str, event: str, seed: int) -> str:
 
 def _fields(study: Study) -> list[str]:
     """Return the columns, with those of as many barriers as the largest layout has."""
-    most = max(len(standing(layout)) for layout in study.layouts.values())
+    most = max(len(study.site.standing(layout)) for layout in study.layouts.values())
     barriers = [f"barrier_{i}_{name}" for i in range(most) for name in HIT]
-    return ["layout", "event", "seed", "capital", *_MONEY, *_NUMBERS, *barriers, "key"]
+    money = _money(study.site)
+    return ["layout", "event", "seed", "capital", *money, *_NUMBERS, *barriers, "key"]
+
+
+def _money(site: Site) -> tuple[str, ...]:
+    """Return the columns with costs and, if the site gives traffic, with the toll."""
+    return _MONEY if site.traffic is None else (*_MONEY, *_TOLL)
 
 
 def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
@@ -271,9 +282,9 @@ def _sound(row: dict[str, Any], study: Study, job: Job) -> bool:
         return False
     if _number(row["capital"]) != study.site.capital(layout):
         return False
-    mine = {f"barrier_{i}_{hit}" for i in range(len(standing(layout))) for hit in HIT}
+    mine = {f"barrier_{i}_{hit}" for i in range(len(study.site.standing(layout))) for hit in HIT}
     said = {field for field, text in row.items() if field.startswith("barrier_") and text}
-    wanted = {*mine, *_NUMBERS, *_MONEY}
+    wanted = {*mine, *_NUMBERS, *_money(study.site)}
     return said == mine and all(math.isfinite(_number(row[field])) for field in wanted)
 
 
@@ -293,7 +304,8 @@ def results(study: Study, path: Path) -> StudyResults:
         own = [row for row in rows if row["layout"] == name]
         on_road = np.array([_number(row["max_energy_on_road"]) for row in own])
         hit = np.array([_hit(row) for row in own])
-        layouts.append(StudiedLayout(name, layout, _account(own), 1e-3 * on_road, 1e-3 * hit))
+        bills = _account(site, own)
+        layouts.append(StudiedLayout(name, layout, bills, 1e-3 * on_road, 1e-3 * hit))
     return StudyResults(site, tuple(layouts), _facts(site, rows))
 
 
@@ -307,7 +319,7 @@ def _hit(row: dict[str, str]) -> float:
     return max(found, default=0.0)
 
 
-def _account(rows: Sequence[dict[str, str]]) -> Account:
+def _account(site: Site, rows: Sequence[dict[str, str]]) -> Account:
     """Return the account of the releases in some rows."""
 
     def column(name: str) -> NDArray[np.float64]:
@@ -321,6 +333,7 @@ def _account(rows: Sequence[dict[str, str]]) -> Account:
         volume=column("road_volume"),
         reached=column("reached") > 0.0,
         failed=np.array(["True" in texts for texts in said], dtype=bool),
+        toll=None if site.traffic is None else np.column_stack([column(n) for n in _TOLL]),
     )
 
 
@@ -330,9 +343,10 @@ def _tells_failure(field: str) -> bool:
 
 def _facts(site: Site, rows: Sequence[dict[str, str]]) -> dict[str, Facts]:
     """Return the facts about each event that the releases with all layouts provide."""
-    found, out = _account(rows), {}
+    found, out = _account(site, rows), {}
     released = np.array([_number(row["released_volume"]) for row in rows])
+    widths = np.array([_number(row["width"]) for row in rows])
     for name in site.event_names:
         own = found.event == name
-        out[name] = learn(site, found.of(own), released[own], 1.0)
+        out[name] = learn(site, found.of(own), released[own], widths[own], 1.0)
     return out

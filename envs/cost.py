@@ -19,6 +19,7 @@ from rigdda import BadInput, Layout, Outcome, Site, display
 from rigdda.barriers import describe
 from rigdda.barriers.fence import PANEL
 from rigdda.envs.intervals import Estimate, Interval, Known, Mean, cost, estimate, pair, total
+from rigdda.envs.traffic_risk import Risk
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +62,8 @@ class Evaluation:
         from the outcome cache. `simulated` is ignored in comparisons.
     seconds : float
         Processor time of the simulations [s]; ignored in comparisons.
+    risk : Risk or None
+        Risk to the traffic; None if the site has no `[traffic]`.
     """
 
     layout: Layout
@@ -84,6 +87,7 @@ class Evaluation:
     releases: int
     simulated: int = field(default=0, compare=False)
     seconds: float = field(default=0.0, compare=False)
+    risk: Risk | None = None
 
     @property
     def typical(self) -> tuple[int, str]:
@@ -124,6 +128,14 @@ class Evaluation:
                 ends = _span((100.0 * chance.low, 100.0 * chance.high), ".1f")
                 share = f"{100.0 * chance.probability:.1f}" if chance.releases else ""
                 rows.append((f"{event}: {words}", share, ends, "% of releases"))
+        if self.risk is not None:
+            for words, mean, unit in (
+                ("vehicles hit", self.risk.hit, "1/year"),
+                ("vehicles that run into debris", self.risk.run_into, "1/year"),
+                ("fatalities", self.risk.fatalities, "1/year"),
+                ("individual risk of a commuter", self.risk.individual, "1/year"),
+            ):
+                rows.append((words, f"{mean.value:.2g}", _span(mean.interval, ".2g"), unit))
         if self.targets is not None:
             rows.append(("targets", self.targets, "", ""))
         rows.append(("releases", f"{self.releases:,}", "", ""))
@@ -159,6 +171,9 @@ class Facts:
         computed as if all released rock had reached it.
     blocks : float
         Mean number of blocks per release.
+    toll : tuple of Known
+        Vehicles hit, vehicles that run into debris and fatalities given that any are, computed as
+        harm is; empty if the site has no `[traffic]`.
     """
 
     releases: int
@@ -166,6 +181,7 @@ class Facts:
     harm: Known
     volume: Known
     blocks: float
+    toll: tuple[Known, ...] = ()
 
 
 Floats = NDArray[np.float64]
@@ -174,7 +190,11 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Costs and outcomes of the releases of one layout, as arrays of shape (n,)."""
+    """Costs and outcomes of the releases of one layout, as arrays of shape (n,).
+
+    `toll` has the columns vehicles hit, vehicles that run into debris and fatalities, (n, 3); None
+    if the site has no `[traffic]`.
+    """
 
     event: NDArray[np.str_]
     harm: Floats
@@ -182,6 +202,7 @@ class Account:
     volume: Floats
     reached: Bools
     failed: Bools
+    toll: Floats | None = None
 
     def of(self, which: Bools) -> Account:
         """Return the account of a selection of the releases."""
@@ -192,6 +213,7 @@ class Account:
             self.volume[which],
             self.reached[which],
             self.failed[which],
+            None if self.toll is None else self.toll[which],
         )
 
 
@@ -205,14 +227,18 @@ def account(site: Site, layout: Layout, outcomes: Sequence[Outcome]) -> Account:
         volume=np.array([outcome.road_volume for outcome in outcomes]),
         reached=np.array([outcome.reached for outcome in outcomes], dtype=bool),
         failed=np.array([any(b.failed for b in o.barriers) for o in outcomes], dtype=bool),
+        toll=None
+        if site.traffic is None
+        else np.array([site.toll(layout, outcome) for outcome in outcomes], dtype=np.float64),
     )
 
 
-def learn(site: Site, own: Account, released: Floats, blocks: float) -> Facts:
+def learn(site: Site, own: Account, released: Floats, widths: Floats, blocks: float) -> Facts:
     """Return the statistics of an event from its releases.
 
-    If no block reached the road, harm and volume are computed as if all released rock had reached
-    it: zero occurrences in n releases do not prove that the event is harmless.
+    If no block reached the road, harm, volume and the toll are computed as if all released rock had
+    reached it and lay there: zero occurrences in n releases do not prove that the event is
+    harmless.
 
     Parameters
     ----------
@@ -222,15 +248,30 @@ def learn(site: Site, own: Account, released: Floats, blocks: float) -> Facts:
         The account of the releases of the event.
     released : (n,) array
         Volume of rock in each release [m3].
+    widths : (n,) array
+        Width of each release [m].
     blocks : float
         Mean number of blocks.
     """
     harm, volume = own.harm[own.reached], own.volume[own.reached]
+    toll = None if own.toll is None else own.toll[own.reached]
     if not len(harm):
         volume = released
         harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
+        if site.traffic is not None:
+            ones = np.ones(len(released), dtype=bool)
+            toll = np.column_stack(
+                site.traffic.toll(ones, ones, widths, volume, np.full(len(ones), np.inf))
+            )
+            harm = harm + site.traffic.price(toll[:, 2])
+    tolls = () if toll is None else tuple(map(_known_of, toll.T))
     count = len(own.harm), int(own.reached.sum())
-    return Facts(*count, Known.of(harm), Known.of(volume), blocks)
+    return Facts(*count, Known.of(harm), Known.of(volume), blocks, tolls)
+
+
+def _known_of(values: Floats) -> Known:
+    """Return the statistics of the values above 0."""
+    return Known.of(values[values > 0.0]) if (values > 0.0).any() else Known(0.0, 0.0)
 
 
 REPAIR_VARIATION = 0.2
@@ -247,6 +288,8 @@ class Sums:
     both: Mean
     volume: Mean
     by_event: dict[str, float]
+    toll: tuple[Mean, ...] = ()
+    """Vehicles hit, vehicles that run into debris and fatalities; empty without `[traffic]`."""
 
 
 def judge(
@@ -303,6 +346,7 @@ def judge(
         targets=None,
         outcomes=tuple(outcomes),
         releases=len(outcomes),
+        risk=Risk.of(site.traffic, sums.toll) if site.traffic is not None else None,
     )
 
 
@@ -315,6 +359,7 @@ def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, F
         If there are no releases of an event with a non-zero rate.
     """
     parts: list[tuple[Mean, ...]] = []
+    tolls: list[tuple[Mean, ...]] = []
     mend = _mending(site, layout)
     by_event: dict[str, float] = {}
     for name in site.event_names:
@@ -327,8 +372,10 @@ def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, F
         known = facts.get(name)
         parts.append(tuple(part.times(rate) for part in _means(own, known, mend)))
         by_event[name] = parts[-1][2].value
+        tolls.append(tuple(part.times(rate) for part in toll_means(own, known)))
     harm, repair, both, volume = (total(part[i] for part in parts) for i in range(4))
-    return Sums(harm, repair, both, volume, by_event)
+    toll = tuple(total(column) for column in zip(*tolls, strict=True))
+    return Sums(harm, repair, both, volume, by_event, toll)
 
 
 def _weighted(
@@ -352,6 +399,7 @@ def _weighted(
         weight * found.volume,
         found.reached,
         found.failed,
+        None if found.toll is None else weight[:, None] * found.toll,
     )
     mixed = _mixture(rate, facts, shares) if facts else None
     harm, repair, both, volume = _means(drawn, mixed, _mending(site, layout) * sum(rate.values()))
@@ -365,7 +413,12 @@ def _weighted(
         for n in site.event_names
     }
     more = math.fsum(dear.values())
-    return Sums(harm.moved(more), repair, both.moved(more), volume.moved(much), by_event)
+    tolls = []
+    for j, mean in enumerate(toll_means(drawn, mixed)):
+        lack = math.fsum((1.0 - seen[n]) * often[n] * facts[n].toll[j].mean for n in often)
+        tolls.append(mean.moved(lack))
+    both = both.moved(more)
+    return Sums(harm.moved(more), repair, both, volume.moved(much), by_event, tuple(tolls))
 
 
 def _mixture(
@@ -383,7 +436,11 @@ def _mixture(
         one, two = float(chance @ mean / chance.sum()), float(chance @ square / chance.sum())
         return Known(one, float(np.sqrt(max(two - one * one, 0.0)) / one) if one else 0.0)
 
-    return Facts(1, 1, known(lambda f: f.harm), known(lambda f: f.volume), 1.0)
+    tolls = tuple(
+        known(lambda f, j=j: f.toll[j])  # type: ignore[misc]
+        for j in range(min(len(fact.toll) for fact in facts.values()))
+    )
+    return Facts(1, 1, known(lambda f: f.harm), known(lambda f: f.volume), 1.0, tolls)
 
 
 def _means(own: Account, known: Facts | None, mend: float) -> tuple[Mean, Mean, Mean, Mean]:
@@ -395,6 +452,16 @@ def _means(own: Account, known: Facts | None, mend: float) -> tuple[Mean, Mean, 
     repair = cost(own.repair, own.failed, Known(mend, REPAIR_VARIATION))
     volume = cost(own.volume, own.reached, known.volume if known else None)
     return harm, repair, pair(harm, repair, _correlation(own.harm, own.repair)), volume
+
+
+def toll_means(own: Account, known: Facts | None) -> tuple[Mean, ...]:
+    """Return the means of the columns of the toll over equally weighted releases."""
+    if own.toll is None:
+        return ()
+    before = known.toll if known is not None and known.toll else (None, None, None)
+    return tuple(
+        cost(values, values > 0.0, prior) for values, prior in zip(own.toll.T, before, strict=True)
+    )
 
 
 def _correlation(one: Floats, two: Floats) -> float:
@@ -418,5 +485,5 @@ def _mending(site: Site, layout: Layout) -> float:
 
     It is the cost of one fence panel length, the least unit of repair; 0 if no barrier can fail.
     """
-    prices = zip(layout, site.capitals(layout), strict=True)
+    prices = site.values(layout).items()
     return PANEL * max((price for b, price in prices if b.fallible), default=0.0)

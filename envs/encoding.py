@@ -16,6 +16,7 @@ embankment    height                               width of the crest, in the ra
 gravity_wall  height, up to what thickness allows  thickness, at least 0.4 times the height
 wall          height                               thickness, least to greatest
 mesh          not used, nor is the station         option of the site, equal parts of the range
+removal       not used, nor is the station         removable barrier, equal parts of the range
 ============  ===================================  =============================================
 
 Heights and depths range from 0.5 m to the maximum of the zone.
@@ -29,9 +30,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Mesh
-from rigdda.barriers import KINDS
+from rigdda.barriers import KINDS, Removal
 from rigdda.barriers.base import MIN_HEIGHT, TOLERANCE, share_of
-from rigdda.envs.siting import Room, Span
+from rigdda.barriers.spacing import Span
+from rigdda.envs.siting import Room
 from rigdda.model.barrier_zone import BarrierZone
 
 Floats = NDArray[np.float64]
@@ -107,6 +109,11 @@ def built_and_dropped(
                 continue
             barrier: Barrier = place.mesh(_part(size, len(place.site.meshes)))
             room: list[Span] = []
+        elif kind == "removal":
+            barrier, room = place.removals[_part(size, len(place.removals))], []
+            if barrier in built:
+                dropped.append(f"slot {number}: removal: an earlier slot already removes it")
+                continue
         else:
             found = place.nearest(make(place.zone, kind, station, height, size), taken)
             if found is None:
@@ -164,6 +171,9 @@ def _numbers(place: Room, i: int, barrier: Barrier) -> list[float]:
         names = [option.name for option in place.site.meshes]
         usual: Barrier = place.mesh(names.index(barrier.option))
         shares = (0.5, 0.0, _middle(names.index(barrier.option), len(names)))
+    elif isinstance(barrier, Removal):
+        usual = barrier
+        shares = (0.5, 0.0, _middle(place.removals.index(barrier), len(place.removals)))
     else:
         shares = (share_of(barrier.x, zone.start, zone.end), *barrier.shares(zone))
         tall = getattr(barrier, barrier.lengths[0].field)

@@ -132,9 +132,10 @@ def statistics(
     """
     found, out = account(site, (), outcomes), {}
     released = np.array([o.released_volume for o in outcomes])
+    widths = np.array([o.width for o in outcomes])
     for name in site.event_names:
         own = found.event == name
-        out[name] = learn(site, found.of(own), released[own], blocks[name])
+        out[name] = learn(site, found.of(own), released[own], widths[own], blocks[name])
     return out
 
 

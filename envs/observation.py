@@ -13,7 +13,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from rigdda import Fence, Layout, Mesh, Outcome, Site
+from rigdda import Fence, Layout, Outcome, Site
+from rigdda.barriers import Built, standing
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.envelope import BINS, STATIONS, Envelope, envelope, largest, stations
 from rigdda.envs.outcome_cache import Memory
@@ -153,12 +154,12 @@ def observe(problem: DesignProblem) -> Arrays:
 
 
 def mesh_last(layout: Layout) -> Layout:
-    """Return a layout in the order of the observation: sorted downhill, mesh last.
+    """Return a layout in the order of the observation: sorted downhill, mesh and removals last.
 
     Sorted by position alone, mesh would always come first, and the entries for mesh in the later
     slots would never vary.
     """
-    return tuple(sorted(layout, key=lambda barrier: (isinstance(barrier, Mesh), barrier.x)))
+    return tuple(sorted(layout, key=lambda barrier: (not isinstance(barrier, Built), barrier.x)))
 
 
 def looked(
@@ -197,7 +198,7 @@ def looked(
     }
     for name in ("taken", "topped", "broken"):
         values[name] = np.zeros(slots)
-    for k in range(sum(not isinstance(barrier, Mesh) for barrier in layout)):
+    for k in range(len(standing(layout))):
         took = [outcome.barriers[k] for outcome in outcomes]
         values["taken"][k] = math.log10(1.0 + max(one.max_energy for one in took))  # type: ignore[index]
         values["topped"][k] = np.mean([one.overtopped > 0 for one in took])  # type: ignore[index]

@@ -31,7 +31,7 @@ from rigdda import (
     Outcome,
     Site,
 )
-from rigdda.barriers import Built, Standing, earthworks, standing
+from rigdda.barriers import Built, Standing, earthworks
 from rigdda.kernel import source_hash
 from rigdda.model.settings import EARTH
 from rigdda.model.terrain import REACH
@@ -304,7 +304,7 @@ Job = tuple[Site, Layout, int, str]
 
 
 class Key(NamedTuple):
-    """Key of a release: site, layout without mesh, seed and event."""
+    """Key of a release: site, all barriers that stand, seed and event."""
 
     site: bytes
     layout: tuple[Built, ...]
@@ -333,7 +333,8 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
     """
     prints = {id(site): fingerprint(site) for site, *_ in jobs}
     keys = [
-        Key(prints[id(site)], standing(layout), seed, event) for site, layout, seed, event in jobs
+        Key(prints[id(site)], site.standing(layout), seed, event)
+        for site, layout, seed, event in jobs
     ]
     known = _recall(keys, jobs)
     new = {key: job for key, job in zip(keys, jobs, strict=True) if key not in known}

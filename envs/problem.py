@@ -21,21 +21,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
 from rigdda.barriers import KINDS
-from rigdda.envs import cost, encoding, ensemble, outcome_cache
+from rigdda.envs import cost, encoding, ensemble, intervals, outcome_cache
 from rigdda.envs.cost import Evaluation
-from rigdda.envs.intervals import Estimate
+from rigdda.envs.intervals import Estimate, Mean, total
 from rigdda.envs.outcome_cache import Sample, fingerprint
 from rigdda.envs.siting import Room
+from rigdda.envs.traffic_risk import Risk
 from rigdda.model.site_tables import BarrierZone
 
 MET, MISSED, UNDECIDED = "met", "missed", "undecided"
-"""States of targets: the upper bounds of all probabilities are low enough; the lower bound of at
-least one is too high; there are too few releases to decide."""
+"""States of targets: the upper bounds of all probabilities and of the individual risk are low
+enough; the lower bound of at least one is too high; there are too few releases to decide."""
 
 
 @dataclass(frozen=True, slots=True)
 class Targets:
-    """Greatest acceptable probabilities in every design event, compared with one-sided 95 % bounds.
+    """Greatest acceptable probabilities in every design event, and individual risk of all events.
+
+    Probabilities are compared with one-sided 95 % bounds, the individual risk with the ends of its
+    95 % interval.
 
     Parameters
     ----------
@@ -43,6 +47,9 @@ class Targets:
         That a block reaches the road.
     failure : float, optional
         That a barrier fails.
+    individual : float, optional
+        That a commuter is killed within a year, see `rigdda.model.traffic`. The site must have a
+        table `[traffic]`.
 
     Raises
     ------
@@ -52,9 +59,10 @@ class Targets:
 
     reach: float | None = None
     failure: float | None = None
+    individual: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("reach", "failure"):
+        for name in ("reach", "failure", "individual"):
             value = getattr(self, name)
             if value is not None:
                 number = check.number(f"targets.{name}", value, 0.0, 1.0, open_low=True)
@@ -65,8 +73,9 @@ class Targets:
         events: Iterable[str],
         reach: Mapping[str, Estimate],
         failure: Mapping[str, Estimate],
+        risk: Risk | None = None,
     ) -> str | None:
-        """Return "met", "missed" or "undecided" over the design events, or None without targets.
+        """Return "met", "missed" or "undecided", or None without targets.
 
         Parameters
         ----------
@@ -74,6 +83,8 @@ class Targets:
             The design events.
         reach, failure : mapping of str to Estimate
             Estimates for each event.
+        risk : Risk, optional
+            Risk to the traffic; needed for the target `individual`.
         """
         states = {
             decide(seen[event], greatest)
@@ -81,6 +92,8 @@ class Targets:
             if greatest is not None
             for event in events
         }
+        if self.individual is not None and risk is not None:
+            states.add(decide_mean(risk.individual, self.individual))
         return next((state for state in (MISSED, UNDECIDED, MET) if state in states), None)
 
 
@@ -89,6 +102,21 @@ def decide(seen: Estimate, greatest: float) -> str:
     if seen.bound <= greatest:
         return MET
     return MISSED if seen.floor > greatest else UNDECIDED
+
+
+def decide_mean(seen: Mean, greatest: float) -> str:
+    """Return whether a mean is at most `greatest`: "met", "missed" or "undecided"."""
+    if seen.high <= greatest:
+        return MET
+    return MISSED if seen.low > greatest else UNDECIDED
+
+
+def excess(value: float, greatest: float) -> float:
+    """Return by which share of itself a value exceeds the greatest acceptable one, 0 to 1 [-].
+
+    It compares an individual risk of the order of 1e-6 with probabilities.
+    """
+    return max(1.0 - greatest / value, 0.0) if value > 0.0 else 0.0
 
 
 FIDELITIES = ("fast", "full")
@@ -128,7 +156,8 @@ MOST_BARRIERS = 100
 """Maximum number of slots of a layout; a site has room for only a few barriers."""
 
 USUAL_KINDS = tuple(name for name, kind in KINDS.items() if kind.designed and name != "mesh")
-"""Default kinds of barrier, to which mesh is added on sites that have mesh options. The rigid wall,
+"""Default kinds of barrier. Mesh is added on sites that have mesh options, and removal on sites
+with existing barriers that may be removed. The rigid wall,
 which cannot move, is for experiments only and not included."""
 
 
@@ -155,7 +184,8 @@ def checked_zone(site: Site, zone: object) -> BarrierZone:
 def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
     """Return the validated kinds of barrier to choose from."""
     if kinds is None:
-        return (*USUAL_KINDS, "mesh") if site.meshes else USUAL_KINDS
+        mesh = ("mesh",) if site.meshes else ()
+        return (*USUAL_KINDS, *mesh, *(("removal",) if site.removals else ()))
     if not isinstance(kinds, Sequence) or isinstance(kinds, str):
         raise BadInput("kinds", kinds, "give a sequence of names")
     names = tuple(check.one_of("kinds", kind, KINDS) for kind in kinds)
@@ -163,6 +193,9 @@ def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
         raise BadInput("kinds", kinds, "name each kind once")
     if "mesh" in names and not site.meshes:
         raise BadInput("kinds", kinds, f"leave mesh out: {site.name} has no options of it")
+    if "removal" in names and not site.removals:
+        mend = f"leave removal out: {site.name} has no existing barrier with removable = true"
+        raise BadInput("kinds", kinds, mend)
     return names
 
 
@@ -178,8 +211,8 @@ def read_targets(targets: Targets | Mapping[str, float | None] | None) -> Target
         return Targets()
     if isinstance(targets, Targets):
         return targets
-    if not isinstance(targets, Mapping) or not set(targets) <= {"reach", "failure"}:
-        mend = "give rigdda.envs.Targets(reach=..., failure=...), or a mapping of these names"
+    if not isinstance(targets, Mapping) or not set(targets) <= {"reach", "failure", "individual"}:
+        mend = "give rigdda.envs.Targets(reach=..., failure=..., individual=...), or a mapping"
         raise BadInput("targets", targets, mend)
     return Targets(**targets)
 
@@ -187,7 +220,11 @@ def read_targets(targets: Targets | Mapping[str, float | None] | None) -> Target
 def checked_targets(site: Site, given: Targets | Mapping[str, float | None] | None) -> Targets:
     """Return the validated targets on a site; none by default."""
     targets = read_targets(given)
-    if targets != Targets() and not any(event.design for event in site.events):
+    if targets.individual is not None and site.traffic is None:
+        mend = f"add the table [traffic] to site {site.name}, for the risk to life"
+        raise BadInput("targets.individual", targets.individual, mend)
+    design = targets.reach is not None or targets.failure is not None
+    if design and not any(event.design for event in site.events):
         raise BadInput("targets", targets, f"mark an event of {site.name} with design = true")
     return targets
 
@@ -270,7 +307,8 @@ class DesignProblem:
     """Barrier design on a site: find the layout with the lowest annual cost.
 
     Z [EUR per metre of road and year] = annual cost of the barriers + expected harm on the road +
-    expected repair cost, see `rigdda.envs.cost`.
+    expected repair cost, see `rigdda.envs.cost`. A layout lists what is built or removed: the
+    existing barriers of the site are part of every layout, also of the empty one.
 
     Parameters
     ----------
@@ -280,9 +318,11 @@ class DesignProblem:
         Number of slots for barriers; each may be empty.
     kinds : sequence of str, optional
         Kinds of barrier to choose from: "fence", "ditch", "embankment", "gravity_wall", "mesh",
-        "wall". By default all but "wall", and "mesh" only on sites with mesh options.
+        "wall", "removal". By default all but "wall", "mesh" only on sites with mesh options, and
+        "removal" (of an existing barrier) only on sites with removable barriers.
     targets : Targets or mapping, optional
-        Greatest acceptable probabilities in the design events, such as {"reach": 0.01}.
+        Greatest acceptable probabilities in the design events and individual risk, such as
+        {"reach": 0.01} or {"individual": 1e-6}.
     fidelity : {"full", "fast"}
         "fast" simulates a cheaper approximation of the site, see `site_at_fidelity`.
     zone : (start, end), optional
@@ -515,16 +555,16 @@ class DesignProblem:
 
         If Z is 0 both without barriers and for the layout, it is the share of debris kept off the
         road, or 0 if none reaches it without barriers. If only Z without barriers is 0, it is -1.
-        If the layout misses a target, it is -1 minus the greatest excess of a probability over its
-        target, regardless of cost.
+        If the layout misses a target, it is -1 minus the greatest excess over a target, regardless
+        of cost: of a probability the difference, of the individual risk see `excess`.
         """
         if evaluation.targets == MISSED:
             return -1.0 - self._excess(evaluation)
         return evaluation.gain(self._known.nothing)
 
     def _excess(self, evaluation: Evaluation) -> float:
-        """Return the greatest excess of a probability in a design event over its target [-]."""
-        return max(
+        """Return the greatest excess over a target [-]."""
+        over = [
             seen[name].probability - greatest
             for greatest, seen in (
                 (self.targets.reach, evaluation.reach),
@@ -532,7 +572,10 @@ class DesignProblem:
             )
             if greatest is not None
             for name in self._design_events
-        )
+        ]
+        if self.targets.individual is not None and evaluation.risk is not None:
+            over.append(excess(evaluation.risk.individual.value, self.targets.individual))
+        return max(over)
 
     @property
     def _design_events(self) -> list[str]:
@@ -540,7 +583,37 @@ class DesignProblem:
 
     def state(self, found: Evaluation) -> str | None:
         """Return whether an evaluation meets the targets; None without targets."""
-        return self.targets.state(self._design_events, found.reach, found.failure)
+        return self.targets.state(self._design_events, found.reach, found.failure, found.risk)
+
+    def individual_risk(self, layout: Layout, fatalities: Mapping[str, Sequence[float]]) -> Mean:
+        """Return the individual risk from the fatalities in releases of each event [1/year].
+
+        Parameters
+        ----------
+        layout : Layout
+            The layout.
+        fatalities : mapping of str to sequence of float
+            Expected fatalities in each release, by name of the event. An event without releases
+            has those of releases without barriers.
+
+        Raises
+        ------
+        BadInput
+            If the site has no `[traffic]`.
+        """
+        site, facts = self.site, self._known.facts
+        if site.traffic is None:
+            raise BadInput("traffic", None, f"add the table [traffic] to site {site.name}")
+        parts = []
+        for name in site.event_names:
+            fact = facts[name]
+            known, killed = fact.toll[2], list(fatalities.get(name, ()))
+            if not killed:
+                killed = [known.mean] * fact.reached + [0.0] * (fact.releases - fact.reached)
+            own = np.array(killed, dtype=np.float64)
+            mean = intervals.cost(own, own > 0.0, known)
+            parts.append(mean.times(site.rate(name, layout)))
+        return total(parts).times(site.traffic.section_length * site.traffic.person)
 
     def _standing(self, layout: Sequence[Barrier] | ArrayLike) -> Layout:
         """Return the layout of a vector, or a checked layout."""

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Site, Terrain
-from rigdda.barriers import standing
 from rigdda.barriers.base import STANDS
-from rigdda.display import BARRIER, GROUND, ROAD, ROCK, ZONE
+from rigdda.display import BARRIER, GROUND, OLD, ROAD, ROCK, ZONE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,6 +52,9 @@ STRETCH = 0.3
 POST = 5.0
 """Line width of a fence post [points], wide enough to be visible on a slope of 200 m."""
 
+DASHED = (0.0, (1.2, 0.6))
+"""Line style of barriers that stand already."""
+
 BAND = 0.02
 """Thickness of the band that represents mesh, as a share of the height of the image."""
 
@@ -68,7 +70,13 @@ class Label(NamedTuple):
     colour: str = BARRIER
 
 
-def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> None:
+def draw(
+    axes: Axes,
+    run: Run,
+    road: tuple[float, float],
+    frame: int = -1,
+    old: Sequence[Barrier] = (),
+) -> None:
     """Draw one frame of a run in metres, with equal axis scales.
 
     Parameters
@@ -81,6 +89,8 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
         Chainages of the uphill and downhill edges of the road [m].
     frame : int
         Index of the frame; by default the last.
+    old : sequence of Barrier
+        Which of the barriers stand already.
     """
     terrain = run.ground
     assert terrain is not None
@@ -91,10 +101,12 @@ def draw(axes: Axes, run: Run, road: tuple[float, float], frame: int = -1) -> No
     axes.plot(lane, [terrain.height(at) for at in lane], color=ROAD, linewidth=5,
               solid_capstyle="butt")  # fmt: skip
     for i, barrier in enumerate(run.scene.barriers):
-        colour = BARRIER if run.state(i, frame) == STANDS else BROKEN
+        worn = barrier.x in {one.x for one in old}
+        stands = run.state(i, frame) == STANDS
+        colour = BROKEN if not stands else OLD if worn else BARRIER
         start = run.outline(i, 0)
         foot = float(start[:, 0].mean()), float(start[:, 1].max()) - barrier.left_height(0.0)
-        draw_barrier(axes, barrier, run.outline(i, frame), foot, colour)
+        draw_barrier(axes, barrier, run.outline(i, frame), foot, colour, worn)
     for i in range(len(run.scene.blocks)):
         axes.fill(*run.corners(i, frame).T, color=ROCK, edgecolor="white", linewidth=0.2,
                   zorder=4)  # fmt: skip
@@ -149,6 +161,7 @@ def draw_barrier(
     outline: Floats,
     foot: tuple[float, float] | None = None,
     colour: str = BARRIER,
+    old: bool = False,
 ) -> None:
     """Draw a barrier: a fence as a post, a ditch as a hatched cut, all others as filled bodies.
 
@@ -165,17 +178,22 @@ def draw_barrier(
         vertically below the top.
     colour : str
         Colour of its faces and edges.
+    old : bool
+        Whether it stands already; then its lines are dashed.
     """
+    line = DASHED if old else "solid"
     if isinstance(barrier, Fence):
         x, top = outline[2:].mean(axis=0).tolist()
         foot = foot or (x, top - barrier.height)
-        axes.plot([foot[0], x], [foot[1], top], color=colour, linewidth=POST,
+        axes.plot([foot[0], x], [foot[1], top], color=colour, linewidth=POST, linestyle=line,
                   solid_capstyle="butt", zorder=3.5)  # fmt: skip
     elif barrier.drawn == "line":
         axes.fill(*outline.T, facecolor=CUT, edgecolor=colour, hatch="////", linewidth=1.5,
-                  zorder=3)  # fmt: skip
+                  linestyle=line, zorder=3)  # fmt: skip
     else:
-        axes.fill(*outline.T, facecolor=colour, edgecolor=colour, linewidth=1.5, zorder=3)
+        face = "white" if old else colour
+        axes.fill(*outline.T, facecolor=face, edgecolor=colour, linewidth=1.5, linestyle=line,
+                  zorder=3)  # fmt: skip
 
 
 def draw_mesh(axes: Axes, site: Site, mesh: Mesh, thickness: float) -> tuple[float, float]:
@@ -286,18 +304,19 @@ def picture(run: Run, site: Site, layout: Layout, title: str) -> NDArray[np.uint
     )  # not registered with pyplot: need not be closed
     canvas = FigureCanvasAgg(figure)
     axes = figure.subplots()
-    draw(axes, run, (site.road.start, site.road.end))
+    draw(axes, run, (site.road.start, site.road.end), old=site.existing_barriers)
     name_places(axes, site, (site.barrier_zone.start, site.barrier_zone.end))
     axes.set_title(title)
     left, right, bottom, top = window(run, site)
     axes.set(xlim=(left, right), ylim=(bottom, top))
     labels = []
-    for i, barrier in enumerate(standing(layout)):
+    for i, words in enumerate(site.labels(layout)):
         state, top_point = run.state(i), top_of(run.outline(i))
         if state == STANDS:
-            labels.append(Label(barrier.label, top_point))
+            colour = OLD if words.startswith("existing") else BARRIER
+            labels.append(Label(words, top_point, colour))
         else:
-            labels.append(Label(f"{barrier.label}: {state}", top_point, BROKEN))
+            labels.append(Label(f"{words}: {state}", top_point, BROKEN))
     for mesh in layout:
         if isinstance(mesh, Mesh):
             labels.append(Label(mesh.label, draw_mesh(axes, site, mesh, BAND * (top - bottom))))

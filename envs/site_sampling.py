@@ -41,6 +41,9 @@ MOST_POSED = 512
 MESH = "mesh"
 """The kind of barrier that only some sites offer."""
 
+REMOVAL = "removal"
+"""The kind that only sites with removable barriers offer."""
+
 KINDS = (*USUAL, MESH)
 """Default kinds of barrier if every episode draws its site."""
 
@@ -67,7 +70,8 @@ class Slots:
 
     def shared(self, site: Site) -> tuple[str, ...]:
         """Return the kinds available on a site; all kinds if none would be left."""
-        offered = tuple(kind for kind in self.kinds if kind != MESH or site.meshes)
+        lacks = {*(() if site.meshes else (MESH,)), *(() if site.removals else (REMOVAL,))}
+        offered = tuple(kind for kind in self.kinds if kind not in lacks)
         return offered or self.kinds
 
     def decode(self, problem: DesignProblem, numbers: Floats) -> Layout:

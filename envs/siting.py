@@ -13,25 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Barrier, GravityWall, Layout, Mesh, Site, check
-from rigdda.barriers import KINDS, Earthwork, as_layout, earthworks
+from rigdda.barriers import KINDS, Earthwork, Removal, as_layout, earthworks
 from rigdda.barriers.base import TOLERANCE
+from rigdda.barriers.spacing import MIN_GAP, Span, meet, room
 from rigdda.model.barrier_zone import BarrierZone
-
-Span = tuple[float, float]
-
-MIN_GAP = 0.5
-"""Minimum distance between the works of two barriers [m]."""
-
-
-def room(barrier: Barrier, works: Span) -> Span:
-    """Return the chainages that a barrier occupies, including its elongation downhill [m]."""
-    start, end = works
-    return start, end + barrier.deflection
-
-
-def meet(one: Span, two: Span) -> bool:
-    """Return whether two barriers are closer than `MIN_GAP`."""
-    return one[0] < two[1] + MIN_GAP - TOLERANCE and two[0] < one[1] + MIN_GAP - TOLERANCE
 
 
 def narrow_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> Iterator[BadInput]:
@@ -72,6 +57,8 @@ class Rules:
     ----------
     parts : list of (start, end)
         Parts of the zone without loose rock [m].
+    fixed : list of (str, (start, end))
+        Kind and room of each existing barrier that may not be removed [m].
 
     Raises
     ------
@@ -86,6 +73,8 @@ class Rules:
         if not self.parts:
             mend = f"overlap one of {site.rooms}, which are free of loose rock"
             raise BadInput("zone", (zone.start, zone.end), mend)
+        old = zip(site.existing, site.existing_barriers, strict=True)
+        self.fixed = [(b.words, room(b, self.works(b))) for e, b in old if not e.removable]
         self._x, self._y = site.profile.points.T
         angles = {kind.steepest for kind in KINDS.values()} - {None}
         self._gentle = {angle: self._stretches(angle) for angle in angles if angle is not None}
@@ -144,17 +133,20 @@ class Rules:
                 check.one_of(f"{where}.kind", barrier.kind, kinds)
                 if isinstance(barrier, Mesh):
                     self.check_mesh(where, barrier)
+                elif isinstance(barrier, Removal):
+                    self._check_removal(where, barrier, barriers[:i])
             except BadInput as bad:
                 yield bad
-            if not isinstance(barrier, Mesh):
+            if not isinstance(barrier, Mesh | Removal):
                 works = yield from self._faults(where, barrier)
                 if works is not None:
                     rooms.append((where, barrier, room(barrier, works)))
-        meshes = sum(isinstance(barrier, Mesh) for barrier in barriers)
-        if meshes > 1:
+        if sum(isinstance(barrier, Mesh) for barrier in barriers) > 1:
             yield BadInput("layout", "several meshes", "give at most one")
         yield from narrow_gaps(rooms)
-        if len(rooms) + meshes == len(barriers):
+        for where, barrier, span in rooms:
+            yield from self._near_existing(where, barrier, span)
+        if len(rooms) == sum(not isinstance(barrier, Mesh | Removal) for barrier in barriers):
             excess = self.too_expensive(barriers)
             if excess is not None:
                 yield BadInput("layout", *excess)
@@ -185,6 +177,25 @@ class Rules:
         options = {option.name: option for option in self.site.meshes}
         check.one_of(f"{where}.option", mesh.option, options)
         check.number(f"{where}.x", mesh.x, *self.site.mesh_span(mesh.option))
+
+    def _check_removal(self, where: str, removal: Removal, before: Layout) -> None:
+        """Check that a removal names a removable barrier, and that none before it does."""
+        known = [one.x for one in self.site.removals]
+        if removal.x not in known:
+            names = " or ".join(f"{x:g}" for x in known) or "no removal: nothing is removable"
+            raise BadInput(f"{where}.x", removal.x, f"give {names}")
+        if removal in before:
+            raise BadInput(f"{where}.x", removal.x, "remove it only once")
+
+    def _near_existing(self, where: str, barrier: Barrier, span: Span) -> Iterator[BadInput]:
+        """Yield an error for each barrier that stands already, may not be removed and is close."""
+        for words, taken in self.fixed:
+            if meet(span, taken):
+                mend = (
+                    f"keep it, with its elongation up to {span[1]:g}, {MIN_GAP:g} m clear of the "
+                    f"existing {words} at {taken[0]:g} to {taken[1]:g}"
+                )
+                yield BadInput(f"{where}.x", barrier.x, mend)
 
     def check(self, where: str, barrier: Barrier) -> Span:
         """Return the works of a barrier after checking that it is feasible where it stands.
@@ -310,6 +321,11 @@ class Room(Rules):
         low, high = self.site.mesh_span(name)
         return Mesh(0.5 * (low + high), name)
 
+    @property
+    def removals(self) -> tuple[Removal, ...]:
+        """A removal of each existing barrier that may be removed."""
+        return self.site.removals
+
     def put(self, barrier: Barrier, x: float) -> Barrier | None:
         """Return a barrier moved to `x` with the sizes required there, or None if impossible."""
         return barrier.placed(x, self.site, self.zone)
@@ -322,13 +338,14 @@ class Room(Rules):
         barrier : Barrier
             The barrier at its desired place.
         taken : sequence of (start, end)
-            The room of existing barriers [m].
+            The room of other new barriers [m].
 
         Returns
         -------
         (Barrier, (start, end)) or None
             None if no candidate place, spaced `STEP` apart, is feasible.
         """
+        taken = [*taken, *(span for _, span in self.fixed)]
         found = self._try(barrier, barrier.x, taken)
         if found is not None:
             return found

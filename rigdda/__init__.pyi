@@ -11,6 +11,7 @@ from .barriers import (
     Layout,
     Mesh,
     MeshOption,
+    Removal,
     Wall,
 )
 from .barriers.layout import load_layout, save_layout
@@ -21,6 +22,7 @@ from .lumped_mass import Points, lumped
 from .model import grounds
 from .model.block import Block
 from .model.corridor import Corridor, CorridorSection
+from .model.existing import Existing
 from .model.loads import BodyForce, Bolt, FixedPoint, LineLoad, PointLoad
 from .model.outcome import BarrierOutcome, Outcome
 from .model.prices import Bill, Consequences, Prices
@@ -31,6 +33,7 @@ from .model.site_tables import Drawn, Event
 from .model.source import Source
 from .model.surface import Surface
 from .model.terrain import Terrain
+from .model.traffic import Toll, Traffic
 from .releases import release, release_many, release_outcome
 
 __version__: str
@@ -53,6 +56,7 @@ __all__ = [
     "Embankment",
     "Error",
     "Event",
+    "Existing",
     "Fence",
     "FixedPoint",
     "GravityWall",
@@ -64,6 +68,7 @@ __all__ = [
     "PointLoad",
     "Points",
     "Prices",
+    "Removal",
     "Run",
     "Scene",
     "Settings",
@@ -73,6 +78,8 @@ __all__ = [
     "Source",
     "Surface",
     "Terrain",
+    "Toll",
+    "Traffic",
     "Wall",
     "grounds",
     "limit_equilibrium",

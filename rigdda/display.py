@@ -31,6 +31,9 @@ section."""
 GROUND, ROCK, BARRIER, ROAD, ZONE = "#c9bca5", "#68584a", "#1c5aa0", "#e85d04", "#9dc3e6"
 """Colours of all images of slopes."""
 
+OLD = "#8a7f9e"
+"""Colour of barriers that stand already, whose outlines are dashed."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
@@ -45,11 +48,14 @@ class Outline:
     filled : bool
         Whether it is filled and hidden below the ground; a ditch or an embankment is drawn as a
         line on the ground.
+    old : bool
+        Whether it stands already; then it is drawn dashed and in another colour.
     """
 
     corners: Floats
     label: str = ""
     filled: bool = True
+    old: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,13 +119,15 @@ def draw(axes: Axes, section: Section) -> None:
     for corners in section.blocks:
         axes.fill(*corners.T, facecolor=ROCK, edgecolor=ROCK, linewidth=0.8)
     for barrier in section.barriers:
-        face = BARRIER if barrier.filled else "white"
-        axes.fill(*barrier.corners.T, facecolor=face, edgecolor=BARRIER, linewidth=2.0,
+        colour = OLD if barrier.old else BARRIER
+        face = colour if barrier.filled else "white"
+        axes.fill(*barrier.corners.T, facecolor=face, edgecolor=colour, linewidth=2.0,
+                  linestyle="--" if barrier.old else "-",
                   zorder=0.9 if barrier.filled else 3.0)  # fmt: skip
         if barrier.label:
             axes.annotate(
                 barrier.label, (barrier.corners[:, 0].mean(), barrier.corners[:, 1].max()),
-                xytext=(0, 10), textcoords="offset points", fontsize=9, color=BARRIER, zorder=4,
+                xytext=(0, 10), textcoords="offset points", fontsize=9, color=colour, zorder=4,
                 bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
             )  # fmt: skip
     axes.set_aspect("equal")

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rigdda.barriers import Barrier, Earthwork, Mesh, as_layout, earthworks
+from rigdda.barriers import Barrier, Earthwork, Mesh, Removal, as_layout, earthworks
 from rigdda.dynamics.point_mass import (
     FRICTION,
     HEIGHT,
@@ -94,8 +94,13 @@ def lumped(
         there are no seeds, or `Site.draw` fails.
     """
     site, layout = as_site(site), as_layout(layout)
+    new = len(layout)
+    layout = site.as_built(layout)
     for i, barrier in enumerate(layout):
-        if not isinstance(barrier, Earthwork | Mesh):
+        if not isinstance(barrier, Earthwork | Mesh | Removal):
+            if i >= new:
+                mend = "use the block model: points know only what is cut or filled"
+                raise BadInput(f"existing {barrier.words}", f"x = {barrier.x:g}", mend)
             mend = "leave it out, or use the block model: points know only what is cut or filled"
             raise BadInput(f"barriers[{i}]", barrier.kind, mend)
     site.built(layout, 1.0)

@@ -281,7 +281,8 @@ class Batch:
         more: Sequence[float] = (),
         end: float | None = None,
     ):
-        self._site, self._layout = as_site(site), as_layout(layout)
+        self._site = as_site(site)
+        self._layout = site.as_built(layout)
         self._more, self._end = more, end
         self._standing = list(standing(self._layout))
         self._watch = watch(site)
@@ -438,7 +439,7 @@ def release(
         If `motion.duration` cuts the release off, see `Outcome.cut_off`.
     """
     drawn = as_site(site).draw(seed, event)
-    scene = site.scene(drawn, site.built(layout, drawn.width))
+    scene = site.scene(drawn, site.built(site.as_built(layout), drawn.width))
     run = simulation(site, scene).run(site.motion.duration, EVERY, progress)
     outcome = measure(site, run, drawn.event, drawn.width)
     if outcome.cut_off:

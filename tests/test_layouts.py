@@ -166,7 +166,7 @@ def test_a_wall_that_rocks_and_comes_back_stands():
 
 
 def test_every_kind_is_described_and_known():
-    assert {barrier.kind for barrier in LAYOUT} == set(KINDS)
+    assert {barrier.kind for barrier in LAYOUT} == set(KINDS) - {"removal"}
     words = [describe(barrier) for barrier in LAYOUT]
     assert words[2] == "fence at 22.0 m, 2.0 m high, 10 kJ/m"
     assert len(set(words)) == 6

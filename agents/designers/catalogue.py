@@ -26,6 +26,7 @@ from rigdda import (
 )
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import Ledger, release_seeds
+from rigdda.barriers import Removal
 from rigdda.barriers.base import ELEMENT
 from rigdda.barriers.fence import PANEL
 from rigdda.barriers.gravity_wall import SLID
@@ -202,7 +203,8 @@ class Catalogue:
     relief : (R, J) array
         Reduction of the harm of each release by each barrier [EUR].
     annual : (J,) array
-        Annual cost of each barrier including its expected repair [EUR per m].
+        Annual cost of each barrier including its expected repair, in addition to the upkeep of
+        existing barriers [EUR per m].
     capital : (J,) array
         Capital cost of each barrier [EUR per m].
     span : (J, 2) array
@@ -236,14 +238,15 @@ def tabulate(
     """Return the catalogue of some barriers of a problem."""
     site = problem.site
     weight = ensemble.weights([site.rate(name, ()) for name in site.event_names])
-    effects = Effects(site, ensemble)
+    effects, standing = Effects(site, ensemble), site.annual(())
     relief = np.zeros((len(weight), len(barriers)))
     annual, capital = np.zeros((2, len(barriers)))
     for j, barrier in enumerate(barriers):
         harm, mended = effects.of(barrier)
         relief[:, j] = effects.base - harm
         capital[j] = site.capital((barrier,))
-        annual[j] = site.annual((barrier,)) + capital[j] * float(weight @ mended)
+        repair = capital[j] * float(weight @ mended)
+        annual[j] = site.annual((barrier,)) - standing + repair
     span = np.array([[b.x, b.x + b.extent] for b in barriers]).reshape(-1, 2)
     return Catalogue(barriers, weight, effects.base, relief, annual, capital, span)
 
@@ -268,6 +271,8 @@ class Effects:
         road = ensemble.at(len(ensemble.stations))
         volume = np.bincount(road["release"], road["volume"], minlength=count)
         self._volume = volume.astype(np.float64)
+        self._energy = np.zeros(count)  # largest energy of a block at the road [J]
+        np.maximum.at(self._energy, road["release"], road["energy"])
         self.base = self._harm(self._volume)
 
     def of(self, barrier: Barrier) -> tuple[Floats, Floats]:
@@ -277,6 +282,8 @@ class Effects:
             factor = [site.rate(name, (barrier,)) / max(site.rate(name, ()), 1e-300)
                       for name in site.event_names]  # fmt: skip
             return self.base * np.array(factor)[self.ensemble.event], np.zeros_like(self.base)
+        if isinstance(barrier, Removal):  # what else it changes is left to the simulation
+            return self.base, np.zeros_like(self.base)
         k = int(np.argmin(np.abs(self.ensemble.stations - barrier.x)))
         table, risky = self._at[k], self._risky[k]
         stopped, broken = self._stopped(barrier, table)
@@ -317,7 +324,11 @@ class Effects:
 
     def _harm(self, volume: Floats) -> Floats:
         """Return the harm of volumes on the road [EUR], which is 0 for a volume of 0."""
-        harms = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
+        harms: Any = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
+        traffic, width = self.site.traffic, self.ensemble.width
+        if traffic is not None:
+            toll = traffic.toll(True, True, width, volume, self._energy)
+            harms = harms + traffic.price(toll.fatalities)
         return np.where(volume > 0.0, harms, 0.0)
 
 

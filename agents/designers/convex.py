@@ -40,8 +40,8 @@ from rigdda.agents.designers.store import Store
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.barriers.base import STEP
 from rigdda.barriers.fence import CLASSES
+from rigdda.barriers.spacing import MIN_GAP
 from rigdda.envs import DesignProblem
-from rigdda.envs.siting import MIN_GAP
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +126,7 @@ def _clashes(catalogue: Catalogue) -> Floats:
     starts = np.unique(start)
     over = (start <= starts[:, None]) & (starts[:, None] < end + MIN_GAP)
     kinds = np.array([b.kind == "mesh" for b in catalogue.barriers])
-    over &= ~kinds
+    over &= ~kinds & np.array([b.kind != "removal" for b in catalogue.barriers])
     rows = np.concatenate([over, kinds[None]])  # at most one mesh
     return np.unique(rows[rows.sum(axis=1) > 1], axis=0).astype(np.float64)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Barrier, Layout, Mesh
-from rigdda.barriers import KINDS
+from rigdda.barriers import KINDS, Built, Removal
 from rigdda.barriers.base import NEAR
 from rigdda.envs import DesignProblem
 
@@ -55,6 +55,8 @@ class Menu:
         if kind == "mesh":
             options = (self.room.mesh(i) for i in range(len(self.problem.site.meshes)))
             return [mesh for mesh in options if self.problem.fits((mesh,))]
+        if kind == "removal":
+            return [one for one in self.problem.site.removals if self.problem.fits((one,))]
         found = []
         for barrier in KINDS[kind].catalogue(self.zone):
             places = [*self.stations, *self._ends(barrier)]
@@ -103,6 +105,9 @@ class Menu:
         """Yield a barrier at other stations and of other sizes, including some that do not fit."""
         if isinstance(barrier, Mesh):
             yield from (b for b in self.lone("mesh") if b != barrier)
+            return
+        if isinstance(barrier, Removal):
+            yield from (b for b in self.problem.site.removals if b != barrier)
             return
         for way in (-1.0, 1.0):
             x = barrier.x + way * step
@@ -159,12 +164,13 @@ def _distances(table: Floats, centres: Floats) -> Floats:
 def on_bound(problem: DesignProblem, layout: Layout) -> tuple[str, ...]:
     """Return descriptions of the bounds of the zone, kind or class list on which a layout lies.
 
-    Bounds of mesh and bounds due to a neighbouring barrier are left out. The greatest height of a
-    class of fence is also left out, because the next class is higher and more expensive.
+    Bounds of mesh and removals and bounds due to a neighbouring barrier are left out. The greatest
+    height of a class of fence is also left out, because the next class is higher and more
+    expensive.
     """
     names = []
     for barrier in layout:
-        if not isinstance(barrier, Mesh):
+        if isinstance(barrier, Built):
             found = [*_place(problem, barrier), *barrier.sizes_at_bounds(problem.zone)]
             names += [f"{barrier.words}: {words}" for words in found]
     return tuple(names)

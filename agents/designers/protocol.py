@@ -26,7 +26,8 @@ from rigdda.agents.designers.menu import on_bound
 from rigdda.agents.designers.store import Store, StoredEvaluation
 from rigdda.agents.limits import RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
-from rigdda.envs.intervals import Estimate
+from rigdda.envs.intervals import Estimate, Mean
+from rigdda.envs.problem import excess
 
 STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
 """Streams of release seeds. search: all layouts of a search; semifinal, final: the best layouts
@@ -71,8 +72,8 @@ year]."""
 def score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, float]:
     """Return the sort key of a layout: the amount by which it misses a target, then its objective.
 
-    The amount is the excess of the upper bound of the probability over the target. It is 0 if the
-    targets are met or undecided.
+    The amount is the excess of the upper bound over the target. It is 0 if the targets are met or
+    undecided.
     """
     if evaluation.targets != "missed":
         return 0.0, evaluation.objective
@@ -84,14 +85,25 @@ def final_score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, 
     return shortfall(problem, evaluation), evaluation.objective
 
 
-def shortfall(
-    problem: DesignProblem,
-    evaluation: Evaluation,
-    of: Callable[[Estimate], float] = lambda chance: chance.bound,
-) -> float:
-    """Return the largest excess over a target in all design events [-].
+End = Literal["upper", "value", "lower"]
+"""Upper bound of a number, its estimate, or its lower bound."""
 
-    The excess is that of the upper bound of a probability, or of another number `of` its estimate.
+
+def of_chance(chance: Estimate, end: End) -> float:
+    """Return a probability or a one-sided 95 % bound of it."""
+    return {"upper": chance.bound, "value": chance.probability, "lower": chance.floor}[end]
+
+
+def of_mean(mean: Mean, end: End) -> float:
+    """Return a mean or an end of its 95 % interval."""
+    return {"upper": mean.high, "value": mean.value, "lower": mean.low}[end]
+
+
+def shortfall(problem: DesignProblem, evaluation: Evaluation, end: End = "upper") -> float:
+    """Return the largest excess over a target [-].
+
+    Targets are those of all design events and of the individual risk, see
+    `rigdda.envs.problem.excess`. The excess is that of upper bounds, estimates or lower bounds.
     """
     design = [event.name for event in problem.site.events if event.design]
     over = [0.0]
@@ -100,7 +112,10 @@ def shortfall(
         (problem.targets.failure, evaluation.failure),
     ):
         if wanted is not None:
-            over += [of(found[name]) - wanted for name in design]
+            over += [of_chance(found[name], end) - wanted for name in design]
+    wanted = problem.targets.individual
+    if wanted is not None and evaluation.risk is not None:
+        over.append(excess(of_mean(evaluation.risk.individual, end), wanted))
     return max(over)
 
 
@@ -114,10 +129,10 @@ def best_of_finals(problem: DesignProblem, evaluations: Sequence[Evaluation]) ->
     their excesses are not above the upper bound of the excess of the first.
     """
     first = min(evaluations, key=lambda e: final_score(problem, e))
-    if any(shortfall(problem, e, lambda p: p.probability) <= 0.0 for e in evaluations):
+    if any(shortfall(problem, e, "value") <= 0.0 for e in evaluations):
         return first
     most = shortfall(problem, first)
-    alike = [e for e in evaluations if shortfall(problem, e, lambda p: p.floor) <= most]
+    alike = [e for e in evaluations if shortfall(problem, e, "lower") <= most]
     return min(alike, key=lambda e: e.objective)
 
 

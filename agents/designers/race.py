@@ -182,7 +182,8 @@ def _kind(track: Track, menu: Menu, ensemble: CrossingEnsemble, barriers: list[B
     table: Catalogue = tabulate(problem, ensemble, barriers)
     annual = np.array([problem.site.annual((b,)) for b in barriers])
     without = float(table.weight @ table.base)
-    share = (table.objective - annual) / without if without > 0.0 else np.ones(len(barriers))
+    more = annual - problem.site.annual(())
+    share = (table.objective - more) / without if without > 0.0 else np.ones(len(barriers))
     trust = TRUST.get(barriers[0].kind, 0.5)
     expected = nothing * (trust * share + 1.0 - trust)
     length = menu.zone.end - menu.zone.start
@@ -366,7 +367,7 @@ def foretold(
         both = tuple(sorted((*one.layout, *two.layout), key=lambda b: b.x))
         if both in found or len(both) > problem.max_barriers or not problem.fits(both):
             continue
-        value = one.annual + two.annual
+        value = one.annual + two.annual - nothing.annual
         value += price * problem.site.capital(both) if price else 0.0
         for name in problem.site.event_names:
             base = nothing.mean(name)

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Fence, Layout
-from rigdda.agents.designers.protocol import Ledger
+from rigdda.agents.designers.protocol import End, Ledger, of_mean
 from rigdda.agents.designers.store import Release
 from rigdda.envs import DesignProblem
 from rigdda.envs.intervals import CONFIDENCE, lower_bound, upper_bound
+from rigdda.envs.problem import excess
 
 Floats = NDArray[np.float64]
 
@@ -104,18 +105,20 @@ class Arm:
         return float(own.std(ddof=1)) if len(own) > 1 else 0.0
 
     def shortfall(self) -> float:
-        """Return the largest excess of a design event over a target [-], 0 if there is none.
+        """Return the largest excess over a target [-], 0 if there is none.
 
-        The excess is that of the estimate or, if `strict`, of its upper bound. The upper bound is 1
-        without releases.
+        The excess is that of the estimate or, if `strict`, of its upper bound. The upper bound of a
+        probability is 1 without releases.
         """
-        return self.excess(upper_bound if self.strict else _share)
+        return self.excess("upper" if self.strict else "value")
 
-    def excess(self, of: Callable[[int, int], float]) -> float:
-        """Return the largest excess of a design event over a target [-], 0 if there is none.
+    def excess(self, end: End) -> float:
+        """Return the largest excess over a target [-], 0 if there is none.
 
-        `of` returns the number to compare with a target from a count and the number of releases.
+        It is that of upper bounds, estimates or lower bounds of the probabilities in design events
+        and of the individual risk.
         """
+        of = OF_COUNTS[end]
         targets = self.problem.targets
         over = [0.0]
         for event in self.problem.site.events:
@@ -125,6 +128,10 @@ class Arm:
                     if wanted is not None:
                         count = sum(getattr(r, which) for r in own)
                         over.append(of(count, len(own)) - wanted)
+        if targets.individual is not None:
+            killed = {name: [r.fatalities for r in own] for name, own in self.releases.items()}
+            risk = self.problem.individual_risk(self.layout, killed)
+            over.append(excess(of_mean(risk, end), targets.individual))
         return max(over)
 
     def key(self) -> tuple[float, float]:
@@ -136,6 +143,14 @@ def _share(count: int, releases: int) -> float:
     return count / releases if releases else 1.0
 
 
+OF_COUNTS: dict[End, Callable[[int, int], float]] = {
+    "upper": upper_bound,
+    "value": _share,
+    "lower": lower_bound,
+}
+"""Functions of a count and the number of releases that return a probability or a bound of it."""
+
+
 def best_of_ends(ends: Sequence[Arm]) -> Arm:
     """Return the best arm of a final, as `protocol.best_of_finals` does.
 
@@ -144,10 +159,10 @@ def best_of_ends(ends: Sequence[Arm]) -> Arm:
     ends : sequence of Arm
         The arms, by their keys.
     """
-    if any(arm.excess(_share) <= 0.0 for arm in ends):
+    if any(arm.excess("value") <= 0.0 for arm in ends):
         return ends[0]
     most = ends[0].shortfall()
-    return min((a for a in ends if a.excess(lower_bound) <= most), key=lambda a: a.objective())
+    return min((a for a in ends if a.excess("lower") <= most), key=lambda a: a.objective())
 
 
 def error(arm: Arm, nothing: Arm) -> float:

@@ -112,13 +112,14 @@ class Release(NamedTuple):
     """Stored values of a release.
 
     These are its bill [EUR per occurrence], the volume on the road [m3], whether a block reached
-    the road and whether a barrier failed.
+    the road, whether a barrier failed, and the expected fatalities (0 without `[traffic]`).
     """
 
     bill: float
     volume: float
     reached: bool
     failed: bool
+    fatalities: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,7 +272,8 @@ class Store:
                 found[outcome.event].append(_release(problem, layout, outcome))
             kept = {name: tuple(releases) for name, releases in found.items()}
             missing = {name: LENT for name in problem.site.event_names if not asked.get(name)}
-            lent = problem.sample((), missing) if missing else ()
+            sample = problem.sample((), missing) if missing else ()
+            lent = [replace(outcome, barriers=()) for outcome in sample]  # existing barriers
             judged = problem.judge(layout, (*outcomes, *lent))
             unknown = dict.fromkeys(missing, estimate(0, 0))
             judged = replace(judged, reach=judged.reach | unknown, failure=judged.failure | unknown)
@@ -333,7 +335,10 @@ def _release(problem: DesignProblem, layout: Layout, outcome: Outcome) -> Releas
     """Return the stored values of an outcome."""
     bill = problem.site.bill(layout, outcome)
     failed = any(barrier.failed for barrier in outcome.barriers)
-    return Release(bill.harm + bill.repair, outcome.road_volume, outcome.reached, failed)
+    killed = 0.0
+    if problem.site.traffic is not None:
+        killed = float(problem.site.toll(layout, outcome).fatalities)
+    return Release(bill.harm + bill.repair, outcome.road_volume, outcome.reached, failed, killed)
 
 
 def _sum(key: str, data: Any) -> str:

@@ -84,6 +84,11 @@ def _budget(text: str) -> str:
         return text
 
 
+def small(number: float) -> str:
+    """Return a small number with two significant figures."""
+    return f"{number:.2g}"
+
+
 def _quantity(name: str, unit: str) -> str:
     """Return the name of a quantity with its unit."""
     said = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
@@ -131,9 +136,9 @@ EXHIBITS = (
         "Cost of each layout",
         f"Z is the sum of capital and upkeep, expected harm on the road and expected repair, in "
         f"{PER_YEAR} with 95 % intervals. To build: EUR per metre of road. Debris: volume on the "
-        "road, relative to no barriers. rule: the fence of UNI 11211-4; rock shed: a reference "
-        "with full protection. All layouts were verified on the same number of releases that the "
-        "search did not use.",
+        "road, relative to the first layout. rule: the fence of UNI 11211-4; rock shed: a "
+        "reference with full protection. All layouts were verified on the same number of releases "
+        "that the search did not use.",
         (
             Column("layout", ("layout", "barriers"), _called, number=False),
             interval("Z", "objective", euros),
@@ -164,9 +169,9 @@ EXHIBITS = (
             value("releases", "releases"),
         ),
     ),
-    Exhibit("layouts", "section.png", "Without barriers and with the layout",
+    Exhibit("layouts", "section.png", "The slope without and with the layout",
             "Some trajectories of each event to scale. Below, the heights and energies that 95 % "
-            "of the passing blocks stay below without barriers.", command="design"),
+            "of the passing blocks stay below without it.", command="design"),
     Exhibit("layouts", "cost.png", "Cost and risk",
             "Annual capital cost of layouts against their remaining risk. Z is the same along the "
             "thin lines."),
@@ -263,6 +268,22 @@ EXHIBITS = (
             "The design of each fence, factor by factor."),
     Exhibit("checks", "demand.png", "What the rule demands along the slope",
             "Class and height of a fence that the engineering rule demands at each chainage."),
+    Exhibit(
+        "risk",
+        "risk.csv",
+        "Risk to life and traffic of each layout",
+        "Expected numbers per year on the section of road below the site, with 95 % intervals: "
+        "vehicles that falling rock hits, vehicles that run into debris, deaths, deaths per km of "
+        "road, and the probability that one commuter is killed.",
+        (
+            words("layout", "layout"),
+            interval("vehicles hit", "hit", small),
+            interval("run into debris", "run_into", small),
+            interval("deaths", "fatalities", small),
+            interval("deaths per km", "per_km", small),
+            interval("one commuter", "individual", small),
+        ),
+    ),
     Exhibit("sureness", "sensitivity.csv", "Sensitivity to the inputs",
             "Influence of each input on each output, the most important first."),
     Exhibit("sureness", "tornado.png", "Sensitivity to the inputs",
@@ -271,7 +292,7 @@ EXHIBITS = (
             f"Z in {PER_YEAR} and probabilities of each layout on grounds within the plausible "
             "range."),
     Exhibit("sureness", "band.png", "The layouts on other grounds",
-            "Z of each layout on each ground, ordered by Z without barriers."),
+            "Z of each layout on each ground, ordered by Z of the first layout."),
     Exhibit("sureness", "fit.csv", "Fit to observations",
             "Fitted numbers with 95 % intervals, and how well the fit predicts observations that "
             "were left out."),

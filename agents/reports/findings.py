@@ -8,7 +8,7 @@ from rigdda import BadInput, Layout, Mesh, Site
 from rigdda.agents.design_study import ComparedLayouts, DesignStudy, design_events
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
-from rigdda.agents.reports.wording import at_most, euros, percent, span
+from rigdda.agents.reports.wording import at_most, before, euros, percent, span
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.problem import MET, MISSED, UNDECIDED
@@ -38,6 +38,16 @@ def of_layout(site: Site, layout: Layout, event: str | None) -> str:
             "their rates without mesh; `design` and `study` take mesh into account"
         )
     return "; ".join(words)
+
+
+def kept(site: Site, layout: Layout) -> list[str]:
+    """Return lines on what happens to the existing barriers of a site with a layout."""
+    stand = site.standing(layout)
+    return [
+        f"existing {barrier.label}, at x = {barrier.x:.1f} m: "
+        + ("kept" if barrier in stand else "removed")
+        for barrier in site.existing_barriers
+    ]
 
 
 def unfitted(site: Site) -> str:
@@ -78,7 +88,7 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
         Text on the remaining risk.
     """
     chosen = cases[-1][1]
-    parts = [pays(cases)]
+    parts = [pays(result.site, cases)]
     parts += [_costs_less(name, other, cases[-1]) for name, other in cases[1:-1]]
     if chosen.layout and result.on_bound:
         parts.append(f"the layout lies on a bound of the search: {', '.join(result.on_bound)}")
@@ -102,14 +112,17 @@ def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> s
     return f"{line}: use a larger --budget"
 
 
-def pays(cases: Sequence[tuple[str, Evaluation]]) -> str:
+def pays(site: Site, cases: Sequence[tuple[str, Evaluation]]) -> str:
     """Return a text if no layout pays or if this is not shown; otherwise an empty text.
 
     Parameters
     ----------
+    site : Site
+        The site.
     cases : sequence of (str, Evaluation)
         Verified layouts; the first is no barrier, and the last is the layout found.
     """
+    status = "the slope as it stands" if site.existing else "no barrier"
     nothing, chosen = cases[0][1], cases[-1][1]
     if chosen.layout:
         if chosen.ci[1] < nothing.ci[0]:
@@ -117,21 +130,21 @@ def pays(cases: Sequence[tuple[str, Evaluation]]) -> str:
         if chosen.ci[0] > nothing.ci[1]:
             return (
                 f"the layout costs more per year than it saves: Z is {span(chosen.ci)} with it and "
-                f"{span(nothing.ci)} without barriers"
+                f"{span(nothing.ci)} {before(site)}"
             )
         return (
             f"{chosen.releases:,} releases do not show that the layout saves more than it costs: Z "
-            f"is {span(chosen.ci)} with the layout and {span(nothing.ci)} without barriers"
+            f"is {span(chosen.ci)} with the layout and {span(nothing.ci)} {before(site)}"
         )
     lower = [(name, e) for name, e in cases[1:-1] if e.objective < nothing.objective]
     if not lower:
-        return "none of the verified layouts costs less per year than no barrier"
+        return f"none of the verified layouts costs less per year than {status}"
     open_ = [name for name, e in lower if e.ci[1] >= nothing.ci[0]]
     if not open_:
         return ""  # `limits` names the layouts that cost less
     names = " and ".join(map(repr, open_))
     return (
-        f"{names} may cost less per year than no barrier, but {nothing.releases:,} releases do "
+        f"{names} may cost less per year than {status}, but {nothing.releases:,} releases do "
         "not show it"
     )
 
@@ -237,7 +250,7 @@ def left_over(evaluation: Evaluation) -> str:
 def failing(site: Site, evaluation: Evaluation) -> list[str]:
     """Return lines on the failure of barriers in design events, if it may be above 5 %."""
     lines = []
-    for event in design_events(site) if evaluation.layout else ():
+    for event in design_events(site) if site.standing(evaluation.layout) else ():
         chance = evaluation.failure[event]
         if chance.releases and chance.bound > SURE:
             lines.append(
@@ -254,5 +267,8 @@ def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
         return ""
     pairs = (("reach", asked.reach), ("failure", asked.failure))
     words = " and ".join(f"P({name}) <= {percent(p)}" for name, p in pairs if p is not None)
+    parts = [f"{words} in every design event"] if words else []
+    if asked.individual is not None:
+        parts.append(f"individual risk <= {asked.individual:.2g} a year")
     more = "; a larger --verify would decide it" if evaluation.targets == "undecided" else ""
-    return f"target {words} in every design event: {evaluation.targets}{more}"
+    return f"target {' and '.join(parts)}: {evaluation.targets}{more}"

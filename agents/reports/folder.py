@@ -12,9 +12,8 @@ from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import findings, frontier_report, layout_tables, pictures
 from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
 from rigdda.agents.reports.simulation_folder import along
-from rigdda.agents.reports.tables import write_rows
-from rigdda.agents.reports.wording import euros, span
-from rigdda.barriers import standing
+from rigdda.agents.reports.tables import known_risks, write_risks, write_rows
+from rigdda.agents.reports.wording import before, euros, span, unchanged
 from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
 
@@ -38,6 +37,7 @@ def write(done: DesignStudy, out: Path, seed: int) -> None:
     """
     write_rows(out / "layouts.csv", layout_tables.layouts(done))
     write_rows(out / "chances.csv", layout_tables.chances(done))
+    write_risks(out, known_risks(done))
     rigdda.save_layout(done.chosen.evaluation.layout, out / "layout.toml")
     _section(done, out / "section.png", seed)
     frontier_report.write(out, done.problem, done.frontier)
@@ -52,12 +52,13 @@ def _section(done: DesignStudy, path: Path, seed: int) -> None:
     """Draw the slope without barriers and with the layout."""
     site, chosen = done.problem.site, done.chosen
     nothing = _all(site, (), seed)
-    panels = [Panel(f"Without barriers: {_words(done.nothing)}", (), nothing)]
+    bare = "As it stands" if site.existing else "Without barriers"
+    panels = [Panel(f"{bare}: {_words(done.nothing)}", (), nothing)]
     layout = chosen.evaluation.layout
     if layout:
         panels.append(Panel(f"With the layout: {_words(chosen)}", layout, _all(site, layout, seed)))
     found = envelopes(site, (), release_seeds("ensemble", seed, ENOUGH), along(site))
-    section(path, site, done.problem.zone, panels, found, "Without barriers")
+    section(path, site, done.problem.zone, panels, found, bare)
 
 
 def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:
@@ -79,20 +80,20 @@ def _replay(done: DesignStudy, path: Path, seed: int) -> None:
     site, nothing, chosen = done.problem.site, done.nothing, done.chosen
     event = findings.worst(nothing.evaluation) or site.event_names[0]
     seeds = release_seeds("verification", seed, SEEN)
-    before = done.problem.sample((), {event: seeds})
-    drawn = next((s for s, o in zip(seeds, before, strict=True) if o.reached), seeds[0])
+    bare = done.problem.sample((), {event: seeds})
+    drawn = next((s for s, o in zip(seeds, bare, strict=True) if o.reached), seeds[0])
     layout = chosen.evaluation.layout
     run, outcome = rigdda.release(site, layout, drawn, event)
     risk = nothing.evaluation.by_event[event]
     notes = {
-        "layout": "; ".join(b.label for b in layout) or "no barrier",
-        "event": f"{event}, {euros(risk)} EUR per metre and year without barriers",
+        "layout": "; ".join(b.label for b in layout) or unchanged(site),
+        "event": f"{event}, {euros(risk)} EUR per metre and year {before(site)}",
         "release": f"seed {drawn}, {outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3 "
         "reach the road",
-        "without barriers": _words(nothing),
+        before(site): _words(nothing),
         "with the layout": _words(chosen),
     }
-    labels = tuple(barrier.label for barrier in standing(layout))
+    labels = site.labels(layout)
     road = site.road.start, site.road.end
     record = release_record(site, layout, drawn, event, outcome)
     run.to_rerun(path, Marks(road, notes, f"{site.name}: {chosen.name}", labels, record))

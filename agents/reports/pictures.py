@@ -18,12 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
 from rigdda.agents.reports.stations import Passing, Rows, summary
-from rigdda.barriers import Earthwork, earthworks, standing
-from rigdda.display import BARRIER, ROAD, ZONE
+from rigdda.barriers import Earthwork, earthworks
+from rigdda.barriers.fence import WornFence
+from rigdda.display import BARRIER, OLD, ROAD, ZONE
 from rigdda.envs import Evaluation
 from rigdda.envs.envelope import largest
 from rigdda.envs.rendering import (
     BAND,
+    DASHED,
     STRETCH,
     Label,
     draw_barrier,
@@ -117,11 +119,10 @@ def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -> Flights
     Diverged
         If a simulation diverges.
     """
-    barriers = standing(layout)
-    first = _run(site, barriers, event, seeds[0])
+    first = _run(site, layout, event, seeds[0])
     more = seeds[1 : max(1, -(-DRAWN // len(first.scene.blocks)))]
     with ThreadPoolExecutor() as pool:
-        runs = [first, *pool.map(lambda seed: _run(site, barriers, event, seed), more)]
+        runs = [first, *pool.map(lambda seed: _run(site, layout, event, seed), more)]
     ways = [run.poses[:, i, :2] for run in runs for i in range(run.poses.shape[1])]
     return Flights(event, tuple(ways[:: max(1, len(ways) // DRAWN)]))
 
@@ -481,7 +482,7 @@ def _slope(
 
     Return the labels of the barriers, which are written when the size of the axes is final.
     """
-    built, moved = earthworks(site.profile, standing(panel.layout), site.slope.surface)
+    built, moved = earthworks(site.profile, site.standing(panel.layout), site.slope.surface)
     *_, bottom, top = window
     draw_ground(axes, site, built, bottom)
     axes.plot(*site.ground_between(site.road.start, site.road.end).T, color=ROAD, linewidth=5,
@@ -507,12 +508,14 @@ def _barriers(
     for barrier in layout:
         if isinstance(barrier, Mesh):
             labels.append(Label(barrier.label, draw_mesh(axes, site, barrier, thickness)))
-    for built in standing(layout):
+    old = site.existing_barriers
+    for built, words in zip(site.standing(layout), site.labels(layout), strict=True):
         outline = moved[built] if isinstance(built, Earthwork) else built.outline(site.profile)
-        draw_barrier(axes, built, outline)
+        colour = OLD if built in old else BARRIER
+        draw_barrier(axes, built, outline, colour=colour, old=built in old)
         if isinstance(built, Fence):
             draw_elongation(axes, site, built)
-        labels.append(Label(built.label, top_of(outline)))
+        labels.append(Label(words, top_of(outline), colour))
     return labels
 
 
@@ -534,17 +537,19 @@ def _envelopes(
         axes.axvspan(site.road.start, site.road.end, color=ROAD, alpha=0.2, lw=0)
         axes.grid(alpha=0.25)
         axes.set_xlabel("x [m]")
-    for barrier in standing(layout):
+    for barrier in site.standing(layout):
         tall = barrier.left_height(0.0)
+        colour = OLD if barrier in site.existing_barriers else BARRIER
         if tall > 0.0:
-            heights.plot([barrier.x] * 2, [0.0, tall], color=BARRIER, linewidth=4,
+            heights.plot([barrier.x] * 2, [0.0, tall], color=colour, linewidth=4,
                          solid_capstyle="butt")  # fmt: skip
         else:
-            heights.axvline(barrier.x, color=BARRIER, linewidth=1, linestyle=":")
+            heights.axvline(barrier.x, color=colour, linewidth=1, linestyle=":")
         if isinstance(barrier, Fence) and barrier.energy_class is not None:
-            energies.plot(barrier.x, barrier.energy_class, "D", color=BARRIER, markersize=8)
+            takes = barrier.remaining if isinstance(barrier, WornFence) else barrier.rated
+            energies.plot(barrier.x, takes, "D", color=colour, markersize=8)
         else:
-            energies.axvline(barrier.x, color=BARRIER, linewidth=1, linestyle=":")
+            energies.axvline(barrier.x, color=colour, linewidth=1, linestyle=":")
     if any((own.energy[0] > 0.0).any() for own in found):  # otherwise there are no curves
         plain_log(energies)
     heights.set_ylim(bottom=0.0)
@@ -607,6 +612,10 @@ def _key(figure: FigureBase, site: Site, events: Sequence[str], envelopes: bool 
         Line2D([], [], color=BARRIER, marker="D", linewidth=4, label="barrier: height, class"),
         Patch(color=BARRIER, alpha=STRETCH, lw=0, label="elongation of a fence"),
     ]
+    if site.existing:
+        lines.append(
+            Line2D([], [], color=OLD, linestyle=DASHED, linewidth=4, label="existing barrier")
+        )
     if envelopes:
         lines += [
             Patch(color="black", alpha=0.2, lw=0, label="95 % interval"),

@@ -27,7 +27,8 @@ from rigdda.agents.reports.html_blocks import (
 )
 from rigdda.agents.reports.results_folder import FIELD, ResultsFolder
 from rigdda.agents.reports.stations import RATE
-from rigdda.agents.reports.wording import euros, figure, order, percent, span
+from rigdda.agents.reports.tables import RISKS
+from rigdda.agents.reports.wording import before, euros, figure, order, percent, span
 from rigdda.agents.run_record import RunRecord
 
 Folders = Sequence[ResultsFolder]
@@ -125,7 +126,7 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
     site, targets = folder.site, chosen["targets"]
     layout = rigdda.load_layout(folder.path / "layout.toml")
     if layout and site is not None:
-        built = [_place(order(barrier, site), barrier.x, site) for barrier in layout]
+        built = [order(barrier, site) for barrier in layout]
         yield Paragraph(f"Build: {'; '.join(built)}.", "answer")
     else:
         yield Paragraph("Build nothing: no layout was found that is worth its cost.", "answer")
@@ -134,23 +135,28 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
         mood = "good" if targets == "met" else "warning"
         yield Paragraph(_verdict(targets, asked), mood)
     z, nothing = _money_of(chosen), _money_of(rows[0])
-    if layout and (doubt := _doubt(chosen, rows[0], bool(targets))):
+    bare = before(site) if site is not None else "without barriers"
+    if layout and (doubt := _doubt(chosen, rows[0], bool(targets), bare)):
         yield Paragraph(doubt, "warning")
     yield Figures([
         ("To build", f"{euros(float(chosen['cost']))} EUR", "per metre of road"),
         ("Annual cost Z", f"{z} EUR", f"per metre and year with it ({_ends_of(chosen)})"),
-        ("Without barriers", f"{nothing} EUR", f"per metre and year ({_ends_of(rows[0])})"),
-        *_chances(folder, chosen["layout"], rows[0]["layout"]),
+        (bare.capitalize(), f"{nothing} EUR", f"per metre and year ({_ends_of(rows[0])})"),
+        *_chances(folder, chosen["layout"], rows[0]["layout"], bare),
+        *_individual(folder, chosen["layout"], rows[0]["layout"], bare),
     ])  # fmt: skip
 
 
-def _doubt(chosen: Row, nothing: Row, targets: bool) -> str:
-    """Return a warning if a layout costs more than it saves, or is not shown to save anything."""
+def _doubt(chosen: Row, nothing: Row, targets: bool, bare: str) -> str:
+    """Return a warning if a layout costs more than it saves, or is not shown to save anything.
+
+    `bare` is what the case without the layout is called.
+    """
     if float(chosen["objective_low"]) > float(nothing["objective_high"]):
         reason = ", and only the target is a reason to build it" if targets else ""
         return (
             f"A year costs {_money_of(chosen)} EUR per metre of road with this layout and "
-            f"{_money_of(nothing)} EUR without barriers: it costs more than it saves{reason}."
+            f"{_money_of(nothing)} EUR {bare}: it costs more than it saves{reason}."
         )
     if float(chosen["objective_high"]) >= float(nothing["objective_low"]):
         return (
@@ -160,31 +166,25 @@ def _doubt(chosen: Row, nothing: Row, targets: bool) -> str:
     return ""
 
 
-def _place(text: str, x: float, site: Site) -> str:
-    """Return the order of a barrier with its place on the survey, if the survey has another."""
-    origin = site.origin
-    if not (origin.chainage or origin.elevation or origin.reversed):
-        return text
-    level = site.profile.height(x) + origin.elevation
-    return (
-        f"{text} (chainage {origin.chainage_of(x):,.1f} m of the survey, ground at elevation "
-        f"{level:,.1f} m)"
-    )
-
-
 def _asked(folder: ResultsFolder) -> str:
     """Return the targets of a design in words."""
     options = folder.records["design"].options
     pairs = (
         ("target", "a block of a design event reaches the road"),
         ("failure", "a barrier fails in a design event"),
+        ("target_risk", "a commuter is killed within a year"),
     )
     said = [
-        f"{what} with a probability of at most {percent(float(options[name]))}"
+        f"{what} with a probability of at most {_limit(name, float(options[name]))}"
         for name, what in pairs
         if options.get(name) is not None
     ]
     return " and that ".join(said)
+
+
+def _limit(name: str, value: float) -> str:
+    """Return the value of a target as text."""
+    return f"{value:.2g}" if name == "target_risk" else percent(value)
 
 
 def _verdict(state: str, asked: str) -> str:
@@ -205,14 +205,29 @@ def _ends_of(row: Row) -> str:
     return span((float(row["objective_low"]), float(row["objective_high"])))
 
 
-def _chances(folder: ResultsFolder, name: str, without: str) -> Iterator[tuple[str, str, str]]:
-    """Yield the probabilities of the design events with a layout, and without barriers."""
+def _individual(
+    folder: ResultsFolder, name: str, without: str, bare: str
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the individual risk with a layout and without it, if the site gives traffic."""
+    _, rows = folder.table(RISKS) if folder.files(RISKS) else ([], [])
+    own = {row["layout"]: row for row in rows}
+    if name in own and without in own:
+        now, then = (float(own[layout]["individual"]) for layout in (name, without))
+        high = float(own[name]["individual_high"])
+        rest = f"a year, at most {high:.2g}; {bare} {then:.2g}"
+        yield "A commuter is killed", f"{now:.2g}", rest
+
+
+def _chances(
+    folder: ResultsFolder, name: str, without: str, bare: str
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the probabilities of the design events with a layout, and without it."""
     _, rows = folder.table("chances.csv") if folder.files("chances.csv") else ([], [])
     for row in rows:
         if row["design"] == "True" and row["layout"] == name:
-            before = next(r for r in rows if r["event"] == row["event"] and r["layout"] == without)
+            earlier = next(r for r in rows if r["event"] == row["event"] and r["layout"] == without)
             reach, bound = float(row["reach"]), float(row["reach_bound"])
-            rest = f"at most {percent(bound)}; without barriers {percent(float(before['reach']))}"
+            rest = f"at most {percent(bound)}; {bare} {percent(float(earlier['reach']))}"
             yield f"“{row['event']}” reaches the road", percent(reach), rest
             fails, bound = float(row["failure"]), float(row["failure_bound"])
             if name != without:
@@ -227,7 +242,8 @@ def _passing(folder: ResultsFolder) -> Iterator[Block]:
     last = rows[-1]["event"] if rows else ""
     record = folder.records.get("simulate")
     layout = record.options.get("layout") if record else None
-    what = f"with the layout of {layout}" if layout else "without barriers"
+    bare = before(folder.site) if folder.site is not None else "without barriers"
+    what = f"with the layout of {layout}" if layout else bare
     lines = []
     for row in rows:
         if row["event"] == last and row["quantity"] == RATE:

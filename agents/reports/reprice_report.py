@@ -9,7 +9,7 @@ import rigdda
 from rigdda.agents.design_study import SHED
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.reports import findings, frontier_report, pictures
-from rigdda.agents.reports.tables import write_rows
+from rigdda.agents.reports.tables import known_risks, write_risks, write_rows
 from rigdda.agents.reports.wording import number
 from rigdda.agents.reprice import BEST, Change, Repriced
 from rigdda.envs import Evaluation
@@ -20,6 +20,7 @@ FILES = ("costs.csv", "site.toml", "layout.toml", "cost.png")
 def write(done: Repriced, folder: Path) -> None:
     """Write the table, the site with its new values, the best layout and the pictures."""
     write_rows(folder / "costs.csv", rows(done))
+    write_risks(folder, known_risks(done))
     done.problem.site.save(folder / "site.toml")
     rigdda.save_layout(done.chosen.evaluation.layout, folder / "layout.toml")
     points = [pictures.Point.of(case.name, case.evaluation) for case in done.cases]
@@ -84,7 +85,7 @@ def sentences(done: Repriced) -> list[str]:
         line += "too low; `rigdda design` with site.toml searches and verifies again"
     lines = [line]
     lines += findings.over_the_cap(done.problem, cases)
-    lines.append(findings.pays(cases))
+    lines.append(findings.pays(done.problem.site, cases))
     lines += [*findings.failing(done.problem.site, chosen)]
     lines.append(findings.undecided(done.problem, chosen))
     lines.append(findings.left_over(chosen))

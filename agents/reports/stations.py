@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rigdda import Layout, Site
 from rigdda.agents.reports.tables import empty_table, write_rows
-from rigdda.agents.reports.wording import figure
+from rigdda.agents.reports.wording import figure, survey_place
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
 from rigdda.envs.quantiles import BlockSample, Quantile, mean, quantiles
 from rigdda.files import atomic
@@ -156,7 +156,8 @@ def summary(passing: Passing, places: Sequence[int]) -> Rows:
 def _station(passing: Passing, station: int, group: str) -> Iterator[dict[str, Any]]:
     """Yield the rows of one station and event."""
     rows, releases = passing.passages(group, station), len(passing.releases(group))
-    head = {"x_m": float(passing.found.stations[station]), "event": group}
+    x = float(passing.found.stations[station])
+    head = {"x_m": x, **survey_place(passing.site, x), "event": group}
     known = {"releases": releases, "n": len(rows)}
     for name, quantity in QUANTITIES.items():
         sample = passing.sample(group, rows, quantity.of(rows))
@@ -223,11 +224,18 @@ def raw(passing: Passing, places: Sequence[int]) -> Rows:
     values = zip(*(column.tolist() for column in own.values()), strict=True)
     seeds = passing.found.seed
     heads = zip(*(table[k].tolist() for k in ("station", "release", "event", "block")), strict=True)
+    surveyed = [survey_place(passing.site, x) for x in lines]
     return [
-        {"x_m": lines[s], "seed": seeds[r], "event": names[e], "block": b}
+        {"x_m": lines[s], **surveyed[s], "seed": seeds[r], "event": names[e], "block": b}
         | dict(zip(own, v, strict=True))
         for (s, r, e, b), v in zip(heads, values, strict=True)
     ]
+
+
+def raw_fields(site: Site) -> list[str]:
+    """Return the columns of the table of passages of a site."""
+    survey = survey_place(site, site.road.start)
+    return [RAW[0], *survey, *RAW[1:]]
 
 
 RAW = (
@@ -248,6 +256,7 @@ def stops(passing: Passing) -> Rows:
             "event": names[e],
             "block": b,
             "x_m": x,
+            **survey_place(passing.site, x),
             "state": STATES[s],
             "mass_kg": m,
         }
@@ -284,7 +293,8 @@ def _beyond(passing: Passing, group: str, grid: Floats) -> Iterator[dict[str, An
         beyond = (table["x"] > x) | (table["state"] == LEFT)
         often = passing.frequency(group, table[beyond])
         yield {
-            "event": group, "x_m": x, "releases": len(passing.releases(group)),
+            "event": group, "x_m": x, **survey_place(passing.site, x),
+            "releases": len(passing.releases(group)),
             **_ends("probability", often.times(1.0 / whole) if whole > 0.0 else often),
             **_ends("rate", often),
             "share_of_blocks": float(weight[beyond].sum() / weight.sum()),
@@ -336,8 +346,14 @@ def tables(rows: Rows) -> Iterator[tuple[str, Table]]:
             if row["quantity"] in SHOWN:
                 words = f"{row['quantity']} [{row['unit']}]"
                 out.add_row(words, *(_words(row, name) for name in ("q50", "q95", "q99")))
+        survey = ""
+        if "chainage_m" in often:
+            survey = (
+                f" (survey: chainage {often['chainage_m']:,.1f} m, elevation "
+                f"{often['elevation_m']:,.1f} m)"
+            )
         line = (
-            f"at {often['x_m']:g} m {often['n']:,} blocks pass, in "
+            f"at {often['x_m']:g} m{survey} {often['n']:,} blocks pass, in "
             f"{_words(often, 'mean')} releases a year per 100 m of road"
         )
         yield line, out

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from rigdda import Layout, Site
 from rigdda.agents.reports import pictures
-from rigdda.agents.reports.tables import bounded, empty_table, write_rows
+from rigdda.agents.reports.tables import bounded, empty_table, risk_table, write_risks, write_rows
 from rigdda.agents.reports.wording import euros, span
 from rigdda.envs.comparison import LEAST, Difference, difference_of_accounts
 from rigdda.envs.cost import Account, Facts, Sums, stratified
 from rigdda.envs.intervals import Estimate, estimate
+from rigdda.envs.traffic_risk import Risk
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,6 +99,12 @@ class StudyResults:
         annual, both = self.site.annual(one.layout), self.sums(one).both
         return annual + both.value, annual + both.low, annual + both.high
 
+    def risk(self, one: StudiedLayout) -> Risk | None:
+        """Return the risk of a layout to the traffic; None if the site has no `[traffic]`."""
+        if self.site.traffic is None:
+            return None
+        return Risk.of(self.site.traffic, self.sums(one).toll)
+
     def cheapest(self) -> StudiedLayout:
         """Return the layout with the lowest Z."""
         return min(self.layouts, key=lambda one: self.objective(one)[0])
@@ -139,13 +146,26 @@ def events(results: StudyResults) -> Table:
     out = empty_table(("event", "layout", "reaches road", "barrier fails", "on road", "hit"))
     for event in results.site.event_names:
         for i, one in enumerate(results.layouts):
-            fails = bounded(one.chance(event, failed=True)) if one.layout else "-"
+            stands = results.site.standing(one.layout)
+            fails = bounded(one.chance(event, failed=True)) if stands else "-"
             energies = [one.energy(event), one.energy(event, hit=True)]
             words = ["-" if np.isnan(e) else euros(e) for e in energies]
             reach = bounded(one.chance(event))
             out.add_row("" if i else event, one.name, reach, fails, *words)
         out.add_section()
     return out
+
+
+def risks(results: StudyResults) -> Table | None:
+    """Return the table of the risk of each layout to the traffic, or None without traffic."""
+    known = _known_risks(results)
+    return risk_table(known) if known else None
+
+
+def _known_risks(results: StudyResults) -> list[tuple[str, Risk]]:
+    """Return the risk of each layout to the traffic; empty without traffic."""
+    pairs = ((one.name, results.risk(one)) for one in results.layouts)
+    return [(name, risk) for name, risk in pairs if risk is not None]
 
 
 def layout_rows(results: StudyResults) -> list[dict[str, Any]]:
@@ -229,6 +249,7 @@ def write(folder: Path, results: StudyResults, seed: int) -> None:
     write_rows(folder / FILES[1], event_rows(results))
     fields = ("one", "two", "difference", "low", "high", "releases", "differ")
     write_rows(folder / FILES[2], difference_rows(results), fields)
+    write_risks(folder, _known_risks(results))
     sections(folder / FILES[3], results, seed)
     bars(folder / FILES[4], results)
 

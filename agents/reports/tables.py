@@ -25,9 +25,17 @@ from rigdda import (
 )
 from rigdda.agents.design_study import SHED, ComparedLayouts, design_events
 from rigdda.agents.designers.protocol import Entry
-from rigdda.agents.reports.wording import at_most, euros, percent, span
-from rigdda.barriers import Earthwork, standing, to_tables
-from rigdda.envs.intervals import Estimate, estimate, mid_p, student_interval
+from rigdda.agents.reports.wording import (
+    at_most,
+    euros,
+    percent,
+    span,
+    survey_place,
+    surveyed,
+)
+from rigdda.barriers import Earthwork, to_tables
+from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
+from rigdda.envs.traffic_risk import Risk
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
@@ -71,7 +79,10 @@ class EvaluationsFile:
     """A CSV file with one row per evaluated layout, which is written during the search.
 
     Costs are in EUR per metre of road and year, except `cost`, which is in EUR per metre. The
-    column `barriers` is a JSON list of tables as in a layout file. The class is a context manager.
+    column `barriers` is a JSON list of tables as in a layout file. If the site has traffic, there
+    are also the columns of `RISK`; if it has other coordinates than its survey, `survey` is a JSON
+    list of the chainage and elevation on the survey of each barrier. The class is a context
+    manager.
     """
 
     FIELDS = (
@@ -80,10 +91,18 @@ class EvaluationsFile:
         "barriers",
     )  # fmt: skip
 
-    def __init__(self, path: str | os.PathLike[str]):
+    RISK = (
+        "vehicles_hit", "vehicles_run_into", "fatalities", "individual_risk",
+        "individual_risk_low", "individual_risk_high",
+    )  # fmt: skip
+
+    def __init__(self, path: str | os.PathLike[str], site: Site):
+        self._site = site
         self._file = Path(path).open("w", newline="", encoding="utf-8")
         self._rows = csv.writer(self._file)
-        self._rows.writerow(self.FIELDS)
+        risk = () if site.traffic is None else self.RISK
+        survey = ("survey",) if site.origin.surveyed else ()
+        self._rows.writerow((*self.FIELDS, *risk, *survey))
 
     def __enter__(self) -> EvaluationsFile:
         return self
@@ -94,11 +113,15 @@ class EvaluationsFile:
     def add(self, entry: Entry) -> None:
         """Write one row and flush it."""
         e = entry.evaluation
-        row = (
+        row: tuple[Any, ...] = (
             entry.simulations, entry.stage, e.releases, e.objective, *e.ci, e.capital, e.harm,
             e.repair, e.cost, e.debris, e.debris_share, e.targets or "", e.seconds,
             json.dumps(to_tables(e.layout)),
         )  # fmt: skip
+        if (r := e.risk) is not None:
+            row += (r.hit.value, r.run_into.value, r.fatalities.value, *r.individual)
+        if self._site.origin.surveyed:
+            row += (json.dumps([survey_place(self._site, b.x) for b in e.layout]),)
         self._rows.writerow(row)
         self._file.flush()
 
@@ -144,7 +167,7 @@ def applies_not(value: Any) -> bool:
     return isinstance(value, float) and math.isnan(value)
 
 
-def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
+def outcomes(site: Site, layout: Layout, results: Sequence[Outcome]) -> Table:
     """Return the table of means over releases with 95 % intervals."""
     table = empty_table(("", "mean", "95 % interval"))
 
@@ -161,9 +184,12 @@ def outcomes(layout: Layout, results: Sequence[Outcome]) -> Table:
         add(words, unit, factor, [getattr(outcome, name) for outcome in results])
     run_out = [outcome.run_out[1] for outcome in results]
     add("run-out of 95 % of the rock", "m", 1.0, run_out, -math.inf)
-    for i, barrier in enumerate(standing(layout)):
+    built = zip(site.standing(layout), site.labels(layout), strict=True)
+    for i, (barrier, label) in enumerate(built):
         table.add_section()
-        table.add_row(f"{barrier.label}, at {barrier.x:.1f} m")
+        table.add_row(f"{label}, at {barrier.x:.1f} m")
+        if words := surveyed(site, barrier.x):
+            table.add_row(words.strip())
         for name, (words, unit, factor) in HIT.items():
             if isinstance(barrier, Earthwork) and name not in ("overtopped", "caught", *ONLY):
                 continue
@@ -300,11 +326,57 @@ def chances(study: ComparedLayouts) -> Table | None:
         for i, case in enumerate(study.cases):
             e = case.evaluation
             reach = e.reach[event]
-            fails = bounded(e.failure[event]) if e.layout else "-"
+            standing = study.problem.site.standing(e.layout)
+            fails = bounded(e.failure[event]) if standing else "-"
             name = "" if i else event
             table.add_row(name, case.name, bounded(reach), fails, f"{reach.releases:,}")
         table.add_section()
     return table
+
+
+def risks(study: ComparedLayouts) -> Table | None:
+    """Return the table of the risk of each layout to the traffic, or None without traffic."""
+    found = known_risks(study)
+    return risk_table(found) if found else None
+
+
+def risk_table(found: Sequence[tuple[str, Risk]]) -> Table:
+    """Return the table of the risk of named layouts to the traffic on the section, per year.
+
+    The individual risk is followed by the upper end of its 95 % interval.
+    """
+    table = empty_table(("layout", "hit", "run into", "deaths", "per km", "one person"))
+    for name, risk in found:
+        means = (risk.hit, risk.run_into, risk.fatalities, risk.per_km)
+        one = f"{risk.individual.value:.2g} (<= {risk.individual.high:.2g})"
+        table.add_row(name, *(f"{mean.value:.2g}" for mean in means), one)
+    return table
+
+
+RISKS = "risk.csv"
+"""File with the risk of each layout to the traffic."""
+
+
+def write_risks(folder: Path, found: Sequence[tuple[str, Risk]]) -> None:
+    """Write the risk of named layouts to `risk.csv`, or remove an old file if there is none."""
+    if found:
+        write_rows(folder / RISKS, [{"layout": name, **_risk_row(risk)} for name, risk in found])
+    else:
+        (folder / RISKS).unlink(missing_ok=True)
+
+
+def _risk_row(risk: Risk) -> dict[str, float]:
+    """Return the columns with a risk, each mean followed by the ends of its 95 % interval."""
+    row: dict[str, float] = {}
+    for name in ("hit", "run_into", "fatalities", "per_km", "individual"):
+        mean: Mean = getattr(risk, name)
+        row |= {name: mean.value, f"{name}_low": mean.low, f"{name}_high": mean.high}
+    return row
+
+
+def known_risks(study: ComparedLayouts) -> list[tuple[str, Risk]]:
+    """Return the risk of each layout to the traffic; empty without traffic."""
+    return [(c.name, c.evaluation.risk) for c in study.cases if c.evaluation.risk is not None]
 
 
 def bounded(estimate: Estimate) -> str:

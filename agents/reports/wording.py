@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rigdda import Barrier, Mesh, Site
+from rigdda.barriers import Removal
 
 
 def order(barrier: Barrier, site: Site) -> str:
@@ -14,13 +15,52 @@ def order(barrier: Barrier, site: Site) -> str:
     if isinstance(barrier, Mesh):
         option = site.mesh(barrier.option)
         return f"mesh {option.name!r}: {option.area:g} m2 per metre, {option.price:g} EUR/m2"
+    if isinstance(barrier, Removal):
+        cost = f"{euros(site.removal_price(barrier.x))} EUR per metre"
+        return f"remove the existing barrier at x = {barrier.x:.1f} m: {cost}"
     ground, road = site.profile, site.road
     above = ground.height(barrier.x) - ground.height(road.start)
-    place = f"at x = {barrier.x:.1f} m, {road.start - barrier.x:.1f} m uphill of the road's edge"
+    uphill = f"{road.start - barrier.x:.1f} m uphill of the road's edge"
+    place = f"at x = {barrier.x:.1f} m{surveyed(site, barrier.x)}, {uphill}"
     if abs(above) >= 1.0:
         place += f" and {above:.0f} m above it" if above > 0.0 else f" and {-above:.0f} m below it"
     sizes, room = barrier.order(road.start)
     return ", ".join(filter(None, (barrier.label, sizes, place))) + room
+
+
+def surveyed(site: Site, x: float) -> str:
+    """Return the chainage and the elevation of the ground on the survey at a chainage `x`.
+
+    The text is in brackets; it is empty if the coordinates of the site are those of the survey.
+    """
+    if not site.origin.surveyed:
+        return ""
+    place = survey_place(site, x)
+    chainage, elevation = place["chainage_m"], place["elevation_m"]
+    return f" (survey: chainage {chainage:,.1f} m, elevation {elevation:,.1f} m)"
+
+
+def survey_place(site: Site, x: float) -> dict[str, float]:
+    """Return the columns with the chainage and elevation of the ground on the survey at `x`.
+
+    There are none if the coordinates of the site are those of the survey.
+    """
+    origin = site.origin
+    if not origin.surveyed:
+        return {}
+    low, high = site.slope.points[0][0], site.slope.points[-1][0]
+    ground = site.profile.height(min(max(x, low), high))
+    return {"chainage_m": origin.chainage_of(x), "elevation_m": origin.elevation_of(ground)}
+
+
+def unchanged(site: Site) -> str:
+    """Return what an empty layout is called."""
+    return "as it stands" if site.existing else "no barrier"
+
+
+def before(site: Site) -> str:
+    """Return what the case without a layout is called in a sentence."""
+    return "as it stands" if site.existing else "without barriers"
 
 
 def euros(value: float) -> str:

@@ -21,6 +21,7 @@ from rigdda.barriers.layout import (
     to_tables,
 )
 from rigdda.barriers.mesh import Mesh, MeshOption
+from rigdda.barriers.removal import Removal
 from rigdda.barriers.wall import Wall
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "Layout",
     "Mesh",
     "MeshOption",
+    "Removal",
     "Standing",
     "Wall",
     "as_layout",

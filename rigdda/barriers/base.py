@@ -132,6 +132,9 @@ class KnownSite(Protocol):
     def mesh(self, name: str) -> MeshPrice:
         """Return a mesh option by its name."""
 
+    def removal_price(self, x: float) -> float:
+        """Return the cost of removing the existing barrier at a chainage [EUR/m]."""
+
 
 class Subsoil(Protocol):
     """Interface of a scene for the resistance of barriers; implemented by `rigdda.Scene`."""

@@ -77,6 +77,7 @@ Heights and elongations are orders of magnitude without a source."""
 CLASSES = tuple(FENCE_CLASSES)
 """Energy classes of fences, ascending [kJ]."""
 
+Condition = Annotated[float, about(ge=0.05, le=1.0)]
 Capacity = Annotated[float, about(ge=LEAST_CAPACITY)]
 Elongation = Annotated[float, about(ge=SHORTEST)]
 
@@ -328,6 +329,36 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         capacity, named = self.capacity, self.energy_class
         takes = f"{named} kJ" if capacity is None else f"{capacity / 1e3:.0f} kJ/m"
         return f"{metres(self.height)} high, {takes}"
+
+
+class WornFence(Fence, frozen=True, tag="fence", omit_defaults=True):
+    """A fence of an energy class that absorbs only a share of the energy of its class.
+
+    It is a barrier that stands already, see `rigdda.Existing`; layout files have no such fences.
+    """
+
+    condition: Annotated[Condition, about("Share of the energy of its class.", "-")] = 1.0
+
+    def for_width(self, width: float) -> Self:
+        """Return the fence for a scene of this width [m], see `Fence.for_width`."""
+        new = super().for_width(width)
+        if new is self or new.capacity is None:
+            return self
+        return new._with(capacity=self.condition * new.capacity)
+
+    @property
+    def strength(self) -> str:
+        """Its energy class and its condition in words."""
+        return f"{super().strength} at {100.0 * self.condition:.0f} %"
+
+    def sizes(self, metres: Callable[[float], str]) -> str:
+        """Return its dimensions, its class and its condition in words."""
+        return f"{super().sizes(metres)} at {100.0 * self.condition:.0f} %"
+
+    @property
+    def remaining(self) -> float:
+        """Energy that it absorbs [kJ]."""
+        return self.condition * self.rated
 
 
 def tallest(zone: BarrierZone) -> float:

@@ -18,6 +18,7 @@ from rigdda.barriers.embankment import Embankment
 from rigdda.barriers.fence import Fence
 from rigdda.barriers.gravity_wall import GravityWall
 from rigdda.barriers.mesh import Mesh
+from rigdda.barriers.removal import Removal
 from rigdda.barriers.wall import Wall
 from rigdda.errors import BadInput
 from rigdda.fields import about
@@ -25,13 +26,13 @@ from rigdda.files import atomic, read
 from rigdda.model.terrain import Terrain
 
 Built = Standing | Earthwork
-"""Barriers that are part of a scene: all kinds except mesh."""
+"""Barriers that are part of a scene: all kinds except mesh and removal."""
 
 Layout = tuple[Barrier, ...]
 
 KINDS: dict[str, type[Barrier]] = {
     str(kind.__struct_config__.tag): kind
-    for kind in (Fence, Ditch, Embankment, GravityWall, Wall, Mesh)
+    for kind in (Fence, Ditch, Embankment, GravityWall, Wall, Mesh, Removal)
 }
 """Kinds of barrier by name in layout files, in the order of the scores in encoded layouts. This is
 the only place where kinds are registered."""
@@ -91,7 +92,7 @@ def as_layout(layout: Any) -> Layout:
     BadInput
         If it is not a sequence of barriers.
     """
-    what = "barriers: rigdda.Wall, GravityWall, Fence, Ditch, Embankment or Mesh"
+    what = "barriers: rigdda.Wall, GravityWall, Fence, Ditch, Embankment, Mesh or Removal"
     return check.sequence("layout", layout, Barrier, what)
 
 
@@ -121,7 +122,10 @@ def to_tables(layout: Sequence[Barrier]) -> list[dict[str, Any]]:
 
 
 def standing(layout: Iterable[Barrier]) -> tuple[Built, ...]:
-    """Return the barriers of a layout that are part of a scene, in order: all except mesh."""
+    """Return the barriers of a layout that are part of a scene, in order.
+
+    Existing barriers of a site are not among them, see `rigdda.Site.standing`.
+    """
     return tuple(barrier for barrier in layout if isinstance(barrier, Built))
 
 
@@ -138,7 +142,7 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     """Read a layout from a TOML or JSON file with one table in `barriers` per barrier.
 
     Each table has the parameters of its class, and `kind` = "wall" (the default), "gravity_wall",
-    "fence", "ditch", "embankment" or "mesh".
+    "fence", "ditch", "embankment", "mesh" or "removal".
 
     Raises
     ------

@@ -143,7 +143,11 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
         `usual` is the upkeep of a kind that is neither in the table `upkeep` nor built-in.
         """
-        return float(self.annuity(kind) + self.upkeep.get(kind, 0.0 if kind in UPKEEP else usual))
+        return float(self.annuity(kind) + self.upkeep_of(kind, usual))
+
+    def upkeep_of(self, kind: str, usual: float = 0.0) -> float:
+        """Return the annual upkeep of a kind of barrier as a share of its capital cost [1/year]."""
+        return self.upkeep.get(kind, 0.0 if kind in UPKEEP else usual)
 
 
 @documented
@@ -162,7 +166,8 @@ class Consequences(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     closure: Annotated[
         float,
         about(
-            "Cost of a day of closure, including detours and the risk to life.",
+            "Cost of a day of closure, including detours. It includes the risk to life only if "
+            "`[traffic]` does not give a value of a prevented fatality.",
             "EUR/day",
             ge=0.0,
             le=1e9,

@@ -20,6 +20,7 @@ from rigdda.barriers import (
     Built,
     Layout,
     Mesh,
+    Removal,
     as_layout,
     describe,
     earthworks,
@@ -28,7 +29,7 @@ from rigdda.barriers import (
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, read
 from rigdda.geometry import polygon_properties
-from rigdda.model import loose_blocks, site_names
+from rigdda.model import existing, loose_blocks, site_names
 from rigdda.model.block import Block
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.outcome import Outcome
@@ -43,6 +44,7 @@ from rigdda.model.source import Source
 from rigdda.model.surface import MOST_DAMPING, Surface, smaller
 from rigdda.model.survey import SURVEYS
 from rigdda.model.terrain import Roughness
+from rigdda.model.traffic import Toll
 
 Value = TypeVar("Value")
 
@@ -85,6 +87,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if not self.rooms:
             mend = "leave room for barriers: bands of loose rock cover the whole zone"
             raise BadInput("barrier_zone.end", self.barrier_zone.end, mend)
+        if self.existing:
+            _check_existing(self)
 
     @classmethod
     def load(cls, source: str | os.PathLike[str]) -> Site:
@@ -135,12 +139,16 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             If a surface has restitution None (plain penalty contact), which TOML cannot represent.
         """
         data = msgspec.to_builtins(self)
+        if data["traffic"] is None:  # TOML has no null
+            del data["traffic"]
         for table in (
             *data["sources"],
             *data["events"],
             data["motion"],
             data["origin"],
-        ):  # TOML has no null
+            data.get("traffic", {}),
+            *data["existing"],
+        ):
             for name in [name for name, value in table.items() if value is None]:
                 del table[name]
         laws = {f"surfaces.{name}": table for name, table in data["surfaces"].items()}
@@ -223,6 +231,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def built(self, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
         """Return the barriers of a layout in a scene, adapted to the width of an event [m].
 
+        Existing barriers are part of the scene only if `as_built` added them to the layout.
+
         Raises
         ------
         BadInput
@@ -241,6 +251,61 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                     raise BadInput(f"barriers[{i}].x", barrier.x, mend)
             found.append(barrier.for_width(width))
         return tuple(found)
+
+    def as_built(self, layout: Sequence[Barrier]) -> Layout:
+        """Return a layout with the existing barriers that it neither removes nor replaces.
+
+        They come after the barriers of the layout. A layout that has them already is not changed.
+
+        Raises
+        ------
+        BadInput
+            If the layout removes what may not be removed, or a barrier stands in an existing one.
+        """
+        own = as_layout(layout)
+        if not self.existing and not any(isinstance(barrier, Removal) for barrier in own):
+            return own
+        return (*own, *existing.kept(self.existing, self.profile, own))
+
+    def standing(self, layout: Sequence[Barrier] = ()) -> tuple[Built, ...]:
+        """Return all barriers that stand with a layout, in the order of `Outcome.barriers`.
+
+        These are the barriers of the layout, without mesh and removals, and the existing ones.
+
+        Raises
+        ------
+        BadInput
+            As `as_built` does.
+        """
+        return standing(self.as_built(layout))
+
+    @property
+    def existing_barriers(self) -> tuple[Built, ...]:
+        """The barriers that stand already, as they are today."""
+        return existing.barriers(self.existing)
+
+    @property
+    def removals(self) -> tuple[Removal, ...]:
+        """A removal of each existing barrier that may be removed."""
+        return tuple(Removal(one.x) for one in self.existing if one.removable)
+
+    def labels(self, layout: Sequence[Barrier] = ()) -> tuple[str, ...]:
+        """Return the labels of the barriers that stand with a layout, see `standing`."""
+        old = self.existing_barriers
+        built = self.standing(layout)
+        return tuple(f"existing {b.label}" if b in old else b.label for b in built)
+
+    def removal_price(self, x: float) -> float:
+        """Return the cost of removing the existing barrier at a chainage [EUR/m].
+
+        Raises
+        ------
+        BadInput
+            If there is none that may be removed.
+        """
+        existing.kept(self.existing, self.profile, (Removal(x),))
+        near = min(self.existing, key=lambda one: abs(one.x - x))
+        return near.removal or 0.0
 
     def scene(self, drawn: Drawn, barriers: Sequence[Built] = ()) -> Scene:
         """Return the scene of a drawn release, with barriers as returned by `built`."""
@@ -267,7 +332,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         Parameters
         ----------
         layout : sequence of Barrier
-            The barriers.
+            The barriers in addition to the existing ones, see `as_built`.
         seed : int
             Seed of the release.
         event : str, optional
@@ -281,7 +346,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             or the seed is not a whole number >= 0.
         """
         drawn = self.draw(seed, event)
-        return self.scene(drawn, self.built(layout, drawn.width))
+        return self.scene(drawn, self.built(self.as_built(layout), drawn.width))
 
     def strength(self, drawn: Drawn) -> tuple[dict[str, Surface], dict[tuple[str, str], Surface]]:
         """Return the surfaces and the interfaces of a release, with its random variation."""
@@ -331,14 +396,37 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def capitals(self, layout: Sequence[Barrier]) -> list[float]:
         """Return the capital cost of each barrier of a layout [EUR per metre of road].
 
+        It includes the cost of removing an existing barrier that the barrier replaces. An existing
+        barrier has no capital cost.
+
         Raises
         ------
         BadInput
             If a barrier has no price, or an earthwork does not fit.
         """
         barriers = as_layout(layout)
+        found = self.values(barriers)
+        if not self.existing:
+            return [found[barrier] for barrier in barriers]
+        old, gone = self.existing_barriers, existing.replaced(self.existing, self.profile, barriers)
+        return [(0.0 if b in old else found[b]) + gone.get(b, 0.0) for b in barriers]
+
+    def values(self, layout: Sequence[Barrier]) -> dict[Barrier, float]:
+        """Return the price of building each barrier as it stands with a layout [EUR per metre].
+
+        Existing barriers have the price of new ones. The price of a removal is its cost.
+
+        Raises
+        ------
+        BadInput
+            If a barrier has no price, or an earthwork does not fit.
+        """
+        barriers = self.as_built(layout)
         _, moved = earthworks(self.profile, barriers, self.soil)
-        return [b.price(self, moved.get(b)) * self.access(b.x) for b in barriers]
+        return {
+            b: b.price(self, moved.get(b)) * (1.0 if isinstance(b, Removal) else self.access(b.x))
+            for b in barriers
+        }
 
     def capital(self, layout: Sequence[Barrier]) -> float:
         """Return the capital cost of a layout [EUR per metre of road].
@@ -353,14 +441,24 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def annual(self, layout: Sequence[Barrier]) -> float:
         """Return the annual cost of a layout, including upkeep [EUR per metre of road and year].
 
+        Existing barriers cost their upkeep, a share of the price of a new one, unless the layout
+        removes or replaces them.
+
         Raises
         ------
         BadInput
             As `capital` does.
         """
         barriers = as_layout(layout)
-        each = zip(barriers, self.capitals(barriers), strict=True)
-        return float(sum(price * self.prices.annual(b.kind, b.upkeep) for b, price in each))
+        worth, old = self.values(barriers), self.existing_barriers
+        new = (b for b in barriers if b not in old)
+        annual = float(sum(worth[b] * self.prices.annual(b.kind, b.upkeep) for b in new))
+        if old:
+            kept = (b for b in self.standing(barriers) if b in old)
+            annual += sum(worth[b] * self.prices.upkeep_of(b.kind, b.upkeep) for b in kept)
+            gone = existing.replaced(self.existing, self.profile, barriers)
+            annual += float(self.prices.annuity("removal") * sum(gone.values()))
+        return annual
 
     def bill(self, layout: Sequence[Barrier], outcome: Outcome) -> Bill:
         """Return the cost of a release with a layout [EUR per occurrence of its event].
@@ -370,19 +468,43 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         rock.
         """
         layout = as_layout(layout)
-        volume, reached = outcome.road_volume, outcome.reached
         repair = self.prices.removal * outcome.held_fraction * outcome.released_volume
         if any(found.failed for found in outcome.barriers):
-            built = standing(layout)
-            cost = _capital_of(self, layout)
+            cost = _values_of(self, layout)
+            for barrier, found in zip(self.standing(layout), outcome.barriers, strict=True):
+                if found.failed:
+                    repair += cost[barrier] * max(outcome.width, barrier.repaired)
+        volume, reached = self.on_road(layout, outcome)
+        harm = self.consequences.harm(volume, reached)
+        if self.traffic is not None and self.traffic.fatality_value:
+            harm += float(self.traffic.price(self.toll(layout, outcome).fatalities))
+        return Bill(harm, repair)
+
+    def on_road(self, layout: Sequence[Barrier], outcome: Outcome) -> tuple[float, bool]:
+        """Return the volume on the road [m3], with that of failed walls, and whether any is."""
+        volume, reached = outcome.road_volume, outcome.reached
+        if any(found.failed for found in outcome.barriers):
+            built = self.standing(layout)
             for barrier, found in zip(built, outcome.barriers, strict=True):
-                if not found.failed:
-                    continue
-                length = max(outcome.width, barrier.repaired)
-                repair += cost[barrier] * length
-                volume += found.road_area * length
-                reached = reached or found.road_area > 0.0
-        return Bill(self.consequences.harm(volume, reached), repair)
+                if found.failed:
+                    volume += found.road_area * max(outcome.width, barrier.repaired)
+                    reached = reached or found.road_area > 0.0
+        return volume, reached
+
+    def toll(self, layout: Sequence[Barrier], outcome: Outcome) -> Toll:
+        """Return the expected consequences of a release for the traffic.
+
+        Raises
+        ------
+        BadInput
+            If the site has no `[traffic]`.
+        """
+        if self.traffic is None:
+            raise BadInput("traffic", None, f"add the table [traffic] to site {self.name}")
+        volume, reached = self.on_road(layout, outcome)
+        lies = outcome.debris_on_road > 0.0 or volume > outcome.road_volume
+        energy = outcome.max_energy_on_road * outcome.width
+        return self.traffic.toll(reached, lies, outcome.width, volume, energy)
 
     def shed(self) -> float:
         """Return the annual cost of a rock shed over the road [EUR per metre of road and year].
@@ -399,10 +521,14 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If a barrier does not stand on the slope or overlaps loose rock.
         """
-        scene = self.realise(layout)
+        scene, old = self.realise(layout), self.existing_barriers
         barriers = [
-            display.Outline(scene.outline(i), describe(barrier), barrier.drawn != "line")
-            for i, barrier in enumerate(standing(as_layout(layout)))
+            display.Outline(
+                scene.outline(i), words + describe(barrier), barrier.drawn != "line", bool(words)
+            )
+            for i, (barrier, words) in enumerate(
+                (b, "existing " if b in old else "") for b in self.standing(layout)
+            )
         ]
         ground, sources = self.profile.points, []
         for source in self.sources:
@@ -494,6 +620,25 @@ def pairs(site: Site, surfaces: Mapping[str, Value]) -> dict[tuple[str, str], Va
     return {(r, g): surfaces[g] for r in sorted(rocks) for g in sorted(grounds) if r != g}
 
 
+def _check_existing(site: Site) -> None:
+    """Check the existing barriers of a site.
+
+    Raises
+    ------
+    BadInput
+        If one does not fit the slope, overlaps loose rock or another one, or has no price.
+    """
+    old = existing.check_existing(site.existing, site.profile, site.soil, site.road.start)
+    for i, barrier in enumerate(old):
+        try:
+            site.built((barrier,), 1.0)
+            site.values((barrier,))
+        except BadInput as bad:
+            field = bad.field.replace("barriers[0]", f"existing[{i}]")
+            field = field if field.startswith("existing") else f"existing[{i}]: {field}"
+            raise BadInput(field, bad.value, bad.mend) from None
+
+
 def _taken(site: Site) -> list[tuple[float, float]]:
     """Return the intervals that loose blocks of bands may occupy [m]."""
     found = []
@@ -540,8 +685,8 @@ def _shifted(surface: Surface, shift: float) -> Surface:
 _last: tuple[Site, Layout, dict[Barrier, float]] | None = None
 
 
-def _capital_of(site: Site, layout: Layout) -> dict[Barrier, float]:
-    """Return the capital cost of each barrier [EUR/m], cached for the last layout.
+def _values_of(site: Site, layout: Layout) -> dict[Barrier, float]:
+    """Return `Site.values`, cached for the last layout.
 
     A layout is evaluated with thousands of releases, and pricing earthworks takes longer than
     simulating one block.
@@ -549,6 +694,6 @@ def _capital_of(site: Site, layout: Layout) -> dict[Barrier, float]:
     global _last
     known = _last
     if known is None or known[0] is not site or known[1] != layout:
-        known = site, layout, dict(zip(layout, site.capitals(layout), strict=True))
+        known = site, layout, site.values(layout)
         _last = known
     return known[2]

@@ -17,11 +17,13 @@ from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.block import Block
+from rigdda.model.existing import Existing
 from rigdda.model.prices import Consequences, Prices
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
 from rigdda.model.source import Point, Source
 from rigdda.model.surface import Damping, Interface, Surface
 from rigdda.model.terrain import Roughness, Terrain
+from rigdda.model.traffic import Traffic
 
 
 @documented
@@ -368,6 +370,15 @@ class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Return the chainage of the survey at a chainage `x` of the site [m]."""
         return self.chainage - x if self.reversed else self.chainage + x
 
+    @property
+    def surveyed(self) -> bool:
+        """Whether coordinates of the survey differ from those of the site."""
+        return bool(self.chainage or self.elevation or self.reversed)
+
+    def elevation_of(self, y: float) -> float:
+        """Return the elevation of the survey at an elevation `y` of the site [m]."""
+        return self.elevation + y
+
     def x_of(self, chainage: float) -> float:
         """Return the chainage of the site at a chainage of the survey [m]."""
         return self.chainage - chainage if self.reversed else chainage - self.chainage
@@ -546,6 +557,14 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     ] = ()
     prices: Annotated[Prices, about("Prices of barriers.")] = msgspec.field(default_factory=Prices)
     consequences: Annotated[Consequences, about("Costs of rock on the road.")] = Consequences()
+    existing: Annotated[
+        tuple[Existing, ...],
+        about("Barriers that stand already. They are part of every layout."),
+    ] = ()
+    traffic: Annotated[
+        Traffic | None,
+        about("Traffic on the road. Without this table the risk to life is not computed."),
+    ] = None
     meshes: Annotated[tuple[MeshOption, ...], about("Mesh options for the rock face.")] = ()
     motion: Annotated[Motion, about("Parameters of the simulation of releases.")] = Motion()
     scatter: Annotated[

@@ -14,6 +14,7 @@ from rigdda import sites
 from rigdda.barriers import KINDS, MeshOption
 from rigdda.fields import Described, described
 from rigdda.files import atomic
+from rigdda.model.existing import Existing
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
 from rigdda.model.prices import Consequences, Prices
@@ -31,6 +32,7 @@ from rigdda.model.site_tables import (
 )
 from rigdda.model.source import Source
 from rigdda.model.surface import Interface, Surface
+from rigdda.model.traffic import Traffic
 
 PATH = Path(__file__).parents[2] / "docs" / "site.md"
 
@@ -44,10 +46,12 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[origin]`", Origin),
     ("`[road]`", Road),
     ("`[barrier_zone]`", BarrierZone),
+    ("`[[existing]]`", Existing),
     ("`[surfaces.NAME]`", Surface),
     ("`[[interfaces]]`", Interface),
     ("`[prices]`", Prices),
     ("`[consequences]`", Consequences),
+    ("`[traffic]`", Traffic),
     ("`[[meshes]]`", MeshOption),
     ("`[motion]`", Motion),
     ("`[scatter]`", Scatter),

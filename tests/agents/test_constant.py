@@ -13,7 +13,7 @@ from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "mesh"])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("mesh", "removal")])
 def test_every_kind_has_a_constant(kind: str) -> None:
     problem = DesignProblem(SITE, kinds=(kind,))
     (barrier,) = constant.constant(problem, Menu(problem))

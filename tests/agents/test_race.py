@@ -128,7 +128,7 @@ def test_what_lies_on_a_bound_is_named(site: Site) -> None:
     assert found == ("gravity wall: end of the zone", "gravity wall: least thickness")
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "mesh"])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("mesh", "removal")])
 def test_all_on_the_menu_may_be_built(kind: str) -> None:
     problem = DesignProblem(SITE, kinds=(kind,))
     menu = Menu(problem)

@@ -313,10 +313,10 @@ def test_none_of_a_few_releases_is_not_never() -> None:
     site = Site.load("verge")
     rows = [
         {"event": name, "reached": "False", "harm": "0.0", "repair": "0.0", "road_volume": "0.0",
-         "released_volume": "1.0", "barrier_0_failed": "False"}
+         "released_volume": "1.0", "width": "1.0", "barrier_0_failed": "False"}
         for name in site.event_names for _ in range(16)
     ]  # fmt: skip
-    own = studies._account(rows)
+    own = studies._account(site, rows)
     assert not own.failed.any() and not own.reached.any()
     sums = stratified(site, (), own, studies._facts(site, rows))
     least = site.rate(site.event_names[0], ()) * site.consequences.harm(1.0, True) / 16

@@ -1,0 +1,249 @@
+"""Barriers that stand already: part of every layout, worn, sunk, kept, removed or replaced."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import rigdda
+from rigdda import BadInput, Ditch, Fence, Mesh, Site, release, release_many
+from rigdda.agents import designers
+from rigdda.agents.designers.menu import Menu
+from rigdda.agents.reports import findings
+from rigdda.agents.reports.wording import before, order, unchanged
+from rigdda.agents.site_check import facts, oddities
+from rigdda.barriers import Removal
+from rigdda.barriers.fence import WornFence
+from rigdda.envs import DesignProblem
+from rigdda.envs.rendering import picture
+from rigdda.envs.repetition import repeat
+from rigdda.envs.replay_record import ReleaseRecord, release_record
+from rigdda.envs.site_sampling import Venue
+from rigdda.model.existing import Existing
+
+OLD = Existing("fence", 20.0, 2.0, energy_class=250, condition=0.5, removable=True, removal=60.0)
+FIXED = msgspec.structs.replace(OLD, removable=False, removal=None)
+NEW = Fence(30.0, 2.0, energy_class=250)
+REPLACING = Fence(20.2, 3.0, energy_class=1000)
+
+
+def having(*existing: Existing) -> Site:
+    return msgspec.structs.replace(rigdda.sites.load("quick"), existing=existing)
+
+
+@pytest.fixture(scope="module")
+def site() -> Site:
+    return having(OLD)
+
+
+def test_it_is_part_of_every_layout(site: Site) -> None:
+    (old,) = site.existing_barriers
+    assert old == WornFence(20.0, 2.0, energy_class=250, condition=0.5)
+    assert having(msgspec.structs.replace(OLD, condition=1.0)).existing_barriers == (
+        Fence(20.0, 2.0, energy_class=250),
+    )
+    assert site.standing() == (old,)
+    assert site.standing((NEW, Mesh(4.0, "face"))) == (NEW, old)
+    assert site.standing(site.as_built((NEW,))) == (NEW, old)  # adding it again changes nothing
+    assert site.labels((NEW,)) == (NEW.label, "existing fence 250 kJ at 50 %, 2.0 m high")
+
+
+def test_condition_reduces_the_energy_not_the_height(site: Site) -> None:
+    (old,) = site.existing_barriers
+    for width in (1.5, 30.0):
+        new = Fence(20.0, 2.0, energy_class=250).for_width(width)
+        worn = old.for_width(width)
+        assert new.capacity is not None
+        assert worn.capacity == pytest.approx(0.5 * new.capacity, rel=1e-15)
+        assert worn.left_height(0.0) == 2.0
+
+
+def test_a_worn_fence_acts_as_one_of_its_remaining_capacity(site: Site) -> None:
+    """125 kJ over the width of the mass, 10 m."""
+    bare = rigdda.sites.load("quick")
+    same = (Fence(20.0, 2.0, capacity=12.5e3, elongation=2.5),)
+    for seed in range(3):
+        found, expected = release(site, (), seed, "mass")[1], release(bare, same, seed, "mass")[1]
+        assert found == expected
+        assert found.barriers[0].resistance == 12.5e3 / 2.5
+
+
+def test_a_release_equals_that_of_the_same_barrier_in_a_layout(site: Site) -> None:
+    """The outcome is that of a site without it and a layout with it, alone and in batches."""
+    bare, (old,) = rigdda.sites.load("quick"), site.existing_barriers
+    for seed in range(6):
+        expected = release(bare, (NEW, old), seed, "group")[1]
+        assert release(site, (NEW,), seed, "group")[1] == expected
+        assert release_many([(site, (NEW,), seed, "group")]) == [expected]
+    seeds = range(24)
+    found = DesignProblem(site, max_barriers=2).evaluate((NEW,), seeds)
+    jobs = [(bare, (NEW, old), s, o.event) for s, o in zip(seeds, found.outcomes, strict=True)]
+    assert list(found.outcomes) == release_many(jobs)
+
+
+def test_its_capital_is_sunk_and_its_upkeep_counts(site: Site) -> None:
+    """1.5 % a year of the price of a new fence of 250 kJ: (200 * 2 + 300) EUR times access."""
+    bare = rigdda.sites.load("quick")
+    worth = (200.0 * 2.0 + 300.0) * bare.access(20.0)
+    assert site.capital(()) == 0.0
+    assert site.annual(()) == pytest.approx(0.015 * worth, rel=1e-14)
+    assert site.capital((NEW,)) == bare.capital((NEW,))
+    assert site.annual((NEW,)) == pytest.approx(bare.annual((NEW,)) + 0.015 * worth, rel=1e-14)
+    nothing = DesignProblem(site).nothing
+    assert nothing.capital == site.annual(())
+    assert nothing.cost == 0.0
+
+
+def test_removing_it_costs_once_and_saves_the_upkeep(site: Site) -> None:
+    gone = (Removal(20.0),)
+    assert site.standing(gone) == ()
+    assert site.capital(gone) == 60.0
+    assert site.annual(gone) == pytest.approx(60.0 * site.prices.annuity("removal"), rel=1e-14)
+    for seed in range(4):
+        assert release(site, gone, seed)[1] == release(rigdda.sites.load("quick"), (), seed)[1]
+
+
+def test_a_barrier_in_its_place_replaces_it(site: Site) -> None:
+    bare = rigdda.sites.load("quick")
+    assert site.standing((REPLACING,)) == (REPLACING,)
+    assert site.capital((REPLACING,)) == pytest.approx(bare.capital((REPLACING,)) + 60.0)
+    expected = bare.annual((REPLACING,)) + 60.0 * site.prices.annuity("removal")
+    assert site.annual((REPLACING,)) == pytest.approx(expected, rel=1e-14)
+    both = (Removal(20.0), REPLACING)
+    assert site.capital(both) == pytest.approx(site.capital((REPLACING,)), rel=1e-14)
+    assert site.annual(both) == pytest.approx(expected, rel=1e-14)
+
+
+def test_its_repair_costs_the_price_of_a_new_one() -> None:
+    weak = having(msgspec.structs.replace(OLD, condition=0.05))
+    bare = rigdda.sites.load("quick")
+    seed = next(s for s in range(50) if release(weak, (), s, "block")[1].barriers[0].failed)
+    outcome = release(weak, (), seed, "block")[1]
+    worth = (200.0 * 2.0 + 300.0) * bare.access(20.0)
+    held = weak.prices.removal * outcome.held_fraction * outcome.released_volume
+    assert weak.bill((), outcome).repair == pytest.approx(10.0 * worth + held, rel=1e-12)
+
+
+def test_designers_keep_clear_of_what_stays() -> None:
+    problem = DesignProblem(having(FIXED), max_barriers=2)
+    assert "removal" not in problem.kinds
+    mend = "clear of the existing fence at 20 to 22.7"
+    with pytest.raises(BadInput, match=mend):
+        problem.check((REPLACING,))
+    with pytest.raises(BadInput, match=mend):
+        problem.check((Fence(16.0, 3.0, energy_class=500),))  # its elongation ends at 19.7
+    assert problem.fits((NEW,))
+    menu = Menu(problem)
+    old = 20.0, 22.7
+    for kind in problem.kinds:
+        for barrier in menu.lone(kind):
+            if kind != "mesh":
+                start, end = problem.place.works(barrier)
+                assert start >= old[1] or end + barrier.deflection <= old[0]
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_every_vector_decodes_to_a_layout_clear_of_what_stays(seed: int) -> None:
+    problem = VECTORS
+    layout = problem.decode(np.random.default_rng(seed).uniform(-1.0, 1.0, problem.size))
+    assert problem.check(layout) == layout
+    assert problem.site.existing_barriers[1] in problem.site.standing(layout)
+
+
+VECTORS = DesignProblem(having(OLD, Existing("ditch", 30.5, depth=1.0, width=2.0)), max_barriers=3)
+
+
+def test_layouts_with_removals_are_encoded() -> None:
+    assert VECTORS.kinds[-1] == "removal"
+    for layout in ((Removal(20.0),), (REPLACING,), (Fence(12.0, 2.0, energy_class=250),), ()):
+        assert VECTORS.decode(VECTORS.encode(layout)) == layout
+    twice = VECTORS.encode((Removal(20.0),))
+    width = len(twice) // 3
+    twice[width : 2 * width] = twice[:width]
+    assert VECTORS.decode(twice) == (Removal(20.0),)
+    assert VECTORS.dropped(twice) == ("slot 1: removal: an earlier slot already removes it",)
+
+
+@pytest.mark.parametrize("name", ["race", "random", "rule", "constant"])
+def test_designers_choose(name: str, site: Site) -> None:
+    problem = DesignProblem(site, max_barriers=2)
+    found = designers.module(name).design(problem, 400, seed=1)
+    assert problem.check(found.layout) == found.layout
+    assert found.evaluation.capital == problem.site.annual(found.layout)
+
+
+def test_a_layout_of_a_user_may_not_overlap_what_stays() -> None:
+    site = having(FIXED)
+    with pytest.raises(BadInput, match=r"barriers\[0\].x = 20.1: .*existing fence"):
+        release(site, (Fence(20.1, 2.0, energy_class=250),), 0)
+    with pytest.raises(BadInput, match=r"barriers\[0\].x = 20.0: leave it out: the site has no"):
+        release(site, (Removal(20.0),), 0)
+    with pytest.raises(BadInput, match=r"barriers\[0\].x = 20.0: leave it out"):
+        release(rigdda.sites.load("quick"), (Removal(20.0),), 0)
+    with pytest.raises(BadInput, match=r"barriers\[0\].x = 5.0: give 20"):
+        release(having(OLD), (Removal(5.0),), 0)
+    with pytest.raises(BadInput, match="use the block model"):
+        rigdda.lumped(site, (), range(2), "block")
+
+
+def test_it_is_named_and_drawn(site: Site) -> None:
+    (line,) = [line for line in facts(site) if line.startswith("existing")]
+    assert "fence 250 kJ at 50 %, 2.0 m high at x = 20 m" in line
+    assert "may be removed or replaced for 60 EUR per metre" in line
+    near = having(Existing("fence", 33.0, 2.0, energy_class=250))
+    assert any("existing[0].x = 33: the fence gives way" in line for line in oddities(near))
+    outlines = site.section((NEW,)).barriers
+    assert [outline.old for outline in outlines] == [False, True]
+    run, _ = release(site, (NEW,), 0, "block")
+    plain, _ = release(rigdda.sites.load("quick"), (NEW, *site.existing_barriers), 0, "block")
+    images = [picture(run, site, (NEW,), ""), picture(plain, having(), site.standing((NEW,)), "")]
+    assert images[0].shape == images[1].shape
+    assert (images[0] != images[1]).any()
+
+
+def test_round_trip(site: Site, tmp_path: Path) -> None:
+    for one in (site, having(OLD, Existing("ditch", 30.5, depth=1.0, width=2.0))):
+        one.save(tmp_path / "site.toml")
+        assert Site.load(tmp_path / "site.toml") == one
+
+
+def test_an_earthwork_that_stands_changes_the_ground() -> None:
+    site = having(Existing("ditch", 30.5, depth=1.0, width=2.0))
+    bare = rigdda.sites.load("quick")
+    ditch = Ditch(30.5, 1.0, 2.0)
+    for seed in range(4):
+        assert release(site, (), seed, "block")[1] == release(bare, (ditch,), seed, "block")[1]
+
+
+def test_reports_say_what_happens_to_it(site: Site) -> None:
+    assert findings.kept(site, (NEW,)) == [
+        "existing fence 250 kJ at 50 %, 2.0 m high, at x = 20.0 m: kept"
+    ]
+    assert findings.kept(site, (REPLACING,))[0].endswith(": removed")
+    assert order(Removal(20.0), site) == (
+        "remove the existing barrier at x = 20.0 m: 60 EUR per metre"
+    )
+    bare = rigdda.sites.load("quick")
+    assert (unchanged(site), before(site)) == ("as it stands", "as it stands")
+    assert (unchanged(bare), before(bare)) == ("no barrier", "without barriers")
+    assert findings.kept(bare, (NEW,)) == []
+
+
+def test_a_record_of_a_release_is_repeated(site: Site) -> None:
+    for layout in ((NEW,), (Removal(20.0),)):
+        _, outcome = release(site, layout, 3, "group")
+        text = release_record(site, layout, 3, "group", outcome)
+        again = repeat(msgspec.json.decode(text, type=ReleaseRecord))
+        assert again.same
+
+
+def test_an_environment_takes_sites_with_and_without_it(site: Site) -> None:
+    slots = Venue(site, 2, None, "full").slots
+    assert slots.kinds[-1] == "removal"
+    assert "removal" not in slots.shared(rigdda.sites.load("quick"))
+    assert slots.shared(site) == slots.kinds

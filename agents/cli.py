@@ -474,11 +474,13 @@ def design(
     """
     from rigdda.agents import ground_band, jobs
     from rigdda.agents.designers.store import FILE, claim
+    from rigdda.agents.parameters import read_posterior
     from rigdda.agents.reports import band_report
     from rigdda.agents.reports.folder import FILES, write
 
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone)
-    folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
+    fitted = None if posterior is None else read_posterior(posterior, problem.site)
+    folder = folder_for(out, f"design-{problem.site.name}", *FILES, *band_report.FILES, FILE)
     claim(folder, problem, *FILES)
     band = None
     with kept(folder, problem.site):

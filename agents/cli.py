@@ -30,6 +30,7 @@ from rigdda.agents.terminal import (
     note,
     once,
     out_option,
+    posterior_option,
     progress,
     read_layout,
     seed_option,
@@ -433,6 +434,10 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               "its survey.  [default: the zone of the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
+@click.option("--ground-samples", "grounds", type=click.IntRange(0, 1000), default=6,
+              show_default=True, help="Number of grounds within the plausible range on which the "
+              "layouts are compared at the end; 0 for none.")  # fmt: skip
+@posterior_option
 @seed_option("Seed of the search and of its releases.", SEED)
 @out_option("design-SITE")
 @executor_option
@@ -447,6 +452,8 @@ def design(
     zone: tuple[float, float] | None,
     budget: int,
     verify: int,
+    grounds: int,
+    posterior: Path | None,
     seed: int,
     out: Path | None,
 ) -> None:
@@ -454,29 +461,49 @@ def design(
 
     SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
     search did not use. The best layout has the least cost Z. Z is the sum of capital and upkeep,
-    expected harm on the road and expected repair, in EUR per metre of road and year.
+    expected harm on the road and expected repair, in EUR per metre of road and year. At the end,
+    the layouts are compared on other grounds within the plausible range.
 
     If the layout misses a target, the cheapest layout for each level of P(reach) is reported and
     written to frontier.csv and frontier.png.
 
-    Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd and the outcomes of all
-    releases, for `rigdda reprice`. An interrupted run continues from evaluations.jsonl. A folder
-    that contains the design of another problem (problem.json) is refused. Of a site with traffic,
-    the risk to life is written to risk.csv.
+    Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd, band.csv and band.png
+    (the comparison on other grounds) and the outcomes of all releases, for `rigdda reprice`. An
+    interrupted run continues from evaluations.jsonl. A folder that contains the design of another
+    problem (problem.json) is refused. Of a site with traffic, the risk to life is written to
+    risk.csv.
     """
-    from rigdda.agents import jobs
+    from rigdda.agents import ground_band, jobs
     from rigdda.agents.designers.store import FILE, claim
+    from rigdda.agents.parameters import read_posterior
+    from rigdda.agents.reports import band_report
     from rigdda.agents.reports.folder import FILES, write
 
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone)
-    folder = folder_for(out, f"design-{problem.site.name}", *FILES, FILE)
+    fitted = None if posterior is None else read_posterior(posterior, problem.site)
+    folder = folder_for(out, f"design-{problem.site.name}", *FILES, *band_report.FILES, FILE)
     claim(folder, problem, *FILES)
+    band = None
     with kept(folder, problem.site):
         with progress(budget + CASES * verify) as tick:
             done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
             tick(budget + CASES * verify, "pictures")
             write(done, folder, seed)
+        if grounds:
+            with progress(grounds) as tick:
+                band = ground_band.assess(done, grounds, fitted, seed, folder, tick)
+            band_report.write(folder, band)
+            ground_band.forget(folder)
     _tell(done, store, verify, folder)
+    if band is not None:
+        click.echo(
+            f"on {len(band.samples)} other grounds ({band.source}), {band.releases} releases of "
+            "each layout on each;\nP(reach): of the design event that reaches the road most often"
+        )
+        show(band_report.table(band))
+        for line in filter(None, (band_report.verdict(band), band_report.on_target(band))):
+            finding(line)
+        click.echo(f"{', '.join(band_report.FILES)} are in {folder}")
     _warn_of_placeholders(site)
 
 
@@ -768,7 +795,8 @@ def corridor(
 
 @cli.command()
 @click.argument("site")
-@click.argument("observed", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("observed", type=click.Path(dir_okay=False, path_type=Path), nargs=-1,
+                required=True)  # fmt: skip
 @click.option("--parameters", "names", multiple=True, required=True, metavar="PATH[=LOW:HIGH]",
               help="Number of the site file to fit, such as surfaces.soil.restitution. May be "
               "repeated; more than four are rarely identified.")  # fmt: skip
@@ -781,7 +809,7 @@ def corridor(
 @executor_option
 def fit(
     site: str,
-    observed: Path,
+    observed: tuple[Path, ...],
     names: tuple[str, ...],
     model: Literal["blocks", "lumped"],
     budget: int,
@@ -789,27 +817,101 @@ def fit(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Fit numbers of SITE to the run-outs in OBSERVED, a CSV file.
+    """Fit numbers of SITE to the observations in OBSERVED, one or several CSV files.
 
-    The columns of the file are event and run_out_m, the chainage at which the block stopped. Prints
-    the fitted numbers with 95 % intervals, or "not identified" if the interval is nearly as long
-    as the given range. Also prints how well the fit predicts runs that were left out of it.
-    Writes site.toml (SITE with the fitted numbers), fit.csv and fit.png.
+    The columns of a file are event and one of: run_out_m, the chainage at which a block stopped;
+    start_m, end_m and share, mass_t or volume_m3, the deposit in an interval of chainage; or
+    station_m, quantity (such as velocity or height) and value, of blocks that pass a station.
+
+    Prints the fitted numbers with 95 % intervals, or "not identified" if the interval is nearly as
+    long as the given range. Also prints how well the fit predicts observations that were left out
+    of it. Writes site.toml (SITE with the fitted numbers), fit.csv, fit.png and posterior.csv,
+    which `design` and `sensitivity` can sample. A run that was interrupted continues where it
+    stopped.
     """
     import rigdda
     from rigdda.agents import fit as job
+    from rigdda.agents import observations
+    from rigdda.agents.parameters import parse
     from rigdda.agents.reports import tables
 
     where = rigdda.Site.load(site)
-    seen, parameters = job.read(observed, where), [job.parse(name) for name in names]
-    folder = folder_for(out, f"fit-{where.name}", "site.toml", "fit.csv", "fit.png")
+    seen, parameters = observations.read(observed, where), [parse(name) for name in names]
+    files = ("site.toml", "fit.csv", "fit.png", "posterior.csv")
+    folder = folder_for(out, f"fit-{where.name}", *files)
     with kept(folder, where), progress(budget) as tick:
-        found = job.fit(where, seen, parameters, budget, releases, seed, tick, model)
+        found = job.fit(where, seen, parameters, budget, releases, seed, tick, model, folder)
         found.site.save(folder / "site.toml")
-        job.write(folder / "fit.csv", found, seen)
-        job.draw(folder / "fit.png", found, seen)
-    show(tables.fit(job.rows(found, seen)))
-    click.echo(f"up to {budget} parameter sets; site.toml, fit.csv and fit.png are in {folder}")
+        job.write(folder / "fit.csv", found)
+        job.draw(folder / "fit.png", found)
+        tables.write_rows(folder / "posterior.csv", found.posterior.rows())
+        job.forget(folder)
+    show(tables.fit(job.rows(found, found.observed)))
+    click.echo(f"up to {budget} parameter sets; {', '.join(files)} are in {folder}")
+
+
+@cli.command()
+@click.argument("site")
+@layout_option
+@click.option("--method", type=click.Choice(("morris", "sobol")), default="morris",
+              show_default=True, help="Screening by the method of Morris, or indices of Sobol', "
+              "which take several times as many releases.")  # fmt: skip
+@click.option("--samples", type=click.IntRange(2), metavar="N",
+              help="Number of trajectories (morris), or of points from which indices are computed "
+              "(sobol), a power of two.  [default: 20 for morris, 64 for sobol]")  # fmt: skip
+@count_option("--releases", 2, 200, "Number of releases at each point, over all events.")
+@click.option("--parameters", "names", multiple=True, metavar="GROUP|PATH[=LOW:HIGH]",
+              help="Inputs to vary: ground, sizes, rates, prices, or the path of a number in the "
+              "site file. May be repeated.  [default: all four groups]")  # fmt: skip
+@posterior_option
+@seed_option("Seed of the points, of the bootstrap and of the first release.", SEED)
+@out_option("sensitivity-SITE")
+@executor_option
+def sensitivity(
+    site: str,
+    layout: str | None,
+    method: Literal["morris", "sobol"],
+    samples: int | None,
+    releases: int,
+    names: tuple[str, ...],
+    posterior: Path | None,
+    seed: int,
+    out: Path | None,
+) -> None:
+    """Find which uncertain numbers of SITE the results depend on.
+
+    Varies the ground within the ranges of the library, block sizes, rates, prices and consequences,
+    and computes how much Z and, for each design event, the probabilities that the road is reached
+    and that a barrier fails depend on each. All points have the same releases. Prices and rates
+    need no simulation of their own.
+
+    Writes sensitivity.csv (indices with intervals), samples.csv (inputs and outputs at each point)
+    and tornado.png. A run that was interrupted continues where it stopped.
+    """
+    import rigdda
+    from rigdda.agents import parameters
+    from rigdda.agents import sensitivity as job
+    from rigdda.agents.reports import sensitivity_report
+
+    where, barriers = rigdda.Site.load(site), read_layout(layout)
+    where.realise(barriers)
+    inputs = parameters.inputs(names, where, barriers, posterior)
+    asked = job.plan(where, barriers, inputs, method, samples, releases, seed)
+    folder = folder_for(out, f"sensitivity-{where.name}", *sensitivity_report.FILES)
+    with kept(folder, where), progress(asked.size) as tick:
+        found = job.run(asked, folder, tick)
+        tick(asked.size, "tables and picture")
+        sensitivity_report.write(folder, found)
+        job.forget(folder)
+    for line, table in sensitivity_report.tables(found):
+        click.echo(line)
+        show(table)
+    finding(sensitivity_report.explain(found))
+    resumed = f", {found.resumed:,} from an interrupted run" if found.resumed else ""
+    click.echo(
+        f"{len(asked.sites):,} points with {len(asked.groups):,} simulated sites, {asked.size:,} "
+        f"releases{resumed}; {', '.join(sensitivity_report.FILES)} are in {folder}"
+    )
 
 
 @cli.command()

@@ -1,12 +1,23 @@
-"""Fit of numbers in a site file to observed run-outs."""
+"""Fit of numbers in a site file to observed run-outs, deposits and passages.
+
+The score of a set of numbers is the mean continuous ranked probability score of the observed
+values: the distance of each value from the computed distribution. Observations of other quantities
+than chainages are divided by their standard deviation first. A deposit counts as many values as it
+has independent blocks, see `independent_blocks`.
+
+The posterior is a bootstrap: for each of many samples of the observed values, drawn with
+replacement, the numbers with the best score are sought on a Gaussian process through the scores of
+all sets that were tried. Each sample also has new noise of the scores, which is as large as the
+process finds it. Without smoothing, a set that was lucky with its releases would win too often.
+"""
 
 from __future__ import annotations
 
-import csv
-import io
+import hashlib
 import math
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import shutil
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -16,58 +27,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from rigdda import BadInput, Site, check, fields, release_many
+import rigdda
+from rigdda import BadInput, Site, release_many
+from rigdda.agents.observations import DEPOSIT, LEAST, RUN_OUT, DataSet, DataSets
+from rigdda.agents.parameters import Parameter, Posterior, check_once, with_values
+from rigdda.agents.reports.stations import QUANTITIES
 from rigdda.agents.reports.tables import write_rows
-from rigdda.files import read as read_text
+from rigdda.agents.score_surface import best_places
+from rigdda.agents.varied_sites import PARTS
+from rigdda.envs.outcome_cache import mechanics
+from rigdda.files import atomic
 from rigdda.lumped_mass import lumped
-from rigdda.model.site_tables import Rebound
-
-RANGES = {
-    "scatter.friction_deg": (0.0, 10.0),
-    "friction_deg": (15.0, 65.0),
-    "restitution": (0.0, 0.8),
-    "damping": (0.0, 3.0),
-    "friction_sd_deg": (0.0, 10.0),
-    "restitution_sd": (0.0, 0.2),
-    "damping_sd": (0.0, 1.0),
-    "roughness": (0.0, 0.2),
-    "normal": (0.0, 0.8),
-    "tangential": (0.4, 1.0),
-}
-"""Default limits of a parameter, by its path or by the last name of its path."""
-
-
-class Parameter(NamedTuple):
-    """A number of a site file that is fitted, such as `surfaces.soil.restitution`."""
-
-    path: str
-    low: float
-    high: float
-
-
-def parse(text: str) -> Parameter:
-    """Return a parameter written as PATH or PATH=LOW:HIGH.
-
-    Raises
-    ------
-    BadInput
-        If it has another form, or if it has no limits and there are no default limits for it.
-    """
-    path, given, limits = text.partition("=")
-    if not given:
-        usual = RANGES.get(path, RANGES.get(path.rpartition(".")[2]))
-        if usual is None:
-            raise BadInput("--parameters", text, f"give limits: {path}=LOW:HIGH")
-        return Parameter(path, *usual)
-    found = re.fullmatch(r"([^:]+):([^:]+)", limits)
-    try:
-        low, high = map(float, found.groups() if found else ())
-    except ValueError:
-        raise BadInput("--parameters", text, f"write {path}=LOW:HIGH") from None
-    if not -math.inf < low < high < math.inf:
-        raise BadInput("--parameters", text, f"write {path}=LOW:HIGH, LOW below HIGH")
-    return Parameter(path, low, high)
-
+from rigdda.passages import Passages, passages
 
 TELLING = {"blocks": ("surfaces", "motion", "scatter"), "lumped": ("lumped", "scatter")}
 """Tables of a site file that affect the run-outs of a model."""
@@ -81,100 +52,16 @@ def check_parameters(parameters: Sequence[Parameter], model: str) -> None:
     BadInput
         If a parameter is repeated or if the run-outs do not depend on it.
     """
-    for i, parameter in enumerate(parameters):
-        if parameter.path in (other.path for other in parameters[:i]):
-            raise BadInput("--parameters", parameter.path, "name each number once")
+    check_once(parameters)
+    for parameter in parameters:
         if parameter.path.partition(".")[0] not in TELLING[model]:
             known = ", ".join(f"{name}.*" for name in TELLING[model])
             mend = f"run-outs of the model {model} do not depend on it: choose from {known}"
             raise BadInput("--parameters", parameter.path, mend)
 
 
-def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[float]) -> Site:
-    """Return a copy of a site with other values of some numbers.
-
-    Raises
-    ------
-    BadInput
-        If there is no such number, or if the site is invalid with the value.
-    """
-    tables = msgspec.to_builtins(site)
-    for parameter, value in zip(parameters, values, strict=True):
-        *tops, last = parameter.path.split(".")
-        table: Any = tables
-        for top in tops:
-            if top in site.surfaces and table is tables.get("lumped"):
-                table.setdefault(top, {})
-            table = table.get(top) if isinstance(table, dict) else None
-        own = Rebound.__struct_fields__ if tops[:1] == ["lumped"] else ()
-        known = isinstance(table, dict) and (last in table or last in own)
-        if not known or isinstance(table.get(last, 0.0), str | dict | list | tuple | bool):
-            mend = "name a number of the site file, such as surfaces.soil.restitution"
-            raise BadInput("--parameters", parameter.path, mend)
-        table[last] = float(value)
-    return fields.read(Site, tables)
-
-
 Floats = NDArray[np.float64]
 Model = Literal["blocks", "lumped"]
-
-
-def read(path: Path, site: Site) -> dict[str, Floats]:
-    """Return the observed run-outs of each event, as chainages of the site [m].
-
-    Raises
-    ------
-    BadInput
-        If the file is not a table with the columns `run_out_m` and, for a site with several
-        events, `event`, or if a run-out is beyond the road, where computed run-outs are cut off.
-    """
-    if not path.is_file():
-        raise BadInput("observed", str(path), "name a CSV file with event and run_out_m")
-    found: dict[str, list[float]] = {}
-    only = site.event_names[0] if len(site.events) == 1 else ""
-    for field, row in _rows(path, only):
-        event = row.get("event") or only
-        if event not in site.event_names:
-            raise BadInput(f"{field} event", event, "choose " + " or ".join(site.event_names))
-        found.setdefault(event, []).append(_run_out(f"{field} run_out_m", row["run_out_m"], site))
-    if sum(map(len, found.values())) < 3:
-        raise BadInput("observed", str(path), "give three observed runs or more")
-    return {event: np.array(values) for event, values in found.items()}
-
-
-def _rows(path: Path, only: str) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield a name for each row of a table and its cells by column.
-
-    `only` is the event of a site with a single event, otherwise an empty text.
-    """
-    table = csv.reader(io.StringIO(read_text("observed", path), newline=""))
-    try:
-        names, *rows = [row for row in table if any(row)] or [[]]
-    except csv.Error as error:
-        raise BadInput("observed", str(path), f"repair line {table.line_num}: {error}") from None
-    if "run_out_m" not in names or not ("event" in names or only):
-        mend = "name its columns event and run_out_m in the first row"
-        raise BadInput("observed", ", ".join(names), mend)
-    if len(set(names)) < len(names):
-        raise BadInput("observed", ", ".join(names), "give each column a different name")
-    for i, row in enumerate(rows):
-        if len(row) != len(names):
-            mend = f"give {len(names)} cells, one per column; use a decimal point in numbers"
-            raise BadInput(f"observed row {i + 1}", ",".join(row), mend)
-        yield f"observed row {i + 1}", dict(zip(names, row, strict=True))
-
-
-def _run_out(field: str, text: str, site: Site) -> float:
-    """Return the run-out of a row of observations [m]."""
-    try:
-        value = float(text if "_" not in text else "")  # Python would read 4_0 as 40
-    except ValueError:
-        raise BadInput(field, text, "give a number") from None
-    check.number(field, value, site.slope.points[0][0], site.slope.points[-1][0])
-    if value > site.road.end:
-        mend = f"move road.end beyond it: computed run-outs are cut off at {site.road.end:g} m"
-        raise BadInput(field, value, mend)
-    return value
 
 
 def run_outs(site: Site, model: Model, events: Sequence[str], seeds: range) -> dict[str, Floats]:
@@ -186,6 +73,123 @@ def run_outs(site: Site, model: Model, events: Sequence[str], seeds: range) -> d
     outcomes = release_many([(site, (), seed, event) for event in events for seed in seeds])
     each = np.array([outcome.run_out[2] for outcome in outcomes]).reshape(len(events), len(seeds))
     return dict(zip(events, each, strict=True))
+
+
+def computed(site: Site, sets: DataSets, model: Model, seeds: range) -> dict[str, Floats]:
+    """Return the computed values of each set of observations, by name.
+
+    Raises
+    ------
+    BadInput
+        If the model is "lumped" and there are other observations than run-outs.
+    Diverged
+        If a simulation diverges.
+    """
+    runs = [one.event for one in sets.values() if one.quantity == RUN_OUT]
+    out = run_outs(site, model, runs, seeds)
+    others = [one for one in sets.values() if one.quantity != RUN_OUT]
+    if not others:
+        return out
+    if model == "lumped":
+        raise BadInput("--model", model, "use blocks: points give run-outs only")
+    stations = sorted({one.station for one in others if one.passes})
+    events = list(dict.fromkeys(one.event for one in others))
+    asked = [(seed, event) for event in events for seed in seeds]
+    found = passages(site, (), asked, stations)
+    return out | {one.name: _values(site, found, one) for one in others}
+
+
+SPREAD = 400
+"""Number of equally heavy pieces into which the rock of a computed deposit is divided."""
+
+
+def _values(site: Site, found: Passages, one: DataSet) -> Floats:
+    """Return the computed values of a deposit or a passage.
+
+    If no block passes a station, the only value is 0. If no rock stops within a deposit, it is
+    taken to lie one length of the deposit uphill of it.
+    """
+    number = site.event_names.index(one.event)
+    if one.passes:
+        rows = found.at(int(np.searchsorted(found.stations, one.station)))
+        values = QUANTITIES[one.quantity].of(rows[rows["event"] == number])
+        return values if len(values) else np.zeros(1)
+    stops = found.stops[found.stops["event"] == number]
+    low, high = one.values[0], one.values[-1]
+    here = np.sort(stops[(stops["x"] >= low) & (stops["x"] <= high)], order="x")
+    if not len(here):
+        return np.array([low - (high - low)])
+    share = np.cumsum(here["mass"])
+    place = (np.arange(SPREAD) + 0.5) / SPREAD * share[-1]
+    return np.asarray(here["x"][np.searchsorted(share, place)], dtype=np.float64)
+
+
+def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
+    """Return how many independent blocks would tell as much as a deposit.
+
+    Blocks of one release push one another and start together, and large blocks count more than
+    small ones. The number follows from the variance between computed releases of the share of rock
+    above each end of an interval, compared with that of equal independent blocks. It is multiplied
+    by the number of releases that made the deposit.
+
+    Raises
+    ------
+    BadInput
+        If there are fewer than three.
+    Diverged
+        If a simulation diverges.
+    """
+    found = passages(site, (), [(seed, one.event) for seed in seeds], ())
+    low, high = one.values[0], one.values[-1]
+    stops = found.stops[(found.stops["x"] >= low) & (found.stops["x"] <= high)]
+    mass = np.zeros(len(found.seed))
+    np.add.at(mass, stops["release"], stops["mass"])
+    above = np.zeros((len(mass), len(one.values) - 2))
+    for j, end in enumerate(one.values[1:-1]):
+        own = stops[stops["x"] <= end]
+        np.add.at(above[:, j], own["release"], own["mass"])
+    share = above.sum(axis=0) / max(float(mass.sum()), 1e-12)
+    alone = float((share * (1.0 - share)).sum())
+    each = (above - share * mass[:, None]) / max(float(mass.mean()), 1e-12)
+    between = float(np.square(each).mean(axis=0).sum())
+    per_release = alone / between if between > 0.0 else 0.0
+    count = round(per_release * one.releases)
+    if count < LEAST:
+        mend = f"a deposit of {one.releases} of these releases tells as little as {count} blocks: "
+        mend += "give the number of releases that made it in a column releases"
+        raise BadInput(f"observed deposit of {one.event}", count, mend)
+    return min(count, SPREAD)
+
+
+def observed_values(site: Site, sets: DataSets, seeds: range) -> dict[str, Floats]:
+    """Return the observed values of each set, by name; of a deposit, those of independent blocks.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `independent_blocks` does.
+    """
+    return {
+        name: one.sample(independent_blocks(site, one, seeds))
+        if one.quantity == DEPOSIT
+        else one.values
+        for name, one in sets.items()
+    }
+
+
+def units(sets: DataSets) -> dict[str, float]:
+    """Return the amounts by which the scores of each set are divided.
+
+    They are 1 m if all are chainages, and otherwise the standard deviations of the observations.
+    """
+    if not any(one.passes for one in sets.values()):
+        return dict.fromkeys(sets, 1.0)
+    found = {}
+    for name, one in sets.items():
+        values = one.sample(SPREAD) if one.quantity == DEPOSIT else one.values
+        spread = float(values.std()) or float(np.abs(values).mean())
+        found[name] = spread or 1.0
+    return found
 
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -249,24 +253,31 @@ class Trials:
 
     Parameters
     ----------
-    observed, parameters, compute
+    observed, parameters, compute, scale
         See `search`.
 
     Attributes
     ----------
     tried : list of Candidate
         The parameter sets in the order in which they were computed.
+    places : list of (P,) array
+        Their points in the unit cube.
     table : list of (runs,) array
         Scores of the observed runs for each parameter set [m].
     """
 
     def __init__(
-        self, observed: Mapping[str, Floats], parameters: Sequence[Parameter], compute: Compute
+        self,
+        observed: Mapping[str, Floats],
+        parameters: Sequence[Parameter],
+        compute: Compute,
+        scale: Mapping[str, float],
     ):
-        self._observed, self._compute = observed, compute
+        self._observed, self._compute, self._scale = observed, compute, scale
         self._low = np.array([p.low for p in parameters])
         self._range = np.array([p.high for p in parameters]) - self._low
         self.tried: list[Candidate] = []
+        self.places: list[Floats] = []
         self.table: list[Floats] = []
 
     def values(self, place: Floats) -> Floats:
@@ -276,13 +287,17 @@ class Trials:
     def compute(self, values: Floats, seeds: range) -> tuple[Candidate, Floats]:
         """Compute the run-outs for a parameter set and the scores of the observed runs."""
         found = self._compute(values, seeds)
-        each = [scores(found[event], self._observed[event]) for event in self._observed]
+        each = [
+            scores(found[name], self._observed[name]) / self._scale.get(name, 1.0)
+            for name in self._observed
+        ]
         return Candidate(values, found), np.concatenate(each)
 
     def add(self, place: Floats, seeds: range) -> float:
         """Try a point of the unit cube and return its mean score [m]."""
         candidate, each = self.compute(self.values(place), seeds)
         self.tried.append(candidate)
+        self.places.append(np.clip(place, 0.0, 1.0))
         self.table.append(each)
         return float(each.mean())
 
@@ -302,6 +317,8 @@ def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed
     best = places[int(np.argmin([score(place) for place in places]))]
     own = seed % (2**32 - 1) + 1  # cma replaces a seed of 0 by the current time
     options = {"bounds": [0, 1], "seed": own, "verbose": -9, "maxfevals": budget - spread}
+    if dimensions == 1:  # cma limits the standard deviation to a third, which fails for one number
+        options["maxstd_boundrange"] = math.inf
     evolution = cma.CMAEvolutionStrategy(best, 0.15, options)
     done = spread
     while budget - done >= evolution.popsize and not evolution.stop():
@@ -320,7 +337,7 @@ FOLDS = 11
 """Number of folds of the cross-validation."""
 
 RESAMPLES = 1000
-"""Number of bootstrap samples of the observed runs for the intervals."""
+"""Number of bootstrap samples of the observed values for the posterior."""
 
 
 class Fit(NamedTuple):
@@ -337,26 +354,38 @@ class Fit(NamedTuple):
     """Statistics of the cross-validation, which predicts each run by a fit to other runs."""
     left_out: Floats
     """Score of each observed run in the cross-validation, (runs,) [m]."""
+    posterior: Posterior
+    """Samples of the parameters; their 95 % interval is from `low` to `high`."""
+    observed: Mapping[str, Floats]
+    """Observed values by set."""
+    sets: DataSets
+    """The sets of observations; empty if all values are run-outs of events."""
+
+    @property
+    def pooled(self) -> bool:
+        """Whether all observations are run-outs, so that they have statistics in common."""
+        return all(one.quantity == RUN_OUT for one in self.sets.values())
 
 
 def fit(
     site: Site,
-    observed: Mapping[str, Floats],
+    sets: DataSets,
     parameters: Sequence[Parameter],
     budget: int,
     releases: int,
     seed: int,
     tick: Tick,
     model: Model = "blocks",
+    out: Path | None = None,
 ) -> Fit:
-    """Fit parameters of a site to observed run-outs.
+    """Fit parameters of a site to observations.
 
     Parameters
     ----------
     site : Site
         The site, which provides the values of all other numbers.
-    observed : mapping of event to (n,) array
-        Observed run-outs [m], see `read`.
+    sets : mapping of str to DataSet
+        The observations, see `rigdda.agents.observations.read`.
     parameters : sequence of Parameter
         The parameters to fit.
     budget : int
@@ -368,13 +397,16 @@ def fit(
     tick : callable
         Called with the number of completed parameter sets and a description.
     model : {"blocks", "lumped"}
-        Model that computes the run-outs.
+        Model that computes the values; "lumped" computes run-outs only.
+    out : path, optional
+        Folder in which computed values are kept until `forget` is called. A fit that was killed
+        continues from there.
 
     Raises
     ------
     BadInput
-        If a parameter is unknown, is repeated or has no influence on the run-outs of the model, or
-        if the site is invalid at a limit.
+        If a parameter is unknown, is repeated or has no influence on the run-outs of the model, if
+        the site is invalid at a limit, or if the model cannot compute an observed quantity.
     Diverged
         If a simulation diverges.
     """
@@ -385,13 +417,50 @@ def fit(
         raise BadInput("--parameters", "motion.damping", mend)
     low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
     with_values(site, parameters, list(low)), with_values(site, parameters, list(high))
-    events = list(observed)
+    middle = with_values(site, parameters, list(0.5 * (low + high)))
+    observed = observed_values(middle, sets, range(seed, seed + releases))
 
     def compute(values: Floats, seeds: range) -> Mapping[str, Floats]:
-        return run_outs(with_values(site, parameters, list(values)), model, events, seeds)
+        changed = with_values(site, parameters, list(values))
+        file = None if out is None else out / PARTS / f"{_key(changed, sets, model, seeds)}.npz"
+        known = None if file is None else _read(file, sets)
+        if known is None:
+            known = computed(changed, sets, model, seeds)
+            if file is not None:
+                with atomic(file) as part, part.open("wb") as opened:
+                    arrays: dict[str, Any] = dict(zip(_columns(sets), known.values(), strict=True))
+                    np.savez(opened, **arrays)
+        return known
 
-    found = search(site, observed, parameters, compute, budget, releases, seed, tick)
-    return found._replace(site=with_values(site, parameters, list(found.best.values)))
+    found = search(site, observed, parameters, compute, budget, releases, seed, tick, units(sets))
+    best = with_values(site, parameters, list(found.best.values))
+    return found._replace(site=best, sets=sets)
+
+
+def _columns(sets: DataSets) -> list[str]:
+    """Return a name without special characters for each set of observations."""
+    return [f"set_{i}" for i in range(len(sets))]
+
+
+def _key(site: Site, sets: DataSets, model: Model, seeds: range) -> str:
+    """Return a hash of everything that computed values depend on."""
+    asked: list[Any] = [rigdda.__version__, mechanics(), site, model, seeds.start, seeds.stop]
+    asked += [[one.name, one.values[[0, -1]].tolist()] for one in sets.values()]
+    return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:24]
+
+
+def _read(file: Path, sets: DataSets) -> dict[str, Floats] | None:
+    """Return the computed values in a file, None if there is none or it is damaged."""
+    try:
+        with np.load(file) as stored:
+            return {name: stored[key] for name, key in zip(sets, _columns(sets), strict=True)}
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def forget(out: Path) -> None:
+    """Remove the computed values of a fit whose tables are written."""
+    shutil.rmtree(out / PARTS, ignore_errors=True)
 
 
 def search(
@@ -403,37 +472,43 @@ def search(
     releases: int,
     seed: int,
     tick: Tick,
+    scale: Mapping[str, float] | None = None,
 ) -> Fit:
-    """Fit the parameters of any model of run-outs to observations.
+    """Fit the parameters of any model to observations.
 
     Parameters
     ----------
     site : Site
         The site, which the fit does not change.
-    observed, parameters, budget, releases, seed, tick
+    observed : mapping of str to (n,) array
+        Observed values of each set, for example the run-outs of an event [m].
+    parameters, budget, releases, seed, tick
         See `fit`.
     compute : callable
-        Function of the values of the parameters, (P,), and of seeds that returns the run-outs of
-        each event [m].
+        Function of the values of the parameters, (P,), and of seeds that returns the computed
+        values of each set.
+    scale : mapping of str to float, optional
+        Amounts by which the scores of the sets are divided, by default 1.
 
     Returns
     -------
     Fit
         Result of the fit.
     """
-    trials, seeds = Trials(observed, parameters, compute), range(seed, seed + releases)
+    trials = Trials(observed, parameters, compute, scale or {})
+    seeds = range(seed, seed + releases)
 
     def add(place: Floats) -> float:
         score = trials.add(place, seeds)
-        tick(len(trials.tried), f"best score {min(map(np.mean, trials.table)):.2f} m")
+        tick(len(trials.tried), f"best score {min(map(np.mean, trials.table)):.3g}")
         return score
 
     explore(add, len(parameters), budget, seed)
     fresh = range(seed + releases, seed + (1 + MORE) * releases)
     again = [trials.compute(candidate.values, fresh) for candidate in trials.best(FINALISTS)]
     winner, each = min(again, key=lambda pair: float(pair[1].mean()))
-    tried, table = trials.tried, np.array(trials.table)
-    low, high = _intervals(table, np.array([c.values for c in tried]), seed)
+    posterior = _posterior(parameters, trials, seed)
+    low, high = posterior.interval(0.95)
     whole = [winner.run_outs[event] for event in observed for _ in observed[event]]
     left, left_out = _validate(trials, observed, seed, fresh)
     return Fit(
@@ -445,21 +520,27 @@ def search(
         quality(observed, whole, float(each.mean()), site.slope.toe),
         quality(observed, left, float(left_out.mean()), site.slope.toe),
         left_out,
+        posterior,
+        dict(observed),
+        {},
     )
 
 
-def _intervals(table: Floats, values: Floats, seed: int) -> tuple[Floats, Floats]:
-    """Return the 95 % interval of each parameter by bootstrap of the observed runs.
+def _posterior(parameters: Sequence[Parameter], trials: Trials, seed: int) -> Posterior:
+    """Return the posterior of the parameters by bootstrap of the observed values.
 
-    If all parameter sets have the same scores, the interval is the range of all values tried.
+    If all parameter sets have the same scores, it is the set of all values tried.
     """
+    paths, table = [parameter.path for parameter in parameters], np.array(trials.table)
     if (table == table[0]).all():
-        return values.min(axis=0), values.max(axis=0)
+        every = np.array([candidate.values for candidate in trials.tried])
+        return Posterior.of(paths, every, np.ones(len(every)))
     rng = np.random.default_rng([seed, 1])
-    runs = rng.integers(table.shape[1], size=(RESAMPLES, table.shape[1]))
-    best = np.array([table[:, chosen].mean(axis=1).argmin() for chosen in runs])
-    low, high = np.quantile(values[best], (0.025, 0.975), axis=0)
-    return low, high
+    count = table.shape[1]
+    drawn = rng.multinomial(count, np.full(count, 1.0 / count), size=RESAMPLES) / count
+    places = best_places(np.array(trials.places), table @ drawn.T, rng)
+    values, number = np.unique([trials.values(at) for at in places], axis=0, return_counts=True)
+    return Posterior.of(paths, values, number.astype(np.float64))
 
 
 def _validate(
@@ -517,6 +598,8 @@ def rows(fitted: Fit, observed: Mapping[str, Floats]) -> list[dict[str, Any]]:
         for p, v, a, b, told in zip(*ends, strict=True)
     ]
     own, left, real = fitted.fitted, fitted.validated, seen(observed, fitted.site.slope.toe)
+    if not fitted.pooled:
+        return [*out, *_by_set(fitted)]
 
     def add(what: str, unit: str, pick: Callable[[Quality], float]) -> None:
         row = {"what": what, "unit": unit, "fitted": pick(own), "low": "", "high": ""}
@@ -532,33 +615,59 @@ def rows(fitted: Fit, observed: Mapping[str, Floats]) -> list[dict[str, Any]]:
     return out
 
 
-def write(path: Path, fitted: Fit, observed: Mapping[str, Floats]) -> None:
+def _by_set(fitted: Fit) -> list[dict[str, Any]]:
+    """Return rows with the score and with the mean and the 95 % quantile of each set."""
+    blank = {"low": "", "high": "", "identified": ""}
+    own, left = fitted.fitted, fitted.validated
+    mixed = any(one.passes for one in fitted.sets.values())
+    head = {"what": "score", "unit": "-" if mixed else "m", "fitted": own.score} | blank
+    out: list[dict[str, Any]] = [head | {"observed": 0.0, "left_out": left.score}]
+    for name, one in fitted.sets.items():
+        real, made = fitted.observed[name], fitted.best.run_outs[name]
+        row = {"what": f"mean, {name}", "unit": one.unit, "fitted": float(made.mean())} | blank
+        out.append(row | {"observed": float(real.mean()), "left_out": left.means[name]})
+        ends = (float(np.quantile(values, 0.95)) for values in (made, real))
+        row = {"what": f"95 %, {name}", "unit": one.unit, "fitted": next(ends)} | blank
+        out.append(row | {"observed": next(ends), "left_out": ""})
+    return out
+
+
+def write(path: Path, fitted: Fit) -> None:
     """Write the rows of a fit as a CSV file."""
-    write_rows(path, rows(fitted, observed))
+    write_rows(path, rows(fitted, fitted.observed))
 
 
-def draw(path: Path, fitted: Fit, observed: Mapping[str, Floats]) -> None:
-    """Write a PNG of the cumulative distribution of observed and computed run-outs."""
+def draw(path: Path, fitted: Fit) -> None:
+    """Write a PNG of the cumulative distributions of observed and computed values."""
     from matplotlib.figure import Figure
 
     from rigdda.agents.reports.pictures import save
 
-    names = ["all", *observed] if len(observed) > 1 else list(observed)
+    observed = fitted.observed
+    names = ["all", *observed] if len(observed) > 1 and fitted.pooled else list(observed)
     figure = Figure(figsize=(3.2 * len(names) + 0.6, 3.6), layout="constrained")
     for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
-        events = list(observed) if name == "all" else [name]
-        real = np.concatenate([observed[e] for e in events])
-        weight = [len(observed[e]) / len(real) for e in events]
+        own = list(observed) if name == "all" else [name]
+        real = np.concatenate([observed[e] for e in own])
+        weight = [len(observed[e]) / len(real) for e in own]
         grid = np.linspace(min(0.0, real.min()), 1.25 * real.max(), 400)
         share = sum(w * (fitted.best.run_outs[e][:, None] <= grid).mean(axis=0)
-                    for w, e in zip(weight, events, strict=True))  # fmt: skip
+                    for w, e in zip(weight, own, strict=True))  # fmt: skip
         half = 1.96 * np.sqrt(share * (1.0 - share) / len(real))
         axes.fill_between(grid, np.clip(share - half, 0, 1), np.clip(share + half, 0, 1),
                           color="#1c5aa0", alpha=0.2, lw=0)  # fmt: skip
         axes.plot(grid, share, color="#1c5aa0", label="computed, 95 % band of samples of this size")
         axes.step(np.sort(real), np.arange(1, len(real) + 1) / len(real), where="post",
                   color="#c0392b", label=f"observed, {len(real)}")  # fmt: skip
-        axes.set(xlabel="run-out [m]", title=name, ylim=(0, 1))
-    figure.axes[0].set_ylabel("share of runs")
+        axes.set(xlabel=_axis(fitted, own[0]), title=name, ylim=(0, 1))
+    figure.axes[0].set_ylabel("share of blocks")
     figure.axes[0].legend(frameon=False, fontsize=8, loc="upper left")
     save(figure, path)
+
+
+def _axis(fitted: Fit, name: str) -> str:
+    """Return the quantity and the unit of a set of observations."""
+    one = fitted.sets.get(name)
+    if one is None or not one.passes:
+        return "run-out [m]"
+    return f"{QUANTITIES[one.quantity].words} [{one.unit}]"

@@ -26,6 +26,14 @@ layout_option = click.option(
     help="Layout of barriers, a TOML or JSON file as `rigdda design` writes it.",
 )
 
+posterior_option = click.option(
+    "--posterior",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Posterior of a fit (posterior.csv of `rigdda fit`), which replaces the plausible ranges "
+    "of the numbers in it.",
+)
+
 
 class Folder(click.Path):
     """Option type for a folder that refuses the empty name.

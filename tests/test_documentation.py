@@ -33,11 +33,12 @@ BLOCK = re.compile(r"^(?:```|~~~)(\S*)[^\n]*\n(.*?)^(?:```|~~~)$", re.MULTILINE 
 SAVED = re.compile(r"[Ss]ave\s+(?:this|the\s+result)\s+as\s+`([\w.-]+)`")
 
 SMALL = {
-    "design": ["--budget", "60", "--verify", "20"],
+    "design": ["--budget", "60", "--verify", "20", "--ground-samples", "1"],
     "corridor": ["--releases", "200"],
     "evaluate": ["--budget", "30", "--sites", "1", "--verify", "20"],
     "fidelity": ["--releases", "10"],
     "fit": ["--budget", "8", "--releases", "10"],
+    "sensitivity": ["--samples", "2", "--releases", "10"],
     "simulate": ["--releases", "4"],
     "train": ["--sites", "2", "--episodes", "4"],
     "validate": ["--only", "free flight"],

@@ -24,7 +24,8 @@ from scipy.optimize import brentq
 
 from experiments.script import BLUE, GREEN, ORANGE, RED, Number, draw, say, write
 from rigdda import Site
-from rigdda.agents.fit import Floats, Model, Parameter, run_outs, with_values
+from rigdda.agents.fit import Floats, Model, run_outs
+from rigdda.agents.parameters import Parameter, with_values
 
 HERE = Path(__file__).parent
 

@@ -29,7 +29,8 @@ from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, int
 from experiments.tschamut.platrock import PARAMETERS, PYTHON, PlatRock
 from rigdda import Site, release
 from rigdda.agents import fit
-from rigdda.agents.fit import Fit, Floats, Parameter, parse, seen, with_values
+from rigdda.agents.fit import Fit, Floats, seen
+from rigdda.agents.parameters import Parameter, parse, with_values
 
 HERE = Path(__file__).parent
 

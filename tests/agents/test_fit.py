@@ -10,15 +10,9 @@ import pytest
 from rigdda import BadInput, Site
 from rigdda.agents import fit
 from rigdda.agents.cli import main
-from rigdda.agents.fit import (
-    Parameter,
-    check_parameters,
-    parse,
-    read,
-    run_outs,
-    scores,
-    with_values,
-)
+from rigdda.agents.fit import check_parameters, run_outs, scores
+from rigdda.agents.observations import RUN_OUT, DataSet, read
+from rigdda.agents.parameters import Parameter, parse, with_values
 from rigdda.model.site_tables import Rebound
 
 SITE = Site.load("verge")
@@ -46,7 +40,8 @@ def test_values_are_found_again_with_what_they_predict():
     parameters, real = truth()
     events = ["block", "small, face"]
     observed = run_outs(real, "lumped", events, range(900, 1020))
-    found = fit.fit(SITE, observed, parameters, 96, 60, 0, lambda done, words: None, "lumped")
+    sets = {event: DataSet(RUN_OUT, event, values) for event, values in observed.items()}
+    found = fit.fit(SITE, sets, parameters, 96, 60, 0, lambda done, words: None, "lumped")
     exact = np.array(list(TRUE.values()))
     # a point that bounces on a short verge hardly slides: friction is left open, and said to be
     assert found.best.values[0] == pytest.approx(exact[0], abs=0.03)
@@ -119,7 +114,7 @@ def test_a_table_of_runs_is_checked(tmp_path, text, what):
     path = tmp_path / "seen.csv"
     path.write_text(text)
     with pytest.raises(BadInput, match=what):
-        read(path, SITE)
+        read([path], SITE)
 
 
 def test_every_seed_may_be_given() -> None:
@@ -155,4 +150,18 @@ def test_a_table_that_is_not_utf_8_is_refused(tmp_path):
     path = tmp_path / "seen.csv"
     path.write_bytes("event,run_out_m\nGr\u00f6\u00dfe,5\n".encode("latin-1"))
     with pytest.raises(BadInput, match="save it as UTF-8"):
-        read(path, Site.load("verge"))
+        read([path], Site.load("verge"))
+
+
+def test_one_number_is_searched_whatever_its_scores() -> None:
+    for seed in range(20):
+        rng, count = np.random.default_rng(seed), [0]
+
+        def score(
+            place: np.ndarray, rng: np.random.Generator = rng, count: list[int] = count
+        ) -> float:
+            count[0] += 1
+            return float(0.1 * rng.random() + 0.1 * (place[0] - 0.7) ** 2)
+
+        fit.explore(score, 1, 60, seed)
+        assert count[0] > 40

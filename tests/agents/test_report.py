@@ -115,7 +115,7 @@ def same(text: str, value: float) -> bool:
 def test_every_number_of_a_table_is_that_of_its_file(made: Made) -> None:
     page, compared = Page(made.page), Counter[str]()
     assert set(page.tables) == {
-        "decision/layouts.csv", "decision/chances.csv", "before/stations.csv"
+        "decision/layouts.csv", "decision/chances.csv", "decision/frontier.csv", "before/stations.csv"
     }  # fmt: skip
     for source, shown in page.tables.items():
         with (made.folder / source).open(encoding="utf-8", newline="") as file:
@@ -186,7 +186,7 @@ def test_sections_come_only_with_results(made: Made) -> None:
     heads = [head.partition(". ")[2] for head in Page(made.page).heads]
     assert heads == [
         "Summary", "Site", "Assumptions and their sources", "What comes down", "Layouts compared",
-        "Limits of the method", "How to repeat the results", "Appendix",
+        "What other targets cost", "Limits of the method", "How to repeat the results", "Appendix",
     ]  # fmt: skip
     assert cli.main(["report", str(made.folder / "before")]) == 0
     text = (made.folder / "before/report.html").read_text(encoding="utf-8")
@@ -199,7 +199,7 @@ def test_each_picture_of_the_folders_is_a_vector(made: Made) -> None:
     assert names == [
         "Section of the site", "Trajectories and envelopes", "Histograms at x = 28 m",
         "Histograms at x = 34.8 m", "Along the slope", "Run-out",
-        "Without barriers and with the layout", "Cost and risk",
+        "The slope without and with the layout", "Cost and risk", "Cost and probability",
     ]  # fmt: skip
     assert "<img" not in made.page
 
@@ -445,7 +445,7 @@ def test_the_page_renders(made: Made, program: str, tmp_path: Path) -> None:
     text, console = look(program, page, "--window-size=1280,900")
     assert console == ""
     found = json.loads(text.partition("<pre>")[2].partition("</pre>")[0].replace("&quot;", '"'))
-    assert len(found["boxes"]) == 8
+    assert len(found["boxes"]) == 9
     assert all(width > 600 and height > 200 for width, height in found["boxes"])
     assert found["wide"] <= 0  # nothing has to be scrolled to the side
 

@@ -115,7 +115,8 @@ def same(text: str, value: float) -> bool:
 def test_every_number_of_a_table_is_that_of_its_file(made: Made) -> None:
     page, compared = Page(made.page), Counter[str]()
     assert set(page.tables) == {
-        "decision/layouts.csv", "decision/chances.csv", "decision/frontier.csv", "before/stations.csv"
+        "decision/layouts.csv", "decision/chances.csv", "decision/frontier.csv",
+        "before/stations.csv",
     }  # fmt: skip
     for source, shown in page.tables.items():
         with (made.folder / source).open(encoding="utf-8", newline="") as file:

@@ -468,10 +468,11 @@ def design(
     written to frontier.csv and frontier.png.
 
     Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd, band.csv and band.png
-    (the comparison on other grounds) and the outcomes of all releases, for `rigdda reprice`. An
-    interrupted run continues from evaluations.jsonl. A folder that contains the design of another
-    problem (problem.json) is refused. Of a site with traffic, the risk to life is written to
-    risk.csv.
+    (the comparison on other grounds) and the outcomes of all releases, for `rigdda reprice`; the
+    checks of the barriers (checks.csv, and design_sheet.csv factor by factor) and what the
+    engineering rule demands along the slope (demand.csv, demand.png). For a site with traffic, the
+    risk to life is written to risk.csv. An interrupted run continues from evaluations.jsonl. A
+    folder that contains the design of another problem (problem.json) is refused.
     """
     from rigdda.agents import ground_band, jobs
     from rigdda.agents.designers.store import FILE, claim
@@ -537,14 +538,14 @@ def _pose(
 
 def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
-    from rigdda.agents.reports import findings, frontier_report, tables
+    from rigdda.agents.reports import checks, findings, frontier_report, tables
     from rigdda.agents.reports.folder import FILES
     from rigdda.agents.reports.wording import order, unchanged
 
     chosen, result = done.chosen.evaluation, done.result
     click.echo(
         "Z, capital, harm and repair in EUR per metre of road and year; to build in EUR per\n"
-        "metre; rule: UNI 11211-4; debris: rock on the road, relative to the first layout"
+        "metre; debris: rock on the road, relative to the first layout"
     )
     show(tables.costs(done))
     chances = tables.chances(done)
@@ -565,6 +566,12 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         click.echo(f"  {order(barrier, site)}")
     for line in findings.kept(site, chosen.layout):
         click.echo(f"  {line}")
+    click.echo(checks.rule_words(done.rule))
+    if done.checks.table:
+        click.echo("checks of this layout (checks.csv, design_sheet.csv)")
+        show(checks.table(done.checks))
+    for line in checks.notes(done.checks):
+        click.echo(line)
     for line in findings.of_design(done):
         finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""

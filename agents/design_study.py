@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rigdda import Site
+from rigdda.agents.barrier_checks import LayoutChecks
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
+from rigdda.agents.designers.rule import RuleAnswer
 from rigdda.envs import DesignProblem, Evaluation
 
-NOTHING, RULE, CONSTANT, SHED = "nothing", "rule", "constant", "rock shed"
+NOTHING, CONSTANT, SHED = "nothing", "constant", "rock shed"
 
 AS_IT_STANDS = "as it stands"
 """Name of the case without new barriers on a site with existing ones."""
@@ -69,6 +71,10 @@ class DesignStudy(ComparedLayouts):
         Result of the designer.
     left : str
         Text on the risk that remains with the layout found.
+    rule : RuleAnswer
+        Answer of the rule with its design sheet.
+    checks : LayoutChecks
+        Checks of the barriers of the layout found.
     frontier : tuple of TriedLayout
         If the layout of the designer misses a target: the cheapest layout for each level of
         P(reach) among all that were evaluated.
@@ -78,6 +84,8 @@ class DesignStudy(ComparedLayouts):
 
     result: DesignResult
     left: str
+    rule: RuleAnswer
+    checks: LayoutChecks
     frontier: tuple[TriedLayout, ...] = ()
     replaced: bool = False
 

@@ -16,15 +16,16 @@ import numpy as np
 import rigdda
 from rigdda import Barrier, Layout, Outcome, Run, Site
 from rigdda.agents import archive, designers
+from rigdda.agents.barrier_checks import check_layout
 from rigdda.agents.design_study import (
     AS_IT_STANDS,
     CONSTANT,
     NOTHING,
-    RULE,
     DesignStudy,
     VerifiedLayout,
     design_events,
 )
+from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.frontier import TriedLayout, frontier
 from rigdda.agents.designers.menu import Menu, on_bound
 from rigdda.agents.designers.protocol import (
@@ -34,6 +35,7 @@ from rigdda.agents.designers.protocol import (
     release_seeds,
     verify,
 )
+from rigdda.agents.designers.rule import RuleAnswer, answer
 from rigdda.agents.designers.store import Store
 from rigdda.agents.reports import findings
 from rigdda.agents.reports.tables import EvaluationsFile
@@ -177,8 +179,9 @@ def study(
             tick(entry.simulations, f"{name}: {entry.stage}")
 
         result = designers.module(name).design(problem, simulations, seed, progress, store)
+        rule = answer(problem)
         cases: list[VerifiedLayout] = []
-        for case, layout in _compared(problem, name, result, simulations, seed, store):
+        for case, layout in _compared(problem, name, result, rule):
             tick(simulations + releases * len(cases), f"verifying: {case}")
             evaluation = verify(problem, layout, releases, seed, store)
             file.add(Entry(result.simulations, "verification", evaluation))
@@ -199,7 +202,7 @@ def study(
                 replaced = best.layout != result.layout
                 result = _with_layout(problem, result, best, [c.evaluation for c in cases[:-1]])
                 cases[-1] = VerifiedLayout(cases[-1].name, best)
-    tick(simulations + releases * len(cases), "analysing the remaining risk")
+    tick(simulations + releases * len(cases), "analysing the remaining risk, checking barriers")
     left = _left(problem, [case.evaluation for case in cases], result.tried, seed)
     layouts = [(case.name, case.evaluation.layout) for case in cases]
     archive.write(out / archive.FILE, archive.archive(problem, seed, layouts, store))
@@ -208,6 +211,8 @@ def study(
         cases=tuple(cases),
         result=result,
         left=left,
+        rule=rule,
+        checks=check_layout(problem, cases[-1].evaluation.layout),
         frontier=front,
         replaced=replaced,
     )
@@ -285,21 +290,16 @@ def _with_layout(
 
 
 def _compared(
-    problem: DesignProblem,
-    name: str,
-    result: DesignResult,
-    simulations: int,
-    seed: int,
-    store: Store,
+    problem: DesignProblem, name: str, result: DesignResult, rule: RuleAnswer
 ) -> list[tuple[str, Layout]]:
     """Return the layouts to verify: no barrier, the rule, the constant and the designer's."""
     bare = AS_IT_STANDS if problem.site.existing else NOTHING
     out: list[tuple[str, Layout]] = [(bare, ())]
-    for words, module in ((RULE, "rule"), (CONSTANT, "constant")):
-        if module != name:
-            found = designers.module(module).design(problem, simulations, seed, None, store)
-            out.append((words, found.layout))
-    words = {"rule": RULE, "constant": CONSTANT}.get(name, f"optimised ({name})")
+    if name != "rule":
+        out.append((rule.name, rule.layout))
+    if name != CONSTANT:
+        out.append((CONSTANT, constant(problem, Menu(problem))))
+    words = {"rule": rule.name, CONSTANT: CONSTANT}.get(name, f"optimised ({name})")
     return [*out, (words, result.layout)]
 
 

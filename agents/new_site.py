@@ -19,6 +19,7 @@ from rigdda.files import atomic
 from rigdda.model import loose_blocks
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.grounds import GROUNDS, USUAL
+from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.prices import Consequences, Prices
 from rigdda.model.site_tables import (
     Event,
@@ -218,6 +219,7 @@ class _Draft:
             *map(self._surface, self.surfaces),
             _defaults("[prices]", Prices),
             _defaults("[consequences]", Consequences),
+            _defaults("[rule]", PartialFactors),
             Part(
                 "[motion]",
                 Motion,

@@ -17,10 +17,9 @@ import numpy as np
 
 from experiments.script import Number, interval, main, say, write
 from rigdda import Layout
-from rigdda.agents.designers.catalogue import ensemble, ensemble_seeds
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.rule import rule
+from rigdda.agents.designers.rule import answer
 from rigdda.envs import DesignProblem
 from rigdda.envs.corridor_environment import CorridorDesign
 
@@ -29,9 +28,6 @@ BUDGETS = (50.0, 200.0, 800.0)
 
 CORRIDORS, SECTIONS, RELEASES = 8, 12, 400
 """Number of corridors for each budget, of their sections, and of releases in each section."""
-
-SEARCH = 4_000
-"""Budget from which the number of releases for the rule follows."""
 
 
 def _nothing(problem: DesignProblem) -> Layout:
@@ -43,9 +39,7 @@ def _constant(problem: DesignProblem) -> Layout:
 
 
 def _rule(problem: DesignProblem) -> Layout:
-    menu = Menu(problem)
-    seeds = ensemble_seeds(problem.site, 0, SEARCH)
-    return rule(problem, ensemble(problem.site, seeds, menu.stations), menu)
+    return answer(problem).layout
 
 
 LAYOUTS: dict[str, Callable[[DesignProblem], Layout]] = {

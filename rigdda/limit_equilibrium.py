@@ -1,4 +1,4 @@
-"""Limit equilibrium of a toppling slope (Goodman and Bray 1976)."""
+"""Limit equilibrium of a toppling slope (Goodman and Bray 1976) and of gravity structures."""
 
 from __future__ import annotations
 
@@ -118,3 +118,140 @@ def columns(crest: int, above: int, rise: float, fall: float, step: float) -> li
     """
     below: Sequence[float] = [n * (rise - step) for n in range(1, crest + 1)]
     return [*below, *(below[-1] - n * (fall + step) for n in range(1, above + 1))]
+
+
+class Impact(NamedTuple):
+    """Impact of a block on a gravity structure.
+
+    Parameters
+    ----------
+    mass : float
+        Mass of the block [kg].
+    speed : float
+        Its velocity towards the structure [m/s].
+    height : float
+        Height of the impact above the base [m].
+    restitution : float
+        Coefficient of restitution of the block on the structure [-].
+    """
+
+    mass: float
+    speed: float
+    height: float
+    restitution: float = 0.0
+
+
+class Stability(NamedTuple):
+    """Stability of a gravity structure under a horizontal load.
+
+    Parameters
+    ----------
+    load : float
+        Horizontal load [N].
+    sliding, overturning, bearing : float
+        Factors of safety: resistance divided by load [-]; inf without a load, and 0 for bearing if
+        the resultant lies outside the base.
+    pressure : float
+        Mean pressure on the compressed part of the base [Pa]; inf if there is none.
+    """
+
+    load: float
+    sliding: float
+    overturning: float
+    bearing: float
+    pressure: float
+
+
+def equivalent_load(impact: Impact, mass: float, displacement: float) -> float:
+    r"""Return the constant force that stops a struck structure over a displacement [N].
+
+    The peak of the contact force lasts milliseconds and says little of stability. Momentum is
+    conserved in the impact, and the force does work on what it leaves (Yong et al., Analytical
+    solution for estimating sliding displacement of rigid barriers subjected to boulder impact,
+    Journal of Engineering Mechanics 145 (2019) 04019006):
+
+    .. math:: V = \frac{(1 + e)\, m}{m + M} v, \qquad F = \frac{M V^2}{2 s}
+
+    A structure whose friction exceeds F slides less than s.
+
+    Parameters
+    ----------
+    impact : Impact
+        The impact.
+    mass : float
+        Mass M of the part of the structure that acts as a unit [kg].
+    displacement : float
+        Tolerated displacement s [m].
+    """
+    check.number("mass", mass, 0.0, open_low=True)
+    check.number("displacement", displacement, 0.0, open_low=True)
+    speed = (1.0 + impact.restitution) * impact.mass * impact.speed / (impact.mass + mass)
+    return 0.5 * mass * speed**2 / displacement
+
+
+def rock_thrust(height: float, unit_weight: float, friction_deg: float) -> float:
+    r"""Return the active thrust of rock with a level surface behind a vertical face [N/m].
+
+    .. math:: T = \tfrac12 K_a \gamma h^2, \qquad K_a = \tan^2(45° - \phi / 2)
+
+    It acts at a third of the height (Rankine 1857).
+
+    Parameters
+    ----------
+    height : float
+        Height of the rock [m].
+    unit_weight : float
+        Its weight [N/m3].
+    friction_deg : float
+        Its friction angle [deg].
+    """
+    active = math.tan(math.radians(45.0 - 0.5 * friction_deg)) ** 2
+    return 0.5 * active * unit_weight * height**2
+
+
+def stability(
+    weight: float, width: float, friction: float, bearing: float, load: float, lever: float
+) -> Stability:
+    r"""Return the factors of safety of a gravity structure under a horizontal load.
+
+    .. math::
+        F_s = \frac{\mu W}{H}, \qquad F_o = \frac{W b / 2}{H h}, \qquad
+        F_b = \frac{q_a (b - 2 e)}{W}, \quad e = \frac{H h}{W}
+
+    against sliding, against overturning about the downhill edge of the base, and against bearing,
+    with the pressure spread evenly over the part of the base that is centred on the resultant
+    (Meyerhof 1953, 3rd ICSMFE, 440-445).
+
+    Parameters
+    ----------
+    weight : float
+        Weight per metre W [N/m].
+    width : float
+        Width of the base b [m]; the weight acts at its middle.
+    friction : float
+        Coefficient of friction of the base [-].
+    bearing : float
+        Admissible pressure on the ground q_a [Pa].
+    load : float
+        Horizontal load per metre H [N/m].
+    lever : float
+        Height of the load above the base h [m].
+
+    Raises
+    ------
+    BadInput
+        If a value is outside its range.
+    """
+    for name, value in (("weight", weight), ("width", width), ("bearing", bearing)):
+        check.number(name, value, 0.0, open_low=True)
+    for name, value in (("friction", friction), ("load", load), ("lever", lever)):
+        check.number(name, value, 0.0)
+    moment = load * lever
+    compressed = max(width - 2.0 * moment / weight, 0.0)
+    return Stability(
+        load=load,
+        sliding=friction * weight / load if load else math.inf,
+        overturning=0.5 * weight * width / moment if moment else math.inf,
+        bearing=bearing * compressed / weight,
+        pressure=weight / compressed if compressed else math.inf,
+    )

@@ -35,7 +35,7 @@ from rigdda.agents.designers.catalogue import (
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, Proposals, search
-from rigdda.agents.designers.rule import rule
+from rigdda.agents.designers.rule import answer
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.barriers.base import STEP
@@ -168,7 +168,7 @@ def design(
     ledger, menu = Ledger(problem, simulations, seed, progress, store), Menu(problem)
     ensemble = ensemble_for(ledger, menu.stations)
     choices = best_choices(problem, ensemble, menu)
-    layouts = [*(choice.layout for choice in choices), rule(problem, ensemble, menu)]
+    layouts = [*(choice.layout for choice in choices), answer(problem).layout]
     ledger.starts |= set(layouts)
     found = search(ledger, _propose(layouts))
     own = {name: getattr(found, name) for name in DesignResult.__dataclass_fields__}
@@ -227,22 +227,22 @@ def starts(ledger: Ledger) -> list[Layout]:
     """Return the starting layouts of a search, the most promising first."""
     menu = Menu(ledger.problem)
     ensemble = ensemble_for(ledger, menu.stations)
-    ledger.known = tuple(unsearched(ledger.problem, ensemble, menu))
+    ledger.known = tuple(unsearched(ledger.problem, menu))
     optima = [choice.layout for choice in best_choices(ledger.problem, ensemble, menu)]
-    found = list(dict.fromkeys([*optima, *known(ledger.problem, ensemble, menu), ()]))
+    found = list(dict.fromkeys([*optima, *known(ledger.problem, menu), ()]))
     ledger.starts |= set(found)
     return found
 
 
-def unsearched(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> list[Layout]:
+def unsearched(problem: DesignProblem, menu: Menu) -> list[Layout]:
     """Return the baseline layouts of every search: the rule and the best constant."""
-    layouts = rule(problem, ensemble, menu), constant(problem, menu)
+    layouts = answer(problem).layout, constant(problem, menu)
     return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]
 
 
-def known(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> list[Layout]:
+def known(problem: DesignProblem, menu: Menu) -> list[Layout]:
     """Return the layouts that need no search: the rule, its variants and the best constant."""
-    one = rule(problem, ensemble, menu)
+    one = answer(problem).layout
     smaller = [_smaller(one, *steps) for steps in CHEAPER]
     layouts = [one, constant(problem, menu), *smaller]
     return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]

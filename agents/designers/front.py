@@ -60,7 +60,7 @@ def layouts(
     first = min(USUAL, max(FEWEST, simulations // (FIELD * events))) * events
     menu, track = Menu(problem), Track(ledger)
     ensemble = ensemble_for(ledger, menu.stations)
-    known = [layout for layout in unsearched(problem, ensemble, menu) if problem.fits(layout)]
+    known = [layout for layout in unsearched(problem, menu) if problem.fits(layout)]
     budget = int(SINGLES * simulations)
     lone, kinds = scout(track, menu, ensemble, known, budget, first, PRICES)
     pairs = [foretold(problem, lone, lone, track.nothing, MOST // 2, price) for price in PRICES[:3]]

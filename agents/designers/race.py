@@ -315,7 +315,7 @@ def design(
         return search(ledger, offered(ledger))
     menu, track = Menu(problem), Track(ledger)
     ensemble = ensemble_for(ledger, menu.stations)
-    known = unsearched(problem, ensemble, menu)
+    known = unsearched(problem, menu)
     lone, _ = scout(track, menu, ensemble, known, int(SINGLES * simulations), first)
     ledger.starts |= {arm.layout for arm in lone}
     pairs = foretold(problem, lone, lone, track.nothing, int(PAIRS * simulations / first))

@@ -1,45 +1,31 @@
 """The engineering rule: the cheapest fence that a code of practice requires.
 
-The rule follows UNI 11211-4:2012 (Peila and Ronco 2009, Nat. Hazards Earth Syst. Sci. 9,
-1291-1298), with values of the partial factors from memory. The design values at a station are the
-95 % quantiles of the blocks of the design events that cross it. Speed and height are multiplied by
-`SPEED` and the mass by `MASS`. A fence must satisfy
-
-    E_d = 1/2 m_d v_d^2 < MEL / 1.2,   height >= h_d + freeboard
-
-with a freeboard equal to the mean radius of the blocks, but at least 0.5 m. If no fence fits, the
-rule uses the ditch of Ritchie (1963, Highway Research Record 17), or else an embankment or a wall
-as high as the fence.
+The rule is that of `rigdda.agents.fence_checks`. Stations are compared by a price without the jumps
+between classes, and among prices that are nearly equal the station nearest the downhill end of the
+zone is taken, so that the answer hardly depends on the releases. If no fence fits, the answer is
+the ditch of Ritchie or else an embankment or a wall as high as the rule would have the fence, under
+its own name.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Site, Wall
-from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble_for
+from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Site, Wall
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress
 from rigdda.agents.designers.store import Store
+from rigdda.agents.fence_checks import Demand, FenceCheck, demand_at, demands
+from rigdda.agents.ritchie_ditch import RitchieDitch
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.barriers.base import MIN_HEIGHT
-from rigdda.envs import DesignProblem
-
-QUANTILE = 0.95
-
-SPEED = 1.10 * 1.02
-"""Factor on speeds and heights [-]: 1.10 for trajectories without calibration, times 1.02 for good
-topographic data."""
-MASS = 1.02
-"""Factor on the mass, for blocks that were surveyed in detail [-]."""
-ENERGY = 1.2
-"""Safety factor on the energy of a class at its maximum energy level (MEL) [-]."""
-FREEBOARD = 0.5
-"""Least freeboard [m]."""
+from rigdda.barriers.fence import CLASSES
+from rigdda.envs import DesignProblem, design_envelope
+from rigdda.envs.design_envelope import DesignEnvelope
 
 COVERED = 0.95
 """Least share of the design blocks that reach the road which must cross the station of a fence [-].
@@ -48,16 +34,51 @@ It prevents fences uphill of the sources."""
 RELEASES = 4000
 """Largest number of releases for the evaluation of a layout that needs no search."""
 
-RITCHIE = {
-    85.0: ((3.7, 1.0), (4.6, 1.2), (6.1, 1.2), (6.1, 1.2)),
-    75.0: ((3.7, 1.0), (4.6, 1.2), (6.1, 1.8), (7.6, 1.8)),
-    63.0: ((3.7, 1.2), (4.6, 1.8), (6.1, 1.8), (7.6, 2.7)),
-    53.0: ((3.7, 1.0), (4.6, 1.2), (4.6, 1.8), (4.6, 1.8)),
-    45.0: ((3.7, 1.0), (3.7, 1.5), (4.6, 1.8), (4.6, 1.8)),
-}
-"""Width and depth of a ditch [m] by inclination of the slope [deg], for slopes up to 10, 20 and
-30 m high and for higher ones; from memory."""
-HIGH = (10.0, 20.0, 30.0)
+NAME = "rule"
+"""Name of the layout in tables if it satisfies the rule."""
+
+
+@dataclass(frozen=True, slots=True)
+class RuleAnswer:
+    """Answer of the rule for a problem.
+
+    Parameters
+    ----------
+    layout : Layout
+        The fence; what stands instead if none fits; no barrier if none is needed or possible.
+    name : str
+        "rule" for a fence that satisfies the rule, otherwise what the layout is.
+    reason : str
+        Why the layout is not a fence of the rule; empty if it is.
+    check : FenceCheck or None
+        The design sheet of the fence or, if none fits, of the one that comes nearest. None if no
+        block of the design events reaches the road or no fence may be built.
+    envelope : DesignEnvelope
+        What the blocks of the design events do.
+    """
+
+    layout: Layout
+    name: str
+    reason: str
+    check: FenceCheck | None
+    envelope: DesignEnvelope
+
+    @property
+    def doubt(self) -> str:
+        """A note if the fence fits at one end of the intervals only; empty if not."""
+        if self.check is None:
+            return ""
+        ranges = self.check.ranges
+        possible = all(low < 1.0 for low, _ in ranges.values())
+        sure = all(high < 1.0 for _, high in ranges.values())
+        if sure or not possible:
+            return ""
+        words = ", ".join(
+            f"{name} {low:.2f} to {high:.2f}"
+            for name, (low, high) in ranges.items()
+            if low < 1.0 <= high
+        )
+        return f"a close call, as the utilisations have 95 % intervals: {words}"
 
 
 def design(
@@ -67,104 +88,215 @@ def design(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> DesignResult:
-    """Return the layout of the rule for an ensemble without barriers, and its evaluation.
+    """Return the layout of the rule and its evaluation.
+
+    The releases of the design envelope do not depend on the seed and are not counted: like those of
+    the cost without barriers they belong to the site, and are simulated once.
 
     Raises
     ------
     BadInput, Diverged
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
-    ledger, menu = Ledger(problem, simulations, seed, progress, store), Menu(problem)
-    layout = rule(problem, ensemble_for(ledger, menu.stations), menu)
+    ledger = Ledger(problem, simulations, seed, progress, store)
+    layout = answer(problem).layout
     evaluation = ledger.evaluate(layout, "report", min(RELEASES, ledger.left))
     return ledger.result(evaluation, "start")
 
 
-def rule(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Layout:
-    """Return the layout of the rule; it is empty if no design block reaches the road."""
-    events = problem.site.events
-    design = [i for i, event in enumerate(events) if event.design] or list(range(len(events)))
-    asked = demands(ensemble, design)
-    if not asked:
-        return ()
-    fences = [f for x, e, h in asked for f in _fences(menu, x, e, h)] if _may(menu, "fence") else []
-    if fences:
-        return (min(fences, key=lambda fence: problem.site.capital((fence,))),)
-    return instead(menu, *asked[-1][::2])
+def answer(problem: DesignProblem, seed: int = 0) -> RuleAnswer:
+    """Return the answer of the rule for a problem.
 
+    Parameters
+    ----------
+    problem : DesignProblem
+        The problem.
+    seed : int
+        Seed of the releases of the design envelope.
 
-def demands(ensemble: CrossingEnsemble, events: list[int]) -> list[tuple[float, float, float]]:
-    """Return the station [m], energy E_d [J] and height [m] that a fence needs, going downhill.
-
-    Only those stations are returned that are crossed by the share `COVERED` of the blocks of the
-    events which reach the road.
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
     """
-    table = ensemble.crossings
-    which = np.isin(ensemble.event[table["release"]], events)
-    dangerous = table[which & ensemble.reach_road()]
-    wanted = COVERED * np.count_nonzero(dangerous["station"] == len(ensemble.stations))
-    found = []
-    for k, x in enumerate(ensemble.stations.tolist()):
-        own = table[which & (table["station"] == k)]
-        if wanted > 0 and np.count_nonzero(dangerous["station"] == k) >= wanted:
-            found.append((x, _energy(own), _height(own)))
-    return found
+    envelope = design_envelope.of(problem.site, problem.zone, seed)
+    return judge(problem, envelope)
 
 
-def _energy(crossings: NDArray[np.void]) -> float:
-    """Return the design energy E_d of some crossings [J]."""
-    speed = SPEED * np.quantile(crossings["speed"], QUANTILE)
-    mass = MASS * np.quantile(crossings["mass"], QUANTILE)
-    return float(0.5 * mass * speed**2)
+def judge(problem: DesignProblem, envelope: DesignEnvelope) -> RuleAnswer:
+    """Return the answer of the rule for what the blocks of the design events do."""
+    if not envelope.reaches:
+        return RuleAnswer((), "no barrier", "no design block reaches the road", None, envelope)
+    menu, zone = Menu(problem), problem.zone
+    asked = [d for d in demands(envelope, problem.site.rule) if d.covered >= COVERED]
+    if "fence" not in problem.kinds:
+        return _instead(menu, envelope, asked, "fences are not allowed", None)
+    if not asked:
+        few = "at no station of the zone do the blocks pass that reach the road"
+        return _instead(menu, envelope, asked, few, None)
+    asked += list(_last_places(problem, envelope))
+    best = choose(menu, asked)
+    if best is not None:
+        demand, fence = best
+        return RuleAnswer((fence,), NAME, "", _check(problem, fence, demand), envelope)
+    if problem.max_cost is not None:
+        free = DesignProblem(problem.site, kinds=problem.kinds, zone=(zone.start, zone.end))
+        dear = choose(Menu(free), asked)
+        if dear is not None:
+            demand, fence = dear
+            price = f"{problem.site.capital((fence,)):,.0f} EUR/m, more than max_cost"
+            reason = f"a fence that fits, {fence.label} at {fence.x:.1f} m, costs {price}"
+            return _instead(menu, envelope, asked, reason, _check(problem, fence, demand))
+    near = nearest(problem, asked)
+    return _instead(menu, envelope, asked, why(problem, asked), near)
 
 
-def _height(crossings: NDArray[np.void]) -> float:
-    """Return the height of a fence that some crossings require [m]."""
-    freeboard = max(FREEBOARD, float(crossings["radius"].mean()))
-    return float(SPEED * np.quantile(crossings["height"], QUANTILE)) + freeboard
+TIE = 0.02
+"""Relative difference of smooth prices below which the place decides [-]; about their standard
+error."""
 
 
-def _may(menu: Menu, kind: str) -> bool:
-    return kind in menu.problem.kinds
+def choose(menu: Menu, asked: list[Demand]) -> tuple[Demand, Fence] | None:
+    """Return the place of the fence and the cheapest fence there; None if none fits anywhere.
+
+    Prices in the catalogue jump from class to class, so that small differences of the demand would
+    decide on the place. Therefore places are compared by `smooth_price`, and of those within `TIE`
+    of the least, the one nearest to the downhill end of the zone is taken.
+    """
+    places = []
+    for demand in asked:
+        found = min(
+            fences(menu, demand), key=lambda f: menu.problem.site.capital((f,)), default=None
+        )
+        if found is not None:
+            places.append((demand, found, smooth_price(menu.problem.site, demand, found)))
+    if not places:
+        return None
+    least = min(price for *_, price in places)
+    tied = [place for place in places if place[2] <= (1.0 + TIE) * least]
+    demand, fence, _ = max(tied, key=lambda place: (place[0].x, -place[2]))
+    return demand, fence
 
 
-def _fences(menu: Menu, x: float, energy: float, height: float) -> Iterator[Fence]:
-    """Yield the fences that may be built at a chainage and have enough energy and height."""
-    wanted = math.ceil(2.0 * height - 1e-9) / 2.0  # in steps of half a metre
-    for name, row in FENCE_CLASSES.items():
+def smooth_price(site: Site, demand: Demand, fence: Fence) -> float:
+    """Return the price of a fence of exactly the demanded energy and height [EUR/m].
+
+    The price per area is interpolated between the classes, in the logarithm of the energy. The
+    energy is at least the one at which the catalogue has the height, interpolated likewise.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    demand : Demand
+        The demand.
+    fence : Fence
+        A fence at this place; the surcharge for access is the same.
+    """
+    factors = demand.hard.factors
+    log = np.log(np.array(CLASSES, dtype=np.float64))
+    heights = np.array([row.height for row in FENCE_CLASSES.values()])
+    first = np.concatenate([[True], np.diff(heights) > 0.0])  # the lowest class of each height
+    share = factors.rated(1) / factors.energy  # usable energy of a class of 1 kJ [J]
+    energy = max(
+        math.log(max(demand.energy() / share, 1e-9)),
+        float(np.interp(demand.height(), heights[first], log[first])),
+    )
+    known = [i for i, name in enumerate(CLASSES) if f"{name}" in site.prices.fence]
+    prices = np.array([site.prices.fence[f"{CLASSES[i]}"] for i in known])
+    access = site.capital((fence,)) / fence.price(site, None)
+    each = float(np.interp(energy, log[known], prices))
+    return access * (each * demand.height() + site.prices.fence_base)
+
+
+def fences(menu: Menu, demand: Demand) -> Iterator[Fence]:
+    """Yield the fences that satisfy the rule, have a price and may be built at a station."""
+    wanted = math.ceil(2.0 * demand.height() - 1e-9) / 2.0  # in steps of half a metre
+    site, factor = menu.problem.site, demand.hard.factors.elongation
+    for name, row in demand.classes():
         tall = max(row.lowest, wanted)
-        if energy < 1e3 * name / ENERGY and tall <= min(row.height, menu.zone.max_height):
-            fence = menu.put(Fence(x, tall, energy_class=name), x)
-            if isinstance(fence, Fence):
+        if tall > min(row.height, menu.zone.max_height) or f"{name}" not in site.prices.fence:
+            continue
+        fence = menu.put(Fence(demand.x, tall, energy_class=name), demand.x)
+        if isinstance(fence, Fence):
+            clear = site.road.start - fence.end
+            if factor * fence.deflection <= clear + 1e-9:
                 yield fence
 
 
-def instead(menu: Menu, x: float, height: float) -> Layout:
-    """Return the layout if no fence fits: a ditch at the toe, or else a barrier of the height."""
-    zone, toe = menu.zone, menu.problem.site.slope.toe
-    width, depth = ritchie(menu.problem.site)
-    width = min(max(width, zone.min_width), zone.max_width)
-    tall = min(max(height, MIN_HEIGHT), zone.max_height)
-    thick = Embankment.least_crest(zone)
-    for barrier, at in (
-        (Ditch(x, min(depth, zone.max_depth), width), toe),
-        (Embankment(x, tall, thick), x),
-        (GravityWall(x, tall, thick), x),
-        (Wall(x, tall, thick), x),
-    ):
-        found = menu.nearest(barrier, at) if _may(menu, barrier.kind) else None
+def _last_places(problem: DesignProblem, envelope: DesignEnvelope) -> Iterator[Demand]:
+    """Yield the demand at the last place where each class keeps clear of the road."""
+    factors, zone = problem.site.rule, problem.zone
+    for name, row in FENCE_CLASSES.items():
+        fence = Fence(0.0, row.lowest, energy_class=name)
+        x = problem.site.road.start - fence.extent - factors.elongation * row.elongation
+        x = math.floor(10.0 * x + 1e-6) / 10.0
+        if zone.start <= x <= zone.end:
+            demand = demand_at(envelope, factors, x)
+            if demand is not None and demand.covered >= COVERED:
+                yield demand
+
+
+def _check(problem: DesignProblem, fence: Fence, demand: Demand) -> FenceCheck:
+    return FenceCheck(fence, demand, problem.site.road.start - fence.end)
+
+
+def nearest(problem: DesignProblem, asked: list[Demand]) -> FenceCheck:
+    """Return the check of the fence that comes nearest to the rule where none fits it.
+
+    Classes that are only made higher than the zone permits are left out.
+    """
+    limit = problem.zone.max_height
+    made = {name: row for name, row in FENCE_CLASSES.items() if row.lowest <= limit}
+    checks = [
+        _check(problem, Fence(demand.x, min(row.height, limit), energy_class=name), demand)
+        for demand in asked
+        for name, row in (made or FENCE_CLASSES).items()
+    ]
+    return min(checks, key=lambda check: (max(check.uses.values()), sum(check.uses.values())))
+
+
+def why(problem: DesignProblem, asked: list[Demand]) -> str:
+    """Return in words why no fence fits at any of some stations."""
+    near = nearest(problem, asked)
+    demand, fence = near.demand, near.fence
+    words = []
+    if near.energy_use >= 1.0:
+        needed = 1e-3 * demand.energy() * near.factors.energy
+        words.append(f"it needs {needed:,.0f} kJ, with factors, of {near.factors.level}")
+    if near.height_use > 1.0:
+        words.append(f"it needs a height of {demand.height():.1f} m")
+    if near.elongation_use > 1.0:
+        room = f"{near.design_elongation:.1f} m, and the road is {near.clearance:.1f} m away"
+        words.append(f"its elongation times its factor is {room}")
+    if not words:
+        words.append("it may not be built there")
+    what = f"a fence of {fence.rated:,} kJ and {fence.height:g} m at {fence.x:.1f} m"
+    return f"no fence fits; {what} comes nearest: {'; '.join(words)}"
+
+
+def _instead(
+    menu: Menu,
+    envelope: DesignEnvelope,
+    asked: list[Demand],
+    reason: str,
+    near: FenceCheck | None,
+) -> RuleAnswer:
+    """Return the answer if no fence fits: a ditch at the toe, or else a barrier of the height."""
+    zone, site = menu.zone, menu.problem.site
+    ritchie = RitchieDitch.of(site)
+    width = min(max(ritchie.width, zone.min_width), zone.max_width)
+    ditch = Ditch(zone.start, min(ritchie.depth, zone.max_depth), width)
+    options: list[tuple[Barrier, float]] = [(ditch, site.slope.toe)]
+    if asked:
+        x, tall = asked[-1].x, min(max(asked[-1].height(), MIN_HEIGHT), zone.max_height)
+        thick = Embankment.least_crest(zone)
+        options += [(kind(x, tall, thick), x) for kind in (Embankment, GravityWall, Wall)]
+    for barrier, at in options:
+        if barrier.kind not in menu.problem.kinds:
+            continue
+        found = menu.nearest(barrier, at)
         if found is not None:
-            return (found,)
-    return ()
-
-
-def ritchie(site: Site) -> tuple[float, float]:
-    """Return the width and depth of the ditch in Ritchie's table for the slope of a site [m]."""
-    points = np.array(site.slope.points)
-    toe = site.slope.toe
-    above = points[points[:, 0] < toe]
-    rock = max(above[:, 1].max() - np.interp(toe, *points.T), 0.1)
-    crest = above[above[:, 1] >= above[:, 1].max() - 0.1 * rock][-1]  # the crest of the cut
-    steep = math.degrees(math.atan2(rock, max(toe - crest[0], 1e-3)))
-    row = RITCHIE[min(RITCHIE, key=lambda angle: abs(angle - steep))]
-    return row[int(np.searchsorted(HIGH, rock))]
+            name = ritchie.name_of(found) if isinstance(found, Ditch) else found.words
+            return RuleAnswer((found,), name, reason, near, envelope)
+    return RuleAnswer((), "no barrier", reason, near, envelope)

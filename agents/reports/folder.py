@@ -9,7 +9,7 @@ from rigdda import Layout, Site
 from rigdda.agents import archive
 from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.reports import findings, frontier_report, layout_tables, pictures
+from rigdda.agents.reports import checks, findings, frontier_report, layout_tables, pictures
 from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
 from rigdda.agents.reports.simulation_folder import along
 from rigdda.agents.reports.tables import known_risks, write_risks, write_rows
@@ -19,7 +19,7 @@ from rigdda.replay.recording import Marks
 
 FILES = (
     "evaluations.csv", "evaluations.jsonl", archive.FILE, "layouts.csv", "chances.csv",
-    "layout.toml", "section.png", "cost.png", "episode.rrd",
+    "layout.toml", "section.png", "cost.png", "episode.rrd", *checks.FILES,
 )  # fmt: skip
 
 
@@ -28,7 +28,7 @@ SEEN = 50
 
 
 def write(done: DesignStudy, out: Path, seed: int) -> None:
-    """Write the tables of the layouts, `layout.toml`, pictures and `episode.rrd` into `out`.
+    """Write the files of a study except its evaluations into `out`.
 
     Raises
     ------
@@ -46,6 +46,7 @@ def write(done: DesignStudy, out: Path, seed: int) -> None:
     reference = pictures.Point(SHED, done.problem.site.shed(), 0.0, (0.0, 0.0))
     pictures.cost(out / "cost.png", tried, [*points, reference])
     _replay(done, out / "episode.rrd", seed)
+    checks.write(done, out)
 
 
 def _section(done: DesignStudy, path: Path, seed: int) -> None:

@@ -18,6 +18,7 @@ from rigdda.fields import about, documented
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.block import Block
 from rigdda.model.existing import Existing
+from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.prices import Consequences, Prices
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
 from rigdda.model.source import Point, Source
@@ -566,6 +567,9 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         about("Traffic on the road. Without this table the risk to life is not computed."),
     ] = None
     meshes: Annotated[tuple[MeshOption, ...], about("Mesh options for the rock face.")] = ()
+    rule: Annotated[
+        PartialFactors, about("Partial factors of the engineering rule for fences.")
+    ] = PartialFactors()
     motion: Annotated[Motion, about("Parameters of the simulation of releases.")] = Motion()
     scatter: Annotated[
         Scatter, about("Random variation between releases, in addition to that of the blocks.")

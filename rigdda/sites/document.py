@@ -17,6 +17,7 @@ from rigdda.files import atomic
 from rigdda.model.existing import Existing
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
+from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.prices import Consequences, Prices
 from rigdda.model.site_tables import (
     BarrierZone,
@@ -53,6 +54,7 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[consequences]`", Consequences),
     ("`[traffic]`", Traffic),
     ("`[[meshes]]`", MeshOption),
+    ("`[rule]`", PartialFactors),
     ("`[motion]`", Motion),
     ("`[scatter]`", Scatter),
     ("`[lumped.NAME]`", Rebound),

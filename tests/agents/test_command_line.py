@@ -31,6 +31,7 @@ FILES = (
     "evaluations.csv", "evaluations.jsonl", "outcomes.msgpack.gz", "layouts.csv", "chances.csv",
     "layout.toml", "section.png", "section.svg", "cost.png", "cost.svg", "episode.rrd",
     "problem.json", "run.json", "band.csv", "band.png", "band.svg",
+    "checks.csv", "design_sheet.csv", "demand.csv", "demand.png", "demand.svg",
 )  # fmt: skip
 NUMBERS = ("objective", "objective_low", "objective_high", "capital", "harm", "repair", "cost")
 
@@ -108,9 +109,11 @@ def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -
         z, low, high, capital, harm, repair, _ = (float(row[name]) for name in NUMBERS)
         assert z == pytest.approx(capital + harm + repair)
         assert low <= z <= high
-    for name in ("section.png", "cost.png"):
+    for name in ("section.png", "cost.png", "demand.png"):
         width, height = png_size(folder / name)
         assert 900 <= width <= 2000 and 600 <= height <= 2500
+    sheet = rows(folder / "design_sheet.csv")
+    assert {row["symbol"] for row in sheet} >= {"v", "g_tr", "g_dp", "m_d", "E_d", "h_d", "D_d"}
     entities = {chunk.entity_path for chunk in RrdReader(folder / "episode.rrd").stream()}
     assert {"/world/road", "/world/terrain", "/notes"} <= entities
     assert json.loads((folder / "problem.json").read_text())["site"] == "quick"
@@ -122,6 +125,7 @@ def test_a_design_says_what_an_engineer_asks(designed: tuple[Path, str]) -> None
     for name in (*names, "reaches road", "barrier fails", "s of processor time"):
         assert name in words
     assert "remain" in words or "saves more" in words
+    assert "rule (UNI 11211-4): fence" in words
     layout = rigdda.load_layout(folder / "layout.toml")
     for barrier in layout:
         assert f"at x = {barrier.x:.1f} m" in words or f"mesh {barrier.option!r}" in words

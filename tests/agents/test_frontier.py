@@ -16,13 +16,16 @@ from valley import SITE, Barren, Valley, seen
 
 from rigdda import Ditch, Fence
 from rigdda.agents import designers, jobs
+from rigdda.agents.barrier_checks import LayoutChecks
 from rigdda.agents.design_study import DesignStudy, VerifiedLayout
 from rigdda.agents.designers.frontier import TriedLayout, frontier
 from rigdda.agents.designers.protocol import DesignResult, History, best_of_finals, ranked
+from rigdda.agents.designers.rule import RuleAnswer
 from rigdda.agents.reports import findings, frontier_report
 from rigdda.agents.reports.wording import at_most, euros, percent, span
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.design_envelope import DesignEnvelope
 from rigdda.envs.intervals import estimate
 from rigdda.envs.problem import Targets
 
@@ -85,7 +88,15 @@ def studies(draw: st.DrawFn) -> DesignStudy:
         problem.site, chosen, last, History(()), 10, "search", bounds, 0.0, ()
     )  # fmt: skip
     left = findings.left_over(last)
-    return DesignStudy(problem=problem, cases=cases, result=result, left=left)
+    rule = RuleAnswer((), "no barrier", "", None, DesignEnvelope([], 0.95, [], []))
+    return DesignStudy(
+        problem=problem,
+        cases=cases,
+        result=result,
+        left=left,
+        rule=rule,
+        checks=LayoutChecks((), (), ()),
+    )
 
 
 SPAN = r"[\d.,e+]+ to [\d.,e+]+"

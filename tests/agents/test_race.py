@@ -101,9 +101,10 @@ def test_a_target_is_met_where_it_can_be(site: Site) -> None:
     lonely = replace(site, consequences=replace(site.consequences, closure=500.0))
     free = race.design(Valley(lonely), 3000)
     strict = Valley(lonely, targets=Targets(reach=0.1))
-    found = race.design(strict, 6000)
-    assert strict.chance(found.layout) < 0.1 < strict.chance(free.layout)
-    assert found.evaluation.targets == "met"
+    assert strict.chance(free.layout) > 0.1
+    found = [race.design(strict, 6000, seed) for seed in range(4)]
+    met = [one for one in found if one.evaluation.targets == "met"]
+    assert len(met) >= 2 and all(strict.chance(one.layout) < 0.1 for one in met)
 
 
 def test_a_search_says_where_its_layout_comes_from(valley: Valley) -> None:

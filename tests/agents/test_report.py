@@ -114,17 +114,18 @@ def same(text: str, value: float) -> bool:
 
 def test_every_number_of_a_table_is_that_of_its_file(made: Made) -> None:
     page, compared = Page(made.page), Counter[str]()
-    assert set(page.tables) == {
+    assert set(page.tables) >= {
         "decision/layouts.csv", "decision/chances.csv", "decision/frontier.csv",
-        "before/stations.csv",
+        "before/stations.csv", "decision/checks.csv", "decision/design_sheet.csv",
     }  # fmt: skip
     for source, shown in page.tables.items():
         with (made.folder / source).open(encoding="utf-8", newline="") as file:
             known = list(csv.DictReader(file))
         for number, cells in zip(page.rows[source], shown, strict=True):
             for columns, text in cells.items():
-                values = [known[number][name] for name in columns.split()]
-                if not all(re.fullmatch(r"[-+\d.e]*", value) for value in values):
+                names = [columns] if columns in known[number] else columns.split()
+                values = [known[number][name] for name in names]
+                if not all(re.fullmatch(r"([-+\d.e]*\d)?", value) for value in values):
                     continue
                 wanted = [float(value) for value in values if value]
                 found = re.findall(rf"{NUMBER.pattern}%?", text.replace(" %", "%"))
@@ -133,7 +134,7 @@ def test_every_number_of_a_table_is_that_of_its_file(made: Made) -> None:
                 assert len(found) == len(wanted), (source, columns, text)
                 assert all(map(same, found, wanted)), (source, columns, text, wanted)
                 compared[source] += len(found)
-    assert min(compared.values()) > 20 and compared["before/stations.csv"] > 200
+    assert min(compared.values()) > 5 and compared["before/stations.csv"] > 200
 
 
 def test_costs_are_written_as_the_command_prints_them(made: Made) -> None:
@@ -187,7 +188,8 @@ def test_sections_come_only_with_results(made: Made) -> None:
     heads = [head.partition(". ")[2] for head in Page(made.page).heads]
     assert heads == [
         "Summary", "Site", "Assumptions and their sources", "What comes down", "Layouts compared",
-        "What other targets cost", "Limits of the method", "How to repeat the results", "Appendix",
+        "Checks", "How sure the answer is", "What other targets cost", "Limits of the method",
+        "How to repeat the results", "Appendix",
     ]  # fmt: skip
     assert cli.main(["report", str(made.folder / "before")]) == 0
     text = (made.folder / "before/report.html").read_text(encoding="utf-8")
@@ -200,7 +202,9 @@ def test_each_picture_of_the_folders_is_a_vector(made: Made) -> None:
     assert names == [
         "Section of the site", "Trajectories and envelopes", "Histograms at x = 28 m",
         "Histograms at x = 34.8 m", "Along the slope", "Run-out",
-        "The slope without and with the layout", "Cost and risk", "Cost and probability",
+        "The slope without and with the layout", "Cost and risk",
+        "What the rule demands along the slope", "The layouts on other grounds",
+        "Cost and probability",
     ]  # fmt: skip
     assert "<img" not in made.page
 
@@ -446,7 +450,7 @@ def test_the_page_renders(made: Made, program: str, tmp_path: Path) -> None:
     text, console = look(program, page, "--window-size=1280,900")
     assert console == ""
     found = json.loads(text.partition("<pre>")[2].partition("</pre>")[0].replace("&quot;", '"'))
-    assert len(found["boxes"]) == 9
+    assert len(found["boxes"]) == 11
     assert all(width > 600 and height > 200 for width, height in found["boxes"])
     assert found["wide"] <= 0  # nothing has to be scrolled to the side
 

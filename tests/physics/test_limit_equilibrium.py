@@ -1,4 +1,4 @@
-"""The recursion of Goodman and Bray (1976) against their table."""
+"""The recursion of Goodman and Bray (1976) against their table, and gravity structures."""
 
 from __future__ import annotations
 
@@ -7,10 +7,19 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from rigdda import BadInput
-from rigdda.limit_equilibrium import columns, toppling
+from rigdda.limit_equilibrium import (
+    Impact,
+    columns,
+    equivalent_load,
+    rock_thrust,
+    stability,
+    toppling,
+)
 
 HEIGHTS = columns(crest=10, above=6, rise=5.0, fall=5.0, step=1.0)
 SLOPE = {"width": 10.0, "step": 1.0, "dip_deg": 30.0, "unit_weight": 25e3}
@@ -71,3 +80,43 @@ def test_bolt():
 def test_unsound_heights(heights):
     with pytest.raises(BadInput, match="heights"):
         toppling(heights, friction_deg=38.0, **SLOPE)
+
+
+def test_a_wall_on_the_verge_of_moving_has_a_factor_of_one() -> None:
+    weight, width, friction = 100e3, 2.0, 0.5
+    slides = stability(weight, width, friction, 1e6, friction * weight, 0.1)
+    assert slides.sliding == pytest.approx(1.0)
+    turns = stability(weight, width, friction, 1e6, 50e3, 2.0)  # 100 kNm against 100 kNm
+    assert turns.overturning == pytest.approx(1.0)
+    assert turns.bearing == 0.0 and turns.pressure == math.inf
+
+
+def test_the_pressure_grows_with_the_eccentricity() -> None:
+    centred = stability(100e3, 2.0, 0.5, 1e5, 0.0, 1.0)
+    assert centred.pressure == pytest.approx(50e3) and centred.bearing == pytest.approx(2.0)
+    assert centred.sliding == centred.overturning == math.inf
+    pushed = stability(100e3, 2.0, 0.5, 1e5, 50e3, 1.0)  # e = 0.5 m, 1 m remains pressed
+    assert pushed.pressure == pytest.approx(100e3) and pushed.bearing == pytest.approx(1.0)
+
+
+@given(
+    mass=st.floats(10.0, 1e5),
+    speed=st.floats(0.1, 50.0),
+    wall=st.floats(1e3, 1e6),
+    way=st.floats(0.01, 1.0),
+    restitution=st.floats(0.0, 1.0),
+)
+def test_the_equivalent_load_takes_the_energy_of_the_struck_wall(
+    mass: float, speed: float, wall: float, way: float, restitution: float
+) -> None:
+    load = equivalent_load(Impact(mass, speed, 1.0, restitution), wall, way)
+    moves = (1.0 + restitution) * mass * speed / (mass + wall)
+    rebound = moves - restitution * speed
+    assert mass * speed == pytest.approx(mass * rebound + wall * moves)  # momentum
+    assert load * way == pytest.approx(0.5 * wall * moves**2)
+    assert load * way <= 0.5 * mass * speed**2 * (1.0 + 1e-9)  # no energy from nothing
+
+
+def test_rock_without_friction_presses_like_a_fluid() -> None:
+    assert rock_thrust(2.0, 18e3, 0.0) == pytest.approx(0.5 * 18e3 * 4.0)
+    assert rock_thrust(2.0, 18e3, 30.0) == pytest.approx(0.5 * 18e3 * 4.0 / 3.0)

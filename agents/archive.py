@@ -9,15 +9,16 @@ from __future__ import annotations
 import gzip
 import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
 from rigdda import BadInput, Layout, Outcome, Site, __version__
-from rigdda.agents.designers.store import Store, unpack
+from rigdda.agents.designers.store import Store, pack, unpack
 from rigdda.barriers import from_table, to_tables
-from rigdda.envs import DesignProblem, ensemble, outcome_cache
+from rigdda.envs import DesignProblem, ensemble, outcome_cache, site_store
 from rigdda.envs.ensemble import Ensemble
 from rigdda.envs.outcome_cache import mechanics
 from rigdda.envs.problem import Targets
@@ -147,6 +148,10 @@ def gathered(store: Store) -> Iterator[LayoutReleases]:
         yield LayoutReleases(layout, tuple(seed for _, seed in known), tuple(known.values()))
 
 
+BARE = "bare"
+"""Name under which outcomes without barriers are stored in the cache of the user."""
+
+
 def _bare(site: Site, known: Ensemble) -> list[Outcome]:
     """Return the outcomes of the releases without barriers from which an ensemble follows."""
     jobs = [
@@ -154,7 +159,16 @@ def _bare(site: Site, known: Ensemble) -> list[Outcome]:
         for name in site.event_names
         for seed in range(ensemble.SEEDS, ensemble.SEEDS + known.nothing.reach[name].releases)
     ]
-    return list(outcome_cache.outcomes(jobs))
+    key = outcome_cache.fingerprint(site)
+    packed = site_store.read(BARE, key, bytes)
+    if packed is not None:
+        with suppress(ValueError):
+            found = unpack(packed)
+            if len(found) == len(jobs):
+                return found
+    found = list(outcome_cache.outcomes(jobs))
+    site_store.write(BARE, key, pack(found))
+    return found
 
 
 def write(path: Path, made: Archive) -> None:

@@ -149,7 +149,7 @@ def envelopes(
     releases = [(seed, name) for name, count in counts.items() for seed in seeds[:count]]
     found = passages(site, layout, releases, stations.tolist())
     passing = Passing.of(site, layout, None, found)
-    rows = summary(passing, range(len(stations)))
+    rows = summary(passing, range(len(stations)), site.event_names, ("height_top", "energy"))
     return [PassageEnvelope.of(name, rows) for name in site.event_names]
 
 

@@ -139,7 +139,12 @@ class Passing(NamedTuple):
         return [name for name in self.events if not len(self.releases(name))]
 
 
-def summary(passing: Passing, places: Sequence[int]) -> Rows:
+def summary(
+    passing: Passing,
+    places: Sequence[int],
+    groups: Sequence[str] | None = None,
+    names: Sequence[str] = (),
+) -> Rows:
     """Return the rows of a table of stations.
 
     One row for each station, event and quantity, with mean and quantiles, each with the ends of its
@@ -149,17 +154,29 @@ def summary(passing: Passing, places: Sequence[int]) -> Rows:
     ----------
     places : sequence of int
         Indices of the stations.
+    groups : sequence of str, optional
+        Events, and `ALL` for all together; by default all of `passing.groups`.
+    names : sequence of str
+        Names of the quantities; by default all of `QUANTITIES` and the passing rate.
     """
-    return [row for k in places for group in passing.groups for row in _station(passing, k, group)]
+    wanted = passing.groups if groups is None else groups
+    return [
+        row
+        for k in places
+        for group in wanted
+        for row in _station(passing, k, group, names or (*QUANTITIES, RATE))
+    ]
 
 
-def _station(passing: Passing, station: int, group: str) -> Iterator[dict[str, Any]]:
+def _station(
+    passing: Passing, station: int, group: str, names: Sequence[str]
+) -> Iterator[dict[str, Any]]:
     """Yield the rows of one station and event."""
     rows, releases = passing.passages(group, station), len(passing.releases(group))
     x = float(passing.found.stations[station])
     head = {"x_m": x, **survey_place(passing.site, x), "event": group}
     known = {"releases": releases, "n": len(rows)}
-    for name, quantity in QUANTITIES.items():
+    for name, quantity in ((name, QUANTITIES[name]) for name in names if name != RATE):
         sample = passing.sample(group, rows, quantity.of(rows))
         levels = quantiles(sample, LEVELS)
         yield {
@@ -175,6 +192,8 @@ def _station(passing: Passing, station: int, group: str) -> Iterator[dict[str, A
             },
             "note": _note(len(rows), levels),
         }
+    if RATE not in names:
+        return
     often = passing.frequency(group, rows) if releases else Mean(*[math.nan] * 3)
     empty = {k: v for q in LEVELS for k, v in _ends(_q(q), Quantile(*[math.nan] * 3)).items()}
     yield {**head, "quantity": RATE, "unit": PER, **known, **_ends("mean", often), **empty,

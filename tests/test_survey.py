@@ -196,7 +196,7 @@ def test_each_value_is_commented_with_its_unit_and_how_sure_it_is(tmp_path):
     assert len(keys) >= 60
     for k in keys:
         assert lines[k - 1].startswith("# ") and lines[k - 1].endswith(ends), lines[k - 1]
-    before = {lines[k].partition(" = ")[0]: lines[k - 1] for k in keys}
+    before = {lines[k].partition(" = ")[0]: lines[k - 1] for k in reversed(keys)}  # the first
     assert "[m]" in before["toe"] and "[kg/m3]" in before["density"] and "[m3]" in before["volume"]
     assert before["points"].endswith(f"; {new_site.SURVEYED}.")
     assert before["volume"].endswith(f"; {new_site.PLACEHOLDER}.")

@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 FILES = ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv", "gain.png", "strip.png")
 """Files that `write` writes besides the folder `layouts`."""
 
+PRIORITIES = (
+    "budget", "priority", "section", "instead_of", "build", "additional_cost",
+    "waiting_costs_per_year", "saving_per_euro",
+)  # fmt: skip
+"""Columns of priorities.csv, which has no row if no step is left undone."""
+
 PER_ROW = 60
 """Largest number of sections in the strip that are labelled."""
 
@@ -32,7 +38,7 @@ def write(plan: CorridorPlan, out: Path) -> None:
     write_rows(out / "budgets.csv", budget_rows(plan))
     write_rows(out / "sections.csv", section_rows(plan))
     write_rows(out / "fronts.csv", front_rows(plan))
-    write_rows(out / "priorities.csv", priority_rows(plan))
+    write_rows(out / "priorities.csv", priority_rows(plan), PRIORITIES)
     for i, own in enumerate(plan.plans[:-1]):
         folder = out / "layouts" / f"budget-{i + 1}"
         folder.mkdir(parents=True, exist_ok=True)

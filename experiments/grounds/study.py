@@ -24,7 +24,7 @@ from experiments.catch_bench.study import FITTED, PREDICTED, below, within
 from experiments.grounds import contacts, reach
 from experiments.grounds.contacts import MASSES, early_contacts, lumped_share, mid_slope, observed
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
-from experiments.tschamut.study import runs
+from experiments.tschamut.study import observed_run_outs, runs
 from rigdda import Site, Surface
 from rigdda.agents import fit
 from rigdda.agents.fit import Floats, explore, scores
@@ -91,7 +91,7 @@ class Field:
     def __init__(self, model: fit.Model):
         self.model = model
         self.slope = Site.load(TSCHAMUT / "site.toml")
-        self.seen = fit.read(TSCHAMUT / "observed.csv", self.slope)
+        self.seen = observed_run_outs(TSCHAMUT / "observed.csv", self.slope)
         self.bench = below(FACE)
         self.kept = observed()[:, 2]
         self.names = tuple(RANGES[model])

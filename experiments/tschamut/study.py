@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, interval, say, write
 from experiments.tschamut.platrock import PARAMETERS, PYTHON, PlatRock
 from rigdda import Site, release
-from rigdda.agents import fit
+from rigdda.agents import fit, observations
 from rigdda.agents.fit import Fit, Floats, seen
 from rigdda.agents.parameters import Parameter, parse, with_values
 
@@ -157,10 +157,15 @@ def predict(path: Path, site: Site, events: Sequence[str], count: int) -> None:
     write(path, rows)
 
 
+def observed_run_outs(path: Path, site: Site) -> dict[str, Floats]:
+    """Return the observed run-outs of each event in a CSV file [m]."""
+    return {one.event: one.values for one in observations.read([path], site).values()}
+
+
 def run(quick: bool, out: Path) -> Number:
     """Fit the models, predict, and write the tables and the picture."""
     site = Site.load(HERE / "site.toml")
-    observed = fit.read(HERE / "observed.csv", site)
+    observed = observed_run_outs(HERE / "observed.csv", site)
     budget, releases, count = (
         (QUICK_BUDGET, QUICK_RELEASES, QUICK_PREDICTED) if quick else (BUDGET, RELEASES, PREDICTED)
     )

@@ -192,7 +192,7 @@ def equivalent_load(impact: Impact, mass: float, displacement: float) -> float:
 def rock_thrust(height: float, unit_weight: float, friction_deg: float) -> float:
     r"""Return the active thrust of rock with a level surface behind a vertical face [N/m].
 
-    .. math:: T = \tfrac12 K_a \gamma h^2, \qquad K_a = \tan^2(45° - \phi / 2)
+    .. math:: T = \tfrac12 K_a \gamma h^2, \qquad K_a = \tan^2(45^\circ - \phi / 2)
 
     It acts at a third of the height (Rankine 1857).
 

@@ -29,7 +29,6 @@ from experiments.script import folder, options, write
 from rigdda import Layout, Site, sites
 from rigdda.envs import DesignProblem
 from rigdda.envs.environments import Ask, simulate
-from rigdda.envs.registration import ENVIRONMENTS
 
 BATCHES = (1, 8, 64, 1)
 """Number of copies in each batch; a single copy is measured twice."""
@@ -97,7 +96,7 @@ def throughput(episodes: int) -> list[dict[str, Any]]:
     measure("rigdda/BarrierPlacement-v0", places()["quick"], 2, 4, 0)  # compile the kernels
     rows: list[dict[str, Any]] = []
     for label, site in places().items():
-        for name in ENVIRONMENTS:
+        for name in BEFORE:
             for copies in BATCHES:
                 seed = 1000 * (len(rows) + 1)
                 row = {"site": label} | measure(name, site, copies, episodes, seed)

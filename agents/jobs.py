@@ -7,6 +7,7 @@ import shutil
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,6 +30,7 @@ from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.frontier import TriedLayout, frontier
 from rigdda.agents.designers.menu import Menu, on_bound
 from rigdda.agents.designers.protocol import (
+    CHOICE,
     DesignResult,
     Entry,
     best_of_finals,
@@ -157,7 +159,8 @@ def study(
     """Design a layout, then verify it and the layouts for comparison on `releases` new releases.
 
     If the layout misses a target, the layouts of the frontier are verified as well, see
-    `with_verified_frontier`, and the best of all verified layouts is taken.
+    `with_verified_frontier`, and the best of all verified layouts is taken. The releases of this
+    choice are others than those on which the choice is verified.
 
     `evaluations.csv` and the store `evaluations.jsonl` are written into `out` during the search,
     and the archive of all outcomes at the end. A study that was interrupted reads the evaluations
@@ -189,19 +192,14 @@ def study(
         if cases[-1].evaluation.targets == MISSED and design_events(problem.site):
             tick(simulations + releases * len(cases), "verifying the frontier")
 
-            def check(layout: Layout) -> Evaluation:
-                evaluation = verify(problem, layout, releases, seed, store)
-                file.add(Entry(result.simulations, "frontier", evaluation))
+            def check(layout: Layout, stage: str) -> Evaluation:
+                stream = CHOICE if stage == "frontier" else stage
+                evaluation = verify(problem, layout, releases, seed, store, stream)
+                file.add(Entry(result.simulations, stage, evaluation))
                 return evaluation
 
-            known = with_verified_frontier(problem, result.tried, cases, check)
-            result, front = replace(result, tried=known), frontier(known)
-            if name not in SEARCHLESS:
-                seen = [one.verified for one in front if one.verified is not None]
-                best = best_of_finals(problem, [*(case.evaluation for case in cases), *seen])
-                replaced = best.layout != result.layout
-                result = _with_layout(problem, result, best, [c.evaluation for c in cases[:-1]])
-                cases[-1] = VerifiedLayout(cases[-1].name, best)
+            searched = name not in SEARCHLESS
+            result, front, replaced = with_frontier(problem, result, cases, check, searched)
     tick(simulations + releases * len(cases), "analysing the remaining risk, checking barriers")
     left = _left(problem, [case.evaluation for case in cases], result.tried, seed)
     layouts = [(case.name, case.evaluation.layout) for case in cases]
@@ -226,6 +224,49 @@ MOST_VERIFIED = 8
 """Largest number of layouts of a frontier that are verified in addition to the others."""
 
 
+Check = Callable[[Layout, str], Evaluation]
+"""Function that evaluates a layout on new releases of a stage: "frontier", by which one of several
+layouts is chosen, or "verification"."""
+
+
+def with_frontier(
+    problem: DesignProblem,
+    result: DesignResult,
+    cases: list[VerifiedLayout],
+    check: Check,
+    searched: bool,
+) -> tuple[DesignResult, tuple[TriedLayout, ...], bool]:
+    """Return a result that misses a target with its verified frontier.
+
+    If the layout was `searched` for, the best of all verified layouts takes its place in the result
+    and in the last of the cases. Its verification has other releases than this choice.
+
+    Returns
+    -------
+    result : DesignResult
+        The result, with what the verification says of the layouts that were tried.
+    frontier : tuple of TriedLayout
+        The frontier.
+    replaced : bool
+        Whether the layout of the result was replaced.
+    """
+    judged = cache(lambda layout: check(layout, "frontier"))
+    known = with_verified_frontier(problem, result.tried, cases, judged)
+    result, front = replace(result, tried=known), frontier(known)
+    if not searched:
+        return result, front, False
+    layouts = [case.evaluation.layout for case in cases]
+    layouts += [one.layout for one in front if one.verified is not None]
+    seen = [judged(layout) for layout in dict.fromkeys(layouts)]
+    best = best_of_finals(problem, seen).layout
+    if best == result.layout:
+        return result, front, False
+    others = {case.evaluation.layout: case.evaluation for case in cases[:-1]}
+    evaluation = others[best] if best in others else check(best, "verification")
+    cases[-1] = VerifiedLayout(cases[-1].name, evaluation)
+    return _with_layout(problem, result, evaluation, list(others)), front, True
+
+
 def with_verified_frontier(
     problem: DesignProblem,
     tried: Sequence[TriedLayout],
@@ -247,7 +288,7 @@ def with_verified_frontier(
     cases : sequence of VerifiedLayout
         Layouts that are verified already.
     check : callable
-        Function that verifies a layout and returns its evaluation.
+        Function that verifies a layout.
 
     Raises
     ------
@@ -269,22 +310,17 @@ def with_verified_frontier(
 
 
 def _with_layout(
-    problem: DesignProblem,
-    result: DesignResult,
-    verified: Evaluation,
-    compared: Sequence[Evaluation],
+    problem: DesignProblem, result: DesignResult, verified: Evaluation, known: Sequence[Layout]
 ) -> DesignResult:
     """Return a result with another layout and its verified evaluation.
 
-    The layout is one of the search or one of those that are `compared` with it.
+    The layout is one of those that need no search (`known`), or one of the search.
     """
-    if verified.layout == result.layout:
-        return result
     return replace(
         result,
         layout=verified.layout,
         evaluation=verified,
-        origin="start" if verified in compared else "search",
+        origin="start" if verified.layout in known else "search",
         on_bound=on_bound(problem, verified.layout),
     )
 

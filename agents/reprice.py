@@ -27,7 +27,7 @@ from rigdda.agents import archive
 from rigdda.agents.archive import Archive
 from rigdda.agents.design_study import ComparedLayouts, VerifiedLayout
 from rigdda.agents.designers.frontier import TriedLayout, frontier, worst
-from rigdda.agents.designers.protocol import STREAMS, End, of_chance, of_mean
+from rigdda.agents.designers.protocol import CHOICE, STREAMS, End, of_chance, of_mean
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.cost import account, judge
 from rigdda.envs.ensemble import Ensemble, statistics
@@ -388,7 +388,8 @@ def judged(problem: DesignProblem, candidate: ScoredLayout, kept: Archive) -> Ev
     )
 
 
-VERIFICATION = STREAMS.index("verification")
+VERIFIED = (STREAMS.index("verification"), STREAMS.index(CHOICE))
+"""Streams of releases that no search used, the one of the table of the design first."""
 
 
 def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, ScoredLayout]:
@@ -401,7 +402,8 @@ def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, ScoredL
     for own in kept.releases:
         layout = archive.layout_of(own.barriers)
         pairs = list(zip(own.seeds, own.outcomes, strict=True))
-        checked = [o for seed, o in pairs if seed % len(STREAMS) == VERIFICATION]
+        streams = [[o for seed, o in pairs if seed % len(STREAMS) == k] for k in VERIFIED]
+        checked = next(filter(None, streams), [])
         outcomes = tuple(checked or own.outcomes)
         found[layout] = _candidate(problem, layout, outcomes, bool(checked), spent)
     return found

@@ -31,8 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Mesh
 from rigdda.barriers import KINDS, Removal
-from rigdda.barriers.base import MIN_HEIGHT, TOLERANCE, share_of
-from rigdda.barriers.spacing import Span
+from rigdda.barriers.base import MIN_HEIGHT, TOLERANCE, Span, share_of
 from rigdda.envs.siting import Room
 from rigdda.model.barrier_zone import BarrierZone
 

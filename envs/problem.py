@@ -22,11 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
 from rigdda.barriers import KINDS
 from rigdda.envs import cost, encoding, ensemble, intervals, outcome_cache
-from rigdda.envs.cost import Evaluation
+from rigdda.envs.cost import Evaluation, Risk
 from rigdda.envs.intervals import Estimate, Mean, total
 from rigdda.envs.outcome_cache import Sample, fingerprint
 from rigdda.envs.siting import Room
-from rigdda.envs.traffic_risk import Risk
 from rigdda.model.site_tables import BarrierZone
 
 MET, MISSED, UNDECIDED = "met", "missed", "undecided"

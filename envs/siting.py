@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from rigdda import BadInput, Barrier, GravityWall, Layout, Mesh, Site, check
 from rigdda.barriers import KINDS, Earthwork, Removal, as_layout, earthworks
-from rigdda.barriers.base import TOLERANCE
-from rigdda.barriers.spacing import MIN_GAP, Span, meet, room
+from rigdda.barriers.base import MIN_GAP, TOLERANCE, Span, meet, occupied
 from rigdda.model.barrier_zone import BarrierZone
 
 
@@ -74,7 +73,7 @@ class Rules:
             mend = f"overlap one of {site.rooms}, which are free of loose rock"
             raise BadInput("zone", (zone.start, zone.end), mend)
         old = zip(site.existing, site.existing_barriers, strict=True)
-        self.fixed = [(b.words, room(b, self.works(b))) for e, b in old if not e.removable]
+        self.fixed = [(b.words, occupied(b, self.works(b))) for e, b in old if not e.removable]
         self._x, self._y = site.profile.points.T
         angles = {kind.steepest for kind in KINDS.values()} - {None}
         self._gentle = {angle: self._stretches(angle) for angle in angles if angle is not None}
@@ -140,7 +139,7 @@ class Rules:
             if not isinstance(barrier, Mesh | Removal):
                 works = yield from self._faults(where, barrier)
                 if works is not None:
-                    rooms.append((where, barrier, room(barrier, works)))
+                    rooms.append((where, barrier, occupied(barrier, works)))
         if sum(isinstance(barrier, Mesh) for barrier in barriers) > 1:
             yield BadInput("layout", "several meshes", "give at most one")
         yield from narrow_gaps(rooms)
@@ -361,7 +360,7 @@ class Room(Rules):
         there = self.put(barrier, x)
         if there is None:
             return None
-        span = room(there, self.works(there))
+        span = occupied(there, self.works(there))
         if any(meet(span, other) for other in taken):
             return None
         try:
@@ -373,7 +372,7 @@ class Room(Rules):
     def _places(self, barrier: Barrier, taken: Sequence[Span]) -> list[float]:
         """Return candidate places after quick checks of the room and the ground, nearest first."""
         length = barrier.extent
-        give = room(barrier, (0.0, length))[1]  # includes the elongation downhill
+        give = occupied(barrier, (0.0, length))[1]  # includes the elongation downhill
         last = self.site.road.start - give if barrier.deflection > 0.0 else math.inf
         ends = [(low, min(high - length, last)) for low, high in self.parts]
         ends = [(low, high) for low, high in ends if low <= high]

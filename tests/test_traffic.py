@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 import rigdda
 from rigdda import BadInput, Fence, Outcome, Site
 from rigdda.envs import DesignProblem
-from rigdda.envs.cost import judge
+from rigdda.envs.cost import Risk, judge
 from rigdda.envs.intervals import Mean
 from rigdda.envs.problem import MET, MISSED, UNDECIDED, Targets, excess
-from rigdda.envs.traffic_risk import Risk
 from rigdda.model.traffic import Traffic
 
 TRAFFIC = Traffic(vehicles_per_day=7200.0, speed=72.0, section_length=250.0)

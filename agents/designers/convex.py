@@ -38,9 +38,8 @@ from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, Pro
 from rigdda.agents.designers.rule import answer
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import FENCE_CLASSES
-from rigdda.barriers.base import STEP
+from rigdda.barriers.base import MIN_GAP, STEP
 from rigdda.barriers.fence import CLASSES
-from rigdda.barriers.spacing import MIN_GAP
 from rigdda.envs import DesignProblem
 
 

@@ -34,6 +34,10 @@ STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
 again, to choose one of them; report: the chosen layout, for an unbiased evaluation; ensemble:
 releases without barriers that a designer analyses; verification: releases that no search uses."""
 
+CHOICE = "report"
+"""Stream of the releases by which one of several verified layouts is chosen if a target is missed.
+No search is guided by it."""
+
 
 def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, ...]:
     """Return `n` release seeds of a stream.
@@ -496,16 +500,18 @@ def verify(
     releases: int = 64,
     seed: int = 0,
     store: Store | None = None,
+    stream: str = "verification",
 ) -> Evaluation:
     """Return the evaluation of a layout on `releases` new releases.
 
     The seeds are from a separate stream, so that the evaluation is unbiased for the result of any
-    search. Layouts that are verified with the same `seed` are evaluated on the same releases.
+    search. Layouts that are verified with the same `seed` are evaluated on the same releases. A
+    choice among verified layouts must use another `stream` than the verification of the choice.
 
     Raises
     ------
     BadInput, Diverged
         The same errors as `DesignProblem.evaluate`.
     """
-    seeds = release_seeds("verification", seed, releases)
+    seeds = release_seeds(stream, seed, releases)
     return (store or Store()).evaluate(problem, layout, seeds)

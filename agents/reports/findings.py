@@ -195,7 +195,8 @@ def frontier(
     if replaced:
         lines.append(
             f"the layout of the search missed the targets by more, or costs more per year; "
-            f"{done.chosen.name!r} was chosen among the verified layouts on the same releases"
+            f"{done.chosen.name!r} was chosen among the verified layouts and verified again on "
+            "other releases"
         )
     return lines
 

@@ -16,9 +16,8 @@ from rigdda.agents.reports import pictures
 from rigdda.agents.reports.tables import bounded, empty_table, risk_table, write_risks, write_rows
 from rigdda.agents.reports.wording import euros, span
 from rigdda.envs.comparison import LEAST, Difference, difference_of_accounts
-from rigdda.envs.cost import Account, Facts, Sums, stratified
+from rigdda.envs.cost import Account, Facts, Risk, Sums, stratified
 from rigdda.envs.intervals import Estimate, estimate
-from rigdda.envs.traffic_risk import Risk
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -34,8 +34,8 @@ from rigdda.agents.reports.wording import (
     surveyed,
 )
 from rigdda.barriers import Earthwork, to_tables
+from rigdda.envs.cost import Risk
 from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
-from rigdda.envs.traffic_risk import Risk
 from rigdda.files import atomic
 
 if TYPE_CHECKING:

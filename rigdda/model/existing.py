@@ -23,10 +23,9 @@ from rigdda.barriers import (
     earthworks,
     from_table,
 )
-from rigdda.barriers.base import Metres
+from rigdda.barriers.base import Metres, meet, occupied
 from rigdda.barriers.fence import WornFence
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE
-from rigdda.barriers.spacing import meet, room
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.model.terrain import Terrain
@@ -237,9 +236,9 @@ def _removed(existing: tuple[Existing, ...], at: int, removal: Barrier) -> list[
 
 def replacing(barrier: Built, ground: Terrain, layout: Layout) -> Built | None:
     """Return the first barrier of a layout that stands in the place of an existing one, or None."""
-    own = room(barrier, barrier.works(ground))
+    own = occupied(barrier, barrier.works(ground))
     for other in layout:
-        if isinstance(other, Built) and meet(own, room(other, other.works(ground))):
+        if isinstance(other, Built) and meet(own, occupied(other, other.works(ground))):
             return other
     return None
 

@@ -134,7 +134,7 @@ def test_a_what_if_prints_and_writes_the_risk_to_life(with_traffic: Path, tmp_pa
 
 def test_without_changes_it_is_the_table_of_the_design(designed: Path) -> None:
     done, table = reprice.reprice(designed), rows(designed / "evaluations.csv")
-    verified = [row for row in table if row["stage"] in ("verification", "frontier")]
+    verified = [row for row in table if row["stage"] == "verification"]
     by_layout = {row["barriers"]: row for row in verified}
     for case in done.cases[:-1]:
         e = case.evaluation

@@ -566,12 +566,12 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
         click.echo(f"  {order(barrier, site)}")
     for line in findings.kept(site, chosen.layout):
         click.echo(f"  {line}")
-    click.echo(checks.rule_words(done.rule))
+    finding(checks.rule_words(done.rule))
     if done.checks.table:
         click.echo("checks of this layout (checks.csv, design_sheet.csv)")
         show(checks.table(done.checks))
     for line in checks.notes(done.checks):
-        click.echo(line)
+        finding(line)
     for line in findings.of_design(done):
         finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""

@@ -13,6 +13,7 @@ from rigdda import Barrier, Ditch, Fence, Site
 from rigdda.agents.reports import pictures
 from rigdda.agents.reports.simulation_folder import along
 from rigdda.agents.reports.stations import Passing, summary
+from rigdda.envs.corridor_environment import CorridorDesign
 from rigdda.files import atomic
 from rigdda.passages import passages
 
@@ -41,13 +42,10 @@ def placement(path: Path) -> None:
 
 def corridor(path: Path) -> None:
     """Draw what `rigdda/Corridor-v0` renders after its first section."""
-    env = gymnasium.make("rigdda/Corridor-v0", site=["verge", "quick"], budget=2000.0,
-                         render_mode="rgb_array")  # fmt: skip
+    env = CorridorDesign(site=["verge", "quick"], budget=2000.0, render_mode="rgb_array")
     env.reset(seed=3)
-    problem = env.unwrapped.problem  # type: ignore[attr-defined]
-    ditch = Ditch(problem.site.slope.toe, 1.5, 4.0)
-    slots = env.unwrapped.slots  # type: ignore[attr-defined]
-    env.step(slots.encode(problem, problem.check((ditch,))).astype("float32"))
+    ditch = Ditch(env.problem.site.slope.toe, 1.5, 4.0)
+    env.step(env.slots.encode(env.problem, env.problem.check((ditch,))))
     _write(path, env)
 
 

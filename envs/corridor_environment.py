@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -22,25 +22,23 @@ import rigdda
 from rigdda import BadInput, Barrier, Corridor, Layout, Site, check
 from rigdda.barriers import describe
 from rigdda.envs import encoding, observation
-from rigdda.envs.corridor_problem import ROUNDING
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.environments import (
-    MOST_RELEASES,
     SCORED_SEEDS,
     TOLD,
     Action,
     Answer,
     Ask,
     Info,
+    LayoutEnv,
     Observation,
     Step,
     look_ahead,
     plain,
-    simulate,
 )
 from rigdda.envs.outcome_cache import Sample
 from rigdda.envs.problem import DesignProblem
-from rigdda.envs.recorder import Recorder, Trigger
+from rigdda.envs.recorder import Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import release_record
 from rigdda.envs.site_sampling import Place, Venue, drawn_from
@@ -49,6 +47,9 @@ from rigdda.model.corridor import names as corridor_names
 
 SECTIONS = 12
 """Default number of sections of an episode."""
+
+ROUNDING = 1e-9
+"""Relative excess of a budget that is attributed to rounding [-]."""
 
 MOST_SECTIONS = 1_000
 """Maximum number of sections of an episode."""
@@ -92,7 +93,7 @@ class PlacedSection:
     name: str
 
 
-class CorridorDesign(gymnasium.Env[Any, Action]):
+class CorridorDesign(LayoutEnv):
     """Design the barriers of a corridor, one section per step, within one budget.
 
     Action
@@ -123,7 +124,8 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
     site : str, path, Site, Corridor or sequence of sites
         Where sections come from: a split of the generated sites ("train", "validation", "test"), a
         site or a sequence of sites, from which `sections` are drawn without repetition, or a
-        corridor (also its name or file), whose sections are all taken.
+        corridor (also its name or file), whose sections are all taken. Targets of its sections
+        are not used.
     sections : int, optional
         Number of sections of an episode; by default 12, or all sites if there are fewer.
     budget : float or (float, float), optional
@@ -154,8 +156,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         Budget of the episode [EUR].
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
-    name: ClassVar[str] = "rigdda/Corridor-v0"
+    name = "rigdda/Corridor-v0"
 
     def __init__(
         self,
@@ -181,37 +182,22 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         )
         if self._corridor and self.sections < most:
             raise BadInput("sections", sections, f"leave it out: the corridor has {most} sections")
-        self._budget = _range("budget", budget or BUDGETS) if budget or not self._corridor else None
+        given = BUDGETS if budget is None and self._corridor is None else budget
+        self._budget = None if given is None else _range("budget", given)
         self._lengths = _range("lengths", lengths)
-        self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
-        if record is None and record_trigger is not None:
-            raise BadInput("record_trigger", record_trigger, "also give a folder with `record`")
-        self.recorder = None if record is None else Recorder(record, record_trigger)
-        if render_mode is not None:
-            check.one_of("render_mode", render_mode, self.metadata["render_modes"])
-        self.render_mode = render_mode
-        self.slots = self._venue.slots
-        self.action_space = spaces.Box(-1.0, 1.0, (self.width,), np.float32)
+        slots = self._venue.slots
         own = {
             name: spaces.Box(-observation.BOUND, observation.BOUND, (f.size,), np.float32)
             for name, f in FIELDS.items()
         }
-        site_space = observation.space(self.slots.size, max_barriers, False)
-        self._space = spaces.Dict({**site_space.spaces, **own})
-        self.flat = check.boolean("flat", flat)
-        self.observation_space = spaces.flatten_space(self._space) if flat else self._space
-        self._episode = 0
+        space = spaces.Dict({**observation.space(slots.size, max_barriers, False).spaces, **own})
+        options = record, record_trigger, render_mode
+        super().__init__(slots, slots.size, space, releases, flat, *options)
         self.placed: tuple[PlacedSection, ...] = ()
         self.budget = 0.0
-        self.open = False
         self.evaluations: list[Evaluation] = []
         self._gains: list[float] = []  # [EUR/year]
         self._dropped: tuple[str, ...] = ()
-
-    @property
-    def width(self) -> int:
-        """Length of an action."""
-        return self.slots.size
 
     @property
     def problem(self) -> DesignProblem:
@@ -298,11 +284,6 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
         first = self.placed[0].problem.nothing
         return self._seen(), self._info(0, first)
 
-    def step(self, action: Action) -> Step:
-        """Simulate the releases of the current section with the layout of `action`."""
-        (answer,) = simulate([self.ask(action)])
-        return self.tell(answer)
-
     def ask(self, action: Action) -> Ask | None:
         """Return the simulations that an action needs, or None if nothing is built."""
         if not self.open:
@@ -375,9 +356,7 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
             scaled = (np.asarray(value, dtype=np.float64) - field.centre) / field.spread
             bound = observation.BOUND
             seen[name] = np.clip(scaled, -bound, bound).astype(np.float32)
-        if self.flat:
-            return np.concatenate([seen[name] for name in self._space])
-        return seen
+        return self._packed(seen)
 
     def _info(self, place: int, now: Evaluation) -> Info:
         """Return the info of the section that was designed last."""
@@ -432,11 +411,8 @@ class CorridorDesign(gymnasium.Env[Any, Action]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return an RGB image of the section that was designed last, (450, 800, 3)."""
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() returns None: make the environment with a render_mode")
+        if not self._renders(bool(self.placed)):
             return None
-        if not self.placed:
-            raise ResetNeeded("call reset() before render()")
         place = max(len(self.evaluations) - 1, 0)
         section = self.placed[place]
         now = self.evaluations[place] if self.evaluations else section.problem.nothing

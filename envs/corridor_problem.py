@@ -20,9 +20,6 @@ from rigdda.envs.cost import Evaluation
 from rigdda.envs.intervals import Interval, Mean, total
 from rigdda.envs.problem import DesignProblem
 
-ROUNDING = 1e-9
-"""Relative excess of a budget that is attributed to rounding [-]."""
-
 
 @dataclass(frozen=True, slots=True)
 class CorridorEvaluation:
@@ -148,10 +145,6 @@ class CorridorProblem:
                     f"sections.{section.name}.{bad.field}", bad.value, bad.mend
                 ) from None
         return tuple(found)
-
-    def affordable(self, layouts: Sequence[Sequence[Barrier]], budget: float) -> bool:
-        """Return whether the construction cost of layouts is within a budget [EUR]."""
-        return self.cost(layouts) <= budget * (1.0 + ROUNDING)
 
     def evaluate(
         self,

@@ -28,7 +28,7 @@ from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.recorder import Recorder, Shown, Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import EpisodeRecord, Versions, as_json
-from rigdda.envs.site_sampling import Place, Venue
+from rigdda.envs.site_sampling import Place, Slots, Venue
 
 
 class Ask(NamedTuple):
@@ -140,8 +140,86 @@ TOLD = ("objective", "capital", "harm", "repair", "debris", "debris_share", "cos
 """Fields of the evaluation that `info` contains."""
 
 
-class BarrierEnv(gymnasium.Env[Any, Action]):
-    """Base class of the environments: the barriers of a site, placed some slots per step.
+class LayoutEnv(gymnasium.Env[Any, Action]):
+    """What all environments share: their spaces, replays and pictures, and a step in two parts.
+
+    Parameters
+    ----------
+    slots : Slots
+        The slots of a layout.
+    width : int
+        Length of an action.
+    space : spaces.Dict
+        Space of the observations before they are flattened.
+    releases, flat, record, record_trigger, render_mode
+        See `BarrierDesign`.
+
+    Raises
+    ------
+    BadInput
+        If a keyword is invalid.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
+
+    name: ClassVar[str]
+    """Registered name of the environment."""
+
+    def __init__(
+        self,
+        slots: Slots,
+        width: int,
+        space: spaces.Dict,
+        releases: int,
+        flat: bool,
+        record: str | os.PathLike[str] | None,
+        record_trigger: Trigger | None,
+        render_mode: str | None,
+    ):
+        self.slots, self.width = slots, width
+        self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
+        if record is None and record_trigger is not None:
+            raise BadInput("record_trigger", record_trigger, "also give a folder with `record`")
+        self.recorder = None if record is None else Recorder(record, record_trigger)
+        if render_mode is not None:
+            check.one_of("render_mode", render_mode, self.metadata["render_modes"])
+        self.render_mode = render_mode
+        self.action_space = spaces.Box(-1.0, 1.0, (width,), np.float32)
+        self._space = space
+        self.flat = check.boolean("flat", flat)
+        self.observation_space = spaces.flatten_space(space) if flat else space
+        self.open = False
+        self._episode = 0
+
+    def step(self, action: Action) -> Step:
+        """Simulate the releases that `action` needs."""
+        (answer,) = simulate([self.ask(action)])
+        return self.tell(answer)
+
+    def ask(self, action: Action) -> Ask | None:
+        """Return the simulations that an action needs, or None if it needs none."""
+        raise NotImplementedError
+
+    def tell(self, answer: Answer | None) -> Step:
+        """Finish the step with the result of its ask."""
+        raise NotImplementedError
+
+    def _packed(self, seen: dict[str, NDArray[np.float32]]) -> Observation:
+        """Return an observation, flattened if requested."""
+        return np.concatenate([seen[name] for name in self._space]) if self.flat else seen
+
+    def _renders(self, started: bool) -> bool:
+        """Return whether a picture is drawn; warn if the environment has no render mode."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() returns None: make the environment with a render_mode")
+            return False
+        if not started:
+            raise ResetNeeded("call reset() before render()")
+        return True
+
+
+class BarrierEnv(LayoutEnv):
+    """Base class of the environments of one site: its barriers, placed some slots per step.
 
     Attributes
     ----------
@@ -150,11 +228,6 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
     venue : Venue
         Provides the site of each episode.
     """
-
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
-
-    name: ClassVar[str]
-    """Registered name of the environment."""
 
     looks: ClassVar[bool]
     """Whether the current layout is simulated and observed after every step."""
@@ -174,19 +247,10 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         render_mode: str | None = None,
     ):
         self.venue = Venue(site, max_barriers, kinds, fidelity, targets, max_cost)
-        self.problem, self.slots = self.venue.first, self.venue.slots
-        self.releases = check.integer("releases", releases, 1, MOST_RELEASES)
-        if record is None and record_trigger is not None:
-            raise BadInput("record_trigger", record_trigger, "also give a folder with `record`")
-        self.recorder = None if record is None else Recorder(record, record_trigger)
-        if render_mode is not None:
-            check.one_of("render_mode", render_mode, self.metadata["render_modes"])
-        self.render_mode = render_mode
-        self.action_space = spaces.Box(-1.0, 1.0, (self.width,), np.float32)
-        self._space = observation.space(self.slots.size, max_barriers, self.looks)
-        self.flat = check.boolean("flat", flat)
-        self.observation_space = spaces.flatten_space(self._space) if flat else self._space
-        self._episode = 0
+        self.problem, slots = self.venue.first, self.venue.slots
+        space = observation.space(slots.size, max_barriers, self.looks)
+        options = record, record_trigger, render_mode
+        super().__init__(slots, self.width_of(slots), space, releases, flat, *options)
         self._numbers = np.zeros(0)  # all actions of this episode so far
         self._asked = self._numbers  # the same with the action being simulated
         self._seed: int | None = None  # seed given to the reset of this episode
@@ -194,13 +258,12 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         self._stages: list[Evaluation] = []  # without barriers, then after each step
         self._rewards: list[float] = []  # one per step
         self._looked = Sample()  # outcomes of the current layout in the observation releases
-        self.open = False
         self._wanted: bool | None = None  # whether to record the episode; None: not yet known
         self._shown: Run | None = None
 
-    @property
-    def width(self) -> int:
-        """Length of an action; a multiple of the slot length."""
+    @classmethod
+    def width_of(cls, slots: Slots) -> int:
+        """Return the length of an action, a multiple of the slot length."""
         raise NotImplementedError
 
     def reset(
@@ -217,11 +280,6 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
         """Simulate the observation releases of the drawn episode and start it."""
         (looked,) = look_ahead([(self.problem, self.sights)])
         return self.start(looked)
-
-    def step(self, action: Action) -> Step:
-        """Simulate the releases of the episode with the barriers that `action` adds."""
-        (answer,) = simulate([self.ask(action)])
-        return self.tell(answer)
 
     def draw(self, seed: int | None, options: Mapping[str, Any] | None = None) -> None:
         """Draw a new episode."""
@@ -294,17 +352,12 @@ class BarrierEnv(gymnasium.Env[Any, Action]):
             "outcomes": plain(now.outcomes),
             **{name: float(getattr(now, name)) for name in TOLD},
         }
-        if self.flat:
-            return np.concatenate([seen[name] for name in self._space]), info
-        return seen, info
+        return self._packed(seen), info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return an RGB image of the end of the representative release, (450, 800, 3)."""
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() returns None: make the environment with a render_mode")
+        if not self._renders(bool(self._stages)):
             return None
-        if not self._stages:
-            raise ResetNeeded("call reset() before render()")
         now, site = self._stages[-1], self.problem.site
         if self._shown is None:
             self._shown = rigdda.release(site, now.layout, *self.typical)[0]
@@ -433,10 +486,10 @@ class BarrierDesign(BarrierEnv):
     name = "rigdda/BarrierDesign-v0"
     looks = False
 
-    @property
-    def width(self) -> int:
-        """Length of an action."""
-        return self.slots.size
+    @classmethod
+    def width_of(cls, slots: Slots) -> int:
+        """Return the length of an action: that of all slots."""
+        return slots.size
 
     def _record(self, recorder: Recorder) -> None:
         record = as_json(self.record)
@@ -487,10 +540,10 @@ class BarrierPlacement(BarrierEnv):
     name = "rigdda/BarrierPlacement-v0"
     looks = True
 
-    @property
-    def width(self) -> int:
-        """Length of an action."""
-        return self.slots.width
+    @classmethod
+    def width_of(cls, slots: Slots) -> int:
+        """Return the length of an action: that of one slot."""
+        return slots.width
 
     def _record(self, recorder: Recorder) -> None:
         record = as_json(self.record)

@@ -20,11 +20,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Error
+
+if TYPE_CHECKING:
+    import cvxpy as cp
 
 Floats = NDArray[np.float64]
 Choice = tuple[int, ...]
@@ -145,12 +149,12 @@ def optimum(
     return tuple(int(np.argmax(np.asarray(x.value))) for x in chosen)
 
 
-def _solve(problem: object) -> float:
+def _solve(problem: cp.Problem) -> float:
     """Solve a programme with HiGHS and return its objective."""
     import cvxpy as cp
 
     try:
-        value = problem.solve(solver=cp.HIGHS, mip_rel_gap=GAP)  # type: ignore[attr-defined]
+        value = problem.solve(solver=cp.HIGHS, mip_rel_gap=GAP)
     except cp.SolverError as error:
         raise Error(f"the integer programme of the corridor failed: {error}") from None
     if not np.isfinite(value):

@@ -7,6 +7,7 @@ it satisfies the rule.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -35,7 +36,8 @@ NOTE = "#4a5560"
 """Colour of the names of classes."""
 
 TALL = 12.0
-"""Largest height in the picture [m]; no fence is nearly as high."""
+"""Largest height in the picture [m] unless more is needed everywhere; no fence is nearly as
+high."""
 
 MARKERS = "Do^sv"
 """Markers of the fences of different layouts."""
@@ -141,8 +143,9 @@ def _heights(axes: Axes, problem: DesignProblem, rows: Sequence[Mapping[str, Any
                       annotation_clip=False)  # fmt: skip
     axes.axhline(limit, color="#b5382a", linewidth=1.4, linestyle="--",
                  label="greatest height here")  # fmt: skip
-    axes.set_ylim(0.0, TALL)
-    words = f"; the curve reaches {height.max():.0f} m" if height.max(initial=0.0) > TALL else ""
+    top = max(TALL, 1.4 * float(height.min(initial=math.inf))) if len(height) else TALL
+    axes.set_ylim(0.0, top)
+    words = f"; the curve reaches {height.max():.0f} m" if height.max(initial=0.0) > top else ""
     axes.set_title(
         "needed height of a fence [m]; lines: greatest height of fences and the class from which "
         f"it is made{words}", loc="left", fontsize=10,

@@ -70,9 +70,11 @@ MIDDLE = np.tile([1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 3)
 """A ditch or an embankment of medium size in the middle of the zone, and two more."""
 
 
-def test_barriers_beyond_the_money_are_told() -> None:
-    env = make(budget=1.0)
+@pytest.mark.parametrize("budget", [0.0, 1.0])
+def test_barriers_beyond_the_money_are_told(budget: float) -> None:
+    env = make(budget=budget)
     _, infos = played(env, 0, MIDDLE)
+    assert env.budget == budget * sum(section.length for section in env.placed)
     assert all(info["layout"] == () for info in infos)
     assert all("EUR are left" in " ".join(info["dropped"]) for info in infos)
 
@@ -134,6 +136,7 @@ def test_sections_of_a_corridor_are_all_played() -> None:
         ({"site": "nowhere"}, "nowhere"),
         ({"sections": 3}, "sections"),
         ({"budget": -1.0}, "budget"),
+        ({"budget": "much"}, "budget"),
         ({"budget": (5.0, 1.0)}, "budget"),
         ({"lengths": (0.0, 1.0)}, "lengths"),
         ({"releases": 0}, "releases"),
@@ -159,4 +162,3 @@ def test_the_objective_of_a_corridor_is_that_of_its_sections() -> None:
     nothing = problem.problems[0].nothing.objective
     assert found.gain == pytest.approx(100.0 * (nothing - parts[1].objective))
     assert found.gain_ci[0] < found.gain < found.gain_ci[1]
-    assert problem.affordable([(), ditch], found.cost) and not problem.affordable([(), ditch], 1.0)

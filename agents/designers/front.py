@@ -19,7 +19,7 @@ from rigdda.agents.designers.catalogue import ensemble_for
 from rigdda.agents.designers.convex import unsearched
 from rigdda.agents.designers.menu import FINEST, Menu
 from rigdda.agents.designers.protocol import Ledger, Progress
-from rigdda.agents.designers.race import Kind, foretold, scout
+from rigdda.agents.designers.race import Kind, first_round, foretold, scout
 from rigdda.agents.designers.racing import Arm, Track
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem
@@ -33,12 +33,6 @@ MOST = 12
 
 SINGLES, PAIRS = 0.5, 0.25
 """Shares of the budget for single barriers and for pairs; the rest is for neighbours [-]."""
-
-FEWEST, USUAL = 8, 24
-"""Least and usual mean number of releases per event with each candidate."""
-
-FIELD = 150
-"""Budget per event for each of the releases of a candidate."""
 
 
 def layouts(
@@ -56,8 +50,7 @@ def layouts(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    events = len(problem.site.events)
-    first = min(USUAL, max(FEWEST, simulations // (FIELD * events))) * events
+    first = first_round(problem, simulations)
     menu, track = Menu(problem), Track(ledger)
     ensemble = ensemble_for(ledger, menu.stations)
     known = [layout for layout in unsearched(problem, menu) if problem.fits(layout)]

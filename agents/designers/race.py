@@ -292,6 +292,12 @@ BEST_OF = 8
 """Number of single barriers of each kind from which pairs are formed."""
 
 
+def first_round(problem: DesignProblem, simulations: int) -> int:
+    """Return the number of releases of a candidate before it may be dropped, for a budget."""
+    events = len(problem.site.events)
+    return min(RELEASES, max(FEWEST, simulations // (FIELD * events))) * events
+
+
 def design(
     problem: DesignProblem,
     simulations: int,
@@ -309,8 +315,7 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    events = len(problem.site.events)
-    first = min(RELEASES, max(FEWEST, simulations // (FIELD * events))) * events
+    first = first_round(problem, simulations)
     if simulations < 27 * first:  # the budget would not suffice for the final
         return search(ledger, offered(ledger))
     menu, track = Menu(problem), Track(ledger)

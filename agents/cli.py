@@ -467,12 +467,14 @@ def design(
     If the layout misses a target, the cheapest layout for each level of P(reach) is reported and
     written to frontier.csv and frontier.png.
 
-    Writes layout.toml, evaluations.csv, section.png, cost.png, episode.rrd, band.csv and band.png
-    (the comparison on other grounds) and the outcomes of all releases, for `rigdda reprice`; the
-    checks of the barriers (checks.csv, and design_sheet.csv factor by factor) and what the
-    engineering rule demands along the slope (demand.csv, demand.png). For a site with traffic, the
-    risk to life is written to risk.csv. An interrupted run continues from evaluations.jsonl. A
-    folder that contains the design of another problem (problem.json) is refused.
+    Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. The comparison on
+    other grounds is in band.csv and band.png, the checks of the barriers are in checks.csv and
+    design_sheet.csv, and what the engineering rule demands along the slope is in demand.csv and
+    demand.png. For a site with traffic, risk.csv contains the risk to life. The outcomes of all
+    releases are kept for `rigdda reprice`.
+
+    An interrupted run continues from evaluations.jsonl. A folder that contains the design of
+    another problem (problem.json) is refused.
     """
     from rigdda.agents import ground_band, jobs
     from rigdda.agents.designers.store import FILE, claim
@@ -605,10 +607,10 @@ def _show_risks(done: ComparedLayouts) -> None:
 def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) -> None:
     """Write one report of results folders: report.html.
 
-    RESULTS are folders that design, simulate, study, check or fit wrote. The page holds everything
-    in itself, so that it opens without a network and prints on A4: a summary, the site, the
-    assumptions with their sources, what comes down, the layouts compared, the limits of the method,
-    and the commands, seeds and versions to repeat the results.
+    RESULTS are folders that design, simulate, study, reprice, check, fit, sensitivity or corridor
+    wrote. The page needs no other file and no network, and it prints on A4: a summary, the site,
+    the assumptions with their sources, what comes down, the layouts compared, the limits of the
+    method, and the commands, seeds and versions to repeat the results.
     """
     from rigdda.agents import browser
     from rigdda.agents.reports import report_page, results_folder

@@ -275,8 +275,15 @@ def interrupted(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, scrip
         time.sleep(0.2)
         os.kill(os.getpid(), signal.SIGINT)
 
-    threading.Thread(target=press_ctrl_c).start()
-    open_viewer(file)
+    # a shell starts background jobs with the signal ignored
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    begun = time.monotonic()
+    try:
+        threading.Thread(target=press_ctrl_c).start()
+        open_viewer(file)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert time.monotonic() - begun < 30.0  # otherwise the script ended by itself
     return int(note.read_text())
 
 

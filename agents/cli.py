@@ -124,6 +124,10 @@ def sites() -> None:
               "all other ground. May be repeated.")  # fmt: skip
 @click.option("--source", "sources", multiple=True, metavar="NAME:START-END",
               help="Band of the slope where loose rock lies. May be repeated.")  # fmt: skip
+@click.option("--mass", "masses", multiple=True, metavar="NAME:START-END:DIP",
+              help="Jointed mass that is taken out of the ground between two chainages: it has a "
+              "vertical crack at its upper end and rests on a plane that dips downhill by DIP "
+              "degrees to its lower end. May be repeated.")  # fmt: skip
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE.toml",
               help="Site file to write.  [default: NAME.toml]")  # fmt: skip
 def new(
@@ -135,6 +139,7 @@ def new(
     zone: tuple[float, float] | None,
     grounds: tuple[str, ...],
     sources: tuple[str, ...],
+    masses: tuple[str, ...],
     out: Path | None,
 ) -> None:
     """Write a site file for the surveyed profile of a slope.
@@ -145,7 +150,7 @@ def new(
     """
     from rigdda.agents import new_site
 
-    wanted = new_site.Wanted(road or None, toe, zone or None, grounds, sources, layer)
+    wanted = new_site.Wanted(road or None, toe, zone or None, grounds, sources, masses, layer)
     file = new_site.file_of(name, out)
     text, found = new_site.compose(name, profile, wanted)
     new_site.write(file, text)

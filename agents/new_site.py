@@ -18,6 +18,7 @@ from rigdda.fields import described
 from rigdda.files import atomic
 from rigdda.model import loose_blocks
 from rigdda.model.barrier_zone import BarrierZone
+from rigdda.model.block import convex_polygon
 from rigdda.model.grounds import GROUNDS, USUAL
 from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.prices import Consequences, Prices
@@ -59,8 +60,11 @@ CLEARANCE = 0.5
 VOLUME = (0.1, 1.0)
 """Placeholder of the volume of blocks [m3]."""
 
-PERIOD = 5.0
-"""Placeholder of the return period of an event [years on 100 m of slope]."""
+PERIOD, MASS_PERIOD = 5.0, 50.0
+"""Placeholders of the return period of blocks and of a jointed mass [years on 100 m of slope]."""
+
+JOINTS = ((70.0, 1.0), (-20.0, 1.0))
+"""Placeholders of the dip [deg] and the spacing [m] of the joints of a mass."""
 
 BLOCK = 0.8
 """Edge of the placeholder of a block on ground that overhangs [m]."""
@@ -73,6 +77,9 @@ STEP = 0.01
 
 SPEED = 3.0
 """Mean speed along the whole profile for which the simulated time is enough [m/s]."""
+
+MASS = re.compile(r"(.+):\s*([+-]?[\d.]+)")
+"""NAME:START-END:DIP of an option."""
 
 RANGE = re.compile(r"(.+?):\s*([+-]?[\d.]+)\s*(?:-|to|\.\.)\s*([+-]?[\d.]+)")
 """NAME:START-END of an option."""
@@ -88,7 +95,25 @@ class Wanted(NamedTuple):
     """NAME:START-END, or NAME for all the rest."""
     sources: Sequence[str] = ()
     """NAME:START-END."""
+    masses: Sequence[str] = ()
+    """NAME:START-END:DIP."""
     layer: str | None = None
+
+
+class Mass(NamedTuple):
+    """A jointed mass, in chainages of the site.
+
+    It lies between a vertical crack at the upper end of its stretch of the ground and a plane that
+    dips downhill and ends at the lower end, as in the analysis of plane failure by Hoek and Bray.
+    """
+
+    name: str
+    span: Span
+    """Stretch of the surveyed ground that is its face [m]."""
+    foot: float
+    """Elevation of the foot of the crack [m]."""
+    polygon: list[list[float]]
+    """Its corners [m]."""
 
 
 def compose(name: str, file: Path, wanted: Wanted) -> tuple[str, Profile]:
@@ -178,6 +203,11 @@ class _Draft:
         self.overhangs = bool((np.diff(self.x) < 0.0).any())
         self.road = self._road()
         self.toe = self._toe(self.road[0])
+        self.masses = [self._mass(text) for text in wanted.masses]
+        for one, other in pairwise(sorted(self.masses, key=lambda mass: mass.span)):
+            if other.span[0] < one.span[1]:
+                mend = f"let it begin where {one.name} ends"
+                raise BadInput("--mass", other.name, mend)
         self.sources = self._sources()
         self.zone = self._zone()
         self.named: set[str] = set()
@@ -192,7 +222,7 @@ class _Draft:
         ground = f"{GIVEN} where named by --ground, else {PLACEHOLDER}"
         ground = ground if given.grounds else PLACEHOLDER
         slope = {
-            "points": (_pairs(self.profile.points), SURVEYED),
+            "points": (_pairs(self._bedrock()), self._surveyed()),
             "toe": (self.toe, PLACEHOLDER if given.toe is None else GIVEN),
             "surface": (self.base, GIVEN if self.base in self.named else PLACEHOLDER),
             "surfaces": (self.stretches, ground),
@@ -283,7 +313,57 @@ class _Draft:
                 mend = f"put it uphill of the road, between chainage {low:.10g} and {high:.10g}"
                 raise BadInput("--source", text, mend)
             found.append((name, span, GIVEN))
-        return found or [("face", self._face(), PLACEHOLDER)]
+        return found if found or self.masses else [("face", self._face(), PLACEHOLDER)]
+
+    def _mass(self, text: str) -> Mass:
+        """Return the mass that an option names."""
+        found, mend = (
+            MASS.fullmatch(text.strip()),
+            'give NAME:START-END:DIP, such as "pillar:8-15:40"',
+        )
+        try:
+            name, span = _ranged("--mass", found[1], self.profile.origin) if found else ("", None)
+            dip = float(found[2]) if found else 0.0
+        except ValueError:
+            span = None
+        if span is None:
+            raise BadInput("--mass", text, mend)
+        low, high = span
+        if not self.x[0] <= low < high < self.road[0]:
+            ends = sorted(map(self.profile.origin.chainage_of, (float(self.x[0]), self.road[0])))
+            mend = f"put it uphill of the road, between chainage {ends[0]:.10g} and {ends[1]:.10g}"
+            raise BadInput("--mass", text, mend)
+        if self.overhangs:
+            raise BadInput("--mass", text, "the profile overhangs: give the polygon in the file")
+        inside = (self.x > low) & (self.x < high)
+        top, bottom = (round(float(np.interp(at, self.x, self.y)), 3) for at in span)
+        face = [[low, top], *_pairs(self.profile.points[inside]), [high, bottom]]
+        foot = round(bottom + (high - low) * float(np.tan(np.radians(dip))), 3)
+        if not 0.0 <= dip < 90.0 or not foot < top:
+            fall = np.degrees(np.arctan2(top - bottom, high - low))
+            mend = f"give a plane that dips by 0 to less than the {fall:.0f} deg of the face"
+            raise BadInput("--mass", text, mend)
+        polygon = [*face, [low, foot]]
+        try:
+            convex_polygon("--mass", polygon)
+        except BadInput:
+            mend = "its face is hollow: name a part of it, or give the polygon in the file"
+            raise BadInput("--mass", text, mend) from None
+        return Mass(name, span, foot, polygon)
+
+    def _bedrock(self) -> Floats:
+        """Return the ground without the jointed masses, (n, 2)."""
+        points = self.profile.points
+        for mass in self.masses:
+            x, (low, high) = points[:, 0], mass.span
+            under = [mass.polygon[0], [low, mass.foot], mass.polygon[-2]]
+            points = np.vstack([points[x < low], under, points[x > high]])
+        return points
+
+    def _surveyed(self) -> str:
+        """Return how sure the points of the ground are."""
+        names = ", ".join(mass.name for mass in self.masses)
+        return f"{SURVEYED}, without the rock of {names}" if names else SURVEYED
 
     def _face(self) -> Span:
         """Return the upper third of the face, where blocks of the placeholder are on the ground."""
@@ -330,8 +410,13 @@ class _Draft:
                 "design": (True, PLACEHOLDER),
             }
             events.append(Part("[[events]]", Event, often))
-        last = sources.pop()
-        return [*sources, last._replace(comments=JOINTED), *events]
+        for mass in self.masses:
+            source, event = _mass_tables(mass)
+            sources.append(source)
+            events.append(event)
+        if not self.masses:
+            sources.append(sources.pop()._replace(comments=JOINTED))
+        return [*sources, *events]
 
     def _zone(self) -> Span:
         """Return where barriers may stand."""
@@ -340,6 +425,7 @@ class _Draft:
             return round(low, 3), round(high, 3)
         high = self.road[0] - CLEARANCE
         free = [span[1] + _reach() + CLEARANCE for _, span, _ in self.sources]
+        free += [mass.span[1] + CLEARANCE for mass in self.masses]
         low = max(self.toe - UPHILL, *free, float(self.x[0]))
         if not low < high:
             mend = f"give where barriers may stand: loose rock lies up to {low:g}, near the road"
@@ -409,8 +495,28 @@ class _Draft:
         return min(max(25.0, 5.0 * np.ceil(length / SPEED / 5.0)), 300.0)
 
 
+def _mass_tables(mass: Mass) -> tuple[Part, Part]:
+    """Return the tables of a jointed mass and of its event."""
+    joints = [{"dip_deg": dip, "spacing": spacing, "scatter": 0.2} for dip, spacing in JOINTS]
+    source: dict[str, tuple[Any, str]] = {
+        "name": (mass.name, GIVEN),
+        "polygon": (mass.polygon, GIVEN),
+        "joints": (joints, PLACEHOLDER),
+        "density": (Source(band=(1.0, 2.0)).density, DEFAULT),
+        "surface": (Source(band=(1.0, 2.0)).surface, DEFAULT),
+    }
+    event: dict[str, tuple[Any, str]] = {
+        "name": (f"mass, {mass.name}", PLACEHOLDER),
+        "source": (mass.name, GIVEN),
+        "return_period": (MASS_PERIOD, PLACEHOLDER),
+        "section_length": (100.0, PLACEHOLDER),
+        "design": (True, PLACEHOLDER),
+    }
+    return Part("[[sources]]", Source, source), Part("[[events]]", Event, event)
+
+
 JOINTED = (
-    "A jointed mass instead of a band, in x and y of this file (`rigdda check` counts its blocks):",
+    "A jointed mass instead of a band, which `rigdda new --mass` takes out of the ground:",
     "polygon = [[x, y], [x, y], [x, y], [x, y]]",
     "joints = [",
     "    { dip_deg = 45.0, spacing = 0.8, scatter = 0.2 },",

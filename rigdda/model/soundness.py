@@ -206,7 +206,10 @@ def _check_piece(
         corners = shapely.points(piece)
         depth = shapely.distance(ground.exterior, corners) * ground.contains(corners)
         corner = int(depth.argmax())
-        mend = f"raise it: the rock overlaps the ground by {sunk:g} m2"
+        mend = (
+            "raise it, or lower slope.points, which are the ground without this rock: it overlaps "
+            f"the ground by {sunk:g} m2"
+        )
         raise BadInput(f"{where}[{corner}]", piece[corner], mend)
 
 

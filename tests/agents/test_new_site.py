@@ -54,6 +54,46 @@ def test_from_a_survey_to_a_checked_site(tmp_path):
     assert width >= 1200 and height >= 600
 
 
+def test_a_jointed_mass_is_taken_out_of_the_ground(tmp_path):
+    (tmp_path / "survey.csv").write_text(GRID)
+    asked = ("--profile", "survey.csv", "--road", 2683512, 2683521)
+    run("new", "slope", *asked, "--mass", "pillar:2683412-2683418:30", folder=tmp_path)
+    site = Site.load(tmp_path / "slope.toml")
+    (pillar,) = site.sources
+    # Face at 10 m in 4, so 15 m high over 6 m; the plane rises by 6 tan 30 deg from its lower end.
+    foot = 85.0 - 15.0 + 6.0 * np.tan(np.radians(30.0))
+    np.testing.assert_allclose(pillar.polygon, [(12, 85), (18, 70), (12, foot)], atol=1e-3)
+    assert pillar.area == pytest.approx(0.5 * 6.0 * (85.0 - foot), abs=0.01)
+    assert site.profile.height(17.0) == pytest.approx(70.0 + np.tan(np.radians(30.0)), abs=1e-3)
+    told = run("check", "slope.toml", folder=tmp_path)
+    assert "source pillar: a jointed mass" in told and "odd: sources" not in told
+
+
+@pytest.mark.parametrize(
+    ("mass", "mend"),
+    [
+        ("pillar:2683412-2683418", "NAME:START-END:DIP"),
+        ("pillar:2683412:30", "NAME:START-END:DIP"),
+        ("pillar:2683412-2683418:1.2.3", "NAME:START-END:DIP"),
+        ("pillar:2683412-2683418:75", "less than the 68 deg"),
+        ("pillar:2683412-2683418:-5", "0 to less than"),
+        ("pillar:2683412-2683470:20", "hollow"),
+        ("pillar:2683300-2683418:20", "between chainage 2683400 and 2683512"),
+    ],
+)
+def test_a_mass_that_cannot_lie_there_is_refused(tmp_path, mass, mend):
+    (tmp_path / "survey.csv").write_text(GRID)
+    asked = ("--profile", "survey.csv", "--road", 2683512, 2683521, "--mass", mass)
+    assert mend in refused("new", "slope", *asked, folder=tmp_path)
+
+
+def test_two_masses_in_one_place_are_refused(tmp_path):
+    (tmp_path / "survey.csv").write_text(GRID)
+    asked = ("--profile", "survey.csv", "--road", 2683512, 2683521)
+    two = ("--mass", "a:2683412-2683418:30", "--mass", "b:2683417-2683420:30")
+    assert "where a ends" in refused("new", "slope", *asked, *two, folder=tmp_path)
+
+
 def test_names_of_sites_and_sources_may_have_any_letters(tmp_path):
     (tmp_path / "survey.csv").write_text(SOUND)
     strange = 'G\N{LATIN SMALL LETTER O WITH DIAERESIS}sgen "east"\n[slope]\x07'

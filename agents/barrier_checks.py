@@ -162,7 +162,8 @@ def _fence(check: FenceCheck) -> Iterator[BarrierCheck]:
 def _who(action: Action) -> str:
     """Return in words which blocks arrive."""
     event = action.event
-    return f"{event.name}, {action.passing:,.0f} of {event.blocks:,} blocks arrive"
+    few = "" if action.enough else ", too few for a quantile"
+    return f"{event.name}, {action.passing:,.0f} of {event.blocks:,} blocks arrive{few}"
 
 
 def _structure(

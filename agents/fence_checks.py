@@ -51,6 +51,11 @@ class Action(NamedTuple):
         """Return the velocity with its factors [m/s]."""
         return self.speed.value * self.factors.velocity
 
+    @property
+    def enough(self) -> bool:
+        """Whether so many blocks pass that the characteristic values are below the largest."""
+        return round(self.passing) * (1.0 - self.factors.quantile) >= 1.0 - 1e-9
+
     def energy(self) -> float:
         """Return the design energy E_d [J]."""
         return 0.5 * self.design_mass * self.design_speed() ** 2 * self.factors.risk
@@ -243,13 +248,15 @@ class FenceCheck:
         """Return the design sheet, factor by factor."""
         return [*self._energy_rows(), *self._height_rows(), *self._elongation_rows()]
 
-    def _quantile(self, value: Quantile) -> str:
-        share = 100.0 * self.factors.quantile
-        return f"{share:g} % quantile, {value.low:.3g} to {value.high:.3g}"
+    def _quantile(self, value: Quantile, action: Action) -> str:
+        share = f"{100.0 * self.factors.quantile:g} % quantile"
+        if not action.enough:
+            return f"largest of {action.passing:.0f}, too few for a {share}"
+        return f"{share}, {value.low:.3g} to {value.high:.3g}"
 
     def _energy_rows(self) -> list[SheetRow]:
         hard, f = self.demand.hard, self.factors
-        speed, use = self._quantile(hard.speed), self.energy_use
+        speed, use = self._quantile(hard.speed, hard), self.energy_use
         return [
             SheetRow("station", "x", self.fence.x, "m", ""),
             SheetRow("design event", "", hard.event.name, "", "the one that demands most energy"),
@@ -274,7 +281,7 @@ class FenceCheck:
 
     def _height_rows(self) -> list[SheetRow]:
         high, f = self.demand.high, self.factors
-        height, use = self._quantile(high.height), self.height_use
+        height, use = self._quantile(high.height, high), self.height_use
         return [
             SheetRow("design event", "", high.event.name, "", "the one that demands most height"),
             SheetRow("bounce height", "h", high.height.value, "m", height),

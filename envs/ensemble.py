@@ -32,6 +32,10 @@ FLOOR = 0.2
 have a lower minimum because they take longer to simulate. It ensures that events which are rare or
 cause no cost without barriers are sampled, too."""
 
+DESIGN_FLOOR = 1.0 / 30.0
+"""Least share of the releases for a design event [-]. Of 3,000 releases at least 100 are of this
+event: if no block reaches the road in any of them, the probability is below 3 % (95 %)."""
+
 OWN_TIME, CROWDED = 1.0, 1.2
 """Model of the processor time of a release relative to that of one block [-]: a constant part, plus
 the number of blocks raised to a power. On `shu-hwa` releases of 1, 7 and 120 blocks take 1.5, 5 and
@@ -143,9 +147,9 @@ def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
     """Return the share of the releases for each event.
 
     The share is proportional to rate x standard deviation / sqrt(time per release) (Neyman
-    allocation), with a minimum share. The standard deviation is the largest that a layout can cause
-    if it lets the event reach the road at most as often as without barriers: barriers can turn
-    certain harm into random harm.
+    allocation), with a minimum share, which is larger for design events. The standard deviation is
+    the largest that a layout can cause if it lets the event reach the road at most as often as
+    without barriers: barriers can turn certain harm into random harm.
     """
     free = all(fact.harm.mean == 0.0 for fact in facts.values())  # then the debris is used instead
     weight = {}
@@ -157,6 +161,9 @@ def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
     whole = sum(weight.values())
     equal = 1.0 / len(weight)
     least = {name: FLOOR * equal * (OWN_TIME + 1.0) / _time(fact) for name, fact in facts.items()}
+    for event in site.events:
+        if event.design:
+            least[event.name] = max(least[event.name], DESIGN_FLOOR)
     raised = {n: max(w / whole if whole else equal, least[n]) for n, w in weight.items()}
     return {name: share / sum(raised.values()) for name, share in raised.items()}
 

@@ -107,6 +107,9 @@ def design(
 def answer(problem: DesignProblem, seed: int = 0) -> RuleAnswer:
     """Return the answer of the rule for a problem.
 
+    Barriers that stand already and are kept hold back the blocks of the design events, as they do
+    in the checks of a layout.
+
     Parameters
     ----------
     problem : DesignProblem
@@ -119,8 +122,15 @@ def answer(problem: DesignProblem, seed: int = 0) -> RuleAnswer:
     Diverged
         If a simulation diverges.
     """
-    envelope = design_envelope.of(problem.site, problem.zone, seed)
-    return judge(problem, envelope)
+    site, kept = problem.site, problem.site.existing_barriers
+    while True:
+        envelope = design_envelope.of(site, problem.zone, seed, layout=kept)
+        found = judge(problem, envelope)
+        standing = site.standing(found.layout)
+        remaining = tuple(barrier for barrier in kept if barrier in standing)
+        if remaining == kept:
+            return found
+        kept = remaining  # the layout replaces the others
 
 
 def judge(problem: DesignProblem, envelope: DesignEnvelope) -> RuleAnswer:

@@ -106,7 +106,9 @@ def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> s
         return ""
     line = f"the layout {name!r} costs less per year than {words!r}"
     if RANK[other.targets] > RANK[chosen.targets]:
-        return f"{line}, but its targets are {other.targets} and not {chosen.targets}"
+        return (
+            f"{line}, but its targets are {other.targets}, and those of the latter {chosen.targets}"
+        )
     if RANK[other.targets] == RANK[MISSED]:
         return f"{line}, and misses the targets, too"
     return f"{line}: use a larger --budget"

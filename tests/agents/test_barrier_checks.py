@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import msgspec
 import pytest
@@ -16,6 +17,7 @@ from rigdda.agents.barrier_checks import (
     LayoutChecks,
     check_layout,
 )
+from rigdda.agents.designers import rule
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.fence_checks import demand_at
 from rigdda.agents.ritchie_ditch import RitchieDitch
@@ -139,6 +141,27 @@ def test_a_barrier_that_nothing_reaches_is_named(
     assert found.table == () and found.idle == ("fence 500 kJ, 3.0 m high, at 7.0 m",)
 
 
+def test_the_rule_and_the_checks_agree_behind_an_existing_fence() -> None:
+    site = Site.load("quick")
+    for removable in (False, True):
+        old = Existing(kind="fence", x=18.3, height=2.0, energy_class=500, removable=removable)
+        problem = DesignProblem(msgspec.structs.replace(site, existing=(old,)), kinds=KINDS)
+        found = rule.answer(problem)
+        assert found.name == rule.NAME and found.check is not None
+        (sheet,) = check_layout(problem, found.layout).fences
+        assert sheet.uses == pytest.approx(found.check.uses)
+
+
+def test_few_blocks_are_said_to_be_too_few() -> None:
+    problem = DesignProblem("quick", kinds=KINDS)
+    found = rule.answer(problem).check
+    assert found is not None
+    hard = found.demand.hard
+    assert hard.enough and "95 % quantile, " in found.rows()[3].basis
+    few = replace(found, demand=replace(found.demand, hard=hard._replace(passing=19.0)))
+    assert few.rows()[3].basis == "largest of 19, too few for a 95 % quantile"
+
+
 def test_an_existing_fence_keeps_blocks_off_and_is_not_checked() -> None:
     site = Site.load("quick")
     old = Existing(kind="fence", x=18.3, height=5.0, energy_class=1000)
@@ -150,4 +173,4 @@ def test_an_existing_fence_keeps_blocks_off_and_is_not_checked() -> None:
     assert behind.fences[0].demand.hard.passing < 0.5 * alone.fences[0].demand.hard.passing
     zone = site.barrier_zone
     bare = design_envelope.of(site, zone), design_envelope.of(stands, zone)
-    assert bare[0].events == bare[1].events  # the rule does not rely on what stands
+    assert bare[0].events == bare[1].events  # without a layout, nothing stands

@@ -168,6 +168,17 @@ def test_releases_spread_over_events_and_a_part_of_them_too(problem: DesignProbl
     assert sum(problem.allocation(3).values()) == 3
 
 
+def test_a_design_event_that_takes_long_has_enough_releases() -> None:
+    site = Site.load("verge")
+    own = {"slab": True}
+    events = tuple(
+        msgspec.structs.replace(e, design=own.get(e.name, e.design)) for e in site.events
+    )
+    before = DesignProblem(site).allocation(3000)["slab"]
+    after = DesignProblem(msgspec.structs.replace(site, events=events)).allocation(3000)["slab"]
+    assert before < 50 and after >= 95
+
+
 def test_small_verifications_hold_the_true_cost(problem: DesignProblem, site: Site) -> None:
     """Z of hand-made distributions, 200 times: 90 to 99 % of the intervals hold it."""
     chance = {"small": 0.005, "block": 0.05, "low": 0.0, "group": 0.5}

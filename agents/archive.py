@@ -22,7 +22,7 @@ from rigdda.envs import DesignProblem, ensemble, outcome_cache, site_store
 from rigdda.envs.ensemble import Ensemble
 from rigdda.envs.outcome_cache import mechanics
 from rigdda.envs.problem import Targets
-from rigdda.files import atomic
+from rigdda.files import atomic, is_file
 
 FILE = "outcomes.msgpack.gz"
 """Name of the archive in the folder of a design."""
@@ -187,7 +187,7 @@ def read(folder: Path) -> Archive:
         If there is none, or it is damaged or was written by another version.
     """
     path = folder / FILE
-    if not path.is_file():
+    if not is_file(path):
         mend = f"name the folder of a completed `rigdda design`, which contains {FILE}"
         raise BadInput("RESULTS", str(folder), mend)
     try:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rigdda import BadInput, Site, check
 from rigdda.agents.limits import RELEASES
 from rigdda.agents.reports.stations import QUANTITIES
+from rigdda.files import is_file
 from rigdda.files import read as read_text
 from rigdda.passages import check_stations
 
@@ -120,7 +121,7 @@ def read(paths: Sequence[Path], site: Site) -> dict[str, DataSet]:
 
 def _read(path: Path, site: Site) -> list[DataSet]:
     """Return the observations in a file."""
-    if not path.is_file():
+    if not is_file(path):
         raise BadInput("observed", str(path), "name a CSV file with event and run_out_m")
     only = site.event_names[0] if len(site.events) == 1 else ""
     names, rows = _table(path, only)

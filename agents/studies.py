@@ -25,7 +25,7 @@ from rigdda.barriers import from_table
 from rigdda.envs.cost import Account, Facts, learn
 from rigdda.envs.outcome_cache import mechanics
 from rigdda.fields import about, checked, parse
-from rigdda.files import read
+from rigdda.files import is_file, read
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def load(path: str | os.PathLike[str]) -> Study:
         If the file is missing, a field is unknown or a value is outside its range.
     """
     file = Path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise BadInput("study", str(path), "name an existing TOML file")
     data = _StudyFile(**checked(_StudyFile, parse("study", str(path), read("study", file))))
     near = file.parent / data.site
@@ -246,7 +246,7 @@ def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
     BadInput
         If the file is not the table of a study.
     """
-    text = path.read_bytes().decode(errors="replace") if path.is_file() else ""
+    text = path.read_bytes().decode(errors="replace") if is_file(path) else ""
     if not text:
         return []
     head, *rows = [*_lines(text)] or [[]]

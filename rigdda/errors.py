@@ -27,8 +27,8 @@ class BadInput(Error, ValueError):
         self.field, self.value, self.mend = field, value, mend
 
     def __str__(self) -> str:
-        text = repr(self.value).replace("\n", " ")
-        return f"{self.field} = {text if len(text) <= 120 else text[:117] + '...'}: {self.mend}"
+        field, text = " ".join(self.field.split()), repr(self.value).replace("\n", " ")
+        return f"{field} = {text if len(text) <= 120 else text[:117] + '...'}: {self.mend}"
 
 
 class Diverged(Error, RuntimeError):

@@ -29,6 +29,14 @@ def read(field: str, path: Path) -> str:
         raise BadInput(field, str(path), mend) from None
 
 
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Return whether there is a file of this name; a name that no file can have is none.
+
+    `Path.is_file` raises an OSError if a name is too long.
+    """
+    return os.path.isfile(path)
+
+
 @contextmanager
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path that replaces `path` when the block ends without an error.

@@ -28,7 +28,7 @@ import tomli_w
 from rigdda import check, fields
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
-from rigdda.files import atomic, read
+from rigdda.files import atomic, is_file, read
 from rigdda.model.prices import Consequences, Prices
 from rigdda.model.site import Site
 
@@ -205,13 +205,13 @@ class Corridor(msgspec.Struct, frozen=True):
         if not isinstance(source, str | os.PathLike):
             raise BadInput("corridor", source, "name a TOML file or a built-in corridor")
         path = Path(source)
-        if path.suffix != ".toml" and not path.is_file():
+        if path.suffix != ".toml" and not is_file(path):
             if str(source) not in names():
                 mend = f"name a TOML file or one of {', '.join(names())}"
                 raise BadInput("corridor", str(source), mend)
             text = (FOLDER / f"{source}.toml").read_text(encoding="utf-8")
             return _corridor(fields.parse("corridor", str(source), text), Path())
-        if not path.is_file():
+        if not is_file(path):
             raise BadInput("corridor", str(source), "name an existing TOML file")
         return _corridor(fields.parse("corridor", str(path), read("corridor", path)), path.parent)
 
@@ -255,7 +255,7 @@ def names() -> list[str]:
 def is_corridor(path: str | os.PathLike[str]) -> bool:
     """Return whether a path is a TOML file with the sections of a corridor."""
     file = Path(path)
-    if file.suffix != ".toml" or not file.is_file():
+    if file.suffix != ".toml" or not is_file(file):
         return False
     data = fields.parse("corridor", str(path), read("corridor", file))
     return "sections" in data or "table" in data
@@ -322,7 +322,7 @@ def _rows(path: Path) -> tuple[SectionTable, ...]:
     BadInput
         If the file is missing or empty, or a cell is invalid.
     """
-    if not path.is_file():
+    if not is_file(path):
         raise BadInput("table", str(path), "name an existing CSV file")
     lines = csv.DictReader(io.StringIO(read("table", path), newline=""))
     known = [field.name for field in fields.described(SectionTable)]

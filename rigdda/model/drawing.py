@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.errors import BadInput
+from rigdda.files import is_file
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def _polylines(path: Path) -> list[Any]:
     except ImportError:
         mend = 'install ezdxf, pip install "rigdda[dxf]", or save the profile as CSV'
         raise BadInput("--profile", str(path), mend) from None
-    if not path.is_file():
+    if not is_file(path):
         raise BadInput("--profile", str(path), "name a file to read (no such file)")
     try:
         space = ezdxf.readfile(path).modelspace()

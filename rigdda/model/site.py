@@ -27,7 +27,7 @@ from rigdda.barriers import (
     standing,
 )
 from rigdda.errors import BadInput, DoubtfulInput
-from rigdda.files import atomic, read
+from rigdda.files import atomic, is_file, read
 from rigdda.geometry import polygon_properties
 from rigdda.model import existing, loose_blocks, site_names
 from rigdda.model.block import Block
@@ -105,9 +105,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if path.suffix.lower() in SURVEYS:
             mend = f"make a site file of this survey: rigdda new NAME --profile {source}"
             raise BadInput("site", str(source), mend)
-        if path.suffix != ".toml" and not path.is_file():
+        if path.suffix != ".toml" and not is_file(path):
             return cls.named(str(source))
-        if not path.is_file():
+        if not is_file(path):
             raise BadInput("site", str(source), "name an existing TOML file")
         return cls.parse(read("site file", path), str(source))
 

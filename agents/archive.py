@@ -127,7 +127,7 @@ def archive(
         seed=seed,
         names=[name for name, _ in cases],
         layouts=[to_tables(layout) for _, layout in cases],
-        shares=known.shares,
+        shares=problem.shares,
         blocks={name: facts.blocks for name, facts in known.facts.items()},
         bare=_bare(problem.site, known),
         releases=[

@@ -247,6 +247,11 @@ class ArchivedProblem(DesignProblem):
         object.__setattr__(self, "_ensemble", Ensemble(nothing, facts, kept.shares))
 
     @property
+    def shares(self) -> dict[str, float]:
+        """Share of the releases for each event in the design."""
+        return self._known.shares
+
+    @property
     def _known(self) -> Ensemble:
         found: Ensemble = self._ensemble  # type: ignore[attr-defined]
         return found

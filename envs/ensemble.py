@@ -53,12 +53,29 @@ class Ensemble:
     facts : dict of str to Facts
         Statistics of each event.
     shares : dict of str to float
-        Share of the releases for each event; they add up to 1.
+        Share of the releases for each event with which the variance of Z is least; they add up to
+        1.
     """
 
     nothing: Evaluation
     facts: dict[str, Facts]
     shares: dict[str, float]
+
+    def planned_shares(self, site: Site) -> dict[str, float]:
+        """Return the shares with at least `DESIGN_FLOOR` for each design event of the site."""
+        design = {event.name for event in site.events if event.design}
+        floor = min(DESIGN_FLOOR, 1.0 / len(self.shares))
+        raised: set[str] = set()
+        shares = self.shares
+        while low := {name for name in design - raised if shares[name] < floor}:
+            raised |= low
+            left = 1.0 - floor * len(raised)
+            whole = sum(share for name, share in self.shares.items() if name not in raised)
+            shares = {
+                name: floor if name in raised else share * left / whole
+                for name, share in self.shares.items()
+            }
+        return shares
 
 
 NAME = "ensemble"
@@ -147,9 +164,9 @@ def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
     """Return the share of the releases for each event.
 
     The share is proportional to rate x standard deviation / sqrt(time per release) (Neyman
-    allocation), with a minimum share, which is larger for design events. The standard deviation is
-    the largest that a layout can cause if it lets the event reach the road at most as often as
-    without barriers: barriers can turn certain harm into random harm.
+    allocation), with a minimum share. The standard deviation is the largest that a layout can cause
+    if it lets the event reach the road at most as often as without barriers: barriers can turn
+    certain harm into random harm.
     """
     free = all(fact.harm.mean == 0.0 for fact in facts.values())  # then the debris is used instead
     weight = {}
@@ -161,9 +178,6 @@ def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
     whole = sum(weight.values())
     equal = 1.0 / len(weight)
     least = {name: FLOOR * equal * (OWN_TIME + 1.0) / _time(fact) for name, fact in facts.items()}
-    for event in site.events:
-        if event.design:
-            least[event.name] = max(least[event.name], DESIGN_FLOOR)
     raised = {n: max(w / whole if whole else equal, least[n]) for n, w in weight.items()}
     return {name: share / sum(raised.values()) for name, share in raised.items()}
 

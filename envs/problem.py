@@ -452,7 +452,12 @@ class DesignProblem:
 
     def plan(self, seeds: Sequence[int]) -> tuple[str, ...]:
         """Return the event of each release; a prefix of the seeds gives a prefix of the events."""
-        return events_of_seeds(self._known.shares, checked_seeds("seeds", seeds))
+        return events_of_seeds(self.shares, checked_seeds("seeds", seeds))
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of the releases for each event; they add up to 1."""
+        return self._known.planned_shares(self.site)
 
     @property
     def _known(self) -> ensemble.Ensemble:
@@ -489,7 +494,7 @@ class DesignProblem:
             If a simulation diverges.
         """
         standing, drawn = self._standing(layout), checked_seeds("seeds", seeds)
-        pairs = zip(drawn, events_of_seeds(self._known.shares, drawn), strict=True)
+        pairs = zip(drawn, events_of_seeds(self.shares, drawn), strict=True)
         jobs = [(self.site, standing, seed, event) for seed, event in pairs]
         return self.judge(standing, outcome_cache.outcomes(jobs, executor), drawn)
 
@@ -538,7 +543,7 @@ class DesignProblem:
             If there are no outcomes, or none of an event with a non-zero rate.
         """
         known = self._known
-        found = cost.judge(self.site, layout, outcomes, known.facts, known.shares)
+        found = cost.judge(self.site, layout, outcomes, known.facts, self.shares)
         without = known.nothing.debris
         return replace(
             found,

@@ -189,18 +189,24 @@ def frontier(
         words = f"{known} of its {len(front)} layouts {verb} verified; the others have few releases"
     least = min(front, key=lambda one: one.level)
     lines = [
-        f"a target is missed; the table shows the cheapest layout to build for each level of "
-        f"P(reach) among {tried:,} layouts, compared by the upper bound: {words}",
+        f"{_what_missed(done, replaced)}; the table shows the cheapest layout to build for each "
+        f"level of P(reach) among {tried:,} layouts, compared by the upper bound: {words}",
         f"the lowest upper bound of P(reach) is {at_most(least.level)}, for {euros(least.cost)} "
         "EUR per metre to build",
     ]
     if replaced:
         lines.append(
-            f"the layout of the search missed the targets by more, or costs more per year; "
+            f"the layout of the search misses the targets by more, or costs more per year; "
             f"{done.chosen.name!r} was chosen among the verified layouts and verified again on "
             "other releases"
         )
     return lines
+
+
+def _what_missed(done: ComparedLayouts, replaced: bool) -> str:
+    """Return in words which layout missed a target."""
+    met = done.chosen.evaluation.targets != MISSED
+    return "the layout of the search missed a target" if replaced and met else "a target is missed"
 
 
 def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:

@@ -145,7 +145,8 @@ def check_advice(words: str, other: Evaluation, chosen: Evaluation) -> None:
     elif words == ", and misses the targets, too":
         assert (other.targets, chosen.targets) == ("missed", "missed")
     else:
-        assert words == f", but its targets are {other.targets} and not {chosen.targets}"
+        states = f"{other.targets}, and those of the latter {chosen.targets}"
+        assert words == f", but its targets are {states}"
         assert findings.RANK[other.targets] > findings.RANK[chosen.targets]
 
 

@@ -41,7 +41,7 @@ from rigdda.envs.problem import DesignProblem
 from rigdda.envs.recorder import Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import release_record
-from rigdda.envs.site_sampling import Place, Venue, drawn_from
+from rigdda.envs.site_sampling import Place, Places, Venue, drawn_from
 from rigdda.model.corridor import is_corridor
 from rigdda.model.corridor import names as corridor_names
 
@@ -160,7 +160,7 @@ class CorridorDesign(LayoutEnv):
 
     def __init__(
         self,
-        site: Place | Corridor | Sequence[Place] = "train",
+        site: Places | Corridor = "train",
         sections: int | None = None,
         budget: float | tuple[float, float] | None = None,
         lengths: tuple[float, float] = LENGTHS,
@@ -435,19 +435,17 @@ def _places(site: Any) -> tuple[Corridor | None, tuple[Place, ...]]:
     """Return the corridor, or the sites, from which episodes draw."""
     if isinstance(site, Corridor):
         return site, ()
-    if isinstance(site, str) and drawn_from(site):
-        return None, drawn_from(site)
     if isinstance(site, str) and site in corridor_names():
         return Corridor.load(site), ()
     if isinstance(site, str | os.PathLike) and is_corridor(site):
         return Corridor.load(site), ()
-    sites = (site,) if isinstance(site, str | os.PathLike | Site) else site
-    if not isinstance(sites, Sequence) or not sites:
-        raise BadInput("site", site, "give a split, a corridor, a site or a sequence of sites")
-    for place in sites:
+    drawn = drawn_from(site)
+    if drawn and isinstance(site, str):
+        return None, drawn
+    for place in drawn or (site,):
         if not isinstance(place, Site):
             Site.load(place)
-    return None, tuple(sites)
+    return None, drawn or (site,)
 
 
 def _range(field: str, value: Any) -> tuple[float, float]:

@@ -28,7 +28,7 @@ from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.recorder import Recorder, Shown, Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import EpisodeRecord, Versions, as_json
-from rigdda.envs.site_sampling import Place, Slots, Venue
+from rigdda.envs.site_sampling import Places, Slots, Venue
 
 
 class Ask(NamedTuple):
@@ -234,7 +234,7 @@ class BarrierEnv(LayoutEnv):
 
     def __init__(
         self,
-        site: Place = "quick",
+        site: Places = "quick",
         max_barriers: int = 3,
         kinds: Sequence[str] | None = None,
         releases: int = 4,
@@ -458,10 +458,10 @@ class BarrierDesign(BarrierEnv):
 
     Parameters
     ----------
-    site : str, path or Site
+    site : str, path, Site or sequence of these
         As for `DesignProblem`; "train", "validation" or "test" draws another site of the split in
-        every episode; "random" is the same as "train". `reset(options={"site": ...})` takes the
-        same values.
+        every episode, "random" is the same as "train", and a sequence of sites draws one of them.
+        `reset(options={"site": ...})` takes the same values.
     max_barriers, kinds, targets, max_cost, fidelity
         See `DesignProblem`. A barrier that would exceed `max_cost` is not built. If every episode
         draws its site, the default is all kinds; mesh is not available on sites without mesh

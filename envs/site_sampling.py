@@ -1,4 +1,4 @@
-"""Sites of episodes, fixed or drawn from a split, and the slots that actions fill.
+"""Sites of episodes, fixed or drawn from a split or list, and the slots that actions fill.
 
 The slots have the same width for all sites of an environment, even if some lack mesh.
 """
@@ -27,6 +27,9 @@ from rigdda.envs.problem import USUAL_KINDS as USUAL
 
 Place = str | os.PathLike[str] | Site
 """Name of a built-in or generated site, a TOML file, a `Site`, or a split; see `drawn_from`."""
+
+Places = Place | Sequence[Place]
+"""A place, or a sequence of sites."""
 
 RANDOM = "random"
 """Alias of the split "train"."""
@@ -129,11 +132,26 @@ def _split(name: str) -> tuple[str, ...]:
     return tuple(sites.split(name))
 
 
-def drawn_from(site: Place) -> tuple[str, ...]:
-    """Return the names of the sites from which episodes draw; empty if `site` is a single site."""
-    if not isinstance(site, str) or site not in (RANDOM, *SPLITS):
+def drawn_from(site: Places) -> tuple[Place, ...]:
+    """Return the sites of a split or sequence, of which each episode draws one.
+
+    The result is empty if `site` is a single site.
+
+    Raises
+    ------
+    BadInput
+        If it is none of these.
+    """
+    if isinstance(site, str) and site in (RANDOM, *SPLITS):
+        return _split("train" if site == RANDOM else site)
+    if isinstance(site, str | os.PathLike | Site):
         return ()
-    return _split("train" if site == RANDOM else site)
+    if not isinstance(site, Sequence) or not site:
+        raise BadInput("site", site, "give a site, a split, or a sequence of sites")
+    for i, place in enumerate(site):
+        if not isinstance(place, str | os.PathLike | Site) or drawn_from(place):
+            raise BadInput(f"site[{i}]", place, "give a name, a TOML file or a rigdda.Site")
+    return tuple(site)
 
 
 def pose(
@@ -173,8 +191,8 @@ class Venue:
 
     Parameters
     ----------
-    site : Place
-        A site or a split.
+    site : Places
+        A site, a split, or a sequence of sites.
     max_barriers, kinds, fidelity, targets, max_cost
         As for `DesignProblem`; if every episode draws its site, the default is all kinds.
 
@@ -195,7 +213,7 @@ class Venue:
 
     def __init__(
         self,
-        site: Place,
+        site: Places,
         max_barriers: int,
         kinds: Sequence[str] | None,
         fidelity: str,
@@ -209,6 +227,8 @@ class Venue:
         if self._drawn:
             self.slots = Slots(named(KINDS if kinds is None else kinds), max_barriers)
             self.first = self.pose(self._drawn[0])
+            if not isinstance(site, str):
+                self._check(self._drawn[1:])
         else:
             limits = self.targets, self.max_cost
             self.first = self.home = pose(site, max_barriers, kinds, fidelity, *limits)
@@ -221,8 +241,16 @@ class Venue:
         kinds = self.slots.shared(whole.site)
         return pose(site, count, kinds, self.fidelity, self.targets, self.max_cost)
 
-    def settle(self, site: Place) -> None:
-        """Change the site or split from the next episode on."""
+    def _check(self, places: Sequence[Place]) -> None:
+        """Raise an error if there is no problem of one of some sites."""
+        for i, place in enumerate(places, 1):
+            try:
+                self.pose(place)
+            except BadInput as bad:
+                raise BadInput(f"site[{i}].{bad.field}", bad.value, bad.mend) from None
+
+    def settle(self, site: Places) -> None:
+        """Change the site, split or sequence from the next episode on."""
         self._drawn = drawn_from(site)
         self.home = None if self._drawn else self.pose(site)
 

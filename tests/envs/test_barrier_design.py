@@ -174,8 +174,23 @@ def test_a_split_draws_another_site_in_every_episode(name: str) -> None:
     assert set(drawn) <= set(sites.split("train" if name == "random" else name))
 
 
-@pytest.mark.parametrize("site", ["bench", "random", "test"])
-def test_a_spec_survives_as_json(site: str) -> None:
+@pytest.mark.parametrize("env_class", [BarrierDesign, BarrierPlacement])
+def test_a_sequence_draws_its_sites_under_common_limits(env_class: type[BarrierEnv]) -> None:
+    targets = {"reach": 0.5}
+    env = env_class(["quick", "verge", CUT], releases=1, targets=targets, max_cost=700.0)
+    env.draw(0)
+    drawn = [env.problem.site.name]
+    for _ in range(30):
+        env.draw(None)
+        drawn.append(env.problem.site.name)
+        assert env.problem.targets == Targets(reach=0.5) and env.problem.max_cost == 700.0
+    assert {*drawn} == {"quick", "verge", CUT.name}
+    env.draw(1, {"site": ["bench"]})
+    assert env.problem.site.name == "bench" and env.problem.max_cost == 700.0
+
+
+@pytest.mark.parametrize("site", ["bench", "random", "test", ["quick", "bench"]])
+def test_a_spec_survives_as_json(site: str | list[str]) -> None:
     terms = {"kinds": ["fence", "ditch"], "max_barriers": 2, "flat": True}
     env = gymnasium.make("rigdda/BarrierDesign-v0", site=site, **terms)
     assert env.spec is not None
@@ -283,6 +298,10 @@ def test_bad_actions_are_refused_and_the_episode_goes_on(
         ({"record_trigger": bool}, "record_trigger = .*: also give a folder"),
         ({"record": Path("here"), "record_trigger": 2}, "record_trigger = 2: give a function"),
         ({"site": "nowhere"}, "site = 'nowhere'"),
+        ({"site": []}, r"site = \[\]: give a site, a split, or a sequence"),
+        ({"site": 3}, "site = 3: give a site, a split, or a sequence"),
+        ({"site": ["quick", "test"]}, r"site\[1\] = 'test': give a name"),
+        ({"site": ["quick", "nowhere"]}, r"site\[1\].site = 'nowhere'"),
         ({"max_barriers": -1}, "max_barriers = -1"),
         ({"site": "train", "kinds": "fence"}, "kinds = 'fence': give a sequence"),
         ({"site": "train", "kinds": ["fence", "fence"]}, "kinds = .*: name each kind once"),

@@ -67,13 +67,14 @@ def test_copies_give_what_singles_give(name: str, mode: AutoresetMode, limit: in
 
 
 @every
-def test_copies_draw_the_sites_that_singles_draw(name: str) -> None:
-    together, alone = batch(name, "random"), gymnasium.make(name, site="random", releases=1)
+@pytest.mark.parametrize("site", ["random", ["quick", "bench", "random-3"]])
+def test_copies_draw_the_sites_that_singles_draw(name: str, site: str | list[str]) -> None:
+    together, alone = batch(name, site), gymnasium.make(name, site=site, releases=1)
     for i, copy_ in enumerate(together.unwrapped.copies):
         copy_.draw(3 + i)
         alone.unwrapped.draw(3 + i)
         assert copy_.problem == alone.unwrapped.problem
-        assert copy_.problem.site.name in sites.split("train")
+        assert copy_.problem.site.name in (sites.split("train") if site == "random" else site)
 
 
 def test_a_reset_may_name_the_site_of_all_copies() -> None:

@@ -794,13 +794,23 @@ def corridor(
         plan = Planner(problem, releases, seed, robust, stored, tick).plan()
         report.write(plan, folder)
     click.echo(
-        "EUR and EUR per year; share: of the gain of unlimited money, also for the same money for\n"
-        "every metre, the worst section first and the greatest saving per cost"
+        "thousand EUR and thousand EUR per year; share: of the gain of unlimited money, also if\n"
+        "same: every metre gets the same money; worst: the worst section comes first; ratio: the\n"
+        "greatest saving per cost comes first; 1 EUR: what one more EUR would save each year"
     )
     show(report.table_of_budgets(plan))
-    for own in plan.plans[:-1][-1:]:
-        click.echo(f"budget {own.budget:,.0f} EUR:")
-        show(report.table_of_sections(plan, own))
+    own = report.shown_budget(plan)
+    click.echo(
+        f"what a budget of {own.budget:,.0f} EUR builds; next: what comes first if there is more\n"
+        "money, see priorities.csv"
+    )
+    show(report.table_of_sections(plan, own))
+    for one in plan.plans[:-1]:
+        if missing := report.sections_that_miss(plan, one):
+            finding(
+                f"with {one.budget:,.0f} EUR, these sections may miss a target: "
+                f"{', '.join(missing)}"
+            )
     click.echo(
         f"{len(where.sections)} sections, {where.length:,.0f} m, {plan.releases:,} releases; "
         f"{', '.join(report.FILES)} and layouts are in {folder}"

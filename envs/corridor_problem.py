@@ -91,13 +91,11 @@ class CorridorProblem:
         whole = corridor if isinstance(corridor, Corridor) else Corridor.load(corridor)
         problems = []
         for section in whole.sections:
-            targets = {"reach": section.reach, "failure": section.failure}
             try:
-                problems.append(DesignProblem(section.site, max_barriers, kinds, targets, fidelity))
+                own = DesignProblem(section.site, max_barriers, kinds, section.targets, fidelity)
             except BadInput as bad:
-                raise BadInput(
-                    f"sections.{section.name}.{bad.field}", bad.value, bad.mend
-                ) from None
+                raise _of_section(section.name, bad) from None
+            problems.append(own)
         object.__setattr__(self, "corridor", whole)
         object.__setattr__(self, "problems", tuple(problems))
 
@@ -141,9 +139,7 @@ class CorridorProblem:
             try:
                 found.append(problem.check(layout))
             except BadInput as bad:
-                raise BadInput(
-                    f"sections.{section.name}.{bad.field}", bad.value, bad.mend
-                ) from None
+                raise _of_section(section.name, bad) from None
         return tuple(found)
 
     def evaluate(
@@ -199,6 +195,18 @@ class CorridorProblem:
             cost=math.fsum(length * e.cost for length, _, e in rows),
             annual=math.fsum(length * e.capital for length, _, e in rows),
         )
+
+    def ahead(self, one: CorridorEvaluation, other: CorridorEvaluation) -> Mean:
+        """Return by how much the objective of one evaluation is less than that of another.
+
+        Sections with the same layout contribute neither to the difference [EUR/year] nor to its
+        95 % interval.
+        """
+        rows = list(zip(self.lengths.tolist(), one.sections, other.sections, strict=True))
+        rows = [row for row in rows if row[1].layout != row[2].layout]
+        less = total(Mean(e.objective, *e.ci).times(length) for length, e, _ in rows)
+        more = total(Mean(e.objective, *e.ci).times(length) for length, _, e in rows)
+        return Mean(more.value - less.value, *difference(more, less))
 
 
 def difference(one: Mean, other: Mean) -> Interval:

@@ -230,6 +230,7 @@ class Venue:
             if not isinstance(site, str):
                 self._check(self._drawn[1:])
         else:
+            assert isinstance(site, str | os.PathLike | Site)
             limits = self.targets, self.max_cost
             self.first = self.home = pose(site, max_barriers, kinds, fidelity, *limits)
             self.slots = Slots(self.first.kinds, max_barriers)
@@ -251,8 +252,10 @@ class Venue:
 
     def settle(self, site: Places) -> None:
         """Change the site, split or sequence from the next episode on."""
-        self._drawn = drawn_from(site)
-        self.home = None if self._drawn else self.pose(site)
+        self.home, self._drawn = None, drawn_from(site)
+        if not self._drawn:
+            assert isinstance(site, str | os.PathLike | Site)
+            self.home = self.pose(site)
 
     def draw(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> DesignProblem:
         """Return the problem of an episode; `options` may specify its site.

@@ -3,13 +3,10 @@
 The plan is made in four stages.
 
 1. Every section is searched for a front of layouts (`rigdda.agents.designers.front`).
-2. The layouts of all fronts are evaluated on the same number of new releases.
-3. Further releases go to the sections in which a wrong choice is likely and expensive. With the
-   shadow price of each budget, the choice of a section is that of the option with the least total
-   cost plus price x construction cost. The expected opportunity cost of this choice follows from
-   the differences between options and their standard errors (Chick and Inoue 2001, Operations
-   Research 49, 732-743). Each batch of releases goes to the section where it reduces this cost
-   most, relative to the number of releases.
+2. The layouts of all fronts are evaluated on a few new releases each. What happens without barriers
+   is known from the stored releases of the site.
+3. Further releases go to the layouts of which a wrong choice is likely and expensive, see
+   `rigdda.agents.corridor.allocation`.
 4. For every budget, an integer programme and the simple methods choose from the fronts. All chosen
    layouts are evaluated on releases that did not affect any choice, so that gains are unbiased.
 """
@@ -24,10 +21,9 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from scipy.stats import norm
 
 from rigdda import BadInput, Corridor, Layout, __version__, check, distribution
-from rigdda.agents.corridor import programme
+from rigdda.agents.corridor import allocation, programme
 from rigdda.agents.corridor.programme import METHODS, Choice, Increment, Options
 from rigdda.agents.designers import front
 from rigdda.agents.designers.protocol import Entry, release_seeds
@@ -37,18 +33,19 @@ from rigdda.barriers import from_table, to_tables
 from rigdda.envs import CorridorEvaluation, CorridorProblem, DesignProblem, Evaluation
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
 from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.problem import excess
 from rigdda.files import atomic
 
 Floats = np.ndarray
 
-SEARCH, CHOICE, MARGIN = 0.5, 0.15, 0.15
-"""Shares of the releases for the search of the fronts, for the first evaluation of their layouts
-and for the sections at the margin [-]. The rest is for the report."""
+SEARCH, CHOICE = 0.5, 0.3
+"""Shares of the releases for the search of the fronts and for the choice [-]. The rest is for the
+report."""
 
-BATCH = 100
-"""Number of releases of each layout in a batch."""
+FEWEST, FIRST = 10, 30
+"""Least and usual number of releases of each layout before releases go to those at the margin."""
 
-ROUNDS = 4
+ROUNDS = 12
 """Number of rounds after which the shadow prices are computed again."""
 
 LEAST, MOST = 100, 5_000
@@ -99,7 +96,7 @@ class Option:
 
     def value(self) -> Mean:
         """Return Z from all batches [EUR/m and year]."""
-        return joined(self.batches)
+        return joined([(Mean(e.objective, *e.ci), e.releases) for e in self.batches])
 
     @property
     def error(self) -> float:
@@ -108,7 +105,7 @@ class Option:
         return (mean.high - mean.low) / (2.0 * DEVIATIONS)
 
     def missed(self, problem: DesignProblem) -> float:
-        """Return the largest excess of an upper bound of a probability over its target [-]."""
+        """Return the largest excess of an upper bound over its target, see `Targets` [-]."""
         over, targets = [0.0], problem.targets
         for event in problem.site.events:
             if event.design:
@@ -116,13 +113,16 @@ class Option:
                     if wanted is not None:
                         seen = [getattr(e, name)[event.name] for e in self.batches]
                         over.append(_joined(seen).bound - wanted)
+        if targets.individual is not None:
+            risks = [(e.risk.individual, e.releases) for e in self.batches if e.risk is not None]
+            over.append(excess(joined(risks).high, targets.individual))
         return max(over)
 
 
-def joined(evaluations: Sequence[Evaluation]) -> Mean:
-    """Return Z from independent evaluations of a layout, weighted by their releases."""
-    whole = sum(evaluation.releases for evaluation in evaluations)
-    return total(Mean(e.objective, *e.ci).times(e.releases / whole) for e in evaluations)
+def joined(means: Sequence[tuple[Mean, int]]) -> Mean:
+    """Return the mean of independent samples from their means and numbers of releases."""
+    whole = sum(releases for _, releases in means)
+    return total(mean.times(releases / whole) for mean, releases in means)
 
 
 def _joined(seen: Sequence[Estimate]) -> Estimate:
@@ -203,7 +203,8 @@ class Planner:
     tick : callable, optional
         Called with the number of releases and a description.
     margin : bool
-        Whether the releases of stage 3 go to the sections at the margin, instead of evenly to all.
+        Whether the releases for the choice go to the layouts at the margin, instead of evenly to
+        all.
 
     Raises
     ------
@@ -240,8 +241,7 @@ class Planner:
             If a simulation diverges.
         """
         self._search()
-        self._first()
-        self._at_margin()
+        self.compare()
         return self._choose()
 
     def _file(self, kind: str, *asked: object) -> Path | None:
@@ -290,7 +290,7 @@ class Planner:
         path = None if self._folder is None else self._folder / f"search-{s + 1:04d}.jsonl"
         return front.layouts(problem, budget, seed, told, Store(path))
 
-    def _evaluate(self, stream: str, wanted: Sequence[tuple[int, int, int]]) -> list[Evaluation]:
+    def evaluate(self, stream: str, wanted: Sequence[tuple[int, int, int]]) -> list[Evaluation]:
         """Evaluate options on releases of a stream.
 
         `wanted` gives the section, the option and the number of releases. In the stream of choices,
@@ -311,57 +311,45 @@ class Planner:
 
     def _add(self, wanted: Sequence[tuple[int, int, int]]) -> None:
         """Evaluate options on further releases that affect choices."""
-        found = self._evaluate(CHOICES, wanted)
+        found = self.evaluate(CHOICES, wanted)
         for (s, k, _), evaluation in zip(wanted, found, strict=True):
             self.fronts[s][k].batches.append(evaluation)
 
-    def _first(self) -> None:
-        """Evaluate the options of all sections on the same number of releases."""
-        self._add(self._evenly(CHOICE, BATCH // 2))
-
-    def _evenly(self, share: float, least: int) -> list[tuple[int, int, int]]:
-        """Return a share of the releases of each section, divided evenly between its options."""
-        return [
-            (s, k, max(least, int(share * self.releases / len(options))))
-            for s, options in enumerate(self.fronts)
-            for k in range(len(options))
-        ]
-
-    def _at_margin(self) -> None:
-        """Spend further releases where they reduce the expected opportunity cost most."""
-        whole = int(MARGIN * self.releases * len(self.fronts))
-        if not self.margin:
-            self._add(self._evenly(MARGIN, 1))
-            return
-        spent = 0
-        for done in range(ROUNDS):
-            counts = self._batches(self._prices(), whole * (done + 1) // ROUNDS - spent)
-            wanted = [(s, k, n * BATCH) for (s, k), n in counts.items()]
+    def compare(self) -> None:
+        """Evaluate the options for the choice: evenly, or where it changes the choice."""
+        whole = int(CHOICE * self.releases * len(self.fronts))
+        built = [(s, k) for s, own in enumerate(self.fronts) for k, o in enumerate(own) if o.layout]
+        for s, options in enumerate(self.fronts):
+            options[0].batches.append(self.problem.problems[s].nothing)
+        each = max(FEWEST, whole // max(1, len(built)))
+        first = max(FEWEST, min(FIRST, each // 2)) if self.margin else each
+        self._add([(s, k, first) for s, k in built])
+        spent = first * len(built)
+        for done in range(ROUNDS if self.margin else 0):
+            counts = allocation.batches(
+                self.estimates(), self._prices(), whole * (done + 1) // ROUNDS - spent
+            )
+            wanted = [(s, k, n * allocation.BATCH) for (s, k), n in counts.items()]
             self._add(wanted)
             spent += sum(count for _, _, count in wanted)
+
+    def estimates(self) -> list[allocation.Estimates]:
+        """Return the estimates of the options of all sections as they are known so far."""
+        found = []
+        for length, options in zip(self.problem.lengths.tolist(), self.fronts, strict=True):
+            releases = np.array([float(option.releases) for option in options])
+            error = np.array([option.error for option in options])
+            cost = np.array([option.cost for option in options])
+            value = np.array([option.value().value for option in options])
+            variance = error**2 * releases
+            found.append(allocation.Estimates(length, cost, value, variance, releases))
+        return found
 
     def _prices(self) -> list[float]:
         """Return the different shadow prices of all budgets [1/year]."""
         options = self.options()
         found = [programme.shadow_price(options, b) for b in self.problem.corridor.budgets]
         return sorted({*found, 0.0})
-
-    def _batches(self, prices: Sequence[float], releases: int) -> dict[tuple[int, int], int]:
-        """Return the number of batches of each option for a number of releases."""
-        tables = [_Table.of(own, length) for own, length in
-                  zip(self.fronts, self.problem.lengths.tolist(), strict=True)]  # fmt: skip
-        worth = [table.worth(prices) for table in tables]
-        out: dict[tuple[int, int], int] = {}
-        while True:
-            s = max(range(len(worth)), key=lambda i: worth[i][0])
-            rate, contenders = worth[s]
-            if rate <= 0.0 or len(contenders) * BATCH > releases:
-                return out
-            for k in contenders:
-                out[s, k] = out.get((s, k), 0) + 1
-                tables[s].releases[k] += BATCH
-                releases -= BATCH
-            worth[s] = tables[s].worth(prices)
 
     def options(self) -> Options:
         """Return the options of all sections as they are known from the batches."""
@@ -410,10 +398,10 @@ class Planner:
     def _report(self, chosen: set[tuple[int, int]]) -> None:
         """Evaluate chosen options on releases that did not affect any choice."""
         built = sorted((s, k) for s, k in chosen if k > 0)
-        share = 1.0 - SEARCH - CHOICE - MARGIN
+        share = 1.0 - SEARCH - CHOICE
         each = int(share * self.releases * len(self.fronts) / max(1, len(built)))
         count = min(MOST, max(LEAST, each))
-        found = self._evaluate("report", [(s, k, count) for s, k in built])
+        found = self.evaluate("report", [(s, k, count) for s, k in built])
         for (s, k), evaluation in zip(built, found, strict=True):
             self.fronts[s][k].report = evaluation
 
@@ -459,60 +447,6 @@ def _write(file: Path | None, layouts: Sequence[Layout]) -> None:
     if file is not None:
         with atomic(file) as part:
             part.write_bytes(msgspec.json.encode([to_tables(layout) for layout in layouts]))
-
-
-@dataclass(slots=True)
-class _Table:
-    """Estimates of the options of a section: values, variances of one release, and releases."""
-
-    length: float
-    cost: Floats
-    value: Floats
-    variance: Floats
-    releases: Floats
-
-    @classmethod
-    def of(cls, options: Sequence[Option], length: float) -> _Table:
-        """Return the table of the options of a section of a given length [m]."""
-        releases = np.array([float(option.releases) for option in options])
-        error = np.array([option.error for option in options])
-        return cls(
-            length,
-            np.array([option.cost for option in options]),
-            np.array([option.value().value for option in options]),
-            error**2 * releases,
-            releases,
-        )
-
-    def worth(self, prices: Sequence[float]) -> tuple[float, list[int]]:
-        """Return the reduction of the opportunity cost per release, and the options to evaluate.
-
-        Both are those of one more batch for the two options between which the choice is the most
-        uncertain for one of the prices.
-        """
-        best: tuple[float, list[int]] = 0.0, []
-        for price in prices:
-            goal = self.value + price * self.cost
-            first = int(np.argmin(goal))
-            now = self._opportunity(goal, first, self.releases)
-            if not now.any():
-                continue
-            second = int(np.argmax(now))
-            after = self.releases.copy()
-            after[[first, second]] += BATCH
-            saved = now[second] - self._opportunity(goal, first, after)[second]
-            if saved * self.length / (2 * BATCH) > best[0]:
-                best = saved * self.length / (2 * BATCH), [first, second]
-        return best
-
-    def _opportunity(self, goal: Floats, first: int, releases: Floats) -> Floats:
-        """Return the expected loss if each option was better than the first after all [EUR/m]."""
-        error = np.sqrt((self.variance / releases)[first] + self.variance / releases)
-        error = np.maximum(error, 1e-12)
-        z = (goal - goal[first]) / error
-        loss = error * (norm.pdf(z) - z * norm.sf(z))
-        loss[first] = 0.0
-        return loss
 
 
 def _following(options: Options, choice: Choice) -> tuple[Increment, ...]:

@@ -12,7 +12,7 @@ import rigdda
 from rigdda.agents.corridor.planning import OPTIMUM, BudgetPlan, CorridorPlan
 from rigdda.agents.reports.pictures import DPI, EVENTS, FONT, save
 from rigdda.agents.reports.tables import empty_table, write_rows
-from rigdda.agents.reports.wording import euros, percent, span
+from rigdda.agents.reports.wording import percent
 from rigdda.barriers import KINDS
 from rigdda.display import ROAD
 
@@ -60,6 +60,7 @@ def budget_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
     for own in plan.plans:
         limit = "unlimited" if own is plan.unlimited else own.budget
         for name, found in {OPTIMUM: own.evaluation, **own.methods}.items():
+            ahead = plan.problem.ahead(own.evaluation, found)
             rows.append(
                 {
                     "budget": limit,
@@ -69,6 +70,9 @@ def budget_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
                     "gain_low": found.gain_ci[0],
                     "gain_high": found.gain_ci[1],
                     "share_of_unlimited": share(plan, found.gain),
+                    "behind": ahead.value,
+                    "behind_low": ahead.low,
+                    "behind_high": ahead.high,
                     "objective": found.objective,
                     "objective_low": found.ci[0],
                     "objective_high": found.ci[1],
@@ -154,47 +158,59 @@ def words(layout: rigdda.Layout) -> str:
 
 
 def table_of_budgets(plan: CorridorPlan) -> Table:
-    """Return the table of all budgets."""
+    """Return the table of all budgets, in thousand EUR and thousand EUR per year."""
     out = empty_table(
-        ("budget", "spent", "gain a year (95 %)", "share", "same money", "worst first",
-         "saving per cost", "1 EUR more saves")
-    )  # fmt: skip
+        ("budget", "spent", "gain (95 %)", "share", "same", "worst", "ratio", "1 EUR")
+    )
     for own in plan.plans:
-        limit = "unlimited" if own is plan.unlimited else euros(own.budget)
+        limit = "unlimited" if own is plan.unlimited else thousands(own.budget)
         found = own.evaluation
         simple = [percent(share(plan, e.gain)) for e in own.methods.values()]
+        low, high = found.gain_ci
         out.add_row(
             limit,
-            euros(found.cost),
-            f"{euros(found.gain)} ({span(found.gain_ci)})",
+            thousands(found.cost),
+            f"{thousands(found.gain)} ({thousands(low)} to {thousands(high)})",
             percent(share(plan, found.gain)),
             *simple,
-            f"{own.shadow_price:.2g} a year",
+            f"{own.shadow_price:.2g}",
         )
     return out
 
 
 def table_of_sections(plan: CorridorPlan, own: BudgetPlan) -> Table:
-    """Return the table of the sections for one budget, with the next steps."""
-    out = empty_table(
-        ("section", "m", "build", "cost", "gain a year", "risk left a year", "next", "cost",
-         "waiting costs a year")
-    )  # fmt: skip
-    following = {step.section: (place + 1, step) for place, step in enumerate(own.following)}
+    """Return the table of the sections for one budget, in thousand EUR (per year)."""
+    out = empty_table(("section", "m", "cost", "gain", "risk left", "next", "layout"))
+    following = {step.section: place + 1 for place, step in enumerate(own.following)}
     for s, evaluation in enumerate(own.evaluation.sections):
         section, nothing = plan.problem.corridor.sections[s], plan.problem.problems[s].nothing
         gain = section.length * (nothing.objective - evaluation.objective)
         risk = section.length * (evaluation.harm + evaluation.repair)
-        then = ("", "", "")
-        if s in following:
-            place, step = following[s]
-            then = f"{place}.", euros(step.cost), euros(step.saving)
+        place = f"{following[s]}." if s in following else ""
         out.add_row(
-            section.name, f"{section.length:g}", words(evaluation.layout),
-            euros(section.length * evaluation.cost), euros(gain) if evaluation.layout else "0",
-            euros(risk), *then,
+            section.name, f"{section.length:g}", thousands(section.length * evaluation.cost),
+            thousands(gain) if evaluation.layout else "0", thousands(risk), place,
+            words(evaluation.layout),
         )  # fmt: skip
     return out
+
+
+def thousands(value: float) -> str:
+    """Return an amount of money in thousands: three significant figures below 100 thousand."""
+    number = value / 1e3
+    return f"{number:,.0f}" if abs(number) >= 99.95 else f"{number:.3g}"
+
+
+def shown_budget(plan: CorridorPlan) -> BudgetPlan:
+    """Return the plan for the largest budget that limits what is built, or else the largest."""
+    limited = [own for own in plan.plans[:-1] if own.shadow_price > 0.0]
+    return (limited or plan.plans[:-1])[-1]
+
+
+def sections_that_miss(plan: CorridorPlan, own: BudgetPlan) -> list[str]:
+    """Return the names of the sections that may miss a target with a plan."""
+    names = [section.name for section in plan.problem.corridor.sections]
+    return [name for name, missed in zip(names, own.missed, strict=True) if missed > 0.0]
 
 
 STYLES = {OPTIMUM: ("#1c5aa0", "o"), "same money per metre": ("#d0312d", "s"),
@@ -221,7 +237,7 @@ def draw_gain(path: Path, plan: CorridorPlan) -> None:
                       linewidth=2.0 if name == OPTIMUM else 1.2, label=name)  # fmt: skip
         whole = plan.unlimited.evaluation
         axes.axhline(whole.gain / 1e3, color="0.4", linestyle="--", linewidth=1.0)
-        axes.annotate(f"unlimited money ({euros(whole.cost / 1e3)} thousand EUR)",
+        axes.annotate(f"unlimited money ({thousands(whole.cost)} thousand EUR)",
                       (0.01, whole.gain / 1e3), xycoords=("axes fraction", "data"),
                       xytext=(0, 4), textcoords="offset points", color="0.3")  # fmt: skip
         if len(budgets) > 1 and budgets[0] > 0.0 and budgets[-1] / budgets[0] > 8.0:
@@ -250,19 +266,21 @@ def draw_strip(path: Path, plan: CorridorPlan) -> None:
             2, 1, figsize=(11.0, 2.6 + 0.42 * len(plans) + 2.4), sharex=True,
             height_ratios=(2.2, 0.4 + 0.42 * len(plans)),
         )  # fmt: skip
+        above.set_xlim(0.0, ends[-1])
         before = np.array([problem.nothing.objective for problem in plan.problem.problems])
         below.bar(starts, before, lengths, align="edge", color="0.85", edgecolor="white",
                   linewidth=0.5, label="without barriers")  # fmt: skip
-        for own, shade in ((plans[len(plans) // 2], 0.45), (plans[-1], 1.0)):
+        shades = {(len(plans) - 1) // 2: 0.45, len(plans) - 1: 1.0}
+        for own, shade in ((plans[i], shade) for i, shade in shades.items()):
             left = np.array([e.harm + e.repair for e in own.evaluation.sections])
             below.step(np.append(starts, ends[-1]), np.append(left, left[-1]), where="post",
                        color=ROAD, alpha=shade, linewidth=1.6,
-                       label=f"risk left with {euros(own.budget / 1e3)} thousand EUR")  # fmt: skip
-        below.set_ylabel("annual cost [EUR/m]")
+                       label=f"risk left with {thousands(own.budget)} thousand EUR")  # fmt: skip
+        below.set_ylabel("cost [EUR per m and year]")
         below.legend(frameon=False, fontsize=9, ncol=3, loc="lower left", bbox_to_anchor=(0, 1))
         for row, own in enumerate(plans):
             _row(above, row, own, starts.tolist(), lengths.tolist(), colours)
-        above.set_yticks(range(len(plans)), [f"{euros(own.budget / 1e3)}" for own in plans])
+        above.set_yticks(range(len(plans)), [f"{thousands(own.budget)}" for own in plans])
         above.set_ylim(-0.6, len(plans) - 0.4)
         above.set_ylabel("budget [thousand EUR]")
         above.set_xlabel("distance along the road [m]")
@@ -278,7 +296,7 @@ def draw_strip(path: Path, plan: CorridorPlan) -> None:
                  for kind in KINDS if kind in used]  # fmt: skip
         figure.legend(handles=marks, frameon=False, loc="lower center", ncol=len(marks) or 1)
         figure.suptitle(f"{corridor.name}: what is built where", y=0.99)
-        figure.subplots_adjust(left=0.09, right=0.98, top=0.88, bottom=0.16, hspace=0.55)
+        figure.subplots_adjust(left=0.09, right=0.98, top=0.88, bottom=0.16, hspace=0.45)
         save(figure, path)
 
 

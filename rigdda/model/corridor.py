@@ -10,7 +10,7 @@ A corridor is a TOML file with a name, a budget and sections; each section has a
     length = 120.0                    # m
 
 Instead of tables, `table = "sections.csv"` names a CSV file with one row per section. Prices and
-consequences in the corridor file replace those of every site.
+consequences in the corridor file replace those of every site, and so does the traffic.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from rigdda.fields import about, documented
 from rigdda.files import atomic, is_file, read
 from rigdda.model.prices import Consequences, Prices
 from rigdda.model.site import Site
+from rigdda.model.traffic import Traffic
 
 MOST_SECTIONS = 10_000
 """Maximum number of sections of a corridor."""
@@ -83,9 +84,25 @@ class SectionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ]
         | None
     ) = None
+    individual: (
+        Annotated[
+            float,
+            about(
+                "Greatest acceptable probability that a commuter is killed. It needs `[traffic]`.",
+                "1/year",
+                gt=0.0,
+                le=1.0,
+            ),
+        ]
+        | None
+    ) = None
 
     def __post_init__(self) -> None:
         fields.check(self)
+
+
+TARGETS = ("reach", "failure", "individual")
+"""Fields of a section that are targets, see `rigdda.envs.Targets`."""
 
 
 class CorridorFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -116,6 +133,13 @@ class CorridorFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     consequences: Annotated[
         dict[str, Any], about("Consequences that replace those of every site.")
     ] = {}
+    traffic: Annotated[
+        dict[str, Any] | None,
+        about(
+            "Traffic on the road, instead of that of every site; `section_length` is the length of "
+            "the section."
+        ),
+    ] = None
 
 
 class CorridorSection(msgspec.Struct, frozen=True):
@@ -131,6 +155,8 @@ class CorridorSection(msgspec.Struct, frozen=True):
         Name of the section.
     reach, failure : float, optional
         Greatest acceptable probabilities in the design events of the site.
+    individual : float, optional
+        Greatest acceptable individual risk [1/year]; the site needs a table `[traffic]`.
 
     Raises
     ------
@@ -143,14 +169,19 @@ class CorridorSection(msgspec.Struct, frozen=True):
     name: str
     reach: float | None = None
     failure: float | None = None
+    individual: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.site, Site):
             raise BadInput("site", self.site, "give a rigdda.Site")
-        values = self.length, self.name, self.reach, self.failure
-        table = SectionTable(self.site.name, *values)
-        for name in ("length", "reach", "failure"):
+        table = SectionTable(self.site.name, self.length, self.name, **self.targets)
+        for name in ("length", *TARGETS):
             msgspec.structs.force_setattr(self, name, getattr(table, name))
+
+    @property
+    def targets(self) -> dict[str, float | None]:
+        """The targets by name; None is no target."""
+        return {name: getattr(self, name) for name in TARGETS}
 
 
 class Corridor(msgspec.Struct, frozen=True):
@@ -231,10 +262,8 @@ class Corridor(msgspec.Struct, frozen=True):
             file = f"site-{i + 1}.toml"
             files[file] = section.site
             table = {"name": section.name, "site": file, "length": section.length}
-            for key in ("reach", "failure"):
-                if getattr(section, key) is not None:
-                    table[key] = getattr(section, key)
-            tables.append(table)
+            wanted = {name: value for name, value in section.targets.items() if value is not None}
+            tables.append(table | wanted)
         for file, site in files.items():
             site.save(out / file)
         data: dict[str, Any] = {"name": self.name, "budget": list(self.budgets)}
@@ -292,9 +321,12 @@ def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
             except BadInput as bad:
                 raise BadInput(f"{where}.{bad.field}", bad.value, bad.mend) from None
         name = table.name or table.site.removesuffix(".toml")
-        sections.append(
-            CorridorSection(sites[table.site], table.length, name, table.reach, table.failure)
-        )
+        site = sites[table.site]
+        if file.traffic is not None:
+            given = {"section_length": table.length, **file.traffic}
+            site = msgspec.structs.replace(site, traffic=fields.read(Traffic, given, "traffic"))
+        targets = {key: getattr(table, key) for key in TARGETS}
+        sections.append(CorridorSection(site, table.length, name, **targets))
     budgets = checked_budgets("budget", file.budget)
     return Corridor(file.name, tuple(sections), budgets, file.yearly_budget)
 
@@ -346,7 +378,7 @@ def _rows(path: Path) -> tuple[SectionTable, ...]:
 def _numbers(cells: dict[str, str], where: str) -> dict[str, Any]:
     """Return the cells of a row with their numbers converted."""
     out: dict[str, Any] = dict(cells)
-    for name in ("length", "reach", "failure"):
+    for name in ("length", *TARGETS):
         if name in cells:
             try:
                 out[name] = float(cells[name])

@@ -12,13 +12,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from test_command_line import png_size, refused, rig, rows, run
 
-from rigdda import BadInput, Corridor, load_layout
-from rigdda.agents.corridor import planning, programme
+import rigdda
+from rigdda import BadInput, Corridor, Ditch, load_layout
+from rigdda.agents.corridor import allocation, planning, programme
+from rigdda.agents.corridor.allocation import Estimates
 from rigdda.agents.corridor.programme import METHODS, Options
 from rigdda.envs import CorridorProblem
 from rigdda.model import corridor as corridors
+
+EXAMPLE = Path(rigdda.__file__).parents[1] / "examples/corridor/pass-road.toml"
 
 Row = list[tuple[float, float]]
 
@@ -115,17 +120,38 @@ def test_a_robust_choice_avoids_what_may_be_bad() -> None:
     assert programme.optimum(given, 20.0, scenarios=scenarios) == (2,)
 
 
-def test_releases_go_to_the_section_whose_choice_is_uncertain() -> None:
-    def table(gap: float) -> planning._Table:
-        two = np.array([0.0, 100.0])
-        return planning._Table(
-            100.0, two, np.array([50.0, 50.0 - gap]), np.full(2, 2500.0), np.full(2, 100.0)
-        )
+def section(gaps: list[float], releases: float = 100.0) -> Estimates:
+    """Return estimates of options that cost 0, 100, 200 EUR/m and so on, and save a gap each."""
+    value = 100.0 - np.array([0.0, *gaps])
+    count = len(value)
+    cost = 100.0 * np.arange(count)
+    return Estimates(100.0, cost, value, np.full(count, 2500.0), np.full(count, releases))
 
-    clear, close = table(40.0).worth([0.0]), table(1.0).worth([0.0])
-    assert close[0] > 100.0 * clear[0] and close[1] == [1, 0]
-    priced = table(40.0).worth([0.4])  # 100 EUR/m at .4 a year cost as much as they save
-    assert priced[0] > 100.0 * clear[0]
+
+def test_releases_go_to_the_section_whose_choice_is_uncertain() -> None:
+    clear, close = section([40.0]).worth([0.0]), section([1.0]).worth([0.0])
+    assert close[1] > 100.0 * clear[1]
+    priced = section([40.0]).worth([0.4])  # 100 EUR/m at .4 a year cost as much as they save
+    assert priced[1] > 100.0 * clear[1]
+    found = allocation.batches([section([40.0]), section([1.0])], [0.0], 20 * allocation.BATCH)
+    assert found[1, 1] > 10 and sum(found.values()) == 20
+    assert all(option > 0 for _, option in found)  # no barrier is known already
+
+
+@given(st.lists(st.floats(-50.0, 50.0), min_size=1, max_size=5), st.floats(0.0, 1.0))
+def test_a_batch_never_harms_and_the_next_one_is_worth_less(
+    gaps: list[float], price: float
+) -> None:
+    few, many = section(gaps), section(gaps, 10_000.0)
+    assert (few.worth([price]) >= 0.0).all()
+    assert many.worth([price]).sum() <= few.worth([price]).sum() + 1e-9
+
+
+def test_the_opportunity_cost_is_the_mean_of_what_is_lost() -> None:
+    drawn = np.random.default_rng(0).standard_normal(200_000)
+    expected = np.maximum(-(3.0 + 2.0 * drawn), 0.0).mean()
+    found = allocation.opportunity(np.array([3.0]), np.array([4.0]))
+    assert found[0] == pytest.approx(expected, rel=0.03)
 
 
 TEXT = """name = "pass"
@@ -212,6 +238,53 @@ def test_sections_may_stand_in_a_table_and_share_prices(tmp_path: Path) -> None:
     assert [s.reach for s in found.sections] == [None, 0.1]
     assert all(s.site.consequences.closure == 7000.0 for s in found.sections)
     assert all(s.site.prices.interest == 0.01 for s in found.sections)
+
+
+def test_the_example_has_targets_and_traffic_of_its_sections() -> None:
+    corridor = Corridor.load(EXAMPLE)
+    wanted = [section.targets for section in corridor.sections]
+    assert wanted[1]["reach"] == 0.4 and wanted[3]["individual"] == 1e-5
+    assert all(value is None for value in wanted[0].values())
+    for section in corridor.sections:
+        assert section.site.traffic is not None
+        assert section.site.traffic.section_length == section.length
+    assert CorridorProblem(corridor).problems[3].targets.individual == 1e-5
+
+
+def test_a_target_of_the_risk_to_life_needs_traffic(tmp_path: Path) -> None:
+    text = TEXT.replace("length = 50.0", "length = 50.0\nindividual = 1e-5")
+    (tmp_path / "pass.toml").write_text(text)
+    line = refused("corridor", "pass.toml", folder=tmp_path)
+    assert "sections.quick.targets.individual" in line and "traffic" in line
+    (tmp_path / "pass.toml").write_text(text + "[traffic]\nspeed = 50.0\n")
+    assert "traffic.vehicles_per_day" in refused("corridor", "pass.toml", folder=tmp_path)
+
+
+def test_options_are_judged_by_the_risk_to_life() -> None:
+    corridor = Corridor.load(EXAMPLE)
+    problem = CorridorProblem(corridor).problems[3]
+    found = problem.evaluate((), range(60))
+    option = planning.Option((), 0.0, 0.0, [found])
+    risk = found.risk.individual.high
+    expected = max(0.0, 1.0 - 1e-5 / risk) if risk > 0.0 else 0.0
+    assert option.missed(problem) == pytest.approx(expected)
+    easy = replace(corridor.sections[3], individual=0.5)
+    one = CorridorProblem(Corridor("one", (easy,), (1.0,))).problems[0]
+    assert option.missed(one) == 0.0
+
+
+def test_the_difference_of_two_choices_is_that_of_the_sections_that_differ() -> None:
+    problem = CorridorProblem(Corridor.load(EXAMPLE))
+    quick = problem.problems[1]
+    ditch = (Ditch(quick.site.slope.toe, 1.0, 3.0),)
+    bare, built = (quick.evaluate(layout, range(50)) for layout in ((), ditch))
+    rest = [own.nothing for own in problem.problems]
+    one = problem.judge([rest[0], built, *rest[2:]])
+    other = problem.judge([rest[0], bare, *rest[2:]])
+    found = problem.ahead(one, other)
+    assert found.value == pytest.approx(80.0 * (bare.objective - built.objective))
+    assert found.low < found.value < found.high
+    assert problem.ahead(one, one) == (0.0, 0.0, 0.0)
 
 
 def test_built_in_corridors_are_valid() -> None:

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -18,6 +19,9 @@ import pytest
 import rigdda
 from rigdda import BadInput, Ditch, Site, distribution
 from rigdda.agents import cli
+from rigdda.agents.corridor.planning import Planner
+from rigdda.agents.reports import corridor_folder
+from rigdda.envs import CorridorProblem
 from rigdda.passages import passages
 
 pytest.importorskip("distributed")
@@ -44,9 +48,9 @@ def wait_for(count: int, address: str) -> None:
         client.wait_for_workers(count, timeout=120)
 
 
-@pytest.fixture(scope="module")
-def scheduler() -> Iterator[str]:
-    """The address of a scheduler with two workers."""
+@contextmanager
+def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Start a scheduler with two workers; yield its address and the workers."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -55,11 +59,18 @@ def scheduler() -> Iterator[str]:
     try:
         made += [worker(address), worker(address)]
         wait_for(2, address)
-        yield address
+        yield address, made[1:]
     finally:
         for process in made:
             process.kill()
             process.wait()
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of a scheduler with two workers."""
+    with cluster() as (address, _):
+        yield address
 
 
 def jobs(count: int) -> list[tuple[Site, tuple[Ditch, ...], int, str]]:
@@ -123,6 +134,45 @@ length = 50.0
 site = "verge"
 length = 20.0
 """
+
+
+FOUR = """name = "four"
+budget = [3_000, 20_000]
+[[sections]]
+site = "quick"
+length = 50.0
+[[sections]]
+site = "verge"
+length = 20.0
+[[sections]]
+site = "verge-3"
+length = 40.0
+[[sections]]
+site = "bench-3"
+length = 30.0
+"""
+
+
+@pytest.mark.slow
+def test_a_corridor_goes_on_without_a_worker_that_dies(tmp_path: Path) -> None:
+    (tmp_path / "four.toml").write_text(FOUR)
+    problem = CorridorProblem(tmp_path / "four.toml")
+    with cluster() as (address, workers):
+        killed = []
+
+        def kill_one(releases: int, words: str) -> None:
+            if words.startswith("evaluating") and not killed:
+                workers[0].kill()
+                killed.append(releases)
+
+        with distribution.connected(f"dask://{address}"):
+            there = Planner(problem, 300, tick=kill_one).plan()
+    here = Planner(problem, 300).plan()
+    assert killed and killed[0] < here.releases
+    corridor_folder.write(here, tmp_path / "here")
+    corridor_folder.write(there, tmp_path / "there")
+    for name in ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv"):
+        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
 
 
 @pytest.mark.slow

@@ -166,7 +166,7 @@ class CorridorDesign(LayoutEnv):
         lengths: tuple[float, float] = LENGTHS,
         max_barriers: int = 3,
         kinds: Sequence[str] | None = None,
-        releases: int = 16,
+        releases: int = 4,
         fidelity: str = "full",
         flat: bool = False,
         record: str | os.PathLike[str] | None = None,

@@ -2,7 +2,7 @@
 
 `python -m experiments.corridor_allocation [--quick] [--out DIR]` replays the choice of layouts for
 corridors of test sites. The stored outcomes of each layout are the population, from which releases
-are drawn with replacement, so that the best choice is known. A corridor has twelve sections of
+are drawn with replacement, so that the best choice is known. A corridor has eight sections of
 random lengths. `rigdda.agents.corridor.planning.Planner` evaluates the layouts with some releases
 per section, at the margin or evenly, and chooses for budgets of 100, 200 and 400 EUR per metre of
 road. The table has the gain as a share of that of the best choice, with 95 % intervals over
@@ -29,16 +29,16 @@ from rigdda.envs import CorridorProblem, Evaluation
 BUDGETS = (100.0, 200.0, 400.0)
 """Budgets per metre of road [EUR/m]."""
 
-SITES, RELEASES = 16, 400
+SITES, RELEASES = 10, 400
 """Number of test sites, and of stored releases of each layout."""
 
-SECTIONS = 12
+SECTIONS = 8
 """Number of sections of a corridor."""
 
-SPREAD = (60, 120, 240, 480)
+SPREAD = (120, 240, 480, 960)
 """Numbers of releases per section for the choice."""
 
-CORRIDORS, REPEATS = 10, 6
+CORRIDORS, REPEATS = 10, 8
 """Number of corridors, and of repetitions of each."""
 
 

@@ -1,20 +1,20 @@
 """Simple methods in the environment `rigdda/Corridor-v0`.
 
 `python -m experiments.corridor_baselines [--quick] [--out DIR]` plays corridors of eight sections,
-drawn from twelve test sites, with random lengths. Layouts are scored on one half of their stored
+drawn from ten test sites, with random lengths. Layouts are scored on one half of their stored
 outcomes (`experiments.corridor_pools`); all methods play the same corridors.
 
 Without a search, a method chooses the layout of a section from its site alone:
 
-- nothing; the best constant; the best constant of the family, chosen on twelve training sites; the
+- nothing; the best constant; the best constant of the family, chosen on ten training sites; the
   engineering rule. Money is either shared (a section may spend the money left per metre of road
   left, for each of its metres) or spent in the order of the sections until it ends;
 - threshold: the constant with the greatest predicted benefit less threshold x cost, in order. The
   benefit is predicted by the mean share of the harm that a constant prevents on the training sites
   of the family. The threshold of each budget is tuned on training corridors.
 
-With a search, the layouts of a section are those of a front (1,000 releases), each evaluated on a
-few more releases, the same number in every section: the integer programme, and the worst section
+With a search, the layouts of a section are those of a front (1,000 releases), each evaluated on
+40 more releases, the same number in every section: the integer programme, and the worst section
 first. The reference is the offline optimum, the integer programme with all layouts on the other
 half of the outcomes.
 
@@ -45,7 +45,7 @@ from rigdda.envs.outcome_cache import Sample
 BUDGETS = (50.0, 200.0, 800.0)
 """Budgets per metre of road [EUR/m]."""
 
-SITES, RELEASES = 12, 400
+SITES, RELEASES = 10, 400
 """Number of sites of each split, and of stored releases of each layout."""
 
 TRAINING, CORRIDORS, SECTIONS = 8, 24, 8

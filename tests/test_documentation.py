@@ -137,6 +137,10 @@ def read_toml(block: Block, site: str) -> str:
     if "layouts" in tables:
         assert block.name
         assert studies.load(block.name).size > 0
+    elif "table" in tables:
+        example = Path("examples/corridor/pass-road.toml")
+        assert tables == tomllib.loads(example.read_text(encoding="utf-8"))
+        assert rigdda.Corridor.load(example).length > 0.0
     elif "sections" in tables:
         assert block.name
         Path(block.name).write_text(block.text, encoding="utf-8")

@@ -333,6 +333,8 @@ EXHIBITS = (
             value("one more EUR saves", "shadow_price"),
         ),
     ),
+    Exhibit("corridor", "gain.png", "Gain and budget"),
+    Exhibit("corridor", "strip.png", "What is built along the corridor"),
     Exhibit(
         "corridor",
         "sections.csv",
@@ -350,8 +352,6 @@ EXHIBITS = (
         ),
     ),
     Exhibit("corridor", "priorities.csv", "What should be built next"),
-    Exhibit("corridor", "gain.png", "Gain and budget"),
-    Exhibit("corridor", "strip.png", "What is built along the corridor"),
 )  # fmt: skip
 """What is shown of each results folder, in the order of the report. A new table or picture needs
 one entry here; tables without an entry are listed in the appendix."""

@@ -105,6 +105,23 @@ def test_the_shadow_price_is_the_slope_of_the_linear_relaxation(
     assert slopes == sorted(slopes, reverse=True) and all(slope > 0.0 for slope in slopes)
 
 
+def test_a_thousand_sections_take_seconds() -> None:
+    rng = np.random.default_rng(0)
+    lengths, costs, values = rng.uniform(50.0, 300.0, 1000), [], []
+    for length in lengths:
+        own = np.sort(np.append(0.0, rng.uniform(50.0, 3000.0, rng.integers(5, 12))))
+        left = np.exp(-own / rng.uniform(200.0, 1500.0)) * rng.uniform(0.8, 1.2, len(own))
+        costs.append(length * own)
+        values.append(length * (rng.lognormal(5.5, 1.0) * left + 0.05 * own))
+    none = [np.zeros(len(own)) for own in costs]
+    given = Options(lengths, costs, [0.05 * own for own in costs], values, none)
+    budget, begun = 200.0 * float(lengths.sum()), time.process_time()
+    choice = programme.optimum(given, budget)
+    assert time.process_time() - begun < 10.0
+    assert given.total(choice, given.costs) <= budget * (1.0 + 1e-6)
+    assert given.gain(choice) >= given.gain(programme.by_ratio(given, budget))
+
+
 def test_missed_targets_come_before_cost() -> None:
     given = options([[(10.0, 120.0), (30.0, 50.0)]], [[0.2, 0.0, 0.1]])
     assert programme.optimum(given, 100.0) == (1,)

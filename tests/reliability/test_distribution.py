@@ -125,6 +125,15 @@ def test_a_worker_that_dies_loses_nothing(scheduler: str) -> None:
     assert found == here
 
 
+STUDY = """site = "verge"
+releases = 20
+[[layouts]]
+name = "nothing"
+[[layouts]]
+name = "ditch"
+barriers = [{ kind = "ditch", x = 8.0, depth = 1.0, width = 3.0, side_slope = 1.0 }]
+"""
+
 CORRIDOR = """name = "pass"
 budget = 4_000
 [[sections]]
@@ -178,12 +187,25 @@ def test_a_corridor_goes_on_without_a_worker_that_dies(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_commands_write_the_same_tables(scheduler: str, tmp_path: Path) -> None:
     (tmp_path / "pass.toml").write_text(CORRIDOR)
+    (tmp_path / "study.toml").write_text(STUDY)
+    seen = "".join(f"block,{9.0 + 0.5 * i}\n" for i in range(12))
+    (tmp_path / "seen.csv").write_text("event,run_out_m\n" + seen)
     where = f"dask://{scheduler}"
     commands = {
         "simulate": (["verge", "--releases", "60"], "outcomes.csv"),
         "design": (["quick", "--budget", "400", "--verify", "40"], "evaluations.csv"),
         "corridor": ([str(tmp_path / "pass.toml"), "--releases", "200"], "sections.csv"),
-    }
+        "study": ([str(tmp_path / "study.toml")], "study.csv"),
+        "fit": (
+            ["verge", str(tmp_path / "seen.csv"), "--parameters", "surfaces.soil.restitution",
+             "--budget", "8", "--releases", "10"], "posterior.csv",
+        ),
+        "sensitivity": (["verge", "--samples", "2", "--releases", "20"], "samples.csv"),
+        "evaluate": (
+            ["--designer", "rule", "--budget", "60", "--sites", "1", "--verify", "20"],
+            "scores.csv",
+        ),
+    }  # fmt: skip
     for name, (arguments, table) in commands.items():
         for folder, extra in (("here", []), ("there", ["--executor", where])):
             out = tmp_path / f"{name}-{folder}"

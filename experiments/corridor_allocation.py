@@ -148,12 +148,11 @@ def run(quick: bool, out: Path) -> Number:
         say(f"corridor {number + 1} of {corridors}")
     rows = table(found, corridors)
     write(out / "corridor_allocation.csv", rows)
-    least = min(
-        row["ahead"] + row["ahead_half_width"] for row in rows if row["ahead"] == row["ahead"]
-    )
+    last = [row for row in rows if not np.isnan(row["ahead"])][-1]
     return Number(
-        "least upper limit of the share gained at the margin, less that of an even spread of twice "
-        "the releases [-]", least, low=0.0,
+        f"upper limit of the share gained at the margin with {last['releases_per_section']} releases "
+        "per section, less that of an even spread of twice as many [-]",
+        last["ahead"] + last["ahead_half_width"], low=0.0,
     )  # fmt: skip
 
 

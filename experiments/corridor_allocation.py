@@ -150,8 +150,8 @@ def run(quick: bool, out: Path) -> Number:
     write(out / "corridor_allocation.csv", rows)
     last = [row for row in rows if not np.isnan(row["ahead"])][-1]
     return Number(
-        f"upper limit of the share gained at the margin with {last['releases_per_section']} releases "
-        "per section, less that of an even spread of twice as many [-]",
+        f"upper limit of the share gained with {last['releases_per_section']} releases per section "
+        "at the margin, less that of an even spread of twice as many [-]",
         last["ahead"] + last["ahead_half_width"], low=0.0,
     )  # fmt: skip
 

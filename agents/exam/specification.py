@@ -1,0 +1,159 @@
+"""The frozen specification of the exam, and the recorded references that scores are relative to."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from rigdda import BadInput, Corridor, Layout, Site, fields
+from rigdda.barriers import from_table, to_tables
+from rigdda.envs import DesignProblem
+from rigdda.fields import about
+from rigdda.files import atomic, read
+from rigdda.kernel import source_hash
+from rigdda.model.corridor import CorridorSection
+
+SHIPPED = Path(__file__).parent / "specification.toml"
+"""Specification that ships with the package."""
+
+
+class ExamCorridor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A corridor of the exam."""
+
+    name: Annotated[str, about("Name of the corridor.")]
+    money: Annotated[float, about("Budget per metre of road.", "EUR/m", gt=0.0)]
+    sites: Annotated[tuple[str, ...], about("Sites of the sections.", least=1)]
+    lengths: Annotated[tuple[float, ...], about("Lengths of the sections.", "m", least=1)]
+
+    def corridor(self) -> Corridor:
+        """Return the corridor with its budget for construction [EUR]."""
+        pairs = zip(self.sites, self.lengths, strict=True)
+        sections = tuple(CorridorSection(Site.load(name), at, name) for name, at in pairs)
+        return Corridor(self.name, sections, (self.money * sum(self.lengths),))
+
+
+class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The exam: sites, corridors, budgets, and the mechanics of the references."""
+
+    version: Annotated[int, about("Version of the exam.", least=None)]
+    mechanics: Annotated[str, about("Hash of the kernels that computed the references.")]
+    budgets: Annotated[tuple[int, ...], about("Releases that an entry may use per section.")]
+    verification: Annotated[int, about("Releases for the verification of each layout.", ge=10)]
+    max_barriers: Annotated[int, about("Largest number of barriers of a layout.", ge=1)]
+    references: Annotated[str, about("JSON file with the references, beside this file.")]
+    sites: Annotated[tuple[str, ...], about("Names or files of the sites.", least=1)]
+    corridors: Annotated[tuple[ExamCorridor, ...], about("The corridors.")] = ()
+
+    @property
+    def current(self) -> bool:
+        """Whether the kernels of this installation are those of the references."""
+        return self.mechanics == source_hash()
+
+    @property
+    def key(self) -> str:
+        """Hash of all values of the specification."""
+        return hashlib.sha256(msgspec.json.encode(self)).hexdigest()[:16]
+
+    def problem(self, site: str) -> DesignProblem:
+        """Return the design problem of a site."""
+        return DesignProblem(site, self.max_barriers)
+
+
+class Anchor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the score of a site or corridor is relative to.
+
+    Parameters
+    ----------
+    layouts : list of layouts
+        The reference, one layout for each section, as the tables of layout files.
+    reference, reference_ci : float, (float, float)
+        Annual cost of the reference on releases that no search used, and its 95 % interval.
+        [EUR per metre and year] for a site, [EUR/year] for a corridor.
+    random : float
+        Mean annual cost of random layouts, in the same unit.
+    nothing : float
+        Annual cost without barriers, in the same unit.
+    releases : int
+        Number of releases that the search for the reference used.
+    """
+
+    layouts: list[list[dict[str, Any]]]
+    reference: float
+    reference_ci: tuple[float, float]
+    random: float
+    nothing: float
+    releases: int
+
+    def built(self) -> tuple[Layout, ...]:
+        """Return the layouts of the reference."""
+        return tuple(
+            tuple(from_table(f"layouts[{i}]", table) for table in own)
+            for i, own in enumerate(self.layouts)
+        )
+
+
+def tables(layouts: tuple[Layout, ...]) -> list[list[dict[str, Any]]]:
+    """Return layouts as the tables of layout files."""
+    return [to_tables(layout) for layout in layouts]
+
+
+class References(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The recorded references of a specification, by name of the site or corridor."""
+
+    mechanics: str
+    anchors: dict[str, Anchor]
+
+    def save(self, path: Path) -> None:
+        """Write the references to a JSON file."""
+        with atomic(path) as part:
+            part.write_bytes(msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n")
+
+
+def load(path: str | os.PathLike[str] | None = None) -> Specification:
+    """Return the specification in a TOML file, by default the one that ships with the package.
+
+    Raises
+    ------
+    BadInput
+        If the file is missing or invalid.
+    """
+    file = SHIPPED if path is None else Path(path)
+    found = fields.read(Specification, fields.parse("spec", str(file), read("spec", file)))
+    if not found.budgets or any(budget < 0 for budget in found.budgets):
+        raise BadInput("budgets", found.budgets, "give at least one number of releases from 0")
+    for corridor in found.corridors:
+        if len(corridor.sites) != len(corridor.lengths):
+            mend = f"give {len(corridor.sites)}, one for each site"
+            raise BadInput("corridors.lengths", corridor.lengths, mend)
+    return found
+
+
+def file_of_references(
+    specification: Specification, path: str | os.PathLike[str] | None = None
+) -> Path:
+    """Return the file of references, which is beside the file of the specification."""
+    return (SHIPPED if path is None else Path(path)).parent / specification.references
+
+
+def references(
+    specification: Specification, path: str | os.PathLike[str] | None = None
+) -> References:
+    """Return the recorded references of a specification.
+
+    Raises
+    ------
+    BadInput
+        If the file is missing or invalid.
+    """
+    file = file_of_references(specification, path)
+    mend = "record it: python -m experiments.exam_reference --spec FILE"
+    try:
+        return msgspec.json.decode(file.read_bytes(), type=References)
+    except OSError as error:
+        raise BadInput("references", str(file), f"{mend} ({error.strerror})") from None
+    except msgspec.MsgspecError as error:
+        raise BadInput("references", str(file), f"{mend} ({error})") from None

@@ -1,16 +1,17 @@
 """Designers of barrier layouts, the command line, studies, fits and reports.
 
-The attribute `rigdda.agents.NAME` imports the designer NAME when it is first used.
+The attribute `rigdda.agents.NAME` imports the designer NAME when it is first used. `AskTell` makes
+a function for any optimiser.
 """
 
 from __future__ import annotations
 
-from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rigdda.agents.designers import DESIGNERS, module
 
 if TYPE_CHECKING:  # `as` declares these names as exports of this package
+    from rigdda.agents.ask_tell import AskTell as AskTell
     from rigdda.agents.designers import cma as cma
     from rigdda.agents.designers import constant as constant
     from rigdda.agents.designers import convex as convex
@@ -21,10 +22,14 @@ if TYPE_CHECKING:  # `as` declares these names as exports of this package
     from rigdda.agents.designers import rule as rule
     from rigdda.agents.designers import tpe as tpe
 
-__all__ = ["DESIGNERS"]
+__all__ = ["DESIGNERS", "AskTell"]
 
 
-def __getattr__(name: str) -> ModuleType:
+def __getattr__(name: str) -> Any:
+    if name == "AskTell":
+        from rigdda.agents.ask_tell import AskTell
+
+        return AskTell
     if name in DESIGNERS:
         return module(name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

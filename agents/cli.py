@@ -1091,6 +1091,36 @@ def exam(
 
 
 @cli.command()
+@click.option("--split", type=click.Choice(("train", "validation", "test")), default="train",
+              show_default=True, help="Split of the generated sites to use.")  # fmt: skip
+@count_option("--sites", 1, 12, "Number of sites. With six, each family is used once.")
+@count_option("--layouts", 1, 32, "Number of layouts of each site.")
+@count_option("--releases", 1, 100, "Number of releases of each layout, over all events.")
+@seed_option("Seed of the layouts and of the releases.", SEED)
+@out_option("dataset-SPLIT")
+@executor_option
+def dataset(
+    split: str, sites: int, layouts: int, releases: int, seed: int, out: Path | None
+) -> None:
+    """Simulate many layouts on many sites and write the outcomes as Parquet.
+
+    The layouts are no barrier, constants, single barriers of the catalogue, random layouts and
+    neighbours of these. Writes for each site outcomes/SITE.parquet, with one row per release (site,
+    layout, event, seed and outcome), and sites/SITE.parquet, with what is known of the site. An
+    interrupted run continues with the next site, and a data set grows with --sites.
+    """
+    from rigdda.agents import dataset as job
+
+    recipe = job.Recipe(split, layouts, releases, seed)
+    names = recipe.names(sites)
+    folder = folder_for(out, f"dataset-{split}", job.CLAIM)
+    with kept(folder), progress(len(names)) as tick:
+        rows = job.write(recipe, sites, folder, tick)
+    click.echo(f"{rows:,} releases on {len(names)} sites of {split}; outcomes and sites are in "
+               f"{folder}")  # fmt: skip
+
+
+@cli.command()
 @click.option("--only", multiple=True, metavar="NAME",
               help="Run only cases whose names begin with NAME. May be repeated.")  # fmt: skip
 @click.option("--slow", is_flag=True, help="Run the slow cases as well.")

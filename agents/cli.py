@@ -1079,7 +1079,7 @@ def exam(
         found = ranking.write(folder, scores, part, entry)
     click.echo("score: 1 for the reference, 0 for random layouts; distance: 0 and 1 for no barrier")
     show(ranking.table(found))
-    for line in ranking.remarks(part):
+    for line in ranking.remarks(part, references):
         note(line)
     click.echo(f"{part.size} tasks, verified on {part.verification:,} releases each; "
                f"{', '.join(ranking.FILES)} are in {folder}")  # fmt: skip

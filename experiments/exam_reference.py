@@ -1,10 +1,12 @@
 """References of the exam: layouts found with 20,000 releases per section, and random layouts.
 
-`python -m experiments.exam_reference [--spec FILE] [--releases N]`. On a site, the layout of the
-designer `race`, the best constant and no barrier are compared on new releases, and the best of them
-is evaluated on further ones. On a corridor, the reference is the joint choice of `rigdda corridor`.
-The random layouts are drawn uniformly from the decision box; on a corridor, in the order of the
-sections, within the money that is left.
+`python -m experiments.exam_reference [--spec FILE] [--releases N]`. With fewer releases than the
+specification asks for, references are provisional, and a later run with more replaces them.
+
+On a site, the layout of the designer `race`, the best constant and no barrier are compared on new
+releases, and the best of them is evaluated on further ones. On a corridor, the reference is the
+joint choice of `rigdda corridor`. The random layouts are drawn uniformly from the decision box; on
+a corridor, in the order of the sections, within the money that is left.
 
 Writes the file of references beside the specification. An interrupted run continues where it
 stopped.
@@ -32,11 +34,11 @@ from rigdda.agents.exam.specification import Anchor, ExamCorridor, References, S
 from rigdda.envs import CorridorProblem, DesignProblem
 from rigdda.kernel import source_hash
 
-RELEASES = 20_000
-"""Releases for the search of a reference, per section."""
+CHOICE, VALUE = 0.1, 0.2
+"""Releases for the choice of the reference and for its value, over those of its search [-]."""
 
-CHOICE, VALUE = 2_000, 4_000
-"""Releases for the choice of the reference and for its value, per section."""
+LEAST = 1_000
+"""Least number of releases for the choice and for the value."""
 
 DRAWS, EACH = 48, 40
 """Number of random layouts, and of releases of each."""
@@ -49,15 +51,22 @@ def of_site(problem: DesignProblem, releases: int) -> Anchor:
     """Return the anchor of a site."""
     found = race.design(problem, releases, SEED)
     candidates = dict.fromkeys([found.layout, constant(problem, Menu(problem)), ()])
-    judged = [verify(problem, layout, CHOICE, SEED, stream="final") for layout in candidates]
+    judged = [
+        verify(problem, layout, _count(CHOICE, releases), SEED, stream="final")
+        for layout in candidates
+    ]
     best = min(judged, key=lambda e: e.objective).layout
-    value = verify(problem, best, VALUE, SEED)
+    value = verify(problem, best, _count(VALUE, releases), SEED)
     rng = np.random.default_rng(SEED)
     drawn = [problem.decode(rng.uniform(*problem.bounds)) for _ in range(DRAWS)]
     random = [_draw(problem, layout, i) for i, layout in enumerate(drawn)]
     nothing = problem.nothing.objective
     mean = float(np.mean(random))
-    return Anchor(tables((best,)), value.objective, value.ci, mean, nothing, found.simulations)
+    return Anchor(tables((best,)), value.objective, value.ci, mean, nothing, releases)
+
+
+def _count(share: float, releases: int) -> int:
+    return max(LEAST, int(share * releases))
 
 
 def _draw(problem: DesignProblem, layout: Layout, i: int) -> float:
@@ -71,11 +80,11 @@ def of_corridor(asked: ExamCorridor, most: int, releases: int) -> Anchor:
     problem = CorridorProblem(corridor, most)
     plan = Planner(problem, releases, SEED).plan()
     best = plan.plans[0].evaluation.layouts
-    value = problem.evaluate(best, release_seeds("verification", SEED, VALUE))
+    value = problem.evaluate(best, release_seeds("verification", SEED, _count(VALUE, releases)))
     rng = np.random.default_rng(SEED)
     random = [_walk(problem, corridor.budgets[0], rng, i) for i in range(DRAWS)]
     mean = float(np.mean(random))
-    return Anchor(tables(best), value.objective, value.ci, mean, problem.nothing, plan.releases)
+    return Anchor(tables(best), value.objective, value.ci, mean, problem.nothing, releases)
 
 
 def _walk(problem: CorridorProblem, money: float, rng: np.random.Generator, i: int) -> float:
@@ -91,22 +100,27 @@ def _walk(problem: CorridorProblem, money: float, rng: np.random.Generator, i: i
 
 
 def record(spec: Specification, file: Path, releases: int) -> References:
-    """Record the references that are missing, or that other kernels made."""
+    """Record references that are missing, had fewer releases or were made by other kernels."""
     found = References(source_hash(), {})
     if file.is_file():
         known = msgspec.json.decode(file.read_bytes(), type=References)
         found = known if known.mechanics == source_hash() else found
     for name in spec.sites:
-        if name not in found.anchors:
+        if _lacks(found, name, releases):
             say(name)
             found.anchors[name] = of_site(spec.problem(name), releases)
             found.save(file)
     for corridor in spec.corridors:
-        if corridor.name not in found.anchors:
+        if _lacks(found, corridor.name, releases):
             say(corridor.name)
             found.anchors[corridor.name] = of_corridor(corridor, spec.max_barriers, releases)
             found.save(file)
     return found
+
+
+def _lacks(found: References, name: str, releases: int) -> bool:
+    """Return whether there is no reference of a name with so many releases."""
+    return name not in found.anchors or found.anchors[name].releases < releases
 
 
 def words(found: References) -> Sequence[str]:
@@ -120,13 +134,14 @@ def words(found: References) -> Sequence[str]:
 @click.command(help=__doc__)
 @click.option("--spec", type=click.Path(exists=True, path_type=Path), metavar="FILE",
               help="Specification.  [default: the one of the package]")  # fmt: skip
-@click.option("--releases", type=click.IntRange(200), default=RELEASES, show_default=True,
-              help="Releases for each search, per section.")  # fmt: skip
-def main(spec: Path | None, releases: int) -> None:
+@click.option("--releases", type=click.IntRange(200),
+              help="Releases for each search, per section.  [default: those of the "
+              "specification]")  # fmt: skip
+def main(spec: Path | None, releases: int | None) -> None:
     """Record the references of a specification."""
     asked = specification.load(spec)
     file = specification.file_of_references(asked, spec)
-    for line in words(record(asked, file, releases)):
+    for line in words(record(asked, file, releases or asked.reference_releases)):
         click.echo(line)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
 from rigdda.agents.exam.scorer import ExamPart, ExamScore
+from rigdda.agents.exam.specification import References
 from rigdda.agents.reports import pictures, tables
 
 if TYPE_CHECKING:
@@ -193,7 +194,7 @@ def broken(scores: Sequence[ExamScore]) -> list[str]:
     ]
 
 
-def remarks(asked: ExamPart) -> list[str]:
+def remarks(asked: ExamPart, references: References) -> list[str]:
     """Return why the results cannot enter the leaderboard; none if they can."""
     found = []
     if not asked.specification.current:
@@ -203,4 +204,10 @@ def remarks(asked: ExamPart) -> list[str]:
         )
     elif not asked.complete:
         found.append("a part of the exam was played: the result cannot enter the leaderboard")
+    wanting = len(references.provisional(asked.specification))
+    if wanting:
+        found.append(
+            f"{wanting} references are provisional, because their searches had fewer releases than "
+            "specified: scores will change when they are replaced"
+        )
     return found

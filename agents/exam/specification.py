@@ -45,6 +45,7 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     verification: Annotated[int, about("Releases for the verification of each layout.", ge=10)]
     max_barriers: Annotated[int, about("Largest number of barriers of a layout.", ge=1)]
     references: Annotated[str, about("JSON file with the references, beside this file.")]
+    reference_releases: Annotated[int, about("Releases of the search for a reference.", ge=200)]
     sites: Annotated[tuple[str, ...], about("Names or files of the sites.", least=1)]
     corridors: Annotated[tuple[ExamCorridor, ...], about("The corridors.")] = ()
 
@@ -78,7 +79,8 @@ class Anchor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     nothing : float
         Annual cost without barriers, in the same unit.
     releases : int
-        Number of releases that the search for the reference used.
+        Number of releases per section that the search for the reference might use. If it is below
+        `Specification.reference_releases`, the reference is provisional.
     """
 
     layouts: list[list[dict[str, Any]]]
@@ -106,6 +108,11 @@ class References(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     mechanics: str
     anchors: dict[str, Anchor]
+
+    def provisional(self, specification: Specification) -> list[str]:
+        """Return the names of the references whose search had fewer releases than specified."""
+        least = specification.reference_releases
+        return [name for name, anchor in self.anchors.items() if anchor.releases < least]
 
     def save(self, path: Path) -> None:
         """Write the references to a JSON file."""

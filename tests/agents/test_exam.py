@@ -30,6 +30,7 @@ budgets = [0, 60]
 verification = 40
 max_barriers = 2
 references = "references.json"
+reference_releases = 2000
 sites = ["narrow-2000000003", "cliff-2000000004"]
 
 [[corridors]]
@@ -122,9 +123,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         problem = DesignProblem(name, 2)
         best = (problem.place.put(Ditch(0.0, 2.5, 5.0), problem.zone.end - 6.0),)
         layout = constant(problem, Menu(problem)) or best
-        anchors[name] = Anchor(tables((layout,)), 50.0, (40.0, 60.0), 200.0, 300.0, 0)
+        anchors[name] = Anchor(tables((layout,)), 50.0, (40.0, 60.0), 200.0, 300.0, 2000)
     both = [anchors[name].layouts[0] for name in SITES]
-    anchors["road"] = Anchor(both, 2000.0, (1900.0, 2100.0), 9000.0, 10000.0, 0)
+    anchors["road"] = Anchor(both, 2000.0, (1900.0, 2100.0), 9000.0, 10000.0, 2000)
     References(source_hash(), anchors).save(home / "references.json")
     return home
 

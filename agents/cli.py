@@ -1071,6 +1071,8 @@ def exam(
     references = specification.references(asked, spec)
     part = scorer.part(asked, sites, corridors, budgets, verify, seed)
     scorer.check_references(part, references)
+    for name in filter(None, (entry, corridor_entry)):
+        scorer.source_hash_of(name)  # refuses a module that cannot be found
     folder = folder_for(out, f"exam-{entry.rpartition(':')[2]}", *ranking.FILES)
     secrets = (specification.file_of_references(asked, spec),)
     with kept(folder), progress(part.size) as tick:

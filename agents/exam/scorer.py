@@ -466,7 +466,15 @@ def _process(entry: str, corridor_entry: str, secrets: tuple[str, ...]) -> Itera
 
 
 def source_hash_of(entry: str) -> str:
-    """Return a hash of the file of an entry, which is found without importing it."""
+    """Return a hash of the file of an entry, which is found without importing it.
+
+    Raises
+    ------
+    BadInput
+        If the name has another form than "package.module:function", or there is no such module.
+    """
+    if not entry.partition(":")[2]:
+        raise BadInput("--entry", entry, "give package.module:function")
     names = entry.partition(":")[0].split(".")
     places: Sequence[str] | None = [os.getcwd(), *sys.path]
     for i, _ in enumerate(names):

@@ -25,7 +25,8 @@ from rigdda.barriers import to_tables
 TINY = ("--budget", "400", "--verify", "40", "--ground-samples", "1")
 COMMANDS = (
     "sites", "new", "check", "simulate", "design", "reprice", "report", "study", "corridor", "fit",
-    "sensitivity", "train", "evaluate", "fidelity", "validate", "replay", "repeat",
+    "sensitivity", "train", "evaluate", "exam", "dataset", "fidelity", "validate", "replay",
+    "repeat",
 )  # fmt: skip
 FILES = (
     "evaluations.csv", "evaluations.jsonl", "outcomes.msgpack.gz", "layouts.csv", "chances.csv",
@@ -393,6 +394,11 @@ def test_a_bad_layout_file_is_one_line(
         (("simulate", "quick", "--event", "flood"), ("event", "flood", "group")),
         (("replay", "quick", "--event", "flood"), ("event", "flood", "group")),
         (("evaluate", "--split", "exam"), ("--split", "exam", "test")),
+        (("exam", "--entry", "no_such_module:design"), ("--entry", "no_such_module")),
+        (("exam", "--entry", "math:cos", "--sites", 25), ("sites", "25", "at most 24")),
+        (("exam", "--entry", "math:cos", "--spec", "none.toml"), ("spec", "none.toml")),
+        (("dataset", "--split", "exam"), ("--split", "exam", "train")),
+        (("dataset", "--sites", 1201), ("sites", "1201", "at most 1200")),
         (("fidelity", "nowhere"), ("site", "nowhere")),
         (("simulate", "quick", "--releases", "many"), ("--releases", "many")),
         (("simulate", "quick", "--seed", "-1"), ("--seed", "-1")),

@@ -14,7 +14,7 @@ import pytest
 from rigdda import BadInput, Ditch, sites
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.exam import ranking, scorer, specification
+from rigdda.agents.exam import counter, ranking, scorer, specification
 from rigdda.agents.exam.counter import practice
 from rigdda.agents.exam.specification import Anchor, References, tables
 from rigdda.envs import DesignProblem
@@ -155,6 +155,21 @@ def test_no_split_contains_a_site_of_the_exam() -> None:
         family, number = instance(name)
         assert family in sites.FAMILIES
         assert not any(number in numbers for numbers in SPLITS.values())
+
+
+def test_every_task_of_the_exam_has_a_reference_that_may_be_built() -> None:
+    asked = specification.load()
+    known, whole = specification.references(asked), scorer.part(asked)
+    assert whole.size == 4 * 27 and whole.complete
+    scorer.check_references(whole, known)
+    assert set(known.anchors) == {order.name for order in whole.orders(0)}
+    for order in whole.orders(0):
+        layouts, cost = known.anchors[order.name].built(), 0.0
+        for problem, layout, length in zip(
+            counter.problems_of(order), layouts, order.lengths, strict=True
+        ):
+            cost += length * problem.site.capital(problem.check(layout))
+        assert order.money is None or 0.0 < cost <= order.money * (1.0 + 1e-9)
 
 
 def test_an_honest_entry_is_scored_and_counted(folder: Path) -> None:

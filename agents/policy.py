@@ -66,12 +66,12 @@ class Network:
         return all(np.isfinite(array).all() for array in arrays) and bool((self.scale > 0).all())
 
     def __call__(self, features: Floats) -> NDArray[np.float64]:
-        """Return the outputs of the network for (F,) features."""
+        """Return the outputs of the network for (..., F) features."""
         values = scaled(features, self.mean, self.scale).astype(np.float64)
         for weight, bias in self.layers[:-1]:
-            values = np.tanh(weight @ values + bias)
+            values = np.tanh(values @ weight.T + bias)
         weight, bias = self.layers[-1]
-        return weight @ values + bias
+        return values @ weight.T + bias
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the network and its notes to a safetensors file."""

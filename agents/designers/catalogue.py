@@ -273,7 +273,11 @@ class Effects:
         self._volume = volume.astype(np.float64)
         self._energy = np.zeros(count)  # largest energy of a block at the road [J]
         np.maximum.at(self._energy, road["release"], road["energy"])
-        self.base = self._harm(self._volume)
+        self.base = self.harm(self._volume)
+
+    def at(self, station: int) -> NDArray[np.void]:
+        """Return the crossings of a station, sorted by release and time."""
+        return self._at[station]
 
     def of(self, barrier: Barrier) -> tuple[Floats, Floats]:
         """Return the harm [EUR] and the length of barrier to repair [m] of each release, (R,)."""
@@ -286,17 +290,17 @@ class Effects:
             return self.base, np.zeros_like(self.base)
         k = int(np.argmin(np.abs(self.ensemble.stations - barrier.x)))
         table, risky = self._at[k], self._risky[k]
-        stopped, broken = self._stopped(barrier, table)
+        stopped, broken = self.stopped(barrier, table)
         volume = table["volume"] * (stopped & risky)
         taken = np.bincount(table["release"], volume, minlength=len(self.base))
         left = self._volume - taken
         gone = left <= 1e-9 * self._volume
-        harm = self._harm(np.where(gone, 0.0, left).astype(np.float64))
+        harm = self.harm(np.where(gone, 0.0, left).astype(np.float64))
         failed = np.bincount(table["release"], broken, minlength=len(self.base)) > 0
         mended: Floats = np.where(failed, np.maximum(self.ensemble.width, barrier.repaired), 0.0)
         return harm, mended
 
-    def _stopped(self, barrier: Barrier, table: NDArray[np.void]) -> tuple[Any, Any]:
+    def stopped(self, barrier: Barrier, table: NDArray[np.void]) -> tuple[Any, Any]:
         """Return which crossings a barrier stops and which break it, two (E,) arrays of bool."""
         none = np.zeros(len(table), dtype=bool)
         if isinstance(barrier, Ditch):
@@ -322,7 +326,7 @@ class Effects:
         leap = BOUNCE * table["speed"] ** 2 / (2.0 * GRAVITY)
         return lands & (leap <= ditch.depth)
 
-    def _harm(self, volume: Floats) -> Floats:
+    def harm(self, volume: Floats) -> Floats:
         """Return the harm of volumes on the road [EUR], which is 0 for a volume of 0."""
         harms: Any = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
         traffic, width = self.site.traffic, self.ensemble.width

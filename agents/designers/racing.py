@@ -44,17 +44,25 @@ class Arm:
     releases : dict of str to list of Release
         Releases by name of event, in the order of the seeds, which are the same for all candidates
         of a race.
-    scale : float
-        Expected mean bill divided by the observed mean bill [-].
+    expected : mapping of str to float
+        Forecast mean bill of each event [EUR], for events with few releases. Without a forecast it
+        is the mean without barriers.
     """
 
-    def __init__(self, problem: DesignProblem, layout: Layout, strict: bool = False):
+    def __init__(
+        self,
+        problem: DesignProblem,
+        layout: Layout,
+        strict: bool = False,
+        expected: Mapping[str, float] | None = None,
+    ):
         site = problem.site
         self.problem, self.layout, self.strict = problem, layout, strict
-        self.scale = 1.0
         self.priced = problem.nothing.objective > 0.0
         self.annual = site.annual(layout) if self.priced else 0.0
         self.rates = {name: site.rate(name, layout) for name in site.event_names}
+        bare = {name: self.without(name) for name in site.event_names}
+        self.expected = bare if expected is None else expected
         self.releases: dict[str, list[Release]] = {name: [] for name in site.event_names}
         self._arrays: dict[str, Floats] = {}
 
@@ -80,14 +88,14 @@ class Arm:
     def mean(self, event: str) -> float:
         """Return the mean bill of an event [EUR].
 
-        With few releases, it is a weighted mean with the bill without barriers.
+        With few releases, it is a weighted mean with the expected bill.
         """
         own = self.bills(event)
         if len(own) >= TRUSTED:
             return float(own.mean())
-        return float((own.sum() + (TRUSTED - len(own)) * self._without(event)) / TRUSTED)
+        return float((own.sum() + (TRUSTED - len(own)) * self.expected[event]) / TRUSTED)
 
-    def _without(self, event: str) -> float:
+    def without(self, event: str) -> float:
         """Return the mean bill of an event without barriers, as known from the problem [EUR]."""
         rate = self.problem.site.rate(event, ())
         if not self.priced or rate == 0.0:
@@ -165,19 +173,47 @@ def best_of_ends(ends: Sequence[Arm]) -> Arm:
     return min((a for a in ends if a.excess("lower") <= most), key=lambda a: a.objective())
 
 
-def error(arm: Arm, nothing: Arm) -> float:
-    """Return the variance of the estimate of Z of an arm.
+def remaining(arm: Arm, nothing: Arm) -> tuple[float, float]:
+    """Return the estimated risk with the layout of an arm and the variance of the estimate.
 
-    The sample of each event is extended by one release that deviates from the mean by the standard
-    deviation without barriers.
+    The risk is Z without the annual cost of the barriers [EUR per m and year]. Its estimate is a
+    regression on the known cost without barriers, since the releases may by chance be more or less
+    harmful than usual. An event without releases has its expected cost.
+
+    Parameters
+    ----------
+    arm, nothing : Arm
+        The arm, and the arm without barriers with the same releases.
     """
-    total = 0.0
+    value = variance = 0.0
     for name, rate in arm.rates.items():
-        own = arm.bills(name)
-        if len(own):
-            squares = float(np.square(own - own.mean()).sum()) + nothing.spread(name) ** 2
-            total += rate * rate * squares / len(own) ** 2
-    return total
+        own, bare = arm.bills(name), nothing.bills(name)
+        n, usual = len(own), arm.without(name)
+        if n == 0:
+            value += rate * arm.expected[name]
+            variance += (rate * UNSEEN * usual) ** 2
+            continue
+        left, slope = own, 0.0
+        if len(bare) == n and arm.priced:
+            slope = _slope(own, bare)
+            left = own - slope * bare
+        value += rate * max(float(left.mean()) + slope * usual, 0.0)
+        squares = float(np.square(left - left.mean()).sum()) + nothing.spread(name) ** 2
+        variance += rate * rate * squares / n**2
+    return value, variance
+
+
+UNSEEN = 0.2
+"""Standard deviation of a forecast cost of an event over its cost without barriers [-]."""
+
+
+def _slope(own: Floats, bare: Floats) -> float:
+    """Return the slope of the regression of bills on those without barriers, from 0 to 1."""
+    if len(own) < 3:
+        return 0.0
+    apart = bare - bare.mean()
+    squares = float(apart @ apart)
+    return min(max(float(apart @ own) / squares, 0.0), 1.0) if squares > 0.0 else 0.0
 
 
 def behind(arm: Arm, other: Arm, nothing: Arm) -> float:
@@ -254,8 +290,8 @@ HOPELESS = 4.0
 that is as good as the best is dropped in about one of a hundred races of a hundred candidates."""
 
 PROTECTED = 2
-"""Number of candidates of every kind that the first round keeps unless they are far behind, because
-pairs are formed from the best of each kind."""
+"""Number of candidates of every kind that the first round keeps unless they are far behind, so that
+the second round compares different kinds."""
 
 
 class Track:
@@ -267,12 +303,15 @@ class Track:
         The candidate without barriers, whose standard deviations are used for other candidates.
     seen : dict of Layout to Arm
         Every candidate with its releases of the last race in which it took part.
+    expect : callable
+        Returns the expected mean bill of each event with a layout [EUR], or None.
     """
 
     def __init__(self, ledger: Ledger):
         self.ledger, self.problem = ledger, ledger.problem
         self.nothing = Arm(ledger.problem, ())
         self.seen: dict[Layout, Arm] = {}
+        self.expect: Callable[[Layout], Mapping[str, float] | None] = lambda _: None
         self._next: dict[tuple[str, str], int] = {}
 
     def race(
@@ -283,7 +322,6 @@ class Track:
         keep: int,
         stage: str = "search",
         strict: bool = False,
-        leaders: Sequence[Arm] = (),
     ) -> list[Arm]:
         """Return the best `keep` candidates of a race, or none if the budget is too small.
 
@@ -302,12 +340,11 @@ class Track:
             Stream of the releases.
         strict : bool
             Whether a target counts as missed unless its upper bound meets it.
-        leaders : sequence of Arm
-            The best candidates of earlier races, which determine the releases of each event.
         """
         budget = min(budget, self.ledger.left)
         end = self.ledger.left - budget
-        alive = [Arm(self.problem, layout, strict) for layout in dict.fromkeys(layouts)]
+        fresh = dict.fromkeys(layouts)
+        alive = [Arm(self.problem, layout, strict, self.expect(layout)) for layout in fresh]
         if len(alive) > keep:  # the budget must suffice for a first and a second round
             alive = alive[: max(keep, int(budget / (first * (1.0 + KEPT))))]
         rounds = max(1, math.ceil(math.log(max(1.0, len(alive) / keep)) / -math.log(KEPT)))
@@ -315,7 +352,7 @@ class Track:
             each = (self.ledger.left - end) // ((rounds - done) * max(1, len(alive)))
             if done == 0 and rounds > 1:
                 each = max(first, each)
-            if not self._round(alive, each, end, stage, alive[: 2 * keep] if done else leaders):
+            if not self._round(alive, each, end, stage, alive[: 2 * keep] if done else []):
                 alive = alive if done else []
                 break
             alive = self._survivors(alive, keep, done == rounds - 1, done == 0)
@@ -324,7 +361,8 @@ class Track:
     def look(self, layouts: Iterable[Layout], each: int, budget: int) -> list[Arm]:
         """Return candidates with `each` releases, as many as the budget allows."""
         budget = min(budget, self.ledger.left)
-        arms = [Arm(self.problem, layout) for layout in dict.fromkeys(layouts)]
+        fresh = dict.fromkeys(layouts)
+        arms = [Arm(self.problem, layout, False, self.expect(layout)) for layout in fresh]
         arms = arms[: budget // max(1, each)]
         return arms if self._round(arms, each, self.ledger.left - budget, "search", []) else []
 

@@ -48,7 +48,8 @@ class Menu:
         corners = [x for x, _ in self.problem.site.slope.points if zone.start < x < zone.end]
         even = np.linspace(zone.start, zone.end, STATIONS)
         apart = [x for x in even if not corners or np.abs(np.subtract(corners, x)).min() >= FINEST]
-        return np.unique(np.round([*apart, *corners], 2))
+        rounded = np.round([*apart, *corners], 2)
+        return np.unique(np.clip(rounded, zone.start, zone.end))  # the ends of the zone exactly
 
     def lone(self, kind: str) -> list[Barrier]:
         """Return all barriers of a kind that may be built, at all stations and of all sizes."""
@@ -81,7 +82,8 @@ class Menu:
         if barrier.deflection > 0.0:
             road = self.problem.site.road.start
             last = min(last, road - barrier.extent - barrier.deflection)
-        return [math.floor(10.0 * last + 1e-6) / 10.0]
+        rounded = math.floor(10.0 * last + 1e-6) / 10.0
+        return [rounded if rounded >= self.zone.start else self.zone.start]
 
     def neighbours(self, layout: Layout, step: float, level: int) -> Iterator[Layout]:
         """Yield layouts that differ from a layout in one station or one size of one barrier.

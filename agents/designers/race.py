@@ -40,6 +40,8 @@ BATCHES = 8
 """Largest number of batches."""
 BOLD = 1.0
 """Number of standard deviations below the mean by which layouts are ranked for simulation [-]."""
+BOLDEST = 3.0
+"""The same for the first barrier of each kind."""
 BEST_OF = 12
 """Number of single barriers of each kind from which pairs are formed."""
 CENTRES = 2
@@ -75,10 +77,10 @@ def design(
     surrogate = forecast_pool(ledger, menu, known)
     track.expect = surrogate.expect
     explore(track, menu, surrogate, int(EXPLORE * simulations))
-    found = surrogate.best(FINALISTS if simulations > 1000 else 6)
+    budget, least = int(FINAL * simulations), 3 * len(problem.site.events)
+    found = surrogate.best(min(FINALISTS, max(1, budget // (4 * least) - 1)))
     finalists = list(dict.fromkeys([(), *found, *known]))
-    budget = int(FINAL * simulations)
-    first = max(2 * len(problem.site.events), budget // (3 * len(finalists)))
+    first = max(least, budget // (3 * len(finalists)))
     ends = track.race(finalists, budget, first, keep=3, stage="final", strict=True)
     chosen = choose(surrogate, ends, track.seen.get((), track.nothing))
     return ledger.result(ledger.evaluate(chosen, "report", ledger.left))
@@ -107,6 +109,16 @@ def firsts(surrogate: Surrogate, n: int) -> list[Layout]:
             if len(own) < n:
                 own.setdefault(at, layout)
     return [layout for own in kept.values() for layout in own.values()]
+
+
+def contenders(surrogate: Surrogate) -> list[Layout]:
+    """Return the best single barrier of each kind that may be better than the best of all.
+
+    A forecast may be wrong for a whole kind of barrier.
+    """
+    most = float(surrogate.value().min()) if surrogate.layouts else 0.0
+    hoped = surrogate.value(hope=BOLDEST)
+    return [x for x in firsts(surrogate, 1) if hoped[surrogate.place[x]] <= most]
 
 
 def joined(
@@ -146,9 +158,9 @@ def explore(
         count = (ledger.left - end) // (each * (batches - i)) - 1
         if count < 1:
             break
-        wanted: dict[Layout, None] = {}
+        wanted = dict.fromkeys(contenders(surrogate)[: count // 2] if i == 0 else ())
+        share = max(1, (count - len(wanted)) // len(prices))
         for price in prices:
-            share = max(1, count // len(prices))
             wanted |= dict.fromkeys(surrogate.promising(share, BOLD, price))
         found = track.look([(), *wanted], each, ledger.left - end)
         if not found:

@@ -80,11 +80,15 @@ class Surrogate:
         self._batches = 0
 
     def add(self, layouts: Iterable[Layout]) -> None:
-        """Add layouts to the pool; those that cost more than all the risk is worth are left out."""
+        """Add layouts to the pool.
+
+        Those that cost more than the whole risk are left out unless there is a target.
+        """
         site = self.problem.site
         new = [x for x in dict.fromkeys(layouts) if x and x not in self.place]
         annual = [site.annual(x) if self.priced else 0.0 for x in new]
         most = self.worth + (site.annual(()) if self.priced else 0.0)
+        most = math.inf if self.has_targets else most
         new = [x for x, a in zip(new, annual, strict=True) if a < most]
         if not new:
             return

@@ -14,7 +14,7 @@ from rigdda import BadInput, check
 DEFAULT = "race"
 """Name of the default designer."""
 
-DESIGNERS = ("cma", "constant", "convex", "pareto", "ppo", "race", "random", "rule", "tpe")
+DESIGNERS = ("cma", "constant", "convex", "pareto", "ppo", "race", "random", "rule", "tpe", "value")
 
 
 def module(name: str) -> ModuleType:

@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from rigdda import Layout
 from rigdda.agents.designers.catalogue import ensemble_for
 from rigdda.agents.designers.convex import offered, unsearched
-from rigdda.agents.designers.forecast import Forecast, value_network
+from rigdda.agents.designers.forecast import Forecast, Value, value_network
 from rigdda.agents.designers.menu import FINEST, Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, search
 from rigdda.agents.designers.racing import Arm, Track, best_of_ends
@@ -86,10 +86,15 @@ def design(
     return ledger.result(ledger.evaluate(chosen, "report", ledger.left))
 
 
-def forecast_pool(ledger: Ledger, menu: Menu, known: Sequence[Layout]) -> Surrogate:
-    """Return the forecasts of all single barriers, of pairs of the best and of `known` layouts."""
+def forecast_pool(
+    ledger: Ledger, menu: Menu, known: Sequence[Layout], value: Value | None = None
+) -> Surrogate:
+    """Return the forecasts of all single barriers, of pairs of the best and of `known` layouts.
+
+    `value` is the network for the forecasts, by default the one that ships with the package.
+    """
     problem = ledger.problem
-    forecast = Forecast(problem, ensemble_for(ledger, menu.stations), value_network())
+    forecast = Forecast(problem, ensemble_for(ledger, menu.stations), value or value_network())
     surrogate = Surrogate(problem, forecast)
     singles = [(b,) for kind in problem.kinds for b in menu.lone(kind)]
     surrogate.add([*known, *singles])

@@ -203,7 +203,7 @@ class Surrogate:
             column = self._posterior_column(i)
             for other in columns:
                 column = column - other * other[i]
-            column = column / np.sqrt(max(column[i], 0.0) + noise)
+            column = column / np.sqrt(max(column[i], 0.0) + noise + 1e-6)
             columns.append(column)
             variance = np.maximum(variance - np.square(column), 0.0)
         return chosen

@@ -34,8 +34,9 @@ OF_SITE, OF_KIND = 0.2, 0.25
 on the same sites."""
 COMMON = 0.5
 """Correlation of the errors of layouts that were simulated on the same releases [-]."""
-MISSED = 2.0
-"""Penalty on the forecast excess over a target, in units of the risk without barriers [-]."""
+MISSED = 1e4
+"""Penalty on the excess over a target, which ranks layouts that miss it behind all others, in units
+of the risk without barriers [-]."""
 
 
 class Surrogate:
@@ -54,6 +55,8 @@ class Surrogate:
         The pool.
     mean, deviation : (M,) arrays
         Estimated remaining share of the risk of each layout and its standard deviation [-].
+    excess : (M,) array
+        Estimated excess over a target [-].
     """
 
     def __init__(self, problem: DesignProblem, forecast: Forecast):
@@ -74,10 +77,10 @@ class Surrogate:
         self._barriers: dict[Barrier, int] = {}
         self._numbers: list[tuple[float, ...]] = []
         self.mean, self.deviation, self.annual, self.capital, self.excess = np.zeros((5, 0))
-        self._prior = np.zeros(0)
+        self._prior, self._missed_before = np.zeros((2, 0))
         self._index = np.zeros((0, 1), dtype=np.int64)
         self._seen: list[tuple[int, float, float, int]] = []
-        self._batches = 0
+        self._batches, self._missed = 0, list[float]()
 
     def add(self, layouts: Iterable[Layout]) -> None:
         """Add layouts to the pool.
@@ -105,7 +108,8 @@ class Surrogate:
         more = [[site.annual(x) if self.priced else 0.0 for x in new]]
         self.annual = np.concatenate([self.annual, *more])
         self.capital = np.concatenate([self.capital, [site.capital(x) for x in new]])
-        self.excess = np.concatenate([self.excess, [self._forecast.excess(x) for x in new]])
+        missed = [self._forecast.excess(x) for x in new]
+        self._missed_before = np.concatenate([self._missed_before, missed])
         most_barriers = max(map(len, self.layouts))
         index = np.full((len(self.layouts), most_barriers), -1, dtype=np.int64)
         old = self._index
@@ -123,8 +127,7 @@ class Surrogate:
                 value, variance = remaining(arm, nothing)
                 number = self._batches
                 self._seen.append((row, value / self.worth, variance / self.worth**2, number))
-                if self.has_targets:
-                    self.excess[row] = arm.shortfall()
+                self._missed.append(arm.shortfall() if self.has_targets else 0.0)
         self._batches += 1
         self._update()
 
@@ -160,9 +163,13 @@ class Surrogate:
         hope : float
             Number of standard deviations below the mean.
         """
+        return self._hoped(self.deviation, hope, price)
+
+    def _hoped(self, deviation: Floats, hope: float, price: float) -> Floats:
+        """Return Z of every layout at `hope` standard deviations below the mean, (M,) [-]."""
         costs = (self.annual + price * self.capital) / self.worth
-        left = np.maximum(self.mean - hope * self.deviation, 0.0)
-        return costs + left + MISSED * self.excess
+        left = np.maximum(self.mean - hope * deviation, 0.0)
+        return costs + left + MISSED * np.maximum(self.excess - hope * deviation, 0.0)
 
     def joint(self, arm: Arm, nothing: Arm) -> float:
         """Return Z of an arm over the risk without barriers, from its releases and the pool [-].
@@ -190,12 +197,11 @@ class Surrogate:
             return []
         variance = np.square(self.deviation)
         noise = float(np.median([seen[2] for seen in self._seen])) if self._seen else NOISE
-        costs = (self.annual + price * self.capital) / self.worth + MISSED * self.excess
         columns: list[Floats] = []
         chosen: list[Layout] = []
         taken: set[int] = set()
         for _ in range(min(n, len(self.layouts))):
-            hoped = costs + np.maximum(self.mean - hope * np.sqrt(variance), 0.0)
+            hoped = self._hoped(np.sqrt(variance), hope, price)
             hoped[list(taken)] = np.inf
             i = int(np.argmin(hoped))
             taken.add(i)
@@ -218,6 +224,7 @@ class Surrogate:
         self.mean = self._prior.copy()
         spread = self._spread()
         self.deviation = spread.copy()
+        self.excess = self._missed_before
         if not len(rows):
             return
         found, noise, batch = np.array([seen[1:] for seen in self._seen]).T
@@ -227,6 +234,9 @@ class Surrogate:
         self._alike_seen = alike
         self._weight = np.linalg.solve(among, alike)
         self.mean = self._prior + self._weight.T @ (found - self._prior[rows])
+        if self.has_targets:
+            more = self._weight.T @ (np.array(self._missed) - self._missed_before[rows])
+            self.excess = np.maximum(self._missed_before + more, 0.0)
         explained = np.einsum("ij,ij->j", self._weight, alike)
         self.deviation = np.sqrt(np.maximum(np.square(spread) - explained, 0.0))
 

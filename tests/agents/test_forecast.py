@@ -69,6 +69,7 @@ def test_the_surrogate_believes_what_it_has_seen(
     assert len(set(chosen)) == 4
     row = surrogate.place[chosen[0]]
     surrogate._seen.append((row, before[row] + 0.3, 1e-5, 0))
+    surrogate._missed.append(0.0)
     surrogate._update()
     assert surrogate.mean[row] == pytest.approx(before[row] + 0.3, abs=0.03)
     assert surrogate.deviation[row] < 0.2 * spread[row]

@@ -279,7 +279,7 @@ def fit(samples: list[Samples], seed: int, notes: dict[str, str]) -> Network:
     return Network(mean, scale, layers, notes)
 
 
-Layer = tuple[Floats, Floats]
+Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 def _member(torch: Any, x: Any, y: Any, w: Any, seed: int) -> list[Layer]:
@@ -308,7 +308,7 @@ def _member(torch: Any, x: Any, y: Any, w: Any, seed: int) -> list[Layer]:
             loss.backward()
             optimiser.step()
             schedule.step()
-    arrays = [layer.detach().numpy() for layer in layers]
+    arrays = [layer.detach().numpy().astype(np.float32) for layer in layers]
     return list(zip(arrays[::2], arrays[1::2], strict=True))
 
 
@@ -319,7 +319,7 @@ def _block_diagonal(layers: tuple[Layer, ...]) -> Layer:
     if weights[0].shape[1] != HIDDEN:
         return np.concatenate(weights), bias
     rows, columns = weights[0].shape
-    out = np.zeros((len(weights) * rows, len(weights) * columns), dtype=weights[0].dtype)
+    out = np.zeros((len(weights) * rows, len(weights) * columns), dtype=np.float32)
     for k, weight in enumerate(weights):
         out[k * rows : (k + 1) * rows, k * columns : (k + 1) * columns] = weight
     return out, bias

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.script import Number, interval, main, say, write
-from experiments.search_gain import FRESH, MOST, QUICK_VERIFY, VERIFY, blocks, load
+from experiments.search_gain import FRESH, QUICK_VERIFY, VERIFY, load, posed
 from rigdda import Layout, sites
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Value
@@ -95,14 +95,8 @@ def run(quick: bool, out: Path) -> Number:
     path = out / "no_search.csv"
     rows: list[Any] = load(path)
     known = {r["site"] for r in rows}
-    count = QUICK_SITES if quick else SITES
-    done = 0
-    for name in sites.split("test"):
-        problem = DesignProblem(name)
-        if done == count or blocks(problem) >= MOST:
-            continue
-        done += 1
-        if name not in known:
+    for problem in posed(QUICK_SITES if quick else SITES, sites.split("test")):
+        if problem.site.name not in known:
             rows += study(problem, QUICK_VERIFY if quick else VERIFY)
             write(path, rows)
     value = relative(rows, "value")

@@ -39,10 +39,10 @@ MOST = 100
 """Number of blocks of an event from which a site is left out."""
 
 
-def posed(count: int) -> list[DesignProblem]:
+def posed(count: int, names: Sequence[str]) -> list[DesignProblem]:
     """Return the problems of the first sites without large masses, those of few blocks first."""
     found: list[DesignProblem] = []
-    for name in sites.split("validation")[SKIPPED:]:
+    for name in names:
         problem = DesignProblem(name)
         if len(found) < count and blocks(problem) < MOST:
             found.append(problem)
@@ -93,7 +93,8 @@ def run(quick: bool, out: Path) -> Number:
     rows: list[Any] = load(path)
     known = {(r["site"], r["designer"], int(r["budget"])) for r in rows}
     budgets = QUICK_BUDGETS if quick else BUDGETS
-    problems = posed(QUICK_SITES if quick else SITES)
+    names = sites.split("validation")[SKIPPED:]
+    problems = posed(QUICK_SITES if quick else SITES, names)
     for budget in budgets:
         for problem in problems:
             for name in NAMES:

@@ -188,10 +188,10 @@ class Forecast:
 
     def _share(self, stopped: Bools, factor: Floats) -> Floats:
         """Return the remaining share of the risk of each event if some blocks are stopped, (E,)."""
-        left = self._whole - np.bincount(
-            self._release[stopped], self._volume[stopped], minlength=len(self._whole)
-        )
-        left = np.where(left <= 1e-9 * self._whole, 0.0, left).astype(np.float64)
+        volume = self._volume[stopped]
+        taken = np.bincount(self._release[stopped], volume, minlength=len(self._whole))
+        remains: Floats = np.asarray(self._whole - taken, dtype=np.float64)
+        left: Floats = np.where(remains <= 1e-9 * self._whole, 0.0, remains)
         harm = left if self._free else self.effects.harm(left)
         return np.minimum(self._in_event @ (harm * factor) / self._risk, 1.0)
 

@@ -28,7 +28,7 @@ MODULE = "rigdda.agents.exam.entries"
 STILL = ("nothing", "constant", "engineering_rule", "random_layout")
 """Entries that do not search."""
 
-SEARCHES = ("random_search", "race", "cma", "tpe", "convex")
+SEARCHES = ("random_search", "race", "cma", "tpe", "convex", "value")
 """Entries that search."""
 
 BUDGETS, QUICK_BUDGETS = (0, 500, 2_000), (0, 60)

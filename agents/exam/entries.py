@@ -65,6 +65,11 @@ def convex(task: Task) -> Layout:
     return _search(task, "convex")
 
 
+def value(task: Task) -> Layout:
+    """Build the layout with the least forecast Z, from releases without barriers."""
+    return _search(task, "value")
+
+
 def _search(task: Task, name: str) -> Layout:
     """Return the layout of a designer."""
     if task.left < LEAST:

@@ -964,7 +964,7 @@ def train(model: str, sites: int, episodes: int, seed: int, out: Path | None) ->
     from rigdda.agents import training, value_training
 
     if model == "value":
-        asked = value_training.Terms(sites, seed)
+        asked = value_training.ValueTerms(sites, seed)
         folder = folder_for(out, "train", *value_training.FILES)
         with kept(folder), progress(asked.sites) as tick:
             value_training.train(asked, folder, tick)

@@ -59,8 +59,8 @@ FILES = ("value.json", "value.safetensors")
 
 
 @dataclass(frozen=True, slots=True)
-class Terms:
-    """Terms of a training.
+class ValueTerms:
+    """ValueTerms of a training.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Samples:
             return cls(file["features"], file["share"], file["weight"])
 
 
-def train(terms: Terms, out: Path, tick: Tick) -> Network:
+def train(terms: ValueTerms, out: Path, tick: Tick) -> Network:
     """Train the value network, or continue an interrupted training.
 
     Raises
@@ -132,7 +132,7 @@ def train(terms: Terms, out: Path, tick: Tick) -> Network:
     return network
 
 
-def _agree(terms: Terms, out: Path) -> None:
+def _agree(terms: ValueTerms, out: Path) -> None:
     """Record the terms in the folder, or check that they are those of the training in it."""
     file, asked = out / "value.json", asdict(terms) | {"mechanics": mechanics()}
     if file.is_file():

@@ -68,7 +68,13 @@ FEWER = {
 }
 """What is shorter in the Python of a page than the reader has it."""
 
-SLOW = {"README.md", "PYPI.md", "docs/tutorials/researcher.md"}
+SLOW = {
+    "README.md",
+    "PYPI.md",
+    "docs/tutorials/researcher.md",
+    "docs/howto/corridor.md",
+    "docs/howto/step_and_fidelity.md",
+}
 """Pages on sites of which nothing is known yet: a thousand releases each come first."""
 
 SKIPPED = {"", "text", "{toctree}", "{eval-rst}", "{code-cell}"}

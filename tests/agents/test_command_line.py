@@ -297,6 +297,7 @@ def test_sites_lists_every_built_in_site_and_its_events(tmp_path: Path) -> None:
     assert "group" in words and "bench" in words
 
 
+@pytest.mark.slow
 def test_designers_are_compared_in_money(tmp_path: Path) -> None:
     options = ("--designer", "rule", "--budget", 60)
     more = ("--sites", 2, "--verify", 40, "--out", "o")

@@ -92,7 +92,7 @@ def test_a_training_of_the_value_network_continues(
     for name, number in dict(ENSEMBLE=4, LEAST=3, FEWEST=3, MASS=9).items():
         monkeypatch.setattr(value_training, name, number)
     monkeypatch.setattr(value_training, "DesignProblem", lambda name: DesignProblem(SITE))
-    terms = value_training.Terms(2, 3)
+    terms = value_training.ValueTerms(2, 3)
     first = value_training.train(terms, tmp_path, lambda *_: None)
     assert first.sizes == [WIDTH, 128, 128, 4] and first.finite
     (tmp_path / "random-1.npz").unlink()
@@ -102,4 +102,4 @@ def test_a_training_of_the_value_network_continues(
         assert np.array_equal(one, two)
     assert saved.notes["command"] == "rigdda train --model value --sites 2 --seed 3"
     with pytest.raises(BadInput, match="another folder"):
-        value_training.train(value_training.Terms(3, 3), tmp_path, lambda *_: None)
+        value_training.train(value_training.ValueTerms(3, 3), tmp_path, lambda *_: None)

@@ -142,12 +142,14 @@ def test_without_changes_it_is_the_table_of_the_design(designed: Path) -> None:
         assert (float(row["objective"]), float(row["cost"])) == (e.objective, e.cost)
         assert (float(row["objective_low"]), float(row["objective_high"])) == e.ci
         assert float(row["debris_share"]) == e.debris_share
-    assert done.chosen.evaluation.layout in {case.evaluation.layout for case in done.cases[:-1]}
+    # None meets the target, so one of the verified layouts is chosen, with those of the frontier.
+    verified = {row["barriers"] for row in table if int(row["releases"]) == VERIFIED}
+    assert json.dumps(to_tables(done.chosen.evaluation.layout)) in verified
 
 
 def test_every_layout_of_the_search_takes_part(designed: Path) -> None:
     kept, done = archive.read(designed), reprice.reprice(designed, {"consequences.closure": 1e6})
-    assert done.tried == len(kept.releases) > 20
+    assert done.tried == len(kept.releases) > 10
     names = {str(one.barriers) for one in kept.releases}
     searched = {row["barriers"] for row in rows(designed / "evaluations.csv")}
     assert len(names) == len(searched)

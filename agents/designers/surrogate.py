@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,8 @@ COMMON = 0.5
 MISSED = 1e4
 """Penalty on the excess over a target, which ranks layouts that miss it behind all others, in units
 of the risk without barriers [-]."""
+NOISE = 0.01
+"""Variance of the estimate of a candidate before any is known, over the squared risk [-]."""
 
 
 class Surrogate:
@@ -272,16 +275,11 @@ class Surrogate:
         return covariance
 
 
-NOISE = 0.01
-"""Variance of the estimate of a candidate before any is known, over the squared risk [-]."""
-
-
 def _coordinates(barrier: Barrier, near: float) -> tuple[float, ...]:
     """Return a number for the kind and scaled numbers that tell how alike two barriers are."""
-    kind = float(sum(ord(c) * 131**i for i, c in enumerate(barrier.kind)) % 1_000_003)
+    kind = float(crc32(barrier.kind.encode()))
     if isinstance(barrier, Mesh):
-        option = float(sum(ord(c) * 131**i for i, c in enumerate(barrier.option)) % 1_000_003)
-        return kind, 1e3 * option, 0.0, 0.0, 0.0
+        return kind, float(crc32(barrier.option.encode())), 0.0, 0.0, 0.0
     tall = getattr(barrier, "height", 0.0) or getattr(barrier, "depth", 0.0)
     size = getattr(barrier, "width", 0.0) or getattr(barrier, "thickness", 0.0)
     named = getattr(barrier, "energy_class", None) or getattr(barrier, "capacity", None)

@@ -143,7 +143,7 @@ def test_without_changes_it_is_the_table_of_the_design(designed: Path) -> None:
         assert (float(row["objective_low"]), float(row["objective_high"])) == e.ci
         assert float(row["debris_share"]) == e.debris_share
     # None meets the target, so one of the verified layouts is chosen, with those of the frontier.
-    verified = {row["barriers"] for row in table if int(row["releases"]) == VERIFIED}
+    verified = {r["barriers"] for r in table if r["stage"] in ("verification", "frontier")}
     assert json.dumps(to_tables(done.chosen.evaluation.layout)) in verified
 
 

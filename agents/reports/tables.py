@@ -228,14 +228,17 @@ def sites(found: Iterable[Site]) -> Table:
 
 
 def empty_table(head: Sequence[str]) -> Table:
-    """Return an empty table with text aligned on the left and numbers on the right."""
+    """Return an empty table with text aligned on the left and numbers on the right.
+
+    Values with their intervals stay on one line. Where a table is too wide, text is broken instead.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for i, name in enumerate(head):
         left = i == 0 or name in WORDS
-        table.add_column(name, justify="left" if left else "right")
+        table.add_column(name, justify="left" if left else "right", no_wrap="(95 %)" in name)
     return table
 
 

@@ -940,9 +940,10 @@ def sensitivity(
 
 
 @cli.command()
-@click.option("--model", type=click.Choice(("policy", "value")), default="policy",
-              show_default=True,
-              help="A policy trained with PPO, or the value network.")  # fmt: skip
+@click.option("--model", type=click.Choice(("policy", "value", "corridor")),
+              default="policy", show_default=True,
+              help="A policy trained with PPO, the value network, or the agent for "
+              "corridors.")  # fmt: skip
 @count_option("--sites", 2, 512, "Number of random sites to train on.")
 @count_option("--episodes", 0, 49152, "Number of episodes, for a policy.")
 @seed_option("Seed of all random numbers.", SEED)
@@ -958,11 +959,26 @@ def train(model: str, sites: int, episodes: int, seed: int, out: Path | None) ->
     barriers. It is trained on simulated layouts of every site, about half a minute each. Writes
     value.safetensors. The one that ships with the package is the prior of the designer `race`.
 
-    An interrupted training continues where it stopped and gives the same result. Requires the extra
-    `rl`.
+    The agent for corridors needs to know what money will gain in the sections to come. This is
+    computed from forecasts of the value network on every site, about five seconds each. Writes
+    prospect.safetensors.
+
+    An interrupted training continues where it stopped and gives the same result; the one of the
+    agent for corridors starts again. A policy and the value network require the extra `rl`.
     """
     from rigdda.agents import training, value_training
+    from rigdda.agents.corridor import agent
 
+    if model == "corridor":
+        folder = folder_for(out, "train", agent.FILE.name)
+        with kept(folder), progress(sites) as tick:
+            found = agent.train(sites, seed, folder, tick)
+        most = 100.0 * found.gain[-1]
+        click.echo(
+            f"forecasts on {sites} sites: unlimited money gains {most:.0f} % of the annual cost; "
+            f"{agent.FILE.name} is in {folder}"
+        )
+        return
     if model == "value":
         asked = value_training.ValueTerms(sites, seed)
         folder = folder_for(out, "train", *value_training.FILES)

@@ -60,7 +60,7 @@ FILES = ("value.json", "value.safetensors")
 
 @dataclass(frozen=True, slots=True)
 class ValueTerms:
-    """ValueTerms of a training.
+    """Terms of a training of the value network.
 
     Parameters
     ----------

@@ -34,6 +34,7 @@ from experiments.corridor_pools import FOLDER, Pool, family, pools
 from experiments.script import Number, interval, main, say, write
 from rigdda import Layout, Outcome
 from rigdda.agents.corridor import programme
+from rigdda.agents.corridor.agent import CorridorAgent
 from rigdda.agents.corridor.programme import Options
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
@@ -125,6 +126,7 @@ class Course:
     def __init__(self, available: Sequence[Pool], sections: int):
         self.known = {own.problem.site.name: Known(own) for own in available}
         self.env = CorridorDesign(list(self.known), sections=sections, releases=1)
+        self.agent = CorridorAgent()
 
     def play(self, seed: int, budget: float, policy: Policy) -> float:
         """Return the sum of the rewards of an episode."""
@@ -290,6 +292,9 @@ def scores(
         if name != "nothing":
             out["no search", name, "shared"] = course.play(seed, budget, shared(policy))
     out["no search", "threshold", "in order"] = course.play(seed, budget, threshold)
+    out["no search", "agent", "in order"] = course.play(
+        seed, budget, lambda env, pool: course.agent.layout(env)
+    )
     for name, method in (
         ("integer programme", programme.optimum),
         ("worst section first", programme.worst_first),

@@ -95,12 +95,21 @@ def forecast_pool(
     """
     problem = ledger.problem
     forecast = Forecast(problem, ensemble_for(ledger, menu.stations), value or value_network())
-    surrogate = Surrogate(problem, forecast)
-    singles = [(b,) for kind in problem.kinds for b in menu.lone(kind)]
-    surrogate.add([*known, *singles])
-    ledger.starts |= {*known, *singles}
+    ledger.starts |= {*known, *single_barriers(menu)}
+    return forecasts_of(forecast, menu, known)
+
+
+def single_barriers(menu: Menu) -> list[Layout]:
+    """Return all layouts of one barrier."""
+    return [(b,) for kind in menu.problem.kinds for b in menu.lone(kind)]
+
+
+def forecasts_of(forecast: Forecast, menu: Menu, known: Sequence[Layout]) -> Surrogate:
+    """Return forecasts of all single barriers, of pairs of the best and of `known` layouts."""
+    surrogate = Surrogate(menu.problem, forecast)
+    surrogate.add([*known, *single_barriers(menu)])
     best = firsts(surrogate, BEST_OF)
-    surrogate.add(joined(problem, best, best))
+    surrogate.add(joined(menu.problem, best, best))
     return surrogate
 
 

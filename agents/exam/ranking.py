@@ -137,9 +137,11 @@ def table(summaries: Sequence[dict[str, Any]]) -> Table:
     head = ("track", "budget", "tasks", "score (95 %)", "distance", "releases used")
     out = tables.empty_table(head)
     for row in summaries:
-        ends = f"{row['score_low']:.3f} to {row['score_high']:.3f}"
+        score = f"{row['score']:.3f}"
+        if row["score_low"] < row["score_high"]:  # of one task per stratum, nothing is resampled
+            score += f" ({row['score_low']:.3f} to {row['score_high']:.3f})"
         out.add_row(
-            row["track"], f"{row['budget']:,}", str(row["tasks"]), f"{row['score']:.3f} ({ends})",
+            row["track"], f"{row['budget']:,}", str(row["tasks"]), score,
             f"{row['distance']:.3f}", f"{row['used']:,.0f}",
         )  # fmt: skip
     return out

@@ -287,6 +287,17 @@ def test_interquartile_mean_and_its_interval() -> None:
     assert inside >= 85
 
 
+@pytest.mark.parametrize(
+    ("high", "printed"), [(0.9, "0.900"), (0.95, "0.900 (0.900 to 0.950)")], ids=["none", "some"]
+)
+def test_an_interval_without_resampling_is_not_printed(high: float, printed: str) -> None:
+    row = {
+        "track": "sites", "budget": 500, "tasks": 2, "score": 0.9, "score_low": 0.9,
+        "score_high": high, "distance": 0.1, "used": 500.0,
+    }  # fmt: skip
+    assert list(ranking.table([row]).columns[3].cells) == [printed]
+
+
 def test_an_exam_without_references_is_refused(folder: Path) -> None:
     asked = specification.load(folder / "spec.toml")
     with pytest.raises(BadInput, match="exam_reference"):

@@ -19,7 +19,7 @@ first. The reference is the offline optimum, the integer programme with all layo
 half of the outcomes.
 
 The table has the mean relative reduction of the annual cost by budget and its share of that of the
-offline optimum, with 95 % intervals over corridors.
+offline optimum, with 95 % intervals over corridors, and the paired difference from the threshold.
 """
 
 from __future__ import annotations
@@ -263,12 +263,14 @@ def run(quick: bool, out: Path) -> Number:
         for (track, method, money), values in found.items():
             mean, half = interval(values)
             behind, behind_half = interval(np.subtract(found[OPTIMUM], values))
+            ahead, ahead_half = interval(np.subtract(values, found[THRESHOLD]))
             rows.append(
                 {
                     "budget": budget, "track": track, "method": method, "money": money,
                     "reduction": mean, "half_width": half,
                     "share_of_optimum": float(mean / optimum), "behind_optimum": behind,
-                    "behind_half_width": behind_half, "corridors": corridors,
+                    "behind_half_width": behind_half, "ahead_of_threshold": ahead,
+                    "ahead_half_width": ahead_half, "corridors": corridors,
                 }
             )  # fmt: skip
             say(f"{budget:g} EUR/m, {track}: {method}, {money}: {mean:.3f} +- {half:.3f}")
@@ -281,6 +283,9 @@ def run(quick: bool, out: Path) -> Number:
 OPTIMUM = "reference", "offline optimum", ""
 """Track, method and use of money of the reference."""
 
+THRESHOLD = "no search", "threshold", "in order"
+"""The same of the best method without a search besides the agent."""
+
 
 def scores(
     course: Course, seed: int, budget: float, best: dict[str, str], threshold: Policy
@@ -291,7 +296,7 @@ def scores(
         out["no search", name, "in order"] = course.play(seed, budget, policy)
         if name != "nothing":
             out["no search", name, "shared"] = course.play(seed, budget, shared(policy))
-    out["no search", "threshold", "in order"] = course.play(seed, budget, threshold)
+    out[THRESHOLD] = course.play(seed, budget, threshold)
     out["no search", "agent", "in order"] = course.play(
         seed, budget, lambda env, pool: course.agent.layout(env)
     )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigdda import Scene, Settings, Simulation, Site
-from rigdda.dynamics.constants import OPEN, REST
+from rigdda import Block, Scene, Settings, Simulation, Site, Surface, Terrain
+from rigdda.dynamics.constants import MOST_SWEEPS, OPEN, REST
 from rigdda.dynamics.records import CONTACTS
 from rigdda.validation.scenes import box, incline
 from rigdda.validation.slides import slide
@@ -62,3 +62,22 @@ def test_a_train_slides_as_one_block_does(dt: float) -> None:
     np.testing.assert_allclose(way, way[0], atol=1e-3)
     gain = sim.energy()
     assert gain.friction < 0.0 and gain.impact < 1e-3 * abs(gain.friction)
+
+
+def test_a_thin_block_on_rough_ground_takes_a_limited_number_of_substeps() -> None:
+    """Impacts that sweeps do not resolve took 10,000 substeps in a step, and seconds a release."""
+    plate = [
+        [-0.252, 0.77], [-0.329, 0.783], [-0.533, 0.715], [-0.669, 0.576],
+        [-0.635, 0.513], [-0.558, 0.507], [-0.407, 0.554], [-0.267, 0.653],
+    ]  # fmt: skip
+    surfaces = {"rock": Surface(friction_deg=52.5, restitution=0.21, damping=1.46)}
+    block = Block(np.array(plate), velocity=(0.5, 0.0, 0.0))
+    scene = Scene(Terrain([(-5.0, 2.5), (5.0, -2.5), (9.0, -4.5)]), (block,), surfaces)
+    sim = Simulation(scene, Settings(dt=5e-3))
+    most = 0
+    for _ in range(200):
+        before = sim.diagnostics.sweeps
+        sim.step(1)
+        most = max(most, sim.diagnostics.sweeps - before)
+    each = 4 * MOST_SWEEPS  # with three attempts of a rebound
+    assert 0 < most <= each * (MOST_SWEEPS + 1)

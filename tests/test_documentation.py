@@ -19,7 +19,8 @@ import pytest
 import tomli_w
 
 import rigdda
-from rigdda.agents import cli, studies
+from rigdda import BadInput
+from rigdda.agents import browser, cli, studies
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -127,12 +128,23 @@ def run_shell(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
             run_command(command, monkeypatch)
 
 
+def has_browser() -> bool:
+    """Return whether a browser that prints is installed; a fresh machine may have none."""
+    try:
+        browser.find()
+    except BadInput:
+        return False
+    return True
+
+
 def run_command(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Run a command of `rigdda`; one that would open a window must name a replay."""
     if command.startswith(ELSEWHERE) or command.endswith("bin/pytest"):
         return
     program, *arguments = shlex.split(command)
     assert program.removeprefix(".venv/bin/") == "rigdda", f"no rule for: {command}"
+    if "--pdf" in arguments and not has_browser():
+        arguments.remove("--pdf")
     opened: list[Path] = []
     monkeypatch.setattr("rigdda.replay.viewer.open_viewer", opened.append)
     assert cli.main([*arguments, *SMALL.get(arguments[0], [])]) == 0, command

@@ -960,7 +960,7 @@ def train(model: str, sites: int, episodes: int, seed: int, out: Path | None) ->
     value.safetensors. The one that ships with the package is the prior of the designer `race`.
 
     The agent for corridors needs to know what money will gain in the sections to come. This is
-    computed from forecasts of the value network on every site, about five seconds each. Writes
+    computed from forecasts of the value network on every site, about half a minute each. Writes
     prospect.safetensors.
 
     An interrupted training continues where it stopped and gives the same result; the one of the

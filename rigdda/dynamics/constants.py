@@ -46,11 +46,8 @@ length. With 5 substeps, a silo filled in steps of 10 ms gains up to 1.5 % of th
 energy."""
 
 MOST_SWEEPS = 100
-"""Maximum number of sweeps over the contacts of an island in a substep, and of substeps of a lone
-body in a step. Sweeps stop earlier when none changes a normal velocity by more than the tolerance.
-Without the limit on substeps, a thin plate on a meadow with a coefficient of friction of 1.3 takes
-10,000 substeps in some steps, because sweeps do not resolve its impacts, and seconds for a
-release."""
+"""Maximum number of sweeps over the contacts of an island in a substep. Sweeps stop earlier when
+none changes a normal velocity by more than the tolerance."""
 
 SAME_NORMAL = 0.7
 """Least cosine of the angle between the normals of a vertex's contacts in two successive steps for

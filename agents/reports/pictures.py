@@ -320,6 +320,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
 
     with atomic(path) as part:
         figure.savefig(part, format="png")
+    figure.set_layout_engine("none")  # the second file has the places of the first
     with rc_context(VECTOR), atomic(Path(path).with_suffix(".svg")) as part:
         figure.savefig(part, format="svg", metadata={"Date": None})
 

@@ -12,7 +12,7 @@ from rigdda import Layout, Site
 from rigdda.agents.designers import constant, rule
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports.tables import empty_table, write_rows
-from rigdda.agents.reports.wording import euros, span
+from rigdda.agents.reports.wording import euros, span, unchanged
 from rigdda.envs import DesignProblem, Evaluation, problem
 from rigdda.envs.cost import Interval
 
@@ -98,7 +98,7 @@ def write(path: Path, site: Site, found: Sequence[Bias]) -> None:
     rows = []
     for c in found:
         row: dict[str, Any] = {"site": site.name, "case": c.name, "releases": c.full.releases}
-        row["layout"] = "; ".join(b.label for b in c.full.layout) or "no barrier"
+        row["layout"] = "; ".join(b.label for b in c.full.layout) or unchanged(site)
         for name, e in (("full", c.full), ("fast", c.fast)):
             row |= {f"z_{name}": e.objective, f"{name}_low": e.ci[0], f"{name}_high": e.ci[1]}
         low, high = c.bias_ci

@@ -177,7 +177,7 @@ class Evaluation:
         if self.targets is not None:
             rows.append(("targets", self.targets, "", ""))
         rows.append(("releases", f"{self.releases:,}", "", ""))
-        words = "; ".join(map(describe, self.layout)) or "no barrier"
+        words = "; ".join(map(describe, self.layout)) or "no added barrier"
         head = ("", "mean", "95 % interval", "unit")
         return f"<p>{html.escape(words)}</p>" + display.table(head, rows)
 

@@ -939,16 +939,21 @@ def sensitivity(
     )
 
 
+TRAINING_SITES = {"policy": 512, "value": 96, "corridor": 12}
+"""Default number of training sites by model. Each takes at most an hour on 2 cores."""
+
+
 @cli.command()
-@click.option("--model", type=click.Choice(("policy", "value", "corridor")),
+@click.option("--model", type=click.Choice(tuple(TRAINING_SITES)),
               default="policy", show_default=True,
               help="A policy trained with PPO, the value network, or the agent for "
               "corridors.")  # fmt: skip
-@count_option("--sites", 2, 512, "Number of random sites to train on.")
+@click.option("--sites", type=click.IntRange(2), show_default="512, 96 or 12, by model",
+              help="Number of random sites to train on.")  # fmt: skip
 @count_option("--episodes", 0, 49152, "Number of episodes, for a policy.")
 @seed_option("Seed of all random numbers.", SEED)
 @out_option("train")
-def train(model: str, sites: int, episodes: int, seed: int, out: Path | None) -> None:
+def train(model: str, sites: int | None, episodes: int, seed: int, out: Path | None) -> None:
     """Train a network that designs layouts without a search.
 
     A policy observes the ground, the prices and the rockfall without barriers, and is improved by
@@ -969,6 +974,7 @@ def train(model: str, sites: int, episodes: int, seed: int, out: Path | None) ->
     from rigdda.agents import training, value_training
     from rigdda.agents.corridor import agent
 
+    sites = sites or TRAINING_SITES[model]
     if model == "corridor":
         folder = folder_for(out, "train", agent.FILE.name)
         with kept(folder), progress(sites) as tick:

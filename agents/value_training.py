@@ -20,7 +20,7 @@ from rigdda import BadInput, Layout, __version__, check, sites
 from rigdda.agents import limits
 from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble
 from rigdda.agents.designers.constant import constant
-from rigdda.agents.designers.forecast import Forecast
+from rigdda.agents.designers.forecast import Forecast, forecast_seeds
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import joined
@@ -36,13 +36,13 @@ Tick = Callable[[int, str], None]
 
 SPLIT = "train"
 """Split with the sites for training."""
-ENSEMBLE, HEAVY_ENSEMBLE, FEW = 40, 6, 6
-"""Releases of each event in an ensemble, the same for events of more than `HEAVY` blocks, and the
-number to which the ensemble is reduced for a second set of features, as with a small budget."""
+FEW = 6
+"""Number of releases of each event to which an ensemble is reduced for a second set of features, as
+with a small budget."""
 RELEASES, LEAST, FEWEST = 72, 10, 4
 """Releases of a layout over all events, the least number for an event, and the same for an event of
 more than `GROUP` blocks."""
-GROUP, HEAVY, MASS = 8, 30, 100
+GROUP, MASS = 8, 100
 """Numbers of blocks of an event. Events of `MASS` blocks or more are not simulated with layouts."""
 RANDOM, SINGLES, PAIRS = 18, 7, 20
 """Numbers of random layouts, of random and of promising single barriers of each kind, and of pairs
@@ -152,11 +152,7 @@ def collect(problem: DesignProblem, rng: np.random.Generator) -> Samples:
     """Return the samples of a site: features and simulated outcomes of many layouts."""
     site, menu = problem.site, Menu(problem)
     sizes = {name: largest(site, name) for name in site.event_names}
-    drawn = {
-        name: release_seeds("ensemble", 0, HEAVY_ENSEMBLE if blocks > HEAVY else ENSEMBLE)
-        for name, blocks in sizes.items()
-    }
-    whole = ensemble(site, drawn, menu.stations)
+    whole = ensemble(site, forecast_seeds(site), menu.stations)
     layouts = propose(menu, Forecast(problem, whole), rng)
     shares, variances = outcomes(problem, layouts, sizes)
     known = np.isfinite(shares)

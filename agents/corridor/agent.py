@@ -25,20 +25,14 @@ from rigdda.agents import limits
 from rigdda.agents.corridor.programme import Options, increments
 from rigdda.agents.designers.catalogue import ensemble
 from rigdda.agents.designers.constant import constant
-from rigdda.agents.designers.forecast import Forecast, value_network
+from rigdda.agents.designers.forecast import Forecast, forecast_seeds, value_network
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import forecasts_of
 from rigdda.agents.policy import Network
 from rigdda.envs import DesignProblem
 from rigdda.envs.corridor_environment import CorridorDesign
-from rigdda.envs.envelope import largest
 
 Floats = NDArray[np.float64]
-
-ENSEMBLE, HEAVY_ENSEMBLE, HEAVY = 40, 6, 30
-"""Releases without barriers of each event, the same for events of more than `HEAVY` blocks, and
-this number of blocks."""
 
 SPLIT = "train"
 """Split with the sites for training."""
@@ -80,13 +74,8 @@ def offer(problem: DesignProblem) -> Offer:
         If a simulation diverges.
     """
     menu, site = Menu(problem), problem.site
-    seeds = {
-        name: release_seeds(
-            "ensemble", 0, HEAVY_ENSEMBLE if largest(site, name) > HEAVY else ENSEMBLE
-        )
-        for name in site.event_names
-    }
-    forecast = Forecast(problem, ensemble(site, seeds, menu.stations), value_network())
+    crossings = ensemble(site, forecast_seeds(site), menu.stations)
+    forecast = Forecast(problem, crossings, value_network())
     pool = forecasts_of(forecast, menu, [constant(problem, menu)])
     layouts: list[Layout] = [()]
     costs, gains = [0.0], [0.0]

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import Barrier, Fence, Layout, Mesh
+from rigdda import Barrier, Fence, Layout, Mesh, Site
 from rigdda.agents.designers.catalogue import CrossingEnsemble, Effects
+from rigdda.agents.designers.protocol import release_seeds
 from rigdda.barriers import Removal
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
@@ -31,6 +32,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+
+ENSEMBLE, HEAVY_ENSEMBLE, HEAVY = 40, 6, 30
+"""Releases of each event that a forecast without a search is made from, the same for events of more
+than `HEAVY` blocks, and this number of blocks. The value network is trained with them."""
 
 KINDS = ("fence", "ditch", "embankment", "gravity_wall", "mesh")
 """Kinds of barrier that the features tell apart."""
@@ -261,6 +266,16 @@ BARRIER = 13
 """Number of features of one barrier besides its kind and its share."""
 WIDTH = 5 + 2 * (len(KINDS) + 1 + BARRIER) + 4
 """Number of features of a layout for one event."""
+
+
+def forecast_seeds(site: Site) -> dict[str, tuple[int, ...]]:
+    """Return the seeds, by event, of the releases that a forecast without a search is made from."""
+    return {
+        name: release_seeds(
+            "ensemble", 0, HEAVY_ENSEMBLE if largest(site, name) > HEAVY else ENSEMBLE
+        )
+        for name in site.event_names
+    }
 
 
 def _keys(table: NDArray[np.void]) -> NDArray[np.int64]:

@@ -22,7 +22,8 @@ from rigdda import Site
 from rigdda.agents import DESIGNERS, cli
 from rigdda.barriers import to_tables
 
-TINY = ("--budget", "400", "--verify", "40", "--ground-samples", "1")
+CHUTE = "chute.toml"
+TINY = ("--budget", "400", "--verify", "40", "--ground-samples", "0")
 COMMANDS = (
     "sites", "new", "check", "simulate", "design", "reprice", "report", "study", "corridor", "fit",
     "sensitivity", "train", "evaluate", "exam", "dataset", "fidelity", "validate", "replay",
@@ -80,16 +81,17 @@ def rows(file: Path) -> list[dict[str, str]]:
 
 @pytest.fixture(scope="module")
 def toml(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    file = tmp_path_factory.mktemp("site") / "chute.toml"
+    file = tmp_path_factory.mktemp("site") / CHUTE
     site.save(file)
     return file
 
 
 @pytest.fixture(scope="module")
-def designed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The folder and the words of a small design of the built-in site for tests."""
+def designed(toml: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder and the words of a small design of a cheap site."""
     folder = tmp_path_factory.mktemp("designed")
-    return folder, run("design", "quick", *TINY, "--seed", 3, "--out", folder, folder=folder)
+    options = (*TINY, "--ground-samples", 1, "--seed", 3, "--out", folder)
+    return folder, run("design", toml, *options, folder=folder)
 
 
 def without_time(file: Path) -> list[dict[str, str]]:
@@ -136,21 +138,23 @@ def test_a_design_says_what_an_engineer_asks(designed: tuple[Path, str]) -> None
     assert float(told[1].replace(",", "")) == pytest.approx(float(costs[0]["objective"]), rel=0.01)
 
 
-def test_a_design_repeats_for_its_seed(designed: tuple[Path, str], tmp_path: Path) -> None:
+def test_a_design_repeats_for_its_seed(
+    designed: tuple[Path, str], toml: Path, tmp_path: Path
+) -> None:
     folder, _ = designed
-    run("design", "quick", *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
+    run("design", toml, *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
     assert (tmp_path / "layout.toml").read_bytes() == (folder / "layout.toml").read_bytes()
     again, before = (without_time(f / "evaluations.csv") for f in (tmp_path, folder))
     assert again == before
 
 
-def test_a_killed_design_goes_on(designed: tuple[Path, str], tmp_path: Path) -> None:
+def test_a_killed_design_goes_on(designed: tuple[Path, str], toml: Path, tmp_path: Path) -> None:
     folder, _ = designed
     lines = (folder / "evaluations.jsonl").read_bytes().splitlines(keepends=True)
     half = len(lines) // 2
     (tmp_path / "evaluations.jsonl").write_bytes(b"".join(lines[:half]) + lines[half][:40])
     (tmp_path / "problem.json").write_bytes((folder / "problem.json").read_bytes())
-    words = run("design", "quick", *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
+    words = run("design", toml, *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
     assert re.search(r"[\d,]+ releases from an earlier run", words)
     assert (tmp_path / "layout.toml").read_bytes() == (folder / "layout.toml").read_bytes()
     again, before = (without_time(f / "evaluations.csv") for f in (tmp_path, folder))
@@ -163,18 +167,18 @@ def test_a_killed_design_goes_on(designed: tuple[Path, str], tmp_path: Path) -> 
     "change, named",
     [
         (("verge",), ("site", "'quick'")),
-        (("quick", "--kinds", "ditch"), ("kinds",)),
-        (("quick", "--target", "0.1"), ("targets",)),
-        (("quick", "--max-cost", "900"), ("max_cost",)),
-        (("quick", "--zone", "12", "30"), ("zone",)),
+        ((CHUTE, "--kinds", "ditch"), ("kinds",)),
+        ((CHUTE, "--target", "0.1"), ("targets",)),
+        ((CHUTE, "--max-cost", "900"), ("max_cost",)),
+        ((CHUTE, "--zone", "12", "30"), ("zone",)),
     ],
 )
 def test_a_design_of_another_problem_is_left_alone(
-    change: tuple[str, ...], named: tuple[str, ...], designed: tuple[Path, str]
+    change: tuple[str, ...], named: tuple[str, ...], designed: tuple[Path, str], toml: Path
 ) -> None:
     folder, _ = designed
     before = {path: path.read_bytes() for path in folder.iterdir()}
-    line = refused("design", *change, *TINY, "--out", folder, folder=folder)
+    line = refused("design", *change, *TINY, "--out", folder, folder=toml.parent)
     assert all(word in line for word in ("--out", "another folder", *named)), line
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
@@ -194,11 +198,11 @@ def test_a_design_is_answered_for_other_prices(designed: tuple[Path, str], tmp_p
     assert table[0]["layout"] == "nothing" and len(table) == 5
 
 
-def test_a_cap_and_a_missed_target_are_told(tmp_path: Path) -> None:
+def test_a_cap_and_a_missed_target_are_told(toml: Path, tmp_path: Path) -> None:
     options = ("--max-cost", 500, "--target", 0.001, "--out", "o")
-    words = run("design", "quick", *TINY, *options, folder=tmp_path)
+    words = run("design", toml, *TINY, *options, folder=tmp_path)
     layout = rigdda.load_layout(tmp_path / "o/layout.toml")
-    assert Site.load("quick").capital(layout) <= 500.0
+    assert Site.load(toml).capital(layout) <= 500.0
     assert all(float(row["cost"]) <= 500.0 for row in rows(tmp_path / "o/evaluations.csv"))
     assert (
         "a target is missed; the table shows the cheapest layout to build for each level" in words
@@ -223,9 +227,9 @@ def test_a_folder_that_does_not_tell_its_problem_is_left_alone(tmp_path: Path) -
     assert [path.name for path in tmp_path.iterdir()] == ["layout.toml"]
 
 
-def test_kinds_zone_and_target_are_kept_to(tmp_path: Path) -> None:
+def test_kinds_zone_and_target_are_kept_to(toml: Path, tmp_path: Path) -> None:
     options = ("--kinds", "ditch,embankment", "--zone", 25, 34, "--target", 0.9)
-    words = run("design", "quick", *TINY, *options, "--out", "o", folder=tmp_path)
+    words = run("design", toml, *TINY, *options, "--out", "o", folder=tmp_path)
     layout = rigdda.load_layout(tmp_path / "o/layout.toml")
     assert all(b.kind in ("ditch", "embankment") and 25.0 <= b.x <= 34.0 for b in layout)
     assert re.search(r"target P\(reach\) <= 90 %.*: (met|missed|undecided)", words)
@@ -233,7 +237,7 @@ def test_kinds_zone_and_target_are_kept_to(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("designer", [name for name in DESIGNERS if name != "race"])
 def test_every_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
-    tiny = ("--budget", 40, "--verify", 12, "--ground-samples", 1)
+    tiny = ("--budget", 40, "--verify", 12, "--ground-samples", 0)
     words = run("design", toml, "--designer", designer, *tiny, folder=tmp_path)
     own = designer in ("rule", "constant")
     assert (designer if own else f"optimised ({designer})") in words

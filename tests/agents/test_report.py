@@ -33,7 +33,10 @@ from rigdda.agents.reports.html_blocks import inline
 from rigdda.agents.run_record import RunRecord, read
 from rigdda.envs.outcome_cache import mechanics
 
-DESIGN = ["design", "chute.toml", "--budget", "60", "--verify", "40", "--target", "0.05"]
+DESIGN = [
+    "design", "chute.toml", "--budget", "60", "--verify", "40", "--target", "0.05",
+    "--ground-samples", "2",
+]  # fmt: skip
 SIMULATE = ["simulate", "chute.toml", "--releases", "60", "--station", "28", "--station", "34.8"]
 
 

@@ -58,7 +58,8 @@ def _section(done: DesignStudy, path: Path, seed: int) -> None:
     layout = chosen.evaluation.layout
     if layout:
         panels.append(Panel(f"With the layout: {_words(chosen)}", layout, _all(site, layout, seed)))
-    found = envelopes(site, (), release_seeds("ensemble", seed, ENOUGH), along(site))
+    blocks = min(ENOUGH, done.nothing.evaluation.releases)  # a quick study draws a rough picture
+    found = envelopes(site, (), release_seeds("ensemble", seed, blocks), along(site))
     section(path, site, done.problem.zone, panels, found, bare)
 
 

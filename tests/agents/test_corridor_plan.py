@@ -218,18 +218,17 @@ def test_the_command_writes_what_its_tables_say(planned: tuple[Path, str]) -> No
 def test_a_killed_plan_goes_on_and_ends_the_same(planned: tuple[Path, str], tmp_path: Path) -> None:
     whole, _ = planned
     (tmp_path / "pass.toml").write_text(TEXT)
-    count = _lines(whole / "evaluations")
+    count, out = _lines(whole / "evaluations"), tmp_path / "killed"
     for least in (count // 4, count // 2):
-        out = tmp_path / f"killed-{least}"
-        killed = rig("corridor", "pass.toml", *SMALL, "--out", out.name, folder=tmp_path)
+        killed = rig("corridor", "pass.toml", *SMALL, "--out", "killed", folder=tmp_path)
         while _lines(out / "evaluations") < least:
             assert killed.poll() is None
             time.sleep(0.02)
         killed.kill()
         killed.communicate()
-        run("corridor", "pass.toml", *SMALL, "--out", out.name, folder=tmp_path)
-        for name in ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv"):
-            assert (out / name).read_bytes() == (whole / name).read_bytes()
+    run("corridor", "pass.toml", *SMALL, "--out", "killed", folder=tmp_path)
+    for name in ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv"):
+        assert (out / name).read_bytes() == (whole / name).read_bytes()
 
 
 def _lines(folder: Path) -> int:

@@ -51,7 +51,7 @@ def test_a_design_that_stops_keeps_its_evaluations_and_goes_on(
 
     options = ["--designer", "random", "--budget", "40", "--verify", "12"]
     options += ["--ground-samples", "0"]
-    arguments = ["design", "quick", *options, "--out", "o"]
+    arguments = ["design", "chute.toml", *options, "--out", "o"]
     whole, left = DesignProblem.evaluate, [3]
 
     def stop(*given: Any, **named: Any) -> Any:

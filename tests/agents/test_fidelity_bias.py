@@ -27,8 +27,8 @@ def test_fast_has_fewer_larger_blocks_and_a_longer_step() -> None:
         problem.site_at_fidelity(site, "coarse")
 
 
-def test_the_bias_is_that_of_the_evaluations() -> None:
-    site, ticks = Site.load("quick"), []
+def test_the_bias_is_that_of_the_evaluations(site: Site) -> None:
+    ticks: list[int] = []
     found = fidelity_bias.compare(site, 12, 3, lambda done, _: ticks.append(done))
     assert ticks == [0, 12, 24, 36, 48, 60]
     assert [c.name for c in found] == ["nothing", "constant", "rule"]

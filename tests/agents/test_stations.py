@@ -208,20 +208,19 @@ def test_all_releases_count(tmp_path: Path) -> None:
 
 
 def test_a_killed_simulation_goes_on_and_ends_the_same(tmp_path: Path) -> None:
-    options = ("--releases", 400, "--station", 8, "--out")
+    options, out = ("--releases", 400, "--station", 8, "--out"), tmp_path / "killed"
     run("simulate", "verge", *options, "whole", folder=tmp_path)
     for least in (1, 4, 9):
-        out = tmp_path / f"killed-{least}"
-        killed = rig("simulate", "verge", *options, out.name, folder=tmp_path)
+        killed = rig("simulate", "verge", *options, "killed", folder=tmp_path)
         while len(list((out / "parts").glob("[!.]*.npz"))) < least:
             assert killed.poll() is None
             time.sleep(0.01)
         killed.kill()
         killed.communicate()
-        words = run("simulate", "verge", *options, out.name, folder=tmp_path)
-        assert "from an interrupted run" in words
-        for file in (f"{name}.csv" for name in (*TABLES, "outcomes")):
-            assert (out / file).read_bytes() == (tmp_path / "whole" / file).read_bytes()
+    words = run("simulate", "verge", *options, "killed", folder=tmp_path)
+    assert "from an interrupted run" in words
+    for file in (f"{name}.csv" for name in (*TABLES, "outcomes")):
+        assert (out / file).read_bytes() == (tmp_path / "whole" / file).read_bytes()
 
 
 @pytest.mark.parametrize(

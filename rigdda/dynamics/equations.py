@@ -92,7 +92,7 @@ def damping_of(body: Body, p: Parameters) -> float:
     It is that of the surface that the block touched last, until `APART` after that contact. The
     comparison uses the middle of the step so that the duration does not depend on the step length.
     """
-    return p.damping_in_flight if body.apart + 0.5 * p.dt > APART else body.damping
+    return p.damping_in_flight if body.apart - 0.5 * p.dt > APART else body.damping
 
 
 @kernel

@@ -1,6 +1,7 @@
 """List recorded results that the current kernels did not make.
 
 `python -m experiments.stale [--out DIR]`. Tables without a note of their kernels count as stale.
+The references of the exam are listed, too.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import click
 
 from experiments.made_by import KERNELS, kernels_hash, made_by
 from experiments.script import RESULTS
+from rigdda.agents.exam import specification
 
 
 def stale(folder: Path) -> list[Path]:
@@ -25,10 +27,13 @@ def stale(folder: Path) -> list[Path]:
               help="Folder of results.")  # fmt: skip
 def main(out: Path) -> None:
     """List the stale tables; exit with 1 if there are any."""
-    found = stale(out)
+    found, exam = stale(out), specification.load()
+    exam_stale = out == RESULTS and not exam.current
+    if exam_stale:
+        click.echo(f"references of the exam (experiments.exam_reference): {exam.mechanics}")
     for path in found:
         click.echo(f"{path}: {made_by(path.parent).get(path.name, 'made by unknown kernels')}")
-    sys.exit(bool(found))
+    sys.exit(bool(found) or exam_stale)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -38,6 +38,9 @@ FINEST = {"dt": 1e-3, "tolerance": 1e-9, "sweep_tolerance": 2e-5, "open_close_it
 
 BLOCKS = "block area"
 
+TOGETHER = 25
+"""Number of releases in a stored part of a sample."""
+
 
 class Budget(NamedTuple):
     """Number of releases of reference and default, of every other choice, and of each peer.
@@ -54,7 +57,7 @@ class Budget(NamedTuple):
     duration: float
 
 
-FULL = Budget(300, 50, 30, ROCK.block_area, (4.0, 2.0, 0.5), SITE.motion.duration)
+FULL = Budget(150, 50, 30, ROCK.block_area, (4.0, 2.0, 0.5), SITE.motion.duration)
 QUICK = Budget(12, 6, 4, 8.0, (2.0,), 20.0)
 
 
@@ -157,22 +160,26 @@ def sample(
     """
     options = dict(choice.settings)
     dt = options.pop("dt", DEFAULT.dt)
+    name = f"{module.NAME}-{choice.knob}-{choice.value:g}".replace(" ", "-")
+    adapter = Path(module.__file__).read_text(encoding="utf-8")
+    what = (dt, options, area, duration, BARRIER, SITE, adapter)
 
-    def compute() -> Outcomes:
+    def compute(seeds: range) -> Outcomes:
         with ThreadPoolExecutor() as pool:
             done = list(
-                pool.map(
-                    lambda seed: release(module, area, duration, seed, dt, options), range(releases)
-                )
+                pool.map(lambda seed: release(module, area, duration, seed, dt, options), seeds)
             )
         outcomes, cpu = zip(*done, strict=True)
         return np.array(outcomes), float(np.mean(cpu))
 
-    name = f"{module.NAME}-{choice.knob}-{choice.value:g}".replace(" ", "-")
-    adapter = Path(module.__file__).read_text(encoding="utf-8")
-    what = (dt, options, releases, area, duration, BARRIER, SITE, adapter)
-    outcomes, cpu = kept(folder, name, what, compute)
-    return Sample(module.NAME, choice.knob, choice.value, choice.default, outcomes, cpu)
+    parts = []
+    for first in range(0, releases, TOGETHER):
+        seeds = range(first, min(first + TOGETHER, releases))
+        parts.append(kept(folder, f"{name}-{first}", (what, seeds), partial(compute, seeds)))
+    outcomes, cpu = zip(*parts, strict=True)
+    mean = float(np.average(cpu, weights=[len(part) for part in outcomes]))
+    values = choice.knob, choice.value, choice.default, np.concatenate(outcomes), mean
+    return Sample(module.NAME, *values)
 
 
 def reference(budget: Budget, folder: Path) -> Sample:

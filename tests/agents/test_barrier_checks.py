@@ -64,10 +64,10 @@ def test_a_fence_is_checked_with_the_demand_where_it_stands(problem: DesignProbl
 
 def test_what_a_fence_stops_does_not_reach_what_is_below_it() -> None:
     problem = DesignProblem("quick", kinds=KINDS)
-    first, second = Fence(18.3, 5.0, energy_class=1000), Fence(26.0, 4.0, energy_class=500)
+    first, second = Fence(18.3, 1.0, energy_class=1000), Fence(26.0, 4.0, energy_class=500)
     alone = check_layout(problem, (second,)).fences[0].demand
     behind = check_layout(problem, (first, second)).fences[1].demand
-    assert alone.hard.passing == 60.0
+    assert alone.hard.passing > 50.0
     assert behind.hard.passing < 0.5 * alone.hard.passing
 
 
@@ -164,7 +164,7 @@ def test_few_blocks_are_said_to_be_too_few() -> None:
 
 def test_an_existing_fence_keeps_blocks_off_and_is_not_checked() -> None:
     site = Site.load("quick")
-    old = Existing(kind="fence", x=18.3, height=5.0, energy_class=1000)
+    old = Existing(kind="fence", x=18.3, height=1.0, energy_class=1000)
     stands = msgspec.structs.replace(site, existing=(old,))
     new = Fence(26.0, 4.0, energy_class=500)
     alone = check_layout(DesignProblem(site, kinds=KINDS), (new,))

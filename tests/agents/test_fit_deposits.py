@@ -105,7 +105,7 @@ def test_passages_and_run_outs_are_fitted_together(tmp_path: Path) -> None:
     assert list(sets) == names
     assert sets["block, deposit"].shares == pytest.approx(one.shares)
     got = fit.fit(SITE, sets, parameters, 16, 40, 0, lambda done, words: None)
-    low, high = got.posterior.interval(0.95)
+    low, high = got.posterior.interval(0.99)
     assert low[0] <= 0.9 <= high[0] and high[0] - low[0] < 2.0
     table = {row["what"]: row for row in fit.rows(got, got.observed)}
     for name in names:

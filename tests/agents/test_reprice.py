@@ -30,7 +30,7 @@ VERIFIED = 60
 def designed(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a design with a target that nothing meets."""
     folder = tmp_path_factory.mktemp("designed")
-    problem = DesignProblem(site, targets={"reach": 0.001}, max_cost=3000.0)
+    problem = DesignProblem(site, targets={"reach": 0.0005}, max_cost=1200.0)
     done, _ = jobs.study(problem, "race", 700, 0, VERIFIED, folder, lambda *_: None)
     assert done.frontier
     return folder

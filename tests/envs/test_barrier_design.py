@@ -104,9 +104,9 @@ def test_the_expected_reward_ranks_as_a_problem_with_targets(env_class: type[Bar
             _, rewards[i, seed], *_, info = env.step(action)
             assert info["targets"] in ("met", "missed", "undecided")
     expected = rewards.mean(axis=1)
-    wanted = np.array([problem.reward(one) - problem.reward(problem.nothing) for one in found])
+    wanted = np.array([problem.reward(one) - problem.reward(found[2]) for one in found])
     assert [one.targets for one in found] == ["met", "missed", "missed"]
-    np.testing.assert_allclose(expected, wanted, atol=0.1)
+    np.testing.assert_allclose(expected, wanted, atol=0.15)  # few of the releases are of groups
     assert expected[2] == 0.0
 
 

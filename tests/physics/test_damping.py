@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from rigdda import Bolt, FixedPoint, Scene, Settings, Simulation, Surface, Terrain
+from rigdda import Block, Bolt, FixedPoint, Scene, Settings, Simulation, Surface, Terrain
 from tests.physics.helpers import FLAT, GRAVITY, box, rock
 
 ALPHA, SPEED = 0.5, 3.0
@@ -36,6 +37,31 @@ def test_a_bounce_is_damped_for_a_tenth_of_a_second(dt):
     sim.run(0.9)
     assert 0.9 < landing * (1.0 + 2.0 * 0.7)
     assert sim.velocities[0, 0] == pytest.approx(SPEED * math.exp(-ALPHA * 0.1), rel=1e-5)
+
+
+def test_run_outs_of_damped_bounces_do_not_depend_on_the_step():
+    """Octagons bounce down 32 degrees.
+
+    With one step of damping less at each touch, they go 7 m too far at 20 ms.
+    """
+    drop = 60.0 * math.tan(math.radians(32.0))
+    ground = Terrain([(-20.0, 0.0), (0.0, 0.0), (60.0, -drop), (200.0, -drop)])
+    surfaces = {"rock": Surface(38.0, restitution=0.6, damping=1.7)}
+    rng = np.random.default_rng(0)
+    eighths = np.pi / 4.0 * (np.arange(8) + rng.uniform(-0.4, 0.4, (80, 8)))
+    means = []
+    for dt in (0.02, 0.0025):
+        ends = []
+        for angles in eighths:
+            corners = 0.8 * np.column_stack([np.cos(angles), np.sin(angles)]) + (5.0, -1.0)
+            block = Block(corners, velocity=(6.0, 0.0, 0.0))
+            scene = Scene(ground, (block,), surfaces, damping_when="contact")
+            sim = Simulation(scene, Settings(dt=dt))
+            sim.step(round(30.0 / dt))
+            ends.append(sim.poses[0, 0])
+        means.append((np.mean(ends), np.var(ends, ddof=1) / len(ends)))
+    (one, spread), (other, more) = means
+    assert abs(one - other) < 1.96 * math.sqrt(spread + more)
 
 
 @pytest.mark.parametrize("dt", [0.02, 0.005, 0.00125])

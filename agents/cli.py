@@ -940,7 +940,7 @@ def sensitivity(
 
 
 TRAINING_SITES = {"policy": 512, "value": 96, "corridor": 12}
-"""Default number of training sites by model. Each takes at most an hour on 2 cores."""
+"""Default number of training sites by model."""
 
 
 @cli.command()

@@ -97,17 +97,17 @@ def test_the_expected_reward_ranks_as_a_problem_with_targets(env_class: type[Bar
     env = env_class(CUT, **terms, releases=160, targets={"reach": 0.3})
     problem = DesignProblem(CUT, **terms, targets=Targets(reach=0.3))
     found = [problem.evaluate(problem.decode(action), range(2000)) for action in actions]
-    rewards = np.zeros((len(actions), 4))
+    rewards = np.zeros((len(actions), 12))
     for i, action in enumerate(actions):
-        for seed in range(4):
+        for seed in range(rewards.shape[1]):
             env.reset(seed=seed)
             _, rewards[i, seed], *_, info = env.step(action)
             assert info["targets"] in ("met", "missed", "undecided")
     expected = rewards.mean(axis=1)
-    wanted = np.array([problem.reward(one) - problem.reward(found[2]) for one in found])
+    wanted = np.array([problem.reward(one) - problem.reward(problem.nothing) for one in found])
     assert [one.targets for one in found] == ["met", "missed", "missed"]
-    np.testing.assert_allclose(expected, wanted, atol=0.15)  # few of the releases are of groups
-    assert expected[2] == 0.0
+    np.testing.assert_allclose(expected[:2], wanted[:2], atol=0.1)
+    assert expected[2] == 0.0  # exactly, whatever the releases
 
 
 def test_targets_survive_as_json() -> None:

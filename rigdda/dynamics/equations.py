@@ -90,7 +90,8 @@ def damping_of(body: Body, p: Parameters) -> float:
     """Return the damping coefficient of a block in this step [1/s].
 
     It is that of the surface that the block touched last, until `APART` after that contact. The
-    comparison uses the middle of the step so that the duration does not depend on the step length.
+    time since then already includes this step. Its value in the middle of the step counts, so that
+    the duration does not depend on the step length.
     """
     return p.damping_in_flight if body.apart - 0.5 * p.dt > APART else body.damping
 

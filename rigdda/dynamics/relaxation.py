@@ -207,9 +207,9 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float, left: flo
         # along x, or with a fence along y
         row[GAIN] = 1.0 / flexible if flexible > 0.0 else 0.0
         row[GAIN_SHEAR] = 1.0 / rolling if rolling > 0.0 else 0.0
-        # Friction that opens a contact by more than the normal impulse which causes it closed the
-        # contact makes full changes alternate. This part of a change converges fastest, whether the
-        # contact slides or sticks.
+        # The friction of a sliding contact may open it by more than the normal impulse closes it.
+        # Full changes of the normal impulse would then alternate between two states. With this part
+        # of them, errors of a sliding and of a sticking contact decrease equally fast.
         opening = row[FRICTION] * abs(cross) * row[GAIN]
         if opening > 1.0:
             row[GAIN] *= 2.0 / (2.0 + opening - cross * cross * row[GAIN] * row[GAIN_SHEAR])

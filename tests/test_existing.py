@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from light_site import LIGHT
 
 import rigdda
 from rigdda import BadInput, Ditch, Fence, Mesh, Site, release, release_many
@@ -33,7 +34,7 @@ REPLACING = Fence(20.2, 3.0, energy_class=1000)
 
 
 def having(*existing: Existing) -> Site:
-    return msgspec.structs.replace(rigdda.sites.load("quick"), existing=existing)
+    return msgspec.structs.replace(LIGHT, existing=existing)
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +64,10 @@ def test_condition_reduces_the_energy_not_the_height(site: Site) -> None:
         assert worn.left_height(0.0) == 2.0
 
 
-def test_a_worn_fence_acts_as_one_of_its_remaining_capacity(site: Site) -> None:
+def test_a_worn_fence_acts_as_one_of_its_remaining_capacity() -> None:
     """125 kJ over the width of the mass, 10 m."""
     bare = rigdda.sites.load("quick")
+    site = msgspec.structs.replace(bare, existing=(OLD,))
     same = (Fence(20.0, 2.0, capacity=12.5e3, elongation=2.5),)
     for seed in range(3):
         found, expected = release(site, (), seed, "mass")[1], release(bare, same, seed, "mass")[1]
@@ -75,7 +77,7 @@ def test_a_worn_fence_acts_as_one_of_its_remaining_capacity(site: Site) -> None:
 
 def test_a_release_equals_that_of_the_same_barrier_in_a_layout(site: Site) -> None:
     """The outcome is that of a site without it and a layout with it, alone and in batches."""
-    bare, (old,) = rigdda.sites.load("quick"), site.existing_barriers
+    bare, (old,) = LIGHT, site.existing_barriers
     for seed in range(6):
         expected = release(bare, (NEW, old), seed, "group")[1]
         assert release(site, (NEW,), seed, "group")[1] == expected
@@ -88,7 +90,7 @@ def test_a_release_equals_that_of_the_same_barrier_in_a_layout(site: Site) -> No
 
 def test_its_capital_is_sunk_and_its_upkeep_counts(site: Site) -> None:
     """1.5 % a year of the price of a new fence of 250 kJ: (200 * 2 + 300) EUR times access."""
-    bare = rigdda.sites.load("quick")
+    bare = LIGHT
     worth = (200.0 * 2.0 + 300.0) * bare.access(20.0)
     assert site.capital(()) == 0.0
     assert site.annual(()) == pytest.approx(0.015 * worth, rel=1e-14)
@@ -105,11 +107,11 @@ def test_removing_it_costs_once_and_saves_the_upkeep(site: Site) -> None:
     assert site.capital(gone) == 60.0
     assert site.annual(gone) == pytest.approx(60.0 * site.prices.annuity("removal"), rel=1e-14)
     for seed in range(4):
-        assert release(site, gone, seed)[1] == release(rigdda.sites.load("quick"), (), seed)[1]
+        assert release(site, gone, seed)[1] == release(LIGHT, (), seed)[1]
 
 
 def test_a_barrier_in_its_place_replaces_it(site: Site) -> None:
-    bare = rigdda.sites.load("quick")
+    bare = LIGHT
     assert site.standing((REPLACING,)) == (REPLACING,)
     assert site.capital((REPLACING,)) == pytest.approx(bare.capital((REPLACING,)) + 60.0)
     expected = bare.annual((REPLACING,)) + 60.0 * site.prices.annuity("removal")
@@ -121,7 +123,7 @@ def test_a_barrier_in_its_place_replaces_it(site: Site) -> None:
 
 def test_its_repair_costs_the_price_of_a_new_one() -> None:
     weak = having(msgspec.structs.replace(OLD, condition=0.05))
-    bare = rigdda.sites.load("quick")
+    bare = LIGHT
     seed = next(s for s in range(50) if release(weak, (), s, "block")[1].barriers[0].failed)
     outcome = release(weak, (), seed, "block")[1]
     worth = (200.0 * 2.0 + 300.0) * bare.access(20.0)
@@ -184,7 +186,7 @@ def test_a_layout_of_a_user_may_not_overlap_what_stays() -> None:
     with pytest.raises(BadInput, match=r"barriers\[0\].x = 20.0: leave it out: the site has no"):
         release(site, (Removal(20.0),), 0)
     with pytest.raises(BadInput, match=r"barriers\[0\].x = 20.0: leave it out"):
-        release(rigdda.sites.load("quick"), (Removal(20.0),), 0)
+        release(LIGHT, (Removal(20.0),), 0)
     with pytest.raises(BadInput, match=r"barriers\[0\].x = 5.0: give 20"):
         release(having(OLD), (Removal(5.0),), 0)
     with pytest.raises(BadInput, match="use the block model"):
@@ -200,7 +202,7 @@ def test_it_is_named_and_drawn(site: Site) -> None:
     outlines = site.section((NEW,)).barriers
     assert [outline.old for outline in outlines] == [False, True]
     run, _ = release(site, (NEW,), 0, "block")
-    plain, _ = release(rigdda.sites.load("quick"), (NEW, *site.existing_barriers), 0, "block")
+    plain, _ = release(LIGHT, (NEW, *site.existing_barriers), 0, "block")
     images = [picture(run, site, (NEW,), ""), picture(plain, having(), site.standing((NEW,)), "")]
     assert images[0].shape == images[1].shape
     assert (images[0] != images[1]).any()
@@ -214,7 +216,7 @@ def test_round_trip(site: Site, tmp_path: Path) -> None:
 
 def test_an_earthwork_that_stands_changes_the_ground() -> None:
     site = having(Existing("ditch", 30.5, depth=1.0, width=2.0))
-    bare = rigdda.sites.load("quick")
+    bare = LIGHT
     ditch = Ditch(30.5, 1.0, 2.0)
     for seed in range(4):
         assert release(site, (), seed, "block")[1] == release(bare, (ditch,), seed, "block")[1]
@@ -228,7 +230,7 @@ def test_reports_say_what_happens_to_it(site: Site) -> None:
     assert order(Removal(20.0), site) == (
         "remove the existing barrier at x = 20.0 m: 60 EUR per metre"
     )
-    bare = rigdda.sites.load("quick")
+    bare = LIGHT
     assert (unchanged(site), before(site)) == ("as it stands", "as it stands")
     assert (unchanged(bare), before(bare)) == ("no barrier", "without barriers")
     assert findings.kept(bare, (NEW,)) == []
@@ -245,5 +247,5 @@ def test_a_record_of_a_release_is_repeated(site: Site) -> None:
 def test_an_environment_takes_sites_with_and_without_it(site: Site) -> None:
     slots = Venue(site, 2, None, "full").slots
     assert slots.kinds[-1] == "removal"
-    assert "removal" not in slots.shared(rigdda.sites.load("quick"))
+    assert "removal" not in slots.shared(LIGHT)
     assert slots.shared(site) == slots.kinds

@@ -72,11 +72,16 @@ FEWER = {
 SLOW = {
     "README.md",
     "PYPI.md",
-    "docs/tutorials/researcher.md",
+    "docs/environments/Corridor-v0.md",
+    "docs/howto/checks.md",
     "docs/howto/corridor.md",
+    "docs/howto/exam.md",
+    "docs/howto/fit.md",
     "docs/howto/step_and_fidelity.md",
+    "docs/howto/what_if.md",
+    "docs/tutorials/researcher.md",
 }
-"""Pages on sites of which nothing is known yet: a thousand releases each come first."""
+"""Pages that take more than 20 s of processor time."""
 
 SKIPPED = {"", "text", "{toctree}", "{eval-rst}", "{code-cell}"}
 """Blocks that are no code, and cells, which run when the documentation is built."""

@@ -178,7 +178,7 @@ site = "verge"
 length = 100.0
 name = "km 1.2"
 [[sections]]
-site = "quick"
+site = "narrow"
 length = 50.0
 """
 SMALL = ("--releases", 300)
@@ -215,6 +215,7 @@ def test_the_command_writes_what_its_tables_say(planned: tuple[Path, str]) -> No
     assert "km 1.2" in words and "unlimited" in words
 
 
+@pytest.mark.slow
 def test_a_killed_plan_goes_on_and_ends_the_same(planned: tuple[Path, str], tmp_path: Path) -> None:
     whole, _ = planned
     (tmp_path / "pass.toml").write_text(TEXT)
@@ -271,7 +272,7 @@ def test_a_target_of_the_risk_to_life_needs_traffic(tmp_path: Path) -> None:
     text = TEXT.replace("length = 50.0", "length = 50.0\nindividual = 1e-5")
     (tmp_path / "pass.toml").write_text(text)
     line = refused("corridor", "pass.toml", folder=tmp_path)
-    assert "sections.quick.targets.individual" in line and "traffic" in line
+    assert "sections.narrow.targets.individual" in line and "traffic" in line
     (tmp_path / "pass.toml").write_text(text + "[traffic]\nspeed = 50.0\n")
     assert "traffic.vehicles_per_day" in refused("corridor", "pass.toml", folder=tmp_path)
 
@@ -317,9 +318,9 @@ def test_built_in_corridors_are_valid() -> None:
         (("budget = [4_000, 12_000]", ""), ("budget", "no default")),
         (("length = 50.0", "length = 0"), ("length", "0")),
         (("length = 50.0", "lenght = 5"), ("lenght", "did you mean length")),
-        (('site = "quick"', 'site = "nowhere"'), ("site", "nowhere")),
-        (('site = "quick"', 'site = "gone.toml"'), ("site", "gone.toml")),
-        (('name = "km 1.2"', 'name = "quick"'), ("sections.name", "quick")),
+        (('site = "narrow"', 'site = "nowhere"'), ("site", "nowhere")),
+        (('site = "narrow"', 'site = "gone.toml"'), ("site", "gone.toml")),
+        (('name = "km 1.2"', 'name = "narrow"'), ("sections.name", "narrow")),
         (("length = 50.0", "length = 50.0\nreach = 2"), ("reach", "2")),
         (('name = "pass"', 'name = "pass"\ntable = "x.csv"'), ("sections", "table")),
         (('name = "pass"', 'name = "pass"\nyearly_budget = -2'), ("yearly_budget", "-2")),

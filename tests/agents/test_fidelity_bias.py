@@ -44,7 +44,7 @@ def test_the_bias_is_that_of_the_evaluations(site: Site) -> None:
 
 
 def test_the_command_writes_its_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["fidelity", "quick", "--releases", "10", "--out", str(tmp_path)]) == 0
+    assert main(["fidelity", "narrow", "--releases", "10", "--out", str(tmp_path)]) == 0
     assert "fidelity.csv is in" in capsys.readouterr().out
     with (tmp_path / "fidelity.csv").open() as file:
         rows = list(csv.DictReader(file))

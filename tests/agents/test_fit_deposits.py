@@ -167,6 +167,7 @@ def test_the_same_observations_in_two_files_are_refused(tmp_path: Path) -> None:
     assert "in one file only" in line
 
 
+@pytest.mark.slow
 def test_a_killed_fit_goes_on_and_its_posterior_is_sampled(tmp_path: Path) -> None:
     lines = ["event,start_m,end_m,volume_m3,releases"]
     one = deposit(SITE, 5000, 30)

@@ -75,6 +75,7 @@ def test_the_band_changes_nothing_else_and_can_be_left_out(designed: tuple[Path,
         assert (folder / "none" / name).read_bytes() == (folder / "whole" / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_killed_band_goes_on(designed: tuple[Path, str]) -> None:
     folder, _ = designed
     options = (*COMMAND, "--target", 0.2, "--ground-samples", 3, "--out", "killed")

@@ -255,6 +255,7 @@ def test_tables_and_picture_of_an_analysis(analysed: tuple[Path, str]) -> None:
     assert max(len(line) for line in words.splitlines() if "─" in line) <= 80
 
 
+@pytest.mark.slow
 def test_a_killed_analysis_goes_on_and_ends_the_same(analysed: tuple[Path, str]) -> None:
     folder, _ = analysed
     dice, out = random.Random(5), folder / "killed"

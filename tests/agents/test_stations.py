@@ -207,6 +207,7 @@ def test_all_releases_count(tmp_path: Path) -> None:
     assert top["q95_high"] != ""  # the third-highest of 60 would have none
 
 
+@pytest.mark.slow
 def test_a_killed_simulation_goes_on_and_ends_the_same(tmp_path: Path) -> None:
     options, out = ("--releases", 400, "--station", 8, "--out"), tmp_path / "killed"
     run("simulate", "verge", *options, "whole", folder=tmp_path)

@@ -45,6 +45,7 @@ def test_a_policy_is_tried_on_unseen_sites(trained: tuple[Path, str], tmp_path: 
     assert design(posed, 30, seed=1) == found
 
 
+@pytest.mark.slow
 def test_a_killed_training_goes_on(trained: tuple[Path, str], tmp_path: Path) -> None:
     more = (*SMALL[:2], "--episodes", 64)
     killed = rig("train", *more, "--out", "o", folder=tmp_path)

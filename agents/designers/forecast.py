@@ -174,10 +174,9 @@ class Forecast:
         rows = []
         for i in range(len(self._risk)):
             mine = table[event == i]
-            energy, height, speed, radius = (
-                _quantile(mine[name]) for name in ("energy", "height", "speed", "radius")
-            )
-            fill = _quantile(taken[self.ensemble.event == i]) / tall**2
+            blows = np.array([mine[name] for name in ("energy", "height", "speed", "radius")])
+            energy, height, speed, radius = _quantile(blows).tolist()
+            fill = float(_quantile(taken[self.ensemble.event == i])) / tall**2
             rows.append(
                 (
                     *own,
@@ -294,9 +293,12 @@ def _tall(barrier: Barrier) -> float:
     return float(getattr(barrier, "height", 0.0) or getattr(barrier, "depth", 0.0))
 
 
-def _quantile(values: Any) -> float:
-    """Return the `QUANTILE` of values, 0 without values."""
-    return float(np.quantile(values, QUANTILE)) if len(values) else 0.0
+def _quantile(values: Floats) -> Floats:
+    """Return the `QUANTILE` along the last axis, 0 without values."""
+    if values.shape[-1] == 0:
+        return np.zeros(values.shape[:-1])
+    found: Floats = np.quantile(values, QUANTILE, axis=-1)
+    return found
 
 
 class Value:

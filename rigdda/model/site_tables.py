@@ -659,9 +659,9 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     def ditch_side(self, x: float, width: float) -> float:
         """Return the side slope of a ditch [-], the flattest that the ground it cuts requires."""
-        points, names = self.slope.chain()
-        ends = zip(points, points[1:], names, strict=False)
-        spanned = {name for (a, _), (b, _), name in ends if a < x + width and b > x}
+        chain, names = self.profile.points[:, 0], self.profile.surfaces
+        cut = np.flatnonzero((chain[:-1] < x + width) & (chain[1:] > x))
+        spanned = {names[k] for k in cut}
         return max((STEEP_SIDES.get(name, FLAT_SIDE) for name in spanned), default=FLAT_SIDE)
 
     def mesh(self, name: str) -> MeshOption:

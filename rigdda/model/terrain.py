@@ -99,20 +99,15 @@ class Terrain:
         BadInput
             If the terrain does not reach `x`.
         """
-        p, q = self.points[:-1], self.points[1:]
-        low, high = np.minimum(p[:, 0], q[:, 0]), np.maximum(p[:, 0], q[:, 0])
-        over = (low <= x) & (x <= high)
-        if not over.any():
+        chain = self.points[:, 0]
+        low, high = np.minimum(chain[:-1], chain[1:]), np.maximum(chain[:-1], chain[1:])
+        over = np.flatnonzero((low <= x) & (x <= high))
+        if not over.size:
             raise BadInput("x", x, f"stay on the terrain, {low.min():g} to {high.max():g} m")
-        p, q = p[over], q[over]
-        run = q[:, 0] - p[:, 0]
-        share = np.where(run == 0.0, 1.0, (x - p[:, 0]) / np.where(run == 0.0, 1.0, run))
-        return float(
-            np.where(
-                run == 0.0,
-                np.maximum(p[:, 1], q[:, 1]),
-                p[:, 1] + share * (q[:, 1] - p[:, 1]),
-            ).max()
+        ends = zip(self.points[over].tolist(), self.points[over + 1].tolist(), strict=True)
+        return max(
+            max(ay, by) if ax == bx else ay + (x - ax) / (bx - ax) * (by - ay)
+            for (ax, ay), (bx, by) in ends
         )
 
 

@@ -73,17 +73,20 @@ def test_the_recorded_prediction_of_contacts_is_near_those_that_were_observed():
     assert abs(np.median(kept) - np.median(real)) < 0.12
 
 
-def test_the_library_has_what_was_fitted_to_both_alpine_cases():
-    (fitted,) = (
-        row
-        for row in table("grounds.csv")
-        if row["model"] == "blocks" and row["fitted_on"] == "tschamut and chant sura"
-    )
-    meadow = GROUNDS["meadow"]
-    assert meadow.friction_deg.typical == pytest.approx(float(fitted["friction_deg"]), abs=0.05)
-    assert meadow.restitution.typical == pytest.approx(float(fitted["restitution"]), abs=0.006)
-    assert meadow.damping.typical == pytest.approx(float(fitted["damping"]), abs=0.006)
-    assert meadow.friction_sd_deg == pytest.approx(float(fitted["friction_sd_deg"]), abs=0.05)
+def test_the_ground_of_the_library_predicts_as_well_as_a_fit():
+    """The alpine cases do not determine single parameters, so its values need not be the fit's."""
+    by = {row["fitted_on"]: row for row in table("grounds.csv") if row["model"] == "blocks"}
+    real = next(row for row in table("grounds.csv") if row["model"] == "observed")
+    fitted, meadow = by["tschamut and chant sura"], by["the library: meadow"]
+    bars = {"run_out_mean_m": 2.0, "run_out_50_m": 2.0, "run_out_95_m": 2.0, "block_4_m": 2.0,
+            "contacts_mean": 0.02, "mid_slope_mean": 0.05, "stops_on_slope": 0.02}  # fmt: skip
+    for column, bar in bars.items():
+        off, best = (abs(float(row[column]) - float(real[column])) for row in (meadow, fitted))
+        assert off < best + bar, column
+    ranges = GROUNDS["meadow"]
+    for name in ("friction_deg", "restitution", "damping"):
+        span = getattr(ranges, name)
+        assert span.low <= float(fitted[name]) <= span.high
 
 
 def test_a_fit_to_run_outs_predicts_the_contacts_and_a_point_does_not():

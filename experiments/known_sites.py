@@ -1,11 +1,11 @@
 """Precomputed properties of sites without barriers, shipped with the package.
 
-`python -m experiments.known_sites` computes the ensembles and envelopes of the built-in sites, and
-of the generated sites of some splits, and writes them to the file of `rigdda.envs.site_store`. The
-first `reset` on such a site reads them instead of simulating two thousand releases. The sites of
-Ritchie's tests are left out, as their masses take hours and no design starts there. The file is
-only used with the sources that made it, so it must be made last before a release. Values in the
-user's cache are not computed again.
+`python -m experiments.known_sites` computes the ensembles and envelopes of the built-in sites, of
+the sites of the exam, and of the generated sites of some splits, and writes them to the file of
+`rigdda.envs.site_store`. The first `reset` on such a site reads them instead of simulating two
+thousand releases. The sites of Ritchie's tests are left out, as their masses take hours and no
+design starts there. The file is only used with the sources that made it, so it must be made last
+before a release. Values in the user's cache are not computed again.
 
 If a source has changed in a way that does not affect results, `--keep N` makes the file quickly: N
 sites of the present file are computed again, and the values of all others are kept if those of the
@@ -25,13 +25,20 @@ import numpy as np
 
 from experiments.script import say
 from rigdda import Site, sites
+from rigdda.agents.exam import specification
 from rigdda.envs import ensemble, envelope, outcome_cache, site_store
 from rigdda.files import atomic
 
 SPLITS = ("validation", "test")
 
-BUILT_IN = ("quick", *sites.design_names())
-"""Built-in sites of the file."""
+EXAM = specification.load()
+ALWAYS = (
+    "quick",
+    *sites.design_names(),
+    *EXAM.sites,
+    *(name for corridor in EXAM.corridors for name in corridor.sites),
+)
+"""Built-in sites and those of the exam."""
 
 
 @click.command(help=__doc__)
@@ -46,7 +53,7 @@ BUILT_IN = ("quick", *sites.design_names())
 def main(splits: tuple[str, ...], count: int, checked: int | None, out: Path) -> None:
     """Compute and write the file."""
     generated = (name for split in splits for name in sites.split(split)[:count])
-    names = [*BUILT_IN, *generated]
+    names = [*ALWAYS, *generated]
     kept = {} if checked is None else kept_values(names, checked, out)
     values: dict[str, Any] = {}
     for name in names:

@@ -139,12 +139,17 @@ def episodes(env: BarrierEnv, names: list[str], each: int) -> dict[str, np.ndarr
     return {name: np.array([one[name] for one in seen], dtype=float) for name in seen[0]}
 
 
+def most_blocks(site: Site) -> int:
+    """Return the largest number of blocks of an event."""
+    return max(largest(site, name) for name in site.event_names)
+
+
 @pytest.mark.parametrize("env_class", [BarrierDesign, BarrierPlacement])
 def test_no_entry_is_always_the_same(env_class: type[BarrierEnv]) -> None:
     """Over a built-in and a generated site of every family but that of large, slow masses."""
-    families = [name for name in sites.FAMILIES if name != "shu-hwa"]
-    names = [*families, *(sites.split("validation", family)[0] for family in families)]
-    env = env_class("validation", releases=1, fidelity="fast")
+    names = [*sites.FAMILIES, *sites.split("validation")[:6]]
+    names = [name for name in names if most_blocks(Site.load(name)) < 100]
+    env = env_class("validation", releases=1)
     for name, values in episodes(env, names, 6).items():
         assert (np.ptp(values, axis=0) > 1e-3).all(), name
 

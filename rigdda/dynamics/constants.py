@@ -81,9 +81,7 @@ APART = 0.1
 """Time since the last contact after which a block counts as separated [s]. Separated from a
 barrier, it can hit that barrier again; separated from everything, it is no longer damped by
 surfaces. If damping ended with the contact itself, the damping of a block that rattles downhill
-would depend on the step: fractions of .50 / .53 / .54 / .57 of a mass (+- .02) reached the road of
-`quick` at 10 / 5 / 2.5 / 1.25 ms; with this delay they are .44 / .45 / .44 (+- .006) at 10 / 5 / 1
-ms."""
+would depend on the time step."""
 
 LONGEST_FLIGHT = 64
 """Maximum number of steps of a free flight. Longer flights require a wider search for obstacles."""

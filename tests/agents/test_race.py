@@ -39,7 +39,7 @@ def test_the_race_beats_random_search(valley: Valley) -> None:
     assert np.mean(raced) < np.mean(drawn)
 
 
-@pytest.mark.parametrize("name", ["race", "random"])
+@pytest.mark.parametrize("name", [pytest.param("race", marks=pytest.mark.slow), "random"])
 def test_what_is_reported_does_not_flatter(name: str, valley: Valley) -> None:
     apart = []
     for seed in range(16):

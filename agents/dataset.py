@@ -32,7 +32,7 @@ from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import observe
 from rigdda.files import atomic
-from rigdda.kernel import source_hash
+from rigdda.kernel import kernels_hash
 
 Tick = Callable[[int, str], None]
 
@@ -171,7 +171,7 @@ def _files(folder: Path, name: str) -> tuple[Path, Path]:
 
 def _claim(recipe: Recipe, folder: Path) -> None:
     """Record what a folder contains."""
-    content = {**msgspec.to_builtins(recipe), "version": __version__, "kernels": source_hash()}
+    content = {**msgspec.to_builtins(recipe), "version": __version__, "kernels": kernels_hash()}
     file = folder / CLAIM
     if file.is_file() and json.loads(file.read_text(encoding="utf-8")) != content:
         mend = "it contains a data set of other terms or of another version: name another folder"

@@ -32,7 +32,7 @@ from rigdda.agents.designers.protocol import release_seeds, verify
 from rigdda.agents.exam import specification
 from rigdda.agents.exam.specification import Anchor, ExamCorridor, References, Specification, tables
 from rigdda.envs import CorridorProblem, DesignProblem
-from rigdda.kernel import source_hash
+from rigdda.kernel import kernels_hash
 
 CHOICE, VALUE = 0.1, 0.2
 """Releases for the choice of the reference and for its value, over those of its search [-]."""
@@ -101,10 +101,10 @@ def _walk(problem: CorridorProblem, money: float, rng: np.random.Generator, i: i
 
 def record(spec: Specification, file: Path, releases: int) -> References:
     """Record references that are missing, had fewer releases or were made by other kernels."""
-    found = References(source_hash(), {})
+    found = References(kernels_hash(), {})
     if file.is_file():
         known = msgspec.json.decode(file.read_bytes(), type=References)
-        found = known if known.mechanics == source_hash() else found
+        found = known if known.mechanics == kernels_hash() else found
     for name in spec.sites:
         if _lacks(found, name, releases):
             say(name)

@@ -24,7 +24,7 @@ import gymnasium
 import numpy as np
 
 import rigdda.envs  # noqa: F401  registers the environments
-from experiments.made_by import KERNELS, kernels_hash, made_by
+from experiments.made_by import KERNELS, made_by
 from experiments.script import RESULTS, put, say, write
 from rigdda import (
     Bolt,
@@ -38,6 +38,7 @@ from rigdda import (
     Site,
 )
 from rigdda.envs import DesignProblem
+from rigdda.kernel import kernels_hash
 from rigdda.model.settings import Settings
 from rigdda.releases import Batch
 from rigdda.validation.case import evaluate

@@ -19,9 +19,10 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from experiments.made_by import KERNELS, kernels_hash, made_by
+from experiments.made_by import KERNELS, made_by
 from rigdda.envs.intervals import quantile
 from rigdda.files import atomic
+from rigdda.kernel import kernels_hash
 
 RESULTS = Path("experiments/results")
 """Folder of recorded results; those of quick runs are in its subfolder `quick`."""

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import click
 
-from experiments.made_by import KERNELS, kernels_hash, made_by
+from experiments.made_by import KERNELS, made_by
 from experiments.script import RESULTS
 from rigdda.agents.exam import specification
+from rigdda.kernel import kernels_hash
 
 
 def stale(folder: Path) -> list[Path]:

@@ -8,9 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from experiments.made_by import kernels_hash
 from experiments.script import say, write
 from rigdda.files import atomic
+from rigdda.kernel import kernels_hash
 
 Row = dict[str, Any]
 

@@ -8,6 +8,7 @@ compiled again.
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import functools
 import hashlib
@@ -28,6 +29,9 @@ from numba.core.targetconfig import TargetConfig
 
 from rigdda.errors import Error
 
+DECORATORS = ("kernel", "inlined", "arithmetic_kernel", "stage", "entry_kernel")
+"""Decorators of compiled functions."""
+
 
 def sources() -> list[bytes]:
     """Return the sources that contain kernels or their constants."""
@@ -46,6 +50,58 @@ def source_hash() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sources():
         digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def _is_text(part: ast.AST) -> bool:
+    """Return whether a statement is a docstring."""
+    value = part.value if isinstance(part, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
+
+
+def _is_kernel(part: ast.stmt) -> bool:
+    """Return whether a statement is a compiled function."""
+    if not isinstance(part, ast.FunctionDef):
+        return False
+    return any(isinstance(d, ast.Name) and d.id in DECORATORS for d in part.decorator_list)
+
+
+def _is_driver(part: ast.stmt) -> bool:
+    """Return whether a statement is ordinary code, as in modules that only call kernels."""
+    if isinstance(part, ast.FunctionDef):
+        return not part.name.startswith("_")
+    return isinstance(part, ast.ClassDef) and not part.bases
+
+
+def kernel_statements(source: bytes) -> list[str]:
+    """Return the code of the kernels, constants and array layouts of a module.
+
+    Docstrings and comments are removed, and the layout is uniform. A module that only calls kernels
+    has none.
+    """
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [part for part in body if not _is_text(part)]  # type: ignore[attr-defined]
+    kernels = [part for part in tree.body if _is_kernel(part)]
+    if not kernels and any(map(_is_driver, tree.body)):
+        return []
+    data = ast.Assign | ast.AnnAssign | ast.ClassDef
+    return [ast.unparse(part) for part in tree.body if part in kernels or isinstance(part, data)]
+
+
+@functools.cache
+def kernels_hash() -> str:
+    """Return a hash of numba's version and of the code of kernels and their constants.
+
+    Unlike `source_hash`, it does not change with comments, docstrings or the module that contains a
+    kernel. It tells whether results were computed by the same mechanics.
+    """
+    parts = [part for source in sources() for part in kernel_statements(source)]
+    digest = hashlib.sha256(numba.__version__.encode())
+    for part in sorted(parts):
+        digest.update(part.encode())
     return digest.hexdigest()[:16]
 
 

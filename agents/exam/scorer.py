@@ -43,7 +43,7 @@ from rigdda.agents.limits import SEED
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.observation import observe
 from rigdda.files import atomic
-from rigdda.kernel import source_hash
+from rigdda.kernel import kernels_hash
 
 Tick = Callable[[int, str], None]
 
@@ -297,7 +297,7 @@ class Scorer:
         """Read what the folder has of this run, and note to which run it belongs."""
         names = self.entry, self.corridor_entry
         code = [source_hash_of(name) for name in names if name]
-        own = [self.asked.specification.key, self.asked.seed, *names, *code, source_hash()]
+        own = [self.asked.specification.key, self.asked.seed, *names, *code, kernels_hash()]
         file, claim = (
             self.folder / CLAIM,
             {"run": msgspec.json.encode([__version__, *own]).decode()},

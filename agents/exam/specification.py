@@ -14,7 +14,7 @@ from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem
 from rigdda.fields import about
 from rigdda.files import atomic, read
-from rigdda.kernel import source_hash
+from rigdda.kernel import kernels_hash
 from rigdda.model.corridor import CorridorSection
 
 SHIPPED = Path(__file__).parent / "specification.toml"
@@ -52,7 +52,7 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def current(self) -> bool:
         """Whether the kernels of this installation are those of the references."""
-        return self.mechanics == source_hash()
+        return self.mechanics == kernels_hash()
 
     @property
     def key(self) -> str:

@@ -18,14 +18,14 @@ from rigdda.agents.exam import counter, ranking, scorer, specification
 from rigdda.agents.exam.counter import practice
 from rigdda.agents.exam.specification import Anchor, References, tables
 from rigdda.envs import DesignProblem
-from rigdda.kernel import source_hash
+from rigdda.kernel import kernels_hash
 from rigdda.model.site_names import SPLITS, instance
 
 SITES = ("narrow-2000000003", "cliff-2000000004")
 
 SPEC = f"""
 version = 7
-mechanics = "{source_hash()}"
+mechanics = "{kernels_hash()}"
 budgets = [0, 60]
 verification = 40
 max_barriers = 2
@@ -126,7 +126,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         anchors[name] = Anchor(tables((layout,)), 50.0, (40.0, 60.0), 200.0, 300.0, 2000)
     both = [anchors[name].layouts[0] for name in SITES]
     anchors["road"] = Anchor(both, 2000.0, (1900.0, 2100.0), 9000.0, 10000.0, 2000)
-    References(source_hash(), anchors).save(home / "references.json")
+    References(kernels_hash(), anchors).save(home / "references.json")
     return home
 
 

@@ -7,7 +7,8 @@ import pytest
 from click.testing import CliRunner
 
 from experiments import outcomes, script
-from experiments.made_by import KERNELS, kernels_hash, made_by
+from experiments.made_by import KERNELS, made_by
+from rigdda.kernel import kernels_hash
 
 NUMBERS = {"one": 1.0, "two": 2.0}
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from click.testing import CliRunner
 
-from experiments import made_by, script, stale
+from experiments import script, stale
+from rigdda.kernel import kernel_statements
 
 
 def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
@@ -29,6 +30,6 @@ def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
 def test_comments_and_the_module_of_a_kernel_do_not_count():
     one = b"import math\n\nA = 1  # why\n@kernel\ndef f(x):\n    'Return x.'\n    return A * x\n"
     two = b"A = 1\n@kernel\ndef f(x):\n    return A * x\n"
-    assert made_by.statements(one) == made_by.statements(two)
-    assert made_by.statements(one) != made_by.statements(two.replace(b"1", b"2"))
-    assert not made_by.statements(b"B = 3\ndef call():\n    return f(B)\n")
+    assert kernel_statements(one) == kernel_statements(two)
+    assert kernel_statements(one) != kernel_statements(two.replace(b"1", b"2"))
+    assert not kernel_statements(b"B = 3\ndef call():\n    return f(B)\n")

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from experiments import study
-from experiments.made_by import kernels_hash, made_by
+from experiments.made_by import made_by
 from experiments.study import tabulate
+from rigdda.kernel import kernels_hash
 
 CASES = [{"name": name, "dt": dt} for name in ("a", "b") for dt in (0.1, 0.2)]
 

@@ -81,7 +81,7 @@ SLOW = {
     "docs/howto/what_if.md",
     "docs/tutorials/researcher.md",
 }
-"""Pages that take more than 20 s of processor time."""
+"""Pages that take much processor time."""
 
 SKIPPED = {"", "text", "{toctree}", "{eval-rst}", "{code-cell}"}
 """Blocks that are no code, and cells, which run when the documentation is built."""

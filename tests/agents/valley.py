@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 
-import msgspec
 import numpy as np
+from light_site import LIGHT
 
 import rigdda
 from rigdda import Barrier, Layout, Outcome, Site
@@ -23,9 +23,8 @@ BEST, WIDE = 20.0, 4.0
 CATCH, HEIGHT = 0.95, 3.0
 """Share of the releases that the best barrier keeps off the road, and the least height for it."""
 
-site = Site.load("quick")
-SITE = msgspec.structs.replace(site, events=site.events[:2], meshes=())
-"""Without the mass, which is slow to look at."""
+SITE = LIGHT
+"""The site of the problem."""
 
 
 class Valley(DesignProblem):

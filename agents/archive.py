@@ -9,18 +9,17 @@ from __future__ import annotations
 import gzip
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
 from rigdda import BadInput, Layout, Outcome, Site, __version__
-from rigdda.agents.designers.store import Store, pack, unpack
+from rigdda.agents.designers.store import Store
 from rigdda.barriers import from_table, to_tables
-from rigdda.envs import DesignProblem, ensemble, outcome_cache, site_store
+from rigdda.envs import DesignProblem, ensemble
 from rigdda.envs.ensemble import Ensemble
-from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.outcome_cache import mechanics, unpack
 from rigdda.envs.problem import Targets
 from rigdda.files import atomic, is_file
 
@@ -148,27 +147,11 @@ def gathered(store: Store) -> Iterator[LayoutReleases]:
         yield LayoutReleases(layout, tuple(seed for _, seed in known), tuple(known.values()))
 
 
-BARE = "bare"
-"""Name under which outcomes without barriers are stored in the cache of the user."""
-
-
 def _bare(site: Site, known: Ensemble) -> list[Outcome]:
     """Return the outcomes of the releases without barriers from which an ensemble follows."""
-    jobs = [
-        (site, (), seed, name)
-        for name in site.event_names
-        for seed in range(ensemble.SEEDS, ensemble.SEEDS + known.nothing.reach[name].releases)
-    ]
-    key = outcome_cache.fingerprint(site)
-    packed = site_store.read(BARE, key, bytes)
-    if packed is not None:
-        with suppress(ValueError):
-            found = unpack(packed)
-            if len(found) == len(jobs):
-                return found
-    found = list(outcome_cache.outcomes(jobs))
-    site_store.write(BARE, key, pack(found))
-    return found
+    counts = {name: known.nothing.reach[name].releases for name in site.event_names}
+    found = ensemble.bare_outcomes(site, counts)
+    return [outcome for name in site.event_names for outcome in found[name]]
 
 
 def write(path: Path, made: Archive) -> None:

@@ -21,15 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Barrier, Layout, Site
-from rigdda.barriers import as_layout
+from rigdda.barriers import as_layout, to_tables
 from rigdda.envs import site_store
 from rigdda.envs.envelope import largest
-from rigdda.envs.outcome_cache import Memory
+from rigdda.envs.outcome_cache import Memory, release_key
 from rigdda.envs.quantiles import BlockSample, Quantile, quantiles
 from rigdda.geometry import polygon_properties
 from rigdda.model.barrier_zone import BarrierZone
-from rigdda.model.partial_factors import PartialFactors
-from rigdda.model.prices import Consequences, Prices
 from rigdda.passages import Passages, passages
 
 Floats = NDArray[np.float64]
@@ -157,8 +155,9 @@ def of(
         If a simulation diverges.
     """
     level, lines, built = site.rule.quantile, stations(zone), as_layout(layout)
-    bare = _bare(site)
-    key = _key(bare, lines, seed, blocks, level, list(built))
+    bare = msgspec.structs.replace(site, existing=()) if site.existing else site
+    names = governing_events(site)
+    key = _key(release_key(bare).hex(), names, lines, seed, blocks, level, to_tables(built))
     known = memory.recall([key]).get(key) or site_store.read(NAME, key, DesignEnvelope)
     if known is None:
         known = _simulate(bare, built, lines, seed, blocks, level)
@@ -167,20 +166,8 @@ def of(
     return known
 
 
-def _bare(site: Site) -> Site:
-    """Return a site without what does not affect the motion of its rock on the bare slope."""
-    return msgspec.structs.replace(
-        site,
-        existing=(),
-        prices=Prices(),
-        consequences=Consequences(),
-        traffic=None,
-        rule=PartialFactors(),
-    )
-
-
 def _key(*parts: Any) -> bytes:
-    """Return a key of a site and the other arguments."""
+    """Return a key of what affects the motion of rock on a site and of the other arguments."""
     return hashlib.sha256(msgspec.json.encode(parts)).digest()[:16]
 
 

@@ -5,17 +5,20 @@ They are computed once per site and stored on disk. Rewards are measured relativ
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 
 from rigdda import Outcome, Site
 from rigdda.envs import outcome_cache, site_store
 from rigdda.envs.cost import Evaluation, Facts, account, judge, learn
-from rigdda.envs.outcome_cache import Memory, Sample
+from rigdda.envs.outcome_cache import Memory
 
 SEEDS = 2**33
 """First seed of the releases used for barrier-free statistics. Episodes use seeds below 2**31, and
@@ -113,19 +116,72 @@ def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
 def _simulate(site: Site, executor: Executor | None) -> Ensemble:
     """Simulate an equal number of releases of each event, then more where they reduce variance."""
     names = site.event_names
-    first = _releases(site, dict.fromkeys(names, FIRST_SEEDS), executor)
-    wanted = _shared(_shares(site, _facts(site, first)), ALL)
-    more = {name: range(SEEDS + FIRST, SEEDS + max(wanted[name], FIRST)) for name in names}
-    both = first + _releases(site, more, executor)
+    first = bare_outcomes(site, dict.fromkeys(names, FIRST), executor)
+    wanted = _shared(_shares(site, _facts(site, _joined(first))), ALL)
+    counts = {name: max(wanted[name], FIRST) for name in names}
+    more = bare_outcomes(site, counts, executor)
+    both = _joined(first) + _joined({name: more[name][FIRST:] for name in names})
     facts = _facts(site, both)
     bare = judge(site, (), both, {}, {})
-    found = replace(bare, outcomes=(), simulated=both.simulated, seconds=both.seconds)
+    found = replace(bare, outcomes=(), simulated=len(both), seconds=0.0)
     return Ensemble(found, facts, _shares(site, facts))
 
 
-def _releases(site: Site, seeds: Mapping[str, range], executor: Executor | None) -> Sample:
-    jobs = [(site, (), seed, name) for name, drawn in seeds.items() for seed in drawn]
-    return outcome_cache.outcomes(jobs, executor)
+BARE = "bare"
+"""Name under which outcomes without barriers are stored on disk, about 100 bytes each."""
+
+
+def bare_outcomes(
+    site: Site, counts: Mapping[str, int], executor: Executor | None = None
+) -> dict[str, list[Outcome]]:
+    """Return the outcomes of the first releases of each event without new barriers.
+
+    They are stored on disk by what affects them, see `rigdda.envs.outcome_cache.release_key`, so
+    that sites with other prices or rates do not simulate them again.
+
+    Parameters
+    ----------
+    site : Site
+        The site, with its existing barriers.
+    counts : mapping of str to int
+        Number of releases of each event; their seeds begin at `SEEDS`.
+    executor : Executor, optional
+        Where to run the simulations; by default in threads on all cores.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    known = {name: _stored(site, name) for name in counts}
+    jobs = [
+        (site, (), SEEDS + i, name)
+        for name, count in counts.items()
+        for i in range(len(known[name]), count)
+    ]
+    if jobs:
+        for (*_, name), outcome in zip(jobs, outcome_cache.outcomes(jobs, executor), strict=True):
+            known[name].append(outcome)
+        for name in {name for *_, name in jobs}:
+            site_store.write(BARE, _bare_key(site, name), outcome_cache.pack(known[name]))
+    return {name: known[name][:count] for name, count in counts.items()}
+
+
+def _stored(site: Site, event: str) -> list[Outcome]:
+    """Return the outcomes of an event that are stored on disk; empty if there are none."""
+    packed = site_store.read(BARE, _bare_key(site, event), bytes)
+    with suppress(ValueError):
+        return outcome_cache.unpack(packed) if packed else []
+    return []
+
+
+def _bare_key(site: Site, event: str) -> bytes:
+    parts = outcome_cache.release_key(site).hex(), site.existing, event
+    return hashlib.sha256(msgspec.json.encode(parts)).digest()[:16]
+
+
+def _joined(found: Mapping[str, Sequence[Outcome]]) -> list[Outcome]:
+    return [outcome for own in found.values() for outcome in own]
 
 
 def _facts(site: Site, outcomes: Sequence[Outcome]) -> dict[str, Facts]:

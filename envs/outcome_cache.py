@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import math
 import time
+import zlib
 from collections import OrderedDict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -55,6 +56,37 @@ V = TypeVar("V")
 def fingerprint(site: Site) -> bytes:
     """Return a key of a site: the hash of its JSON encoding, in which numbers are exact."""
     return hashlib.sha256(msgspec.json.encode(site)).digest()[:16]
+
+
+NO_MOTION = (
+    "name",
+    "description",
+    "family",
+    "origin",
+    "prices",
+    "consequences",
+    "existing",
+    "traffic",
+    "meshes",
+    "rule",
+    "lumped",
+)
+"""Tables of a site that do not affect the outcome of a release with given barriers. Those that
+exist are among the barriers, see `Key`."""
+
+NO_EVENT_MOTION = ("rate", "design")
+"""Fields of an event that do not affect the outcome of its releases."""
+
+
+def release_key(site: Site) -> bytes:
+    """Return a key of everything that affects the outcomes of the releases of a site.
+
+    Sites that differ in prices, rates, targets or traffic only share their outcomes.
+    """
+    tables = {name: getattr(site, name) for name in site.__struct_fields__ if name not in NO_MOTION}
+    events = [msgspec.structs.asdict(event) for event in site.events]
+    kept = [{k: v for k, v in event.items() if k not in NO_EVENT_MOTION} for event in events]
+    return hashlib.sha256(msgspec.json.encode(tables | {"events": kept})).digest()[:16]
 
 
 class Memory(Generic[K, V]):
@@ -182,7 +214,7 @@ def misses(site: Site, key: bytes, layout: tuple[Built, ...], outcome: Outcome) 
     Parameters
     ----------
     site, key : Site, bytes
-        The site and its `fingerprint`.
+        The site and its `release_key`.
     layout : tuple of Built
         The barriers.
     outcome : Outcome
@@ -304,7 +336,7 @@ Job = tuple[Site, Layout, int, str]
 
 
 class Key(NamedTuple):
-    """Key of a release: site, all barriers that stand, seed and event."""
+    """Key of a release: `release_key` of the site, all barriers that stand, seed and event."""
 
     site: bytes
     layout: tuple[Built, ...]
@@ -331,7 +363,7 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
     BadInput, Diverged
         As `rigdda.release` does.
     """
-    prints = {id(site): fingerprint(site) for site, *_ in jobs}
+    prints = {id(site): release_key(site) for site, *_ in jobs}
     keys = [
         Key(prints[id(site)], site.standing(layout), seed, event)
         for site, layout, seed, event in jobs
@@ -392,3 +424,22 @@ def _remember(fresh: Mapping[Key, Outcome], jobs: Mapping[Key, Job]) -> None:
             alone = replace(outcome, barriers=(), held_fraction=0.0, slope_fraction=lies)
             bare[key._replace(layout=())] = alone
     bare_outcomes.remember(bare)
+
+
+def pack(outcomes: Sequence[Outcome]) -> bytes:
+    """Return outcomes in compressed form, about 100 bytes each."""
+    return zlib.compress(msgspec.msgpack.encode(list(outcomes)))
+
+
+def unpack(packed: bytes) -> list[Outcome]:
+    """Return the outcomes of their compressed form; numbers are exact.
+
+    Raises
+    ------
+    ValueError
+        If the bytes are damaged.
+    """
+    try:
+        return msgspec.msgpack.decode(zlib.decompress(packed), type=list[Outcome])
+    except (zlib.error, msgspec.MsgspecError) as error:
+        raise ValueError(f"damaged outcomes ({error})") from None

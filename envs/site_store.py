@@ -26,12 +26,13 @@ SHIPPED = Path(__file__).parent / "site_store.msgpack.xz"
 """File that ships with the package, made by `python -m experiments.known_sites`."""
 
 
-STATISTICS = ("cost", "ensemble", "envelope", "intervals", "outcome_cache")
+STATISTICS = ("cost", "design_envelope", "ensemble", "envelope", "intervals", "outcome_cache",
+              "quantiles")  # fmt: skip
 """Modules of this package that compute the statistics."""
 
 UNRELATED = ("agents", "envs", "replay", "sites", "validation", "corridor", "display",
              "distribution", "drawing", "errors", "files", "limit_equilibrium", "lumped_mass",
-             "passages", "site_generator", "site_names", "survey")  # fmt: skip
+             "site_generator", "site_names", "survey")  # fmt: skip
 """Folders and modules of `rigdda` that do not affect the releases of a given site. Those that make
 a site are among them, because values are stored by its content."""
 

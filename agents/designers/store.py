@@ -9,7 +9,6 @@ import hashlib
 import json
 import math
 import os
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,7 +20,7 @@ import msgspec
 from rigdda import BadInput, Layout, Outcome, __version__, distribution
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.intervals import estimate
-from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.outcome_cache import mechanics, pack
 from rigdda.files import atomic
 
 FILE = "problem.json"
@@ -133,25 +132,6 @@ class StoredEvaluation:
     evaluation: Evaluation
     releases: dict[str, tuple[Release, ...]]
     outcomes: bytes = b""
-
-
-def pack(outcomes: Sequence[Outcome]) -> bytes:
-    """Return outcomes in compressed form, about 100 bytes each."""
-    return zlib.compress(msgspec.msgpack.encode(list(outcomes)))
-
-
-def unpack(packed: bytes) -> list[Outcome]:
-    """Return the outcomes of their compressed form; numbers are exact.
-
-    Raises
-    ------
-    ValueError
-        If the bytes are damaged.
-    """
-    try:
-        return msgspec.msgpack.decode(zlib.decompress(packed), type=list[Outcome])
-    except (zlib.error, msgspec.MsgspecError) as error:
-        raise ValueError(f"damaged outcomes ({error})") from None
 
 
 class KeptReleases(NamedTuple):

@@ -11,8 +11,9 @@ from valley import SITE, Valley
 
 import rigdda.agents
 from rigdda import Fence, Layout
-from rigdda.agents.designers.store import Release, Store, unpack
+from rigdda.agents.designers.store import Release, Store
 from rigdda.envs import DesignProblem
+from rigdda.envs.outcome_cache import unpack
 from rigdda.envs.problem import Targets
 
 FENCE = (Fence(20.0, 2.0, energy_class=500),)

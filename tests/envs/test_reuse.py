@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, replace
 
 import cases
@@ -11,7 +12,13 @@ import pytest
 import rigdda
 from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Outcome, Site
 from rigdda.envs import outcome_cache
-from rigdda.envs.outcome_cache import Memory, Sample, fingerprint
+from rigdda.envs.outcome_cache import Memory, Sample, release_key
+from rigdda.model.barrier_zone import BarrierZone
+from rigdda.model.existing import Existing
+from rigdda.model.partial_factors import PartialFactors
+from rigdda.model.site_tables import Origin, Rebound, Road
+from rigdda.model.surface import Interface, Surface
+from rigdda.model.traffic import Traffic
 
 SEEDS = range(24)
 
@@ -75,7 +82,7 @@ def test_a_release_that_stays_clear_of_its_layout_is_one_without(site: Site) -> 
     for seed, outcome, ran in zip(SEEDS, without, without.ran, strict=True):
         if not ran:
             same(outcome, rigdda.release(site, (), seed, "small")[1])
-            assert outcome_cache.misses(site, fingerprint(site), layout, first[seed])
+            assert outcome_cache.misses(site, release_key(site), layout, first[seed])
 
 
 def test_equal_releases_are_simulated_once_and_other_sites_anew(site: Site) -> None:
@@ -85,6 +92,78 @@ def test_equal_releases_are_simulated_once_and_other_sites_anew(site: Site) -> N
     assert found[0] == found[1] == rigdda.release(*job)[1]
     slower = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, damping=0.2))
     assert outcome_cache.outcomes([(slower, (), 3, "small")]).simulated == 1
+
+
+def repriced(site: Site) -> Site:
+    """Return a site that differs in everything that does not affect its releases."""
+    events = tuple(
+        msgspec.structs.replace(event, rate=3.0 * event.rate, design=not event.design)
+        for event in site.events
+    )
+    same_tables = {
+        "name": "another",
+        "description": "Other prices.",
+        "family": "verge",
+        "origin": Origin(100.0, 7.0),
+        "prices": msgspec.structs.replace(site.prices, concrete=900.0, interest=0.07),
+        "consequences": msgspec.structs.replace(site.consequences, closure=90000.0),
+        "existing": (
+            Existing(
+                kind="fence", x=12.0, height=2.0, energy_class=100, removable=True, removal=10.0
+            ),
+        ),
+        "traffic": Traffic(vehicles_per_day=5000, speed=80.0, section_length=100.0),
+        "meshes": (),
+        "rule": PartialFactors(quantile=0.9),
+        "lumped": {"rock": Rebound(0.3)},
+    }
+    assert set(same_tables) == set(outcome_cache.NO_MOTION)
+    return msgspec.structs.replace(site, events=events, **same_tables)
+
+
+def test_releases_do_not_depend_on_prices_and_rates(site: Site) -> None:
+    other = repriced(site)
+    assert all(getattr(other, name) != getattr(site, name) for name in outcome_cache.NO_MOTION)
+    assert release_key(other) == release_key(site)
+    fence = Fence(15.0, 2.0, energy_class=250)
+    stands = other.standing((fence, rigdda.Removal(12.0)))
+    assert stands == (fence,)
+    for seed in range(4):
+        for event in site.event_names:
+            _, one = rigdda.release(site, (fence,), seed, event)
+            _, two = rigdda.release(other, (fence, rigdda.Removal(12.0)), seed, event)
+            assert one == two
+
+
+MOTION: dict[str, Callable[[Site], object]] = {
+    "slope": lambda s: msgspec.structs.replace(s.slope, toe=10.5),
+    "sources": lambda s: s.sources[::-1],
+    "events": lambda s: s.events[::-1],
+    "road": lambda s: Road(18.0, 27.0),
+    "barrier_zone": lambda s: BarrierZone(4.0, 17.0),
+    "surfaces": lambda s: s.surfaces | {"soil": Surface(31.0)},
+    "interfaces": lambda s: (Interface("rock", "soil", 31.0),),
+    "motion": lambda s: msgspec.structs.replace(s.motion, damping=0.2),
+    "scatter": lambda s: msgspec.structs.replace(s.scatter, friction_deg=1.0),
+}
+
+
+def test_every_other_table_of_a_site_is_part_of_the_key(site: Site) -> None:
+    assert {*MOTION, *outcome_cache.NO_MOTION} == {*site.__struct_fields__}
+    found = {
+        release_key(msgspec.structs.replace(site, **{name: change(site)}))
+        for name, change in MOTION.items()
+    }
+    assert len(found | {release_key(site)}) == len(MOTION) + 1
+
+
+@pytest.mark.parametrize(
+    "change", [{"area": (0.1, 0.3)}, {"number": (1, 2), "width": 3.0}, {"exponent": 0.7}]
+)
+def test_what_an_event_releases_is_part_of_the_key(site: Site, change: dict[str, object]) -> None:
+    event = msgspec.structs.replace(site.events[0], **change)
+    other = msgspec.structs.replace(site, events=(event, *site.events[1:]))
+    assert release_key(other) != release_key(site)
 
 
 def test_mesh_is_no_part_of_a_release(site: Site) -> None:
@@ -117,7 +196,7 @@ def test_a_release_that_struck_is_not_one_without(site: Site) -> None:
     hit = replace(cases.outcome("small", 0.0, False), reach=(0.0, 5.0))
     assert hit.barriers[0].hits == 0
     struck = replace(hit, barriers=(replace(hit.barriers[0], hits=2),))
-    key = outcome_cache.Key(fingerprint(site), layout, 1, "small")
+    key = outcome_cache.Key(release_key(site), layout, 1, "small")
     for outcome, kept in ((struck, 0), (hit, 1)):
         outcome_cache._remember({key: outcome}, {key: (site, layout, 1, "small")})
         assert len(outcome_cache.bare_outcomes.recall([key._replace(layout=())])) == kept
@@ -126,13 +205,13 @@ def test_a_release_that_struck_is_not_one_without(site: Site) -> None:
 def test_blocks_that_stop_short_by_less_than_a_step_may_have_touched(site: Site) -> None:
     layout = (Fence(15.0, 2.0, energy_class=250),)
     near, far = (replace(cases.outcome("small"), reach=(0.0, 15.0 - d)) for d in (0.25, 0.5))
-    assert not outcome_cache.misses(site, fingerprint(site), layout, near)
-    assert outcome_cache.misses(site, fingerprint(site), layout, far)
+    assert not outcome_cache.misses(site, release_key(site), layout, near)
+    assert outcome_cache.misses(site, release_key(site), layout, far)
 
 
 def test_outcomes_without_barriers_have_nothing_held(site: Site) -> None:
     held = replace(cases.outcome("small", 0.0, False, held=0.5), reach=(0.0, 5.0))
-    key = outcome_cache.Key(fingerprint(site), (Fence(15.0, 2.0, energy_class=100),), 1, "small")
+    key = outcome_cache.Key(release_key(site), (Fence(15.0, 2.0, energy_class=100),), 1, "small")
     outcome_cache._remember({key: held}, {key: (site, key.layout, 1, "small")})
     (kept,) = outcome_cache.bare_outcomes.recall([key._replace(layout=())]).values()
     assert (kept.held_fraction, kept.slope_fraction) == (0.0, 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from cases import cut
 
-from rigdda.envs import ensemble, envelope, site_store
+from rigdda.envs import ensemble, envelope, outcome_cache, site_store
 from rigdda.envs.environments import BarrierPlacement
 from rigdda.envs.outcome_cache import Memory
 from rigdda.envs.problem import DesignProblem
@@ -60,6 +60,34 @@ def test_another_process_reads_what_was_simulated(monkeypatch: pytest.MonkeyPatc
     assert again == first and same(seen_again, seen)
     with pytest.raises(ValueError, match="read-only"):
         seen_again.energy[0] = 0.0
+
+
+def test_other_prices_and_rates_simulate_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outcome_cache, "bare_outcomes", Memory(0))
+    first = ensemble.of(CUT, DesignProblem(CUT).key)
+    often = tuple(msgspec.structs.replace(event, rate=2.0 * event.rate) for event in CUT.events)
+    prices = msgspec.structs.replace(CUT.prices, removal=2.0 * CUT.prices.removal)
+    other = msgspec.structs.replace(CUT, name="other", events=often, prices=prices)
+    monkeypatch.setattr(outcome_cache, "_simulate", lambda *_: pytest.fail("simulated a release"))
+    again = ensemble.of(other, DesignProblem(other).key)
+    assert again.nothing.objective == pytest.approx(2.0 * first.nothing.objective)
+    assert again.shares == pytest.approx(first.shares)
+    assert again.nothing.simulated == first.nothing.simulated
+
+
+@pytest.mark.parametrize("found", ["damaged", "shorter"])
+def test_stored_releases_are_completed(
+    found: str, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counts = {"small": 6, "block": 4}
+    whole = ensemble.bare_outcomes(CUT, counts)
+    (path,) = cache.rglob(f"*{ensemble._bare_key(CUT, 'small').hex()}.msgpack")
+    kept = b"damaged" if found == "damaged" else outcome_cache.pack(whole["small"][:2])
+    path.write_bytes(msgspec.msgpack.encode(kept))
+    monkeypatch.setattr(outcome_cache, "bare_outcomes", Memory(0))
+    assert ensemble.bare_outcomes(CUT, counts) == whole
+    (again,) = cache.rglob(f"*{ensemble._bare_key(CUT, 'small').hex()}.msgpack")
+    assert outcome_cache.unpack(msgspec.msgpack.decode(again.read_bytes())) == whole["small"]
 
 
 def ship(cache: Path, sources: str | None = None) -> tuple[ensemble.Ensemble, envelope.Envelope]:

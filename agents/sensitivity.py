@@ -31,7 +31,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,12 +41,12 @@ from rigdda.agents.varied_sites import (
     PARTS,
     Priced,
     Seeds,
-    mechanical,
     noise,
     price,
     simulate,
 )
 from rigdda.envs import DesignProblem
+from rigdda.envs.outcome_cache import release_key
 
 Floats = NDArray[np.float64]
 Method = Literal["morris", "sobol"]
@@ -409,13 +408,12 @@ def plan(
     cube = places(method, len(inputs), SAMPLES[method] if samples is None else samples, seed)
     seeds = seeds_of(site, releases, seed)
     sites = tuple(site_at(site, inputs, row) for row in cube)
-    groups: dict[bytes, tuple[Site, list[int]]] = {}
+    for own in sites:
+        own.built(layout, 1.0)  # larger blocks may take the room of a barrier
+    groups: dict[tuple[bytes, Layout], tuple[Site, list[int]]] = {}
     for i, own in enumerate(sites):
-        moves = mechanical(own, site)
-        groups.setdefault(msgspec.json.encode(moves), (moves, []))[1].append(i)
-    for moves, _ in groups.values():
-        moves.built(layout, 1.0)  # larger blocks may take the room of a barrier
-    found = tuple((moves, tuple(rows)) for moves, rows in groups.values())
+        groups.setdefault((release_key(own), own.standing(layout)), (own, []))[1].append(i)
+    found = tuple((own, tuple(rows)) for own, rows in groups.values())
     return SensitivityPlan(site, layout, tuple(inputs), method, cube, seeds, sites, found, seed)
 
 

@@ -32,22 +32,6 @@ Seeds = Mapping[str, Sequence[int]]
 """Seeds of the releases of each event."""
 
 
-def mechanical(site: Site, usual: Site) -> Site:
-    """Return a site with the prices, consequences and rates of another one.
-
-    Two sites with the same result have the same releases.
-    """
-    rates = {event.name: event.rate for event in usual.events}
-    events = tuple(msgspec.structs.replace(e, rate=rates[e.name]) for e in site.events)
-    return msgspec.structs.replace(
-        site,
-        prices=usual.prices,
-        consequences=usual.consequences,
-        meshes=usual.meshes,
-        events=events,
-    )
-
-
 class SimulatedSite(NamedTuple):
     """Outcomes of the releases of a site with one layout, by event."""
 
@@ -105,7 +89,8 @@ def _key(site: Site, layouts: Sequence[Layout], seeds: Seeds) -> str:
     """Return a hash of everything that the outcomes depend on."""
     built = [list(layout) for layout in layouts]
     drawn = {name: list(own) for name, own in seeds.items()}
-    asked = [rigdda.__version__, outcome_cache.mechanics(), site, built, drawn]
+    moves = [outcome_cache.release_key(site).hex(), site.existing]
+    asked = [rigdda.__version__, outcome_cache.mechanics(), moves, built, drawn]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:24]
 
 

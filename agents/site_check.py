@@ -559,7 +559,7 @@ def draw(path: str | os.PathLike[str], site: Site) -> None:
         axes.set_title(site.name, loc="left", fontweight="bold", fontsize=12)
         _draw_survey(axes, site)
         figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=10)
-        write_labels(axes, [*_names(site), *_draw_standing(axes, site)])
+        write_labels(figure, [(axes, [*_names(site), *_draw_standing(axes, site)])])
         save(figure, path)
 
 

@@ -18,6 +18,7 @@ from rigdda.display import BARRIER, GROUND, OLD, ROAD, ROCK, ZONE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.transforms import Bbox
 
 Floats = NDArray[np.float64]
@@ -237,16 +238,22 @@ def name_places(axes: Axes, site: Site, zone: tuple[float, float]) -> None:
         )
 
 
-def write_labels(axes: Axes, labels: Sequence[Label]) -> None:
-    """Write labels above their points without overlaps.
+def write_labels(figure: Figure, labels: Sequence[tuple[Axes, Sequence[Label]]]) -> None:
+    """Write the labels of each axes of a figure above their points without overlaps.
 
-    The limits and the size of the axes must be final. Each label starts above its point, moves up
-    if another label is in the way, and moves left if it would leave the axes.
+    The limits of the axes must be final; their places are no longer changed by the layout of the
+    figure. Each label starts above its point, moves up if another label is in the way, and moves
+    left if it would leave the axes.
     """
-    figure = axes.get_figure(root=True)
-    assert figure is not None
     figure.draw_without_rendering()
-    frame, point = axes.get_window_extent(), figure.dpi / 72.0
+    figure.set_layout_engine("none")
+    for axes, own in labels:
+        _write_labels(axes, own, figure.dpi / 72.0)
+
+
+def _write_labels(axes: Axes, labels: Sequence[Label], point: float) -> None:
+    """Write labels above their points; `point` is the size of a point in pixels."""
+    frame = axes.get_window_extent()
     font: dict[str, Any] = {"fontsize": 9, "fontweight": "bold"}
     taken: list[Bbox] = []
     for label in sorted(labels, key=lambda one: -one.at[0]):
@@ -320,7 +327,7 @@ def picture(run: Run, site: Site, layout: Layout, title: str) -> NDArray[np.uint
     for mesh in layout:
         if isinstance(mesh, Mesh):
             labels.append(Label(mesh.label, draw_mesh(axes, site, mesh, BAND * (top - bottom))))
-    write_labels(axes, labels)
+    write_labels(figure, [(axes, labels)])
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 

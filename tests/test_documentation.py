@@ -77,7 +77,9 @@ SLOW = {
     "docs/howto/corridor.md",
     "docs/howto/exam.md",
     "docs/howto/fit.md",
+    "docs/howto/report.md",
     "docs/howto/step_and_fidelity.md",
+    "docs/howto/traffic.md",
     "docs/howto/what_if.md",
     "docs/tutorials/researcher.md",
 }

@@ -5,13 +5,11 @@ The ensemble of these releases records all blocks that pass each station. Severa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +29,7 @@ from rigdda.barriers.base import ELEMENT
 from rigdda.barriers.fence import PANEL
 from rigdda.barriers.gravity_wall import SLID
 from rigdda.envs import DesignProblem
+from rigdda.envs.outcome_cache import Memory, release_key
 from rigdda.geometry import polygon_properties
 
 Floats = NDArray[np.float64]
@@ -136,17 +135,25 @@ def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -
     Diverged
         If a simulation diverges.
     """
-    asked = tuple((name, tuple(drawn)) for name, drawn in seeds.items())
-    return _ensemble(msgspec.json.encode(site), asked, tuple(np.asarray(stations).tolist()))
+    jobs = tuple((name, seed) for name, drawn in seeds.items() for seed in drawn)
+    places = tuple(np.asarray(stations).tolist())
+    key = release_key(site), site.standing(), jobs, places
+    found = memory.recall([key]).get(key)
+    if found is None:
+        found = _simulate(site, jobs, places)
+        memory.remember({key: found})
+    return found
 
 
-@lru_cache(maxsize=4)
-def _ensemble(
-    text: bytes, seeds: tuple[tuple[str, tuple[int, ...]], ...], stations: tuple[float, ...]
+memory: Memory[tuple[Hashable, ...], CrossingEnsemble] = Memory(4)
+"""Ensembles by what affects their releases, the releases and the stations."""
+
+
+def _simulate(
+    site: Site, jobs: Sequence[tuple[str, int]], stations: Sequence[float]
 ) -> CrossingEnsemble:
-    site = msgspec.json.decode(text, type=Site)
+    """Simulate releases without new barriers, given by event and seed."""
     lines = (*stations, site.road.start)
-    jobs = [(name, seed) for name, drawn in seeds for seed in drawn]
 
     def one(job: tuple[int, tuple[str, int]]) -> tuple[NDArray[np.void], float]:
         release, (event, seed) = job

@@ -386,8 +386,7 @@ def section(
             axes.axvspan(zone.start, zone.end, color=ZONE, alpha=0.25, lw=0)
         _envelopes(heights, energies, site, panels[-1].layout, envelopes, words)
         _key(lower, site, [own.event for own in envelopes])
-        for axes, own in zip(grid.flat, labels, strict=True):
-            write_labels(axes, own)
+        write_labels(figure, list(zip(grid.flat, labels, strict=True)))
         save(figure, path)
 
 
@@ -430,8 +429,7 @@ def slopes(
         for axes in grid.flat[len(panels) :]:
             axes.set_visible(False)
         _key(figure, site, site.event_names, envelopes=False)
-        for (axes, _), own in zip(drawn, labels, strict=True):
-            write_labels(axes, own)
+        write_labels(figure, [(axes, own) for (axes, _), own in zip(drawn, labels, strict=True)])
         save(figure, path)
 
 

@@ -14,13 +14,13 @@ import pytest
 from test_command_line import refused, rows, run
 
 import rigdda
-from rigdda import BadInput, Site
+from rigdda import BadInput, Outcome, Site
 from rigdda.agents import archive, jobs, reprice
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import frontier_report
 from rigdda.barriers import to_tables
-from rigdda.envs import DesignProblem, Evaluation, ensemble
+from rigdda.envs import DesignProblem, Evaluation, ensemble, outcome_cache
 from rigdda.envs.cost import judge
 
 VERIFIED = 60
@@ -67,14 +67,22 @@ def changed_by_hand(site: Site, settings: dict[str, object]) -> Site:
     return msgspec.convert(data, Site)
 
 
+simulated: dict[tuple[bytes, rigdda.Layout, tuple[tuple[int, str], ...]], list[Outcome]] = {}
+
+
+def anew(site: Site, layout: rigdda.Layout, drawn: list[tuple[int, str]]) -> list[Outcome]:
+    """Return the outcomes of releases, simulated once for all sites with the same releases."""
+    key = outcome_cache.release_key(site), layout, tuple(drawn)
+    if key not in simulated:
+        simulated[key] = rigdda.release_many([(site, layout, *one) for one in drawn])
+    return simulated[key]
+
+
 def from_scratch(site: Site, problem: DesignProblem, kept: archive.Archive) -> list[Evaluation]:
     """Return the evaluations of the verified layouts, with every release simulated anew."""
     counts = DesignProblem(kept.site).nothing.reach
-    bare = rigdda.release_many([
-        (site, (), seed, name)
-        for name in site.event_names
-        for seed in range(ensemble.SEEDS, ensemble.SEEDS + counts[name].releases)
-    ])  # fmt: skip
+    seeds = {n: range(ensemble.SEEDS, ensemble.SEEDS + counts[n].releases) for n in counts}
+    bare = anew(site, (), [(seed, name) for name in site.event_names for seed in seeds[name]])
     facts = ensemble._facts(site, bare)
     nothing = judge(site, (), bare, {}, {})
     events = DesignProblem(kept.site).plan(release_seeds("verification", kept.seed, VERIFIED))
@@ -82,7 +90,7 @@ def from_scratch(site: Site, problem: DesignProblem, kept: archive.Archive) -> l
     found = []
     for tables in kept.layouts:
         layout = archive.layout_of(tables)
-        outcomes = rigdda.release_many([(site, layout, seed, event) for seed, event in drawn])
+        outcomes = anew(site, layout, drawn)
         one = judge(site, layout, outcomes, facts, kept.shares)
         share = one.debris / nothing.debris if nothing.debris else 0.0
         found.append(replace(one, debris_share=share, targets=problem.state(one), outcomes=()))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from light_site import LIGHT
 
 import rigdda
 import rigdda.envs
@@ -90,7 +91,7 @@ def test_a_recorded_episode_repeats_with_its_cap(tmp_path) -> None:
 @pytest.mark.parametrize("name", DESIGNERS)
 @pytest.mark.parametrize("cap", [0.0, 400.0])
 def test_every_designer_keeps_to_the_cap(name: str, cap: float) -> None:
-    problem = DesignProblem("quick", max_cost=cap)
+    problem = DesignProblem(LIGHT, max_cost=cap)
     result = module(name).design(problem, 120, seed=2)
     assert problem.site.capital(result.layout) <= cap
     assert all(e.evaluation.cost <= cap for e in result.history.entries)
@@ -99,7 +100,7 @@ def test_every_designer_keeps_to_the_cap(name: str, cap: float) -> None:
 
 
 def test_the_race_spends_what_it_may() -> None:
-    problem = DesignProblem("quick", max_cost=400.0)
+    problem = DesignProblem(LIGHT, max_cost=400.0)
     result = module("race").design(problem, 1_500, seed=0)
     costs = [e.evaluation.cost for e in result.history.entries]
     assert len({e.evaluation.layout for e in result.history.entries}) > 10

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import binom
+from scipy.special import bdtr, bdtrik
 
 from rigdda.envs import intervals
 from rigdda.envs.intervals import CONFIDENCE, Mean
@@ -146,5 +146,14 @@ def _effective(sample: BlockSample, value: float, level: float) -> int:
 @lru_cache(maxsize=4096)
 def _ranks(n: int, level: float) -> tuple[float, float]:
     """Return the shares at which the two order statistics lie, outside 0 to 1 if there is none."""
-    low, high = binom.ppf(TAIL, n, level), binom.ppf(1.0 - TAIL, n, level) + 1.0
+    low, high = binomial_quantile(TAIL, n, level), binomial_quantile(1.0 - TAIL, n, level) + 1
     return (low - 0.5) / n, (high - 0.5) / n
+
+
+def binomial_quantile(tail: float, n: int, p: float) -> int:
+    """Return the least number of successes with at least a probability of `tail` up to it.
+
+    It equals `scipy.stats.binom.ppf`, whose import takes as long as a small evaluation.
+    """
+    count = math.ceil(bdtrik(tail, n, p))
+    return count - 1 if count > 0 and bdtr(count - 1, n, p) >= tail else count

@@ -15,7 +15,7 @@ from experiments.script import Number
 
 SLOW = {
     "catch_bench", "fence_step", "fig10_modes", "fig13_deposit", "fig14_retained", "hard_cases",
-    "speed_error", "thrust",
+    "lumped_mass", "one_slope", "outcome_step", "speed_error", "thrust",
 }  # fmt: skip
 TIMED = {"fig04_deformable", "fig05_solvers", "ablation"}
 """Their numbers or notes are processor times: tested below without them."""

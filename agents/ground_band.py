@@ -17,7 +17,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from rigdda import Layout, Site
 from rigdda.agents.design_study import DesignStudy, design_events
@@ -170,6 +169,8 @@ def assess(
     Diverged
         If a simulation diverges.
     """
+    from scipy.stats import qmc  # takes half a second
+
     problem, asked = done.problem, inputs(done.problem.site, posterior)
     cube = qmc.LatinHypercube(len(asked), rng=np.random.default_rng(seed)).random(grounds)
     layouts = [case.evaluation.layout for case in done.cases]

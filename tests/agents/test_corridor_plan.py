@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from test_command_line import png_size, refused, rig, rows, run
 
 import rigdda
-from rigdda import BadInput, Corridor, Ditch, load_layout
+from rigdda import BadInput, Corridor, CorridorSection, Ditch, Site, load_layout
 from rigdda.agents.corridor import allocation, planning, programme
 from rigdda.agents.corridor.allocation import Estimates
 from rigdda.agents.corridor.programme import METHODS, Options
@@ -290,14 +290,13 @@ def test_options_are_judged_by_the_risk_to_life() -> None:
     assert option.missed(one) == 0.0
 
 
-def test_the_difference_of_two_choices_is_that_of_the_sections_that_differ() -> None:
-    problem = CorridorProblem(Corridor.load(EXAMPLE))
-    quick = problem.problems[1]
-    ditch = (Ditch(quick.site.slope.toe, 1.0, 3.0),)
-    bare, built = (quick.evaluate(layout, range(50)) for layout in ((), ditch))
-    rest = [own.nothing for own in problem.problems]
-    one = problem.judge([rest[0], built, *rest[2:]])
-    other = problem.judge([rest[0], bare, *rest[2:]])
+def test_the_difference_of_two_choices_is_that_of_the_sections_that_differ(site: Site) -> None:
+    sections = tuple(CorridorSection(site, 40.0 * (i + 1), f"km {i}") for i in range(3))
+    problem = CorridorProblem(Corridor("three", sections, (1e5,)))
+    ditch = (Ditch(site.slope.toe, 1.0, 3.0),)
+    bare, built = (problem.problems[1].evaluate(layout, range(50)) for layout in ((), ditch))
+    first, _, last = (own.nothing for own in problem.problems)
+    one, other = (problem.judge([first, chosen, last]) for chosen in (built, bare))
     found = problem.ahead(one, other)
     assert found.value == pytest.approx(80.0 * (bare.objective - built.objective))
     assert found.low < found.value < found.high

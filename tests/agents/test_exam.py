@@ -196,10 +196,10 @@ def test_an_honest_entry_is_scored_and_counted(folder: Path) -> None:
     [
         ("greedy", "its counter says"),
         ("sneaky", "simulated releases itself"),
-        ("direct", "simulated releases itself (Simulation)"),
-        ("wild", "submitted what cannot be built"),
-        ("peeking", "read the recorded references"),
-        ("forking", "started another process"),
+        pytest.param("direct", "simulated releases itself (Simulation)", marks=pytest.mark.slow),
+        pytest.param("wild", "submitted what cannot be built", marks=pytest.mark.slow),
+        pytest.param("peeking", "read the recorded references", marks=pytest.mark.slow),
+        pytest.param("forking", "started another process", marks=pytest.mark.slow),
     ],
 )
 def test_the_command_flags_a_cheat(folder: Path, entry: str, reason: str) -> None:
@@ -223,6 +223,7 @@ def test_an_entry_that_fails_is_one_line(folder: Path) -> None:
     assert "name a function that can be imported" in missing.stderr
 
 
+@pytest.mark.slow
 def test_a_corridor_must_not_cost_more_than_the_money(folder: Path) -> None:
     more = ("--corridor-entry", "entries_of_test:spender", "--budget", "0", "--corridors", "1")
     done = exam(folder, "honest", *more, "--sites", "1", "--out", "out-spender")
@@ -232,6 +233,7 @@ def test_a_corridor_must_not_cost_more_than_the_money(folder: Path) -> None:
     assert done.returncode == 1
 
 
+@pytest.mark.slow
 def test_a_part_is_marked_and_an_exam_continues(folder: Path) -> None:
     first = exam(folder, "honest", "--sites", "1", "--budget", "60", "--out", "out-part")
     assert first.returncode == 0 and "cannot enter the leaderboard" in first.stdout

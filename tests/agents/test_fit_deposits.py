@@ -85,6 +85,7 @@ def test_the_least_place_of_noisy_scores_is_found_with_its_error() -> None:
     assert (low <= [0.3, 0.6]).all() and (high >= [0.3, 0.6]).all()
 
 
+@pytest.mark.slow
 def test_passages_and_run_outs_are_fitted_together(tmp_path: Path) -> None:
     parameters = [parse("surfaces.rock.damping")]
     real = with_values(SITE, parameters, (0.9,))

@@ -67,6 +67,7 @@ def test_a_row_equals_an_evaluation_from_scratch(designed: tuple[Path, str]) -> 
     assert float(row["Z"]) == pytest.approx(afresh.objective, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_band_changes_nothing_else_and_can_be_left_out(designed: tuple[Path, str]) -> None:
     folder, _ = designed
     words = run(*COMMAND, "--target", 0.2, "--ground-samples", 0, "--out", "none", folder=folder)

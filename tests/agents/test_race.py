@@ -96,6 +96,7 @@ def test_the_race_repeats_and_resumes(valley: Valley, tmp_path: Path) -> None:
     assert file.stat().st_size < 200 * whole.simulations
 
 
+@pytest.mark.slow
 def test_a_target_is_met_where_it_can_be(site: Site) -> None:
     """On a road that hardly anybody needs nothing pays, so that only the target asks for one."""
     lonely = replace(site, consequences=replace(site.consequences, closure=500.0))

@@ -195,6 +195,7 @@ def test_a_block_that_leaves_the_profile_is_told(tmp_path: Path) -> None:
     assert float(row["x_m"]) == Site.load("shu-hwa").road.start  # by default
 
 
+@pytest.mark.slow
 def test_all_releases_count(tmp_path: Path) -> None:
     """Not only those of which trajectories are drawn."""
     options = ("--event", "small, crest", "--releases", 300, "--out", "o")

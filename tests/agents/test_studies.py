@@ -212,6 +212,7 @@ def test_a_study_s_table_is_what_the_problem_says(folder: Path, site: Site) -> N
     assert float(str(cells[1]).split()[0].replace(",", "")) == pytest.approx(z, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_example_in_python_says_that_stronger_fences_fail_less() -> None:
     found = example("study").study(releases=40)
     failed = [e.failure["block"].probability for e in found.values()]

@@ -90,6 +90,7 @@ def test_a_training_that_was_stopped_ends_as_if_it_had_not_been(
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
+@pytest.mark.slow
 def test_a_training_goes_on_with_more_episodes(trained: tuple[Path, str], tmp_path: Path) -> None:
     folder = tmp_path / "o"
     shutil.copytree(trained[0], folder)

@@ -461,6 +461,7 @@ def test_layouts_are_compared_in_the_same_releases(problem: DesignProblem, site:
         compare(problem, FENCE, weak, range(2))
 
 
+@pytest.mark.slow
 def test_paired_intervals_hold_the_difference(problem: DesignProblem) -> None:
     """In 95 % of 40 repetitions; a binomial of 40 is below 33 once in 3,000 times."""
     weak = (Fence(12.0, 2.0, energy_class=100),)

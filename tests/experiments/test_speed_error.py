@@ -100,6 +100,7 @@ def test_slides_are_exact_at_every_choice():
     assert default.error < 1e-3
 
 
+@pytest.mark.slow
 def test_a_run_writes_its_tables_and_pictures(tmp_path, monkeypatch):
     monkeypatch.setattr(highway, "QUICK", Budget(8, 2, 2, 12.0, (), 16.0))
     monkeypatch.setattr(study, "peers", list)

@@ -236,7 +236,7 @@ def test_kinds_zone_and_target_are_kept_to(toml: Path, tmp_path: Path) -> None:
     assert re.search(r"target P\(reach\) <= 90 %.*: (met|missed|undecided)", words)
 
 
-@pytest.mark.parametrize("designer", ["rule", "tpe", "ppo"])
+@pytest.mark.parametrize("designer", ["rule", pytest.param("tpe", marks=pytest.mark.slow), "ppo"])
 def test_a_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
     tiny = ("--budget", 40, "--verify", 12, "--ground-samples", 0)
     words = run("design", toml, "--designer", designer, *tiny, folder=tmp_path)

@@ -27,6 +27,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, run("train", *SMALL, "--out", folder, folder=folder)
 
 
+@pytest.mark.slow
 def test_a_training_leaves_a_policy_and_its_logs(trained: tuple[Path, str]) -> None:
     folder, words = trained
     assert list((folder / "ppo_0").glob("events.out.tfevents*"))
@@ -35,6 +36,7 @@ def test_a_training_leaves_a_policy_and_its_logs(trained: tuple[Path, str]) -> N
     assert "before" in words and "after" in words
 
 
+@pytest.mark.slow
 def test_a_policy_is_tried_on_unseen_sites(trained: tuple[Path, str], tmp_path: Path) -> None:
     """On the built-in site quick, which no training sees, by the designer that loads the file."""
     design = policy.using(policy.load(trained[0] / "policy.safetensors"))
@@ -134,6 +136,7 @@ def test_a_damaged_training_is_one_line(name: str, content: bytes | None, tmp_pa
     assert sorted(tmp_path.iterdir()) == sorted([file, tmp_path / "run.json"])
 
 
+@pytest.mark.slow
 def test_a_checkpoint_without_its_terms_is_one_line(
     trained: tuple[Path, str], tmp_path: Path
 ) -> None:
@@ -142,6 +145,7 @@ def test_a_checkpoint_without_its_terms_is_one_line(
     assert "training.json" in line and "missing" in line and "another folder" in line
 
 
+@pytest.mark.slow
 def test_a_checkpoint_cut_off_is_one_line(trained: tuple[Path, str], tmp_path: Path) -> None:
     for name in ("training.json", "checkpoint.zip"):
         (tmp_path / name).write_bytes((trained[0] / name).read_bytes())
@@ -212,6 +216,7 @@ def test_the_exported_network_says_what_torch_says(tmp_path: Path) -> None:
     assert (made(mean) != made(mean + scale)).any()
 
 
+@pytest.mark.slow
 def test_a_training_that_is_done_is_not_done_again(
     trained: tuple[Path, str], tmp_path: Path
 ) -> None:

@@ -17,9 +17,9 @@ from rigdda.agents.designers import front, rule
 from rigdda.agents.designers.constant import place
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.designers.store import pack, unpack
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem
+from rigdda.envs.outcome_cache import pack, unpack
 from rigdda.envs.site_store import sources
 from rigdda.files import atomic
 

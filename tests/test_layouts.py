@@ -227,7 +227,9 @@ def test_a_picture_names_the_state_of_a_wall_that_slid(monkeypatch: pytest.Monke
     assert run.state(0, 0) == "stands" and run.state(0) in ("slid", "overturned")
     written: list[str] = []
     monkeypatch.setattr(
-        rendering, "write_labels", lambda axes, labels: written.extend(one.words for one in labels)
+        rendering,
+        "write_labels",
+        lambda figure, labels: written.extend(one.words for _, own in labels for one in own),
     )
     rendering.picture(run, QUICK, run.scene.barriers, "wall")
     assert written == [f"gravity wall 1.0 m high: {run.state(0)}"]
@@ -244,7 +246,8 @@ def test_labels_of_a_picture_do_not_overlap(size):
     axes = figure.subplots()
     axes.set(xlim=(0.0, 100.0), ylim=(0.0, 50.0))
     places = [(10.0, 40.0), (60.0, 8.0), (62.0, 5.0), (90.0, 3.0), (91.0, 3.0), (99.0, 3.0)]
-    write_labels(axes, [Label(f"fence 1,000 kJ, {x:.1f} m high", (x, y)) for x, y in places])
+    labels = [Label(f"fence 1,000 kJ, {x:.1f} m high", (x, y)) for x, y in places]
+    write_labels(figure, [(axes, labels)])
     figure.draw_without_rendering()
     boxes = [
         Annotation.get_bbox_patch(text).get_window_extent()

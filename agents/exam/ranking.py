@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -49,7 +50,15 @@ def interval(values: Floats, strata: Sequence[str], seed: int = 0) -> tuple[floa
         resample has the same number of values of each.
     seed : int
         Seed of the resamples.
+
+    Returns
+    -------
+    (float, float)
+        The ends of the interval; NaN if no stratum has more than one value, since nothing can be
+        resampled then.
     """
+    if len(set(strata)) == len(values):
+        return math.nan, math.nan
     rng, labels = np.random.default_rng(seed), np.array(strata)
     drawn = np.empty((RESAMPLES, len(values)))
     for label in np.unique(labels):
@@ -138,7 +147,7 @@ def table(summaries: Sequence[dict[str, Any]]) -> Table:
     out = tables.empty_table(head)
     for row in summaries:
         score = f"{row['score']:.3f}"
-        if row["score_low"] < row["score_high"]:  # of one task per stratum, nothing is resampled
+        if not math.isnan(row["score_low"]):
             score += f" ({row['score_low']:.3f} to {row['score_high']:.3f})"
         out.add_row(
             row["track"], f"{row['budget']:,}", str(row["tasks"]), score,

@@ -32,6 +32,7 @@ from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.cost import account, judge
 from rigdda.envs.ensemble import Ensemble, statistics
 from rigdda.envs.intervals import Estimate, Mean, estimate
+from rigdda.envs.outcome_cache import NO_EVENT_MOTION, NO_MOTION
 from rigdda.envs.problem import MISSED, Targets, excess, read_targets
 
 BEST = "best of search"
@@ -39,16 +40,17 @@ BEST = "best of search"
 
 Value = bool | int | float | str | Mapping[str, Any]
 
-EVENT_KEYS = ("rate", "return_period", "section_length", "design")
+EVENT_KEYS = (*NO_EVENT_MOTION, "return_period", "section_length")
 """Keys of an event that do not affect its releases."""
 
 MOTION = (
-    "slope", "sources", "road", "surfaces", "interfaces", "existing", "motion", "scatter", "lumped",
-)  # fmt: skip
+    "existing",
+    *(name for name in Site.__struct_fields__ if name not in (*NO_MOTION, "events")),
+)
 """Tables of a site file on which the motion of rock depends."""
 
-LABELS = ("name", "description", "family", "origin")
-"""Keys of a site file that affect no result."""
+LABELS = ("name", "description", "family", "origin", "lumped")
+"""Keys of a site file that affect no result of a design."""
 
 
 class Change(NamedTuple):
@@ -135,11 +137,11 @@ def _table_of(site: Site, path: str, value: Value) -> tuple[str, list[str]]:
         near = difflib.get_close_matches(top, names, 1)
         mend = f"did you mean {near[0]}?" if near else "give a key such as consequences.closure"
         raise BadInput(path, value, f"there is no such key: {mend}")
-    if top in MOTION:
-        raise _needs_simulation(path, value)
     if top == "barrier_zone":
         mend = "a search in another zone tries other layouts: run `rigdda design` for this"
         raise BadInput(path, value, mend)
+    if top in MOTION:
+        raise _needs_simulation(path, value)
     if top in LABELS:
         raise BadInput(path, value, "leave it out: no result depends on it")
     if not keys:

@@ -286,10 +286,14 @@ LOCK = ".lock"
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Lock a folder against other processes of this package if its drive supports file locks."""
+    """Lock a folder against other processes of this package if its drive supports file locks.
+
+    Temporary files of killed processes are removed.
+    """
     from filelock import FileLock, Timeout
 
     from rigdda import BadInput
+    from rigdda.files import remove_parts
 
     lock = FileLock(folder / LOCK)
     try:
@@ -299,6 +303,8 @@ def _alone(folder: Path) -> Iterator[None]:
         raise BadInput("--out", str(folder), mend) from None
     except (OSError, NotImplementedError):  # some network drives cannot lock files
         pass
+    if lock.is_locked:
+        remove_parts(folder)
     try:
         yield
     finally:

@@ -37,6 +37,16 @@ def is_file(path: str | os.PathLike[str]) -> bool:
     return os.path.isfile(path)
 
 
+PART = "part-"
+"""Beginning of the suffix of a temporary file."""
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove the temporary files of `atomic` that killed processes left in a folder."""
+    for part in folder.rglob(f".*.{PART}????????"):
+        part.unlink(missing_ok=True)
+
+
 @contextmanager
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path that replaces `path` when the block ends without an error.
@@ -53,7 +63,7 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
     target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.{PART}")
     os.close(handle)
     part = Path(name)
     try:

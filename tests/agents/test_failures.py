@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -162,6 +164,20 @@ def test_a_folder_is_written_by_one_run_at_a_time(tmp_path: Path) -> None:
             pass
     with kept(tmp_path):
         pass
+
+
+def test_temporary_files_of_a_killed_run_are_removed(tmp_path: Path) -> None:
+    script = (
+        "import os, sys\nfrom rigdda.files import atomic\n"
+        "with atomic(sys.argv[1]) as part:\n    part.write_text('half')\n    os._exit(9)\n"
+    )
+    for name in ("gain.svg", "layouts/km 1.toml"):
+        subprocess.run([sys.executable, "-c", script, tmp_path / name], check=False)
+    (tmp_path / ".notes.personal").write_text("mine")
+    assert len([*tmp_path.rglob(".*")]) == 3
+    with kept(tmp_path):
+        pass
+    assert [path.name for path in tmp_path.rglob(".*")] == [".notes.personal"]
 
 
 def test_replay_opens_recordings_and_converts_runs(

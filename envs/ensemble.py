@@ -19,6 +19,7 @@ from rigdda import Outcome, Site
 from rigdda.envs import outcome_cache, site_store
 from rigdda.envs.cost import Evaluation, Facts, account, judge, learn
 from rigdda.envs.outcome_cache import Memory
+from rigdda.releases import check_duration
 
 SEEDS = 2**33
 """First seed of the releases used for barrier-free statistics. Episodes use seeds below 2**31, and
@@ -152,8 +153,15 @@ def bare_outcomes(
     ------
     Diverged
         If a simulation diverges.
+
+    Warns
+    -----
+    DoubtfulInput
+        If `motion.duration` cuts off more than one release in twenty.
     """
     known = {name: _stored(site, name) for name in counts}
+    stored = _joined(known)
+    check_duration([site] * len(stored), stored)
     jobs = [
         (site, (), SEEDS + i, name)
         for name, count in counts.items()

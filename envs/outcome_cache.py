@@ -36,6 +36,7 @@ from rigdda.barriers import Built, Standing, earthworks
 from rigdda.kernel import source_hash
 from rigdda.model.settings import EARTH
 from rigdda.model.terrain import REACH
+from rigdda.releases import check_duration
 
 
 @cache
@@ -362,8 +363,14 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
     ------
     BadInput, Diverged
         As `rigdda.release` does.
+
+    Warns
+    -----
+    DoubtfulInput
+        As `rigdda.release_many` does, also for releases that are not simulated.
     """
-    prints = {id(site): release_key(site) for site, *_ in jobs}
+    sites = {id(site): site for site, *_ in jobs}
+    prints = {number: release_key(site) for number, site in sites.items()}
     keys = [
         Key(prints[id(site)], site.standing(layout), seed, event)
         for site, layout, seed, event in jobs
@@ -374,6 +381,8 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
     fresh = dict(zip(new, found, strict=True))
     _remember(fresh, new)
     known |= fresh
+    recalled = [place for place, key in enumerate(keys) if key not in new]
+    check_duration([jobs[i][0] for i in recalled], [known[keys[i]] for i in recalled])
     ran = []
     for key in keys:
         ran.append(key in new)

@@ -153,7 +153,11 @@ def _ranks(n: int, level: float) -> tuple[float, float]:
 def binomial_quantile(tail: float, n: int, p: float) -> int:
     """Return the least number of successes with at least a probability of `tail` up to it.
 
-    It equals `scipy.stats.binom.ppf`, whose import takes as long as a small evaluation.
+    It equals `scipy.stats.binom.ppf` for 0 < tail < 1. The import of scipy.stats takes as long as a
+    small evaluation.
     """
-    count = math.ceil(bdtrik(tail, n, p))
+    found = bdtrik(tail, n, p)
+    if math.isnan(found):  # no success is possible
+        return 0
+    count = math.ceil(found)
     return count - 1 if count > 0 and bdtr(count - 1, n, p) >= tail else count

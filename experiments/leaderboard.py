@@ -116,9 +116,7 @@ def run(quick: bool, out: Path, budgets: Sequence[int] = ()) -> Number:
     tau, table = stability(compared)
     write(out / "exam" / "stability.csv", table)
     note = "\n".join(
-        f"{r['track']}, {r['budget']:,}: {r['entry']} {r['score']:.3f} "
-        f"({r['score_low']:.3f} to {r['score_high']:.3f})"
-        for r in rows
+        f"{r['track']}, {r['budget']:,}: {r['entry']} {ranking.with_interval(r)}" for r in rows
     )
     what = "Kendall's tau of the rankings of the entries on two sets of releases"
     return Number(what, tau, low=QUICK_STABLE if quick else STABLE, note=note)

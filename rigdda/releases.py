@@ -507,10 +507,26 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
         if isinstance(outcome, Error):
             raise outcome
     good = [outcome for outcome in found if isinstance(outcome, Outcome)]
-    cut = [each[place][0] for place, outcome in enumerate(good) if outcome.cut_off]
-    if len(cut) > max(1.0, MANY * len(good)):
-        _doubt_duration(cut[0])
+    check_duration([site for site, *_ in each], good)
     return good
+
+
+def check_duration(sites: Sequence[Site], outcomes: Sequence[Outcome]) -> None:
+    """Warn if `motion.duration` cuts off more than one release in twenty.
+
+    Parameters
+    ----------
+    sites, outcomes : sequence of Site, sequence of Outcome
+        The site and the outcome of each release.
+
+    Warns
+    -----
+    DoubtfulInput
+        If it does, and more than one release.
+    """
+    cut = [site for site, outcome in zip(sites, outcomes, strict=True) if outcome.cut_off]
+    if len(cut) > max(1.0, MANY * len(outcomes)):
+        _doubt_duration(cut[0])
 
 
 def _in_threads(jobs: Sequence[CheckedJob], threads: int) -> list[Outcome | Error]:

@@ -141,16 +141,21 @@ def _summary(
     }
 
 
+def with_interval(row: dict[str, Any]) -> str:
+    """Return the score of a row of the summary as text, with its interval if it has one."""
+    score = f"{row['score']:.3f}"
+    if math.isnan(row["score_low"]):
+        return score
+    return f"{score} ({row['score_low']:.3f} to {row['score_high']:.3f})"
+
+
 def table(summaries: Sequence[dict[str, Any]]) -> Table:
     """Return the table that the command prints."""
     head = ("track", "budget", "tasks", "score (95 %)", "distance", "releases used")
     out = tables.empty_table(head)
     for row in summaries:
-        score = f"{row['score']:.3f}"
-        if not math.isnan(row["score_low"]):
-            score += f" ({row['score_low']:.3f} to {row['score_high']:.3f})"
         out.add_row(
-            row["track"], f"{row['budget']:,}", str(row["tasks"]), score,
+            row["track"], f"{row['budget']:,}", str(row["tasks"]), with_interval(row),
             f"{row['distance']:.3f}", f"{row['used']:,.0f}",
         )  # fmt: skip
     return out

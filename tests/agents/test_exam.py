@@ -199,7 +199,7 @@ def test_an_honest_entry_is_scored_and_counted(folder: Path) -> None:
         ("sneaky", "simulated releases itself"),
         pytest.param("direct", "simulated releases itself (Simulation)", marks=pytest.mark.slow),
         pytest.param("wild", "submitted what cannot be built", marks=pytest.mark.slow),
-        pytest.param("peeking", "read the recorded references", marks=pytest.mark.slow),
+        ("peeking", "read the recorded references"),
         pytest.param("forking", "started another process", marks=pytest.mark.slow),
     ],
 )

@@ -20,7 +20,7 @@ from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import frontier_report
 from rigdda.barriers import to_tables
-from rigdda.envs import DesignProblem, Evaluation, ensemble, outcome_cache
+from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.cost import judge
 
 VERIFIED = 60
@@ -67,12 +67,12 @@ def changed_by_hand(site: Site, settings: dict[str, object]) -> Site:
     return msgspec.convert(data, Site)
 
 
-simulated: dict[tuple[bytes, rigdda.Layout, tuple[tuple[int, str], ...]], list[Outcome]] = {}
+simulated: dict[tuple[object, ...], list[Outcome]] = {}
 
 
 def anew(site: Site, layout: rigdda.Layout, drawn: list[tuple[int, str]]) -> list[Outcome]:
-    """Return the outcomes of releases, simulated once for all sites with the same releases."""
-    key = outcome_cache.release_key(site), layout, tuple(drawn)
+    """Return the outcomes of releases, simulated once for all sites with the same events."""
+    key = site.events, layout, tuple(drawn)
     if key not in simulated:
         simulated[key] = rigdda.release_many([(site, layout, *one) for one in drawn])
     return simulated[key]

@@ -166,6 +166,15 @@ def test_what_an_event_releases_is_part_of_the_key(site: Site, change: dict[str,
     assert release_key(other) != release_key(site)
 
 
+def test_a_duration_that_is_too_short_is_told_for_every_site(site: Site) -> None:
+    motion = msgspec.structs.replace(site.motion, duration=1.0)
+    for name in ("first", "second"):
+        hasty = msgspec.structs.replace(site, name=name, motion=motion)
+        with pytest.warns(rigdda.DoubtfulInput, match=f"of site '{name}'"):
+            found = outcome_cache.outcomes(jobs(hasty, (), "block"))
+    assert found.simulated == 0
+
+
 def test_mesh_is_no_part_of_a_release(site: Site) -> None:
     outcome_cache.outcomes(jobs(site, (), "small"))
     assert outcome_cache.outcomes(jobs(site, (rigdda.Mesh(1.5, "light"),), "small")).simulated == 0

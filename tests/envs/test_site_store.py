@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from cases import cut
 
+import rigdda
+
 from rigdda.envs import ensemble, envelope, outcome_cache, site_store
 from rigdda.envs.environments import BarrierPlacement
 from rigdda.envs.outcome_cache import Memory
@@ -131,3 +133,11 @@ def test_what_ships_is_ignored_unless_it_is_sound_and_of_these_sources(
     )
     again, _ = known()
     assert len(asked) == 1 and again == first
+
+
+def test_modules_that_are_named_exist() -> None:
+    """A module that is renamed would no longer be part of the hash, or would be by mistake."""
+    here, whole = Path(ensemble.__file__).parent, Path(rigdda.__file__).parent
+    assert all((here / f"{name}.py").is_file() for name in site_store.STATISTICS)
+    parts = {part for path in whole.rglob("*.py") for part in path.with_suffix("").parts}
+    assert {*site_store.UNRELATED} <= parts | {path.name for path in whole.iterdir()}

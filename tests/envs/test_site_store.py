@@ -11,7 +11,6 @@ import pytest
 from cases import cut
 
 import rigdda
-
 from rigdda.envs import ensemble, envelope, outcome_cache, site_store
 from rigdda.envs.environments import BarrierPlacement
 from rigdda.envs.outcome_cache import Memory

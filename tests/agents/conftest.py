@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 from valley import SITE, Valley, seen
 
 from rigdda import Site
-from rigdda.envs import DesignProblem
+from rigdda.envs import DesignProblem, design_envelope
 
 
 @pytest.fixture(scope="session")
@@ -22,4 +24,5 @@ def problem(site: Site) -> DesignProblem:
 @pytest.fixture
 def valley(site: Site, monkeypatch: pytest.MonkeyPatch) -> Valley:
     monkeypatch.setattr("rigdda.agents.designers.catalogue.ensemble", seen)
+    monkeypatch.setattr(design_envelope, "of", partial(design_envelope.of, blocks=60))
     return Valley(site)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -179,7 +180,8 @@ def assess(
     samples = []
     for i, place in enumerate(cube):
         tick(i, f"ground {i + 1} of {grounds}")
-        site = site_at(problem.site, asked, place)
+        name = f"{problem.site.name}, ground {i + 1}"  # for warnings
+        site = msgspec.structs.replace(site_at(problem.site, asked, place), name=name)
         found = simulate(site, layouts, seeds, out)
         pairs = zip(asked, place.tolist(), strict=True)
         values = {p: v for one, at in pairs for p, v in zip(one.paths, one.at(at), strict=True)}

@@ -408,11 +408,11 @@ def plan(
     cube = places(method, len(inputs), SAMPLES[method] if samples is None else samples, seed)
     seeds = seeds_of(site, releases, seed)
     sites = tuple(site_at(site, inputs, row) for row in cube)
-    for own in sites:
-        own.built(layout, 1.0)  # larger blocks may take the room of a barrier
     groups: dict[tuple[bytes, Layout], tuple[Site, list[int]]] = {}
     for i, own in enumerate(sites):
         groups.setdefault((release_key(own), own.standing(layout)), (own, []))[1].append(i)
+    for own, _ in groups.values():
+        own.built(layout, 1.0)  # larger blocks may take the room of a barrier
     found = tuple((own, tuple(rows)) for own, rows in groups.values())
     return SensitivityPlan(site, layout, tuple(inputs), method, cube, seeds, sites, found, seed)
 

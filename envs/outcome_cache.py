@@ -72,8 +72,8 @@ NO_MOTION = (
     "rule",
     "lumped",
 )
-"""Tables of a site that do not affect the outcome of a release with given barriers. Those that
-exist are among the barriers, see `Key`."""
+"""Tables of a site that do not affect the outcome of a release with given barriers. Existing
+barriers are among the given ones, see `Key`."""
 
 NO_EVENT_MOTION = ("rate", "design")
 """Fields of an event that do not affect the outcome of its releases."""
@@ -82,7 +82,7 @@ NO_EVENT_MOTION = ("rate", "design")
 def release_key(site: Site) -> bytes:
     """Return a key of everything that affects the outcomes of the releases of a site.
 
-    Sites that differ in prices, rates, targets or traffic only share their outcomes.
+    Sites that differ only in prices, rates, traffic or existing barriers have the same key.
     """
     tables = {name: getattr(site, name) for name in site.__struct_fields__ if name not in NO_MOTION}
     events = [msgspec.structs.asdict(event) for event in site.events]
@@ -381,7 +381,7 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
     fresh = dict(zip(new, found, strict=True))
     _remember(fresh, new)
     known |= fresh
-    if len(new) < len(keys):  # the others were not simulated, and nothing was said of them
+    if len(new) < len(keys):  # `release_many` checks only the releases that it simulates
         check_duration([site for site, *_ in jobs], [known[key] for key in keys])
     ran = []
     for key in keys:

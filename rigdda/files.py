@@ -6,7 +6,7 @@ import errno
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rigdda.errors import BadInput
@@ -42,9 +42,14 @@ PART = "part-"
 
 
 def remove_parts(folder: Path) -> None:
-    """Remove the temporary files of `atomic` that killed processes left in a folder."""
-    for part in folder.rglob(f".*.{PART}????????"):
-        part.unlink(missing_ok=True)
+    """Remove the temporary files of `atomic` that killed processes left in a results folder.
+
+    Its subfolders are searched, too, but not theirs, since a user may name a large tree.
+    """
+    name = f".*.{PART}????????"
+    for part in (*folder.glob(name), *folder.glob(f"*/{name}")):
+        with suppress(OSError):  # the file of another user does no harm
+            part.unlink()
 
 
 @contextmanager

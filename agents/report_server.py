@@ -152,11 +152,10 @@ def serve(page: Path, replay: Path, say: Callable[[str], None]) -> None:
         with contextlib.suppress(KeyboardInterrupt):
             part = Path(folder) / "impact.rrd"
             when = record_impact(replay, part)
-            server = stack.enter_context(ThreadingHTTPServer((HOST, 0), _Handler))
-            server.daemon_threads = True
+            server = stack.enter_context(_Server((HOST, 0), _Handler))
             address = f"http://{HOST}:{server.server_port}"
             viewer = stack.enter_context(_viewer(f"{address}/whole.rrd"))
-            server.shown = _Shown(  # type: ignore[attr-defined]
+            server.shown = _Shown(
                 {
                     "/": ("text/html; charset=utf-8", _frame(address, when).encode()),
                     f"/{page.name}": ("text/html; charset=utf-8", page),
@@ -204,13 +203,25 @@ a {{ color: #1c5aa0; margin-left: .8rem; }}
 """
 
 
+class _Server(ThreadingHTTPServer):
+    """Serves each request in a thread and reports nothing when a browser leaves early."""
+
+    daemon_threads = True
+    shown: _Shown
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Report an error of a request, unless the browser has closed the connection."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
+
 class _Handler(BaseHTTPRequestHandler):
     """Answers requests for the report, the replay and the pages of the viewer."""
 
     def do_GET(self) -> None:
         """Answer a request."""
-        server: Any = self.server
-        shown: _Shown = server.shown
+        assert isinstance(self.server, _Server)
+        shown = self.server.shown
         host = self.headers.get("Host", "").rpartition(":")[0]
         asked = urlsplit(self.path)
         if host not in (HOST, "localhost"):  # another site's name that was pointed here
@@ -237,13 +248,12 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(kind, data, VIEWER_POLICY)
 
     def _answer(self, kind: str, data: bytes, policy: str) -> None:
-        with contextlib.suppress(ConnectionError):  # the browser has left the page
-            self.send_response(200)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(data)))
-            self.send_header("Content-Security-Policy", policy)
-            self.end_headers()
-            self.wfile.write(data)
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(data)))
+        self.send_header("Content-Security-Policy", policy)
+        self.end_headers()
+        self.wfile.write(data)
 
     def log_message(self, *_: Any) -> None:
         """Print nothing."""

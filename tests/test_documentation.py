@@ -78,6 +78,7 @@ SLOW = {
     "docs/howto/corridor.md",
     "docs/howto/exam.md",
     "docs/howto/fit.md",
+    "docs/howto/long_study.md",
     "docs/howto/report.md",
     "docs/howto/sensitivity.md",
     "docs/howto/stations.md",

@@ -138,6 +138,7 @@ def test_a_design_says_what_an_engineer_asks(designed: tuple[Path, str]) -> None
     assert float(told[1].replace(",", "")) == pytest.approx(float(costs[0]["objective"]), rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_design_repeats_for_its_seed(
     designed: tuple[Path, str], toml: Path, tmp_path: Path
 ) -> None:
@@ -198,6 +199,7 @@ def test_a_design_is_answered_for_other_prices(designed: tuple[Path, str], tmp_p
     assert table[0]["layout"] == "nothing" and len(table) == 5
 
 
+@pytest.mark.slow
 def test_a_cap_and_a_missed_target_are_told(toml: Path, tmp_path: Path) -> None:
     options = ("--max-cost", 500, "--target", 0.001, "--out", "o")
     words = run("design", toml, *TINY, *options, folder=tmp_path)
@@ -235,7 +237,9 @@ def test_kinds_zone_and_target_are_kept_to(toml: Path, tmp_path: Path) -> None:
     assert re.search(r"target P\(reach\) <= 90 %.*: (met|missed|undecided)", words)
 
 
-@pytest.mark.parametrize("designer", ["rule", pytest.param("tpe", marks=pytest.mark.slow), "ppo"])
+@pytest.mark.parametrize(
+    "designer", ["rule", *(pytest.param(name, marks=pytest.mark.slow) for name in ("tpe", "ppo"))]
+)
 def test_a_designer_can_be_chosen(designer: str, toml: Path, tmp_path: Path) -> None:
     tiny = ("--budget", 40, "--verify", 12, "--ground-samples", 0)
     words = run("design", toml, "--designer", designer, *tiny, folder=tmp_path)

@@ -196,7 +196,7 @@ def test_an_honest_entry_is_scored_and_counted(folder: Path) -> None:
     ("entry", "reason"),
     [
         ("greedy", "its counter says"),
-        ("sneaky", "simulated releases itself"),
+        pytest.param("sneaky", "simulated releases itself", marks=pytest.mark.slow),
         pytest.param("direct", "simulated releases itself (Simulation)", marks=pytest.mark.slow),
         pytest.param("wild", "submitted what cannot be built", marks=pytest.mark.slow),
         ("peeking", "read the recorded references"),

@@ -27,6 +27,7 @@ def test_fast_has_fewer_larger_blocks_and_a_longer_step() -> None:
         problem.site_at_fidelity(site, "coarse")
 
 
+@pytest.mark.slow
 def test_the_bias_is_that_of_the_evaluations(site: Site) -> None:
     ticks: list[int] = []
     found = fidelity_bias.compare(site, 12, 3, lambda done, _: ticks.append(done))

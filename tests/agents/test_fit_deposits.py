@@ -45,6 +45,7 @@ def holds(found: fit.Fit, i: int) -> bool:
     return bool(((low <= true) & (true <= high)).all())
 
 
+@pytest.mark.slow
 def test_a_synthetic_deposit_gives_back_its_damping() -> None:
     found = fitted(1, PATHS[:1], 40, 16, 40)
     assert holds(found, 1)

@@ -286,7 +286,7 @@ def test_a_search_returns_what_no_layout_of_it_dominates(
         assert one.reach.releases <= sum(e.reach["block"].releases for e in own)
 
 
-@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("seed", [0, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("site", [Valley, Barren])
 def test_a_missed_target_returns_a_verified_frontier(
     site: type[Valley], seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

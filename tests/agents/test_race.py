@@ -53,6 +53,7 @@ def test_what_is_reported_does_not_flatter(name: str, valley: Valley) -> None:
     assert np.mean(np.abs(apart) < 1.96) >= 0.75
 
 
+@pytest.mark.slow
 def test_every_race_has_its_final(valley: Valley) -> None:
     """A budget that does not pay for one would give nothing as the answer, whatever was found."""
 

@@ -79,6 +79,7 @@ def test_names_are_written_whatever_the_locale(
     assert "größer,block,0" in (folder / "o/study.csv").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_killed_study_goes_on_and_ends_the_same(folder: Path) -> None:
     whole = run("study", "study.toml", "--out", "o", folder=folder)
     text = (folder / "study.toml").read_text()

@@ -87,9 +87,8 @@ def test_without_prices_the_reward_is_the_debris_kept_off() -> None:
     assert reward == pytest.approx(1.0 - info["debris_share"])
 
 
-@pytest.mark.parametrize(
-    "env_class", [BarrierDesign, pytest.param(BarrierPlacement, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("env_class", [BarrierDesign, BarrierPlacement])
 def test_the_expected_reward_ranks_as_a_problem_with_targets(env_class: type[BarrierEnv]) -> None:
     """A low fence misses the target: it ranks behind a tall one."""
     terms: dict[str, Any] = {"max_barriers": 1, "kinds": ("fence", "ditch")}

@@ -144,7 +144,9 @@ def most_blocks(site: Site) -> int:
     return max(largest(site, name) for name in site.event_names)
 
 
-@pytest.mark.parametrize("env_class", [BarrierDesign, BarrierPlacement])
+@pytest.mark.parametrize(
+    "env_class", [BarrierDesign, pytest.param(BarrierPlacement, marks=pytest.mark.slow)]
+)
 def test_no_entry_is_always_the_same(env_class: type[BarrierEnv]) -> None:
     """Over a built-in and a generated site of every family but that of large, slow masses."""
     names = [*sites.FAMILIES, *sites.split("validation")[:6]]

@@ -13,7 +13,11 @@ from rigdda.validation.convergence import Convergence
 @pytest.mark.parametrize(
     "case",
     [
-        pytest.param(case, id=case.name, marks=pytest.mark.slow if case.slow else ())
+        pytest.param(
+            case,
+            id=case.name,
+            marks=pytest.mark.slow if case.slow or case.name in ("silo", "collisions") else (),
+        )
         for case in CASES
     ],
 )

@@ -139,7 +139,7 @@ def archive(
 def gathered(store: Store) -> Iterator[LayoutReleases]:
     """Yield the releases that a store keeps, for each layout every release once."""
     found: dict[Layout, dict[tuple[str, int], Outcome]] = {}
-    for own in store.kept():
+    for own in store.stored_releases():
         known = found.setdefault(own.layout, {})
         for seed, outcome in zip(own.seeds, unpack(own.outcomes), strict=True):
             known.setdefault((outcome.event, seed), outcome)

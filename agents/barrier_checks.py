@@ -278,7 +278,7 @@ def _ditch(problem: DesignProblem, ditch: Ditch) -> Iterator[BarrierCheck]:
     """Yield the comparison of a ditch with that of Ritchie."""
     ritchie = RitchieDitch.of(problem.site)
     note = f"Ritchie, {ritchie.height:.0f} m high at {ritchie.inclination:.0f} deg"
-    note += f"; {ritchie.doubt}" if ritchie.doubt else ""
+    note += f"; {ritchie.caveat}" if ritchie.caveat else ""
     head = ditch.label, ditch.x
     yield BarrierCheck(*head, "width", ritchie.width, ditch.width, "m", 1.0, note)
     yield BarrierCheck(*head, "depth", ritchie.depth, ditch.depth, "m", 1.0, note)

@@ -26,7 +26,6 @@ from rigdda.agents.terminal import (
     fail,
     finding,
     folder_for,
-    kept,
     layout_option,
     note,
     once,
@@ -34,6 +33,7 @@ from rigdda.agents.terminal import (
     posterior_option,
     progress,
     read_layout,
+    recorded_run,
     seed_option,
     show,
 )
@@ -151,9 +151,9 @@ def new(
     """
     from rigdda.agents import new_site
 
-    wanted = new_site.Wanted(road or None, toe, zone or None, grounds, sources, masses, layer)
+    request = new_site.SiteRequest(road or None, toe, zone or None, grounds, sources, masses, layer)
     file = new_site.file_of(name, out)
-    text, found = new_site.compose(name, profile, wanted)
+    text, found = new_site.compose(name, profile, request)
     new_site.write(file, text)
     for words in found.notes:
         note(words)
@@ -179,7 +179,7 @@ def check(site: str, seed: int, out: Path | None) -> None:
 
     where = rigdda.Site.load(site)
     folder = folder_for(out, f"check-{where.name}", "site.png")
-    with kept(folder, where):
+    with recorded_run(folder, where):
         site_check.draw(folder / "site.png", where)
         trials = site_check.try_releases(where, seed)
     for line in site_check.facts(where):
@@ -273,7 +273,7 @@ def simulate(
             raise click.UsageError("--station is for --model blocks")
         points = rigdda.lumped(where, barriers, seeds, event)
         folder = folder_for(out, f"simulate-{where.name}", "points.csv")
-        with kept(folder, where):
+        with recorded_run(folder, where):
             tables.write_points(folder / "points.csv", seeds, points)
         show(tables.points(points))
         note(findings.unfitted(where))
@@ -283,7 +283,7 @@ def simulate(
     where.realise(barriers, seed, event)  # report an impossible layout before making a folder
     asked = check_stations(where, at or (where.road.start,))
     folder = folder_for(out, f"simulate-{where.name}", *simulation_folder.files(asked.tolist()))
-    with kept(folder, where), progress(releases) as tick:
+    with recorded_run(folder, where), progress(releases) as tick:
         lines = simulation_folder.lines(where, asked)
         found = jobs.simulate(where, barriers, seeds, event, lines.tolist(), folder, tick)
         tick(releases, "tables and pictures")
@@ -323,7 +323,7 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
 
     where = DesignProblem(site).site
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
-    with kept(folder, where), progress(6 * releases) as tick:
+    with recorded_run(folder, where), progress(6 * releases) as tick:
         found = fidelity_bias.compare(where, releases, seed, tick)
     fidelity_bias.write(folder / "fidelity.csv", where, found)
     show(fidelity_bias.table(found))
@@ -365,7 +365,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     where, barriers = rigdda.Site.load(target), read_layout(layout)
     where.realise(barriers, seed, event)
     folder = folder_for(out, f"replay-{where.name}", "episode.rrd")
-    with kept(folder, where):
+    with recorded_run(folder, where):
         run, outcome = rigdda.release(where, barriers, seed, event)
     came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
     notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
@@ -483,7 +483,7 @@ def design(
     another problem (problem.json) is refused.
     """
     from rigdda.agents import ground_band, jobs
-    from rigdda.agents.designers.store import FILE, claim
+    from rigdda.agents.designers.store import FILE, record_problem
     from rigdda.agents.parameters import read_posterior
     from rigdda.agents.reports import band_report
     from rigdda.agents.reports.folder import FILES, write
@@ -491,9 +491,9 @@ def design(
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone)
     fitted = None if posterior is None else read_posterior(posterior, problem.site)
     folder = folder_for(out, f"design-{problem.site.name}", *FILES, *band_report.FILES, FILE)
-    claim(folder, problem, *FILES)
+    record_problem(folder, problem, *FILES)
     band = None
-    with kept(folder, problem.site):
+    with recorded_run(folder, problem.site):
         with progress(budget + CASES * verify) as tick:
             done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
             tick(budget + CASES * verify, "pictures")
@@ -572,7 +572,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     click.echo(f"layout{from_start}:" if chosen.layout else f"layout: {unchanged(site)}")
     for barrier in chosen.layout:
         click.echo(f"  {order(barrier, site)}")
-    for line in findings.kept(site, chosen.layout):
+    for line in findings.existing_barriers(site, chosen.layout):
         click.echo(f"  {line}")
     finding(checks.rule_words(done.rule))
     if done.checks.table:
@@ -682,7 +682,7 @@ def reprice(
     folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
     if folder.resolve() == results.resolve():
         raise click.UsageError("--out is the folder of the design: name another folder")
-    with kept(folder, done.problem.site):
+    with recorded_run(folder, done.problem.site):
         reprice_report.write(done, folder)
     for change in done.changes:
         click.echo(reprice_report.changed(change))
@@ -699,7 +699,7 @@ def reprice(
     click.echo("layout:" if chosen else f"layout: {unchanged(site)}")
     for barrier in chosen:
         click.echo(f"  {order(barrier, site)}")
-    for line in findings.kept(site, chosen):
+    for line in findings.existing_barriers(site, chosen):
         click.echo(f"  {line}")
     for line in reprice_report.sentences(done):
         finding(line)
@@ -727,7 +727,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
     asked = studies.load(file)
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.FILES)
-    with kept(folder, asked.site), progress(asked.size) as tick:
+    with recorded_run(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
         tick(asked.size, "tables and pictures")
         found = studies.results(asked, folder / "study.csv")
@@ -791,7 +791,7 @@ def corridor(
     folder = folder_for(out, f"corridor-{where.name}", *report.FILES)
     stored = folder / "evaluations"
     stored.mkdir(exist_ok=True)
-    with kept(folder), progress(releases * len(where.sections)) as tick:
+    with recorded_run(folder), progress(releases * len(where.sections)) as tick:
         plan = Planner(problem, releases, seed, robust, stored, tick).plan()
         report.write(plan, folder)
     click.echo(
@@ -864,7 +864,7 @@ def fit(
     seen, parameters = observations.read(observed, where), [parse(name) for name in names]
     files = ("site.toml", "fit.csv", "fit.png", "posterior.csv")
     folder = folder_for(out, f"fit-{where.name}", *files)
-    with kept(folder, where), progress(budget) as tick:
+    with recorded_run(folder, where), progress(budget) as tick:
         found = job.fit(where, seen, parameters, budget, releases, seed, tick, model, folder)
         found.site.save(folder / "site.toml")
         job.write(folder / "fit.csv", found)
@@ -923,7 +923,7 @@ def sensitivity(
     inputs = parameters.inputs(names, where, barriers, posterior)
     asked = job.plan(where, barriers, inputs, method, samples, releases, seed)
     folder = folder_for(out, f"sensitivity-{where.name}", *sensitivity_report.FILES)
-    with kept(folder, where), progress(asked.size) as tick:
+    with recorded_run(folder, where), progress(asked.size) as tick:
         found = job.run(asked, folder, tick)
         tick(asked.size, "tables and picture")
         sensitivity_report.write(folder, found)
@@ -977,7 +977,7 @@ def train(model: str, sites: int | None, episodes: int, seed: int, out: Path | N
     sites = sites or TRAINING_SITES[model]
     if model == "corridor":
         folder = folder_for(out, "train", agent.FILE.name)
-        with kept(folder), progress(sites) as tick:
+        with recorded_run(folder), progress(sites) as tick:
             found = agent.train(sites, seed, folder, tick)
         most = 100.0 * found.gain[-1]
         click.echo(
@@ -988,13 +988,13 @@ def train(model: str, sites: int | None, episodes: int, seed: int, out: Path | N
     if model == "value":
         asked = value_training.ValueTerms(sites, seed)
         folder = folder_for(out, "train", *value_training.FILES)
-        with kept(folder), progress(asked.sites) as tick:
+        with recorded_run(folder), progress(asked.sites) as tick:
             value_training.train(asked, folder, tick)
         click.echo(f"value network of {asked.sites} sites; value.safetensors is in {folder}")
         return
     terms = training.Terms(sites, episodes, seed)
     folder = folder_for(out, "train", *training.FILES)
-    with kept(folder), progress(terms.episodes) as tick:
+    with recorded_run(folder), progress(terms.episodes) as tick:
         trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
     click.echo(
         f"mean relative reduction of Z on {terms.beside} sites not used in training: "
@@ -1046,16 +1046,16 @@ def evaluate(
     entrants = {name: designers.module(name).design for name in tried}
     if policy is not None:
         entrants["policy"] = using(load(policy))
-    posed = contest.pose(split, sites)
+    places = contest.site_names(split, sites)
     folder = folder_for(out, "evaluate", "evaluations.jsonl", "scores.csv")
     store = Store(folder / "evaluations.jsonl")
-    with kept(folder), progress(len(posed) * len(entrants)) as tick:
-        scores = contest.hold(posed, entrants, budget, verify, seed, store, tick)
+    with recorded_run(folder), progress(len(places) * len(entrants)) as tick:
+        scores = contest.hold(places, entrants, budget, verify, seed, store, tick)
     tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
     click.echo("EUR per metre of road and year; best: the best of these designers on each site")
     show(contest.table(scores))
     resumed = f", {store.resumed:,} releases from an earlier run" if store.resumed else ""
-    click.echo(f"{len(posed)} sites of {split}, verified on {verify:,} releases each{resumed}; "
+    click.echo(f"{len(places)} sites of {split}, verified on {verify:,} releases each{resumed}; "
                f"scores.csv is in {folder}")  # fmt: skip
 
 
@@ -1113,7 +1113,7 @@ def exam(
         scorer.source_hash_of(name)  # refuses a module that cannot be found
     folder = folder_for(out, f"exam-{entry.rpartition(':')[2]}", *ranking.FILES)
     secrets = (specification.file_of_references(asked, spec),)
-    with kept(folder), progress(part.size) as tick:
+    with recorded_run(folder), progress(part.size) as tick:
         job = scorer.Scorer(part, references, entry, corridor_entry, folder, secrets, tick)
         scores = job.run()
         found = ranking.write(folder, scores, part, entry)
@@ -1153,8 +1153,8 @@ def dataset(
 
     recipe = job.Recipe(split, layouts, releases, seed)
     names = recipe.names(sites)
-    folder = folder_for(out, f"dataset-{split}", job.CLAIM)
-    with kept(folder), progress(len(names)) as tick:
+    folder = folder_for(out, f"dataset-{split}", job.RECIPE)
+    with recorded_run(folder), progress(len(names)) as tick:
         rows = job.write(recipe, sites, folder, tick)
     click.echo(f"{rows:,} releases on {len(names)} sites of {split}; outcomes and sites are in "
                f"{folder}")  # fmt: skip
@@ -1177,7 +1177,7 @@ def validate(only: tuple[str, ...], slow: bool, seed: int, out: Path | None) -> 
 
     cases = accuracy.choose(only, slow)
     folder = folder_for(out, "validate", "validate.csv", "convergence.csv")
-    with kept(folder), progress(accuracy.runs(cases)) as tick:
+    with recorded_run(folder), progress(accuracy.runs(cases)) as tick:
         results, studies = accuracy.validate(cases, seed, folder, tick)
     show(accuracy.table(results))
     if studies:

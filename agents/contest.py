@@ -68,7 +68,7 @@ class Score:
         }
 
 
-def pose(split: str, count: int) -> list[str]:
+def site_names(split: str, count: int) -> list[str]:
     """Return the names of the first sites of a split.
 
     Raises
@@ -115,12 +115,12 @@ def hold(
     """
     scores: list[Score] = []
     for site in names:
-        posed = DesignProblem(site)
-        nothing = verify(posed, (), releases, seed, store)
+        problem = DesignProblem(site)
+        nothing = verify(problem, (), releases, seed, store)
         for name, design in designers.items():
             tick(len(scores), f"{site}: {name}")
-            found = design(posed, simulations, seed, None, store)
-            built = verify(posed, found.layout, releases, seed, store)
+            found = design(problem, simulations, seed, None, store)
+            built = verify(problem, found.layout, releases, seed, store)
             scores.append(Score(site, name, found.simulations, nothing, built))
     return scores
 

@@ -36,7 +36,7 @@ from rigdda.kernel import kernels_hash
 
 Tick = Callable[[int, str], None]
 
-CLAIM = "dataset.json"
+RECIPE = "dataset.json"
 """File that records what the parts of a folder are."""
 
 OUTCOMES = pa.schema(
@@ -150,7 +150,7 @@ def write(recipe: Recipe, count: int, folder: Path, tick: Tick = lambda done, wo
         If a simulation diverges.
     """
     names = recipe.names(count)
-    _claim(recipe, folder)
+    _check_folder(recipe, folder)
     missing = [name for name in names if not _files(folder, name)[1].is_file()]
     found = distribution.mapped(partial(part, recipe), missing)
     done = len(names) - len(missing)
@@ -169,10 +169,10 @@ def _files(folder: Path, name: str) -> tuple[Path, Path]:
     return folder / "outcomes" / f"{name}.parquet", folder / "sites" / f"{name}.parquet"
 
 
-def _claim(recipe: Recipe, folder: Path) -> None:
+def _check_folder(recipe: Recipe, folder: Path) -> None:
     """Record what a folder contains."""
     content = {**msgspec.to_builtins(recipe), "version": __version__, "kernels": kernels_hash()}
-    file = folder / CLAIM
+    file = folder / RECIPE
     if file.is_file() and json.loads(file.read_text(encoding="utf-8")) != content:
         mend = "it contains a data set of other terms or of another version: name another folder"
         raise BadInput("--out", str(folder), mend)
@@ -237,7 +237,7 @@ def _drawn(
     problem: DesignProblem, menu: Menu, rng: np.random.Generator, found: dict[Layout, str]
 ) -> Iterator[tuple[str, Layout]]:
     """Yield layouts that are drawn in turn from the catalogue, at random and from neighbours."""
-    lists = [menu.lone(kind) for kind in problem.kinds if kind != "wall"]
+    lists = [menu.singles(kind) for kind in problem.kinds if kind != "wall"]
     lists = [own for own in lists if own]
     step = (problem.zone.end - problem.zone.start) / 16.0
     while True:

@@ -19,7 +19,7 @@ from rigdda.envs.cost import Interval
 if TYPE_CHECKING:
     from rich.table import Table
 
-LOOKED = 512
+RULE_RELEASES = 512
 """Number of releases that the rule may simulate."""
 
 
@@ -69,7 +69,7 @@ def layouts(site: Site, seed: int) -> dict[str, Layout]:
     return {
         "nothing": (),
         "constant": constant.design(problem, 2 * len(site.events), seed).layout,
-        "rule": rule.design(problem, LOOKED, seed).layout,
+        "rule": rule.design(problem, RULE_RELEASES, seed).layout,
     }
 
 

@@ -40,7 +40,7 @@ from rigdda.files import atomic
 from rigdda.lumped_mass import lumped
 from rigdda.passages import Passages, passages
 
-TELLING = {"blocks": ("surfaces", "motion", "scatter"), "lumped": ("lumped", "scatter")}
+FITTED_TABLES = {"blocks": ("surfaces", "motion", "scatter"), "lumped": ("lumped", "scatter")}
 """Tables of a site file that affect the run-outs of a model."""
 
 
@@ -54,8 +54,8 @@ def check_parameters(parameters: Sequence[Parameter], model: str) -> None:
     """
     check_once(parameters)
     for parameter in parameters:
-        if parameter.path.partition(".")[0] not in TELLING[model]:
-            known = ", ".join(f"{name}.*" for name in TELLING[model])
+        if parameter.path.partition(".")[0] not in FITTED_TABLES[model]:
+            known = ", ".join(f"{name}.*" for name in FITTED_TABLES[model])
             mend = f"run-outs of the model {model} do not depend on it: choose from {known}"
             raise BadInput("--parameters", parameter.path, mend)
 

@@ -358,8 +358,8 @@ def _left(
         for one in tried
     ):
         return words
-    held = unheld(problem, most, seed)
-    return f"{held}: {words}" if held else words
+    trials = failed_trials(problem, most, seed)
+    return f"{trials}: {words}" if trials else words
 
 
 STATIONS = 3
@@ -378,7 +378,7 @@ HOLDS = 0.5
 """An event counts as stopped if at most this share of its releases reaches the road [-]."""
 
 
-def tried(problem: DesignProblem) -> tuple[Layout, ...]:
+def trial_layouts(problem: DesignProblem) -> tuple[Layout, ...]:
     """Return layouts with one of the largest barriers of each kind, at `STATIONS` places each.
 
     Mesh and removals are left out because they do not stop an event.
@@ -386,7 +386,7 @@ def tried(problem: DesignProblem) -> tuple[Layout, ...]:
     menu, found = Menu(problem), list[Barrier]()
     for kind in problem.kinds:
         barriers = (
-            [menu.put(b.thickest(menu.zone), b.x) or b for b in menu.lone(kind)]
+            [menu.put(b.thickest(menu.zone), b.x) or b for b in menu.singles(kind)]
             if kind not in ("mesh", "removal")
             else []
         )
@@ -397,7 +397,7 @@ def tried(problem: DesignProblem) -> tuple[Layout, ...]:
     return tuple((barrier,) for barrier in found)
 
 
-def unheld(problem: DesignProblem, event: str, seed: int) -> str:
+def failed_trials(problem: DesignProblem, event: str, seed: int) -> str:
     """Return a text that says that none of the largest single barriers stops an event.
 
     The text is empty if one of them stops the event in half of the releases or more, or if none may
@@ -408,7 +408,7 @@ def unheld(problem: DesignProblem, event: str, seed: int) -> str:
     Diverged
         If a simulation diverges.
     """
-    layouts = tried(problem)
+    layouts = trial_layouts(problem)
     seeds = {event: release_seeds("ensemble", seed, RELEASES)}
     for layout in layouts:
         outcomes = problem.sample(layout, seeds)

@@ -85,7 +85,7 @@ RANGE = re.compile(r"(.+?):\s*([+-]?[\d.]+)\s*(?:-|to|\.\.)\s*([+-]?[\d.]+)")
 """NAME:START-END of an option."""
 
 
-class Wanted(NamedTuple):
+class SiteRequest(NamedTuple):
     """What is asked of a new site, in the chainages of the survey [m]."""
 
     road: Span | None = None
@@ -116,7 +116,7 @@ class Mass(NamedTuple):
     """Its corners [m]."""
 
 
-def compose(name: str, file: Path, wanted: Wanted) -> tuple[str, Profile]:
+def compose(name: str, file: Path, request: SiteRequest) -> tuple[str, Profile]:
     """Return the text of a site file for a surveyed profile, and the profile.
 
     Parameters
@@ -125,17 +125,17 @@ def compose(name: str, file: Path, wanted: Wanted) -> tuple[str, Profile]:
         Name of the site.
     file : Path
         The survey, a CSV file or a DXF drawing.
-    wanted : Wanted
+    request : SiteRequest
         What is known beside the profile; the rest is filled with placeholders.
 
     Raises
     ------
     BadInput
-        If the survey or what is wanted is unsound, or no site can be made of them.
+        If the survey or the request is unsound, or no site can be made of them.
     """
-    road = None if wanted.road is None else _sorted("--road", wanted.road)
-    profile = profile_of(str(file), read_survey(file, wanted.layer), road)
-    draft = _Draft(profile, wanted._replace(road=road))
+    road = None if request.road is None else _sorted("--road", request.road)
+    profile = profile_of(str(file), read_survey(file, request.layer), road)
+    draft = _Draft(profile, request._replace(road=road))
     text = _render(_head(name, file, profile), draft.tables(name, file))
     Site.parse(text, name)
     return text, profile
@@ -197,13 +197,13 @@ class Part(NamedTuple):
 class _Draft:
     """The tables of a new site, in its own chainages."""
 
-    def __init__(self, profile: Profile, wanted: Wanted):
-        self.profile, self.wanted = profile, wanted
+    def __init__(self, profile: Profile, request: SiteRequest):
+        self.profile, self.request = profile, request
         self.x, self.y = profile.points.T
         self.overhangs = bool((np.diff(self.x) < 0.0).any())
         self.road = self._road()
         self.toe = self._toe(self.road[0])
-        self.masses = [self._mass(text) for text in wanted.masses]
+        self.masses = [self._mass(text) for text in request.masses]
         for one, other in pairwise(sorted(self.masses, key=lambda mass: mass.span)):
             if other.span[0] < one.span[1]:
                 mend = f"let it begin where {one.name} ends"
@@ -215,7 +215,7 @@ class _Draft:
 
     def tables(self, name: str, file: Path) -> list[Part]:
         """Return all tables of the file."""
-        given = self.wanted
+        given = self.request
         road = GIVEN if given.road else PLACEHOLDER
         zone = GIVEN if given.zone else PLACEHOLDER
         words = f"Imported from {file.name}. Say here what is known of the slope, and by whom."
@@ -267,12 +267,12 @@ class _Draft:
 
     def _toe(self, most: float) -> float:
         """Return the foot of the slope, not beyond a chainage."""
-        if self.wanted.toe is not None:
-            at, origin = self.profile.origin.x_of(self.wanted.toe), self.profile.origin
+        if self.request.toe is not None:
+            at, origin = self.profile.origin.x_of(self.request.toe), self.profile.origin
             if not self.x[0] <= at <= most:
                 ends = sorted(map(origin.chainage_of, (float(self.x[0]), most)))
                 mend = f"give a chainage on the slope, {ends[0]:.10g} to {ends[1]:.10g}"
-                raise BadInput("--toe", self.wanted.toe, mend)
+                raise BadInput("--toe", self.request.toe, mend)
             return round(at, 3)
         steep = (self._inclinations() >= STEEP) & (self.x[:-1] < most)
         if not steep.any():
@@ -282,8 +282,8 @@ class _Draft:
     def _road(self) -> Span:
         """Return the edges of the road, and check that the ground goes on beyond it."""
         origin, end = self.profile.origin, float(self.x[-1])
-        if self.wanted.road is not None:
-            low, high = sorted(map(origin.x_of, self.wanted.road))
+        if self.request.road is not None:
+            low, high = sorted(map(origin.x_of, self.request.road))
         else:
             low = self._toe(end) + VERGE
             high = low + LANES
@@ -292,7 +292,7 @@ class _Draft:
             run, drop = self.x[-1] - self.x[-2], self.y[-2] - self.y[-1]
             level = float(self.y[-1] - (need - end) * (drop / run if run > 0.0 else 0.0))
             at = f"{origin.chainage_of(need):.10g}, {level + origin.elevation:.6g}"
-            whose = "the road" if self.wanted.road else "the placeholder of the road (see --road)"
+            whose = "the road" if self.request.road else "the placeholder of the road (see --road)"
             mend = (
                 f"survey the ground to {BEYOND:g} m beyond {whose}, or add the point {at} if it "
                 "goes on as its last piece does"
@@ -303,7 +303,7 @@ class _Draft:
     def _sources(self) -> list[tuple[str, Span, str]]:
         """Return the name of each source, its band and how sure that is."""
         found, origin = [], self.profile.origin
-        for text in self.wanted.sources:
+        for text in self.request.sources:
             name, span = _ranged("--source", text, origin)
             if span is None:
                 mend = 'give NAME:START-END with chainages, such as "cliff:2-8"'
@@ -382,7 +382,7 @@ class _Draft:
         """Return the tables of sources and events."""
         sources, events = [], []
         for name, span, sure in self.sources:
-            blocks = self.overhangs and not self.wanted.sources
+            blocks = self.overhangs and not self.request.sources
             place: dict[str, tuple[Any, str]] = (
                 {"blocks": ([_block(self.profile.points, span)], sure)} if blocks else {}
             )
@@ -420,8 +420,8 @@ class _Draft:
 
     def _zone(self) -> Span:
         """Return where barriers may stand."""
-        if self.wanted.zone is not None:
-            low, high = sorted(map(self.profile.origin.x_of, _sorted("--zone", self.wanted.zone)))
+        if self.request.zone is not None:
+            low, high = sorted(map(self.profile.origin.x_of, _sorted("--zone", self.request.zone)))
             return round(low, 3), round(high, 3)
         high = self.road[0] - CLEARANCE
         free = [span[1] + _reach() + CLEARANCE for _, span, _ in self.sources]
@@ -436,7 +436,7 @@ class _Draft:
         """Return the surface of all that is not listed, the stretches, and the grounds."""
         origin, base, given = self.profile.origin, None, []
         grounds = {"rock": USUAL["rock"], "soil": USUAL["soil"]}
-        for text in self.wanted.grounds:
+        for text in self.request.grounds:
             word, span = _ranged("--ground", text, origin)
             surface, ground = _library(word)
             grounds[surface] = ground
@@ -561,15 +561,15 @@ def _ranged(option: str, text: str, origin: Origin) -> tuple[str, Span | None]:
 
 def _library(word: str) -> tuple[str, str]:
     """Return the name of a surface and its ground by the name of a ground, or a part of it."""
-    wanted = word.casefold().replace(" ", "_").replace("-", "_")
-    ground = USUAL.get(wanted, wanted)
+    asked = word.casefold().replace(" ", "_").replace("-", "_")
+    ground = USUAL.get(asked, asked)
     if ground not in GROUNDS:
-        near = [name for name in GROUNDS if wanted in name]
+        near = [name for name in GROUNDS if asked in name]
         if len(near) != 1:
             mend = f"name one of the grounds {', '.join(near or GROUNDS)}"
             raise BadInput("--ground", word, mend)
         ground = near[0]
-    surface = {ground: name for name, ground in USUAL.items()}.get(ground, wanted)
+    surface = {ground: name for name, ground in USUAL.items()}.get(ground, asked)
     return surface, ground
 
 

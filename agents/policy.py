@@ -189,10 +189,10 @@ def decide(network: Network, problem: DesignProblem) -> Layout:
         raise BadInput("kinds", problem.kinds, mend)
     site = replace(problem.site, barrier_zone=problem.zone)  # the observation covers this zone
     slots = min(problem.max_barriers, SLOTS.count)
-    posed = DesignProblem(site, slots, kinds, max_cost=problem.max_cost)
-    seen = features(observe(posed))
+    unlimited = DesignProblem(site, slots, kinds, max_cost=problem.max_cost)
+    seen = features(observe(unlimited))
     numbers = np.clip(ANCHOR + network(seen), -1.0, 1.0)
-    return SLOTS.decode(posed, numbers[: posed.max_barriers * SLOTS.width])
+    return SLOTS.decode(unlimited, numbers[: unlimited.max_barriers * SLOTS.width])
 
 
 @lru_cache(maxsize=4)

@@ -204,14 +204,17 @@ a {{ color: #1c5aa0; margin-left: .8rem; }}
 
 
 class _Server(ThreadingHTTPServer):
-    """Serves each request in a thread and reports nothing when a browser leaves early."""
+    """Serves each request in a thread; connections that end early are not reported."""
 
     daemon_threads = True
     shown: _Shown
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Report an error of a request, unless the browser has closed the connection."""
-        if not isinstance(sys.exception(), ConnectionError):
+        """Report an error of a request, unless its connection was closed.
+
+        A browser closes connections when it leaves a page, and the server when it ends.
+        """
+        if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
 
@@ -228,8 +231,12 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_error(403)
         elif asked.path in shown.files:
             kind, content = shown.files[asked.path]
-            data = content.read_bytes() if isinstance(content, Path) else content
-            self._answer(kind, data, PAGES_POLICY)
+            try:
+                data = content.read_bytes() if isinstance(content, Path) else content
+            except OSError:
+                self.send_error(404)
+            else:
+                self._answer(kind, data, PAGES_POLICY)
         elif asked.path.startswith("/viewer/"):
             self._pass_on(f"{shown.viewer}/{asked.path.removeprefix('/viewer/')}")
         else:
@@ -242,6 +249,9 @@ class _Handler(BaseHTTPRequestHandler):
                 kind, data = found.headers.get("Content-Type", ""), found.read()
         except urllib.error.HTTPError as error:
             self.send_error(error.code)
+            return
+        except OSError:  # the viewer's server has ended
+            self.send_error(502)
             return
         if kind.startswith("text/html"):
             data = ELSEWHERE.sub(b"", data)

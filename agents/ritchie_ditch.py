@@ -69,7 +69,7 @@ class RitchieDitch(NamedTuple):
         return cls(float(rise), steep, width, depth)
 
     @property
-    def doubt(self) -> str:
+    def caveat(self) -> str:
         """Why the chart does not apply to the cut; empty if it does."""
         words = []
         if not INCLINATIONS[0] <= self.inclination <= INCLINATIONS[1]:
@@ -81,4 +81,4 @@ class RitchieDitch(NamedTuple):
     def name_of(self, ditch: Ditch) -> str:
         """Return the name of a ditch in tables: that of Ritchie only if it is as large."""
         whole = ditch.width >= self.width - 1e-6 and ditch.depth >= self.depth - 1e-6
-        return "Ritchie ditch" if whole and not self.doubt else "ditch"
+        return "Ritchie ditch" if whole and not self.caveat else "ditch"

@@ -214,7 +214,7 @@ def _part(name: str) -> str:
 
 
 @contextmanager
-def kept(folder: Path, site: Site | None = None) -> Iterator[None]:
+def recorded_run(folder: Path, site: Site | None = None) -> Iterator[None]:
     """Record a run in `run.json`, and report its files if it diverges or the user interrupts it.
 
     Parameters

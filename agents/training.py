@@ -26,7 +26,7 @@ from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import barrier_free
 from rigdda.envs.observation import observe
 from rigdda.envs.outcome_cache import mechanics
-from rigdda.envs.site_sampling import pose
+from rigdda.envs.site_sampling import problem_of
 from rigdda.files import atomic
 
 Tick = Callable[[int], None]
@@ -107,8 +107,8 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
     stages = _stages(terms, out)
     names = sites.split(SPLIT)
     pool = [problem(name) for name in names[: terms.sites]]
-    barrier_free([posed.site for posed in pool])
-    mean, scale = scaling(np.stack([see(posed) for posed in pool]))
+    barrier_free([problem.site for problem in pool])
+    mean, scale = scaling(np.stack([observed_features(problem) for problem in pool]))
     copies = ppo.Featured(ppo.pool(names[: terms.sites], FIDELITY), mean, scale)
     with closing(copies):
         model = ppo.learner(copies, terms.seed, out)
@@ -119,18 +119,18 @@ def train(terms: Terms, out: Path, tick: Tick) -> Trained:
         ppo.learn(model, terms.episodes, out / "checkpoint.zip", tick)
     network = ppo.export(model, mean, scale, notes)
     network.save(out / "policy.safetensors")
-    posed = [problem(name) for name in names[terms.sites : terms.sites + terms.beside]]
-    return Trained(network, examine(start, posed), examine(network, posed))
+    others = [problem(name) for name in names[terms.sites : terms.sites + terms.beside]]
+    return Trained(network, examine(start, others), examine(network, others))
 
 
 def problem(name: str) -> DesignProblem:
     """Return the problem of a training site."""
-    return pose(name, SLOTS.count, None, FIDELITY)
+    return problem_of(name, SLOTS.count, None, FIDELITY)
 
 
-def see(posed: DesignProblem) -> NDArray[np.float32]:
+def observed_features(problem: DesignProblem) -> NDArray[np.float32]:
     """Return the features of a problem."""
-    return features(observe(posed))
+    return features(observe(problem))
 
 
 def scaling(
@@ -147,7 +147,7 @@ def scaling(
 def examine(network: Network, problems: list[DesignProblem]) -> float:
     """Return the relative reduction of Z by the layouts of a policy, as a mean over problems."""
     seeds = release_seeds("final", 0, RELEASES)
-    built = [posed.evaluate(decide(network, posed), seeds) for posed in problems]
+    built = [problem.evaluate(decide(network, problem), seeds) for problem in problems]
     return float(np.mean([p.reward(e) for p, e in zip(problems, built, strict=True)]))
 
 

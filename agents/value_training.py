@@ -180,7 +180,7 @@ def propose(menu: Menu, forecast: Forecast, rng: np.random.Generator) -> list[La
     tops: list[list[Layout]] = []
     most = 0.9 * problem.nothing.objective
     for kind in problem.kinds:
-        singles = [(b,) for b in menu.lone(kind) if problem.site.annual((b,)) < most]
+        singles = [(b,) for b in menu.singles(kind) if problem.site.annual((b,)) < most]
         if not singles:
             continue
         share = [float(forecast.analytic(x)[0].mean()) for x in singles]

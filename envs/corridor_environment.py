@@ -24,8 +24,8 @@ from rigdda.barriers import describe
 from rigdda.envs import encoding, observation
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.environments import (
+    COSTS_IN_INFO,
     SCORED_SEEDS,
-    TOLD,
     Action,
     Answer,
     Ask,
@@ -33,15 +33,15 @@ from rigdda.envs.environments import (
     LayoutEnv,
     Observation,
     Step,
-    look_ahead,
     plain,
+    simulate_observations,
 )
 from rigdda.envs.outcome_cache import Sample
 from rigdda.envs.problem import DesignProblem
 from rigdda.envs.recorder import Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import release_record
-from rigdda.envs.site_sampling import Place, Places, Venue, drawn_from
+from rigdda.envs.site_sampling import EpisodeSites, Place, Places, drawn_from
 from rigdda.model.corridor import is_corridor
 from rigdda.model.corridor import names as corridor_names
 
@@ -174,7 +174,7 @@ class CorridorDesign(LayoutEnv):
         render_mode: str | None = None,
     ):
         self._corridor, self._names = _places(site)
-        self._venue = Venue("train", max_barriers, kinds, fidelity)
+        self._sites = EpisodeSites("train", max_barriers, kinds, fidelity)
         most = len(self._corridor.sections) if self._corridor else len(self._names)
         usual = most if self._corridor else min(SECTIONS, most)
         self.sections = check.integer(
@@ -185,7 +185,7 @@ class CorridorDesign(LayoutEnv):
         given = BUDGETS if budget is None and self._corridor is None else budget
         self._budget = None if given is None else _range("budget", given)
         self._lengths = _range("lengths", lengths)
-        slots = self._venue.slots
+        slots = self._sites.slots
         own = {
             name: spaces.Box(-observation.BOUND, observation.BOUND, (f.size,), np.float32)
             for name, f in FIELDS.items()
@@ -204,7 +204,7 @@ class CorridorDesign(LayoutEnv):
         """The problem of the current section, or of the last one after the end."""
         return self.placed[min(len(self.evaluations), len(self.placed) - 1)].problem
 
-    sights = 0
+    observed_releases = 0
     """Number of observation releases per event, as the vectorised environment needs it."""
 
     @property
@@ -228,7 +228,7 @@ class CorridorDesign(LayoutEnv):
         `options` may contain `budget` [EUR/m], which sets the budget of this episode.
         """
         self.draw(seed, options)
-        look_ahead([(section.problem, 0) for section in self.placed])
+        simulate_observations([(section.problem, 0) for section in self.placed])
         return self.start(Sample())
 
     def draw(self, seed: int | None, options: Mapping[str, Any] | None = None) -> None:
@@ -266,10 +266,12 @@ class CorridorDesign(LayoutEnv):
         if self._corridor is not None:
             order = rng.permutation(len(self._corridor.sections)).tolist()
             rows = [self._corridor.sections[i] for i in order]
-            return tuple(PlacedSection(self._venue.pose(r.site), r.length, r.name) for r in rows)
+            return tuple(
+                PlacedSection(self._sites.problem_of(r.site), r.length, r.name) for r in rows
+            )
         chosen = rng.choice(len(self._names), self.sections, replace=False).tolist()
         lengths = np.round(rng.uniform(*self._lengths, size=self.sections), 1).tolist()
-        problems = [self._venue.pose(self._names[i]) for i in chosen]
+        problems = [self._sites.problem_of(self._names[i]) for i in chosen]
         return tuple(
             PlacedSection(problem, length, problem.site.name)
             for problem, length in zip(problems, lengths, strict=True)
@@ -372,7 +374,7 @@ class CorridorDesign(LayoutEnv):
             "metres": math.fsum(s.length for s in self.placed[done:]),
             "spent": self.spent,
             "gain": self.gain,
-            **{name: float(getattr(now, name)) for name in TOLD},
+            **{name: float(getattr(now, name)) for name in COSTS_IN_INFO},
         }
 
     def _end(self) -> None:

@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import BadInput, Barrier, Layout, Mesh
 from rigdda.barriers import KINDS, Removal
 from rigdda.barriers.base import MIN_HEIGHT, TOLERANCE, Span, share_of
-from rigdda.envs.siting import Room
+from rigdda.envs.siting import FeasiblePlaces
 from rigdda.model.barrier_zone import BarrierZone
 
 Floats = NDArray[np.float64]
@@ -69,12 +69,12 @@ def vector(field: str, value: ArrayLike, size: int) -> Floats:
     return np.clip(array, -1.0, 1.0)
 
 
-def decode(place: Room, values: Floats, kinds: Sequence[str]) -> Layout:
+def decode(place: FeasiblePlaces, values: Floats, kinds: Sequence[str]) -> Layout:
     """Return the layout encoded by a vector, sorted downhill.
 
     Parameters
     ----------
-    place : Room
+    place : FeasiblePlaces
         Finds feasible places on the site.
     values : (slot_size n,) array
         n slots in [-1, 1]; see the module docstring.
@@ -91,7 +91,7 @@ def decode(place: Room, values: Floats, kinds: Sequence[str]) -> Layout:
 
 
 def built_and_dropped(
-    place: Room, values: Floats, kinds: Sequence[str]
+    place: FeasiblePlaces, values: Floats, kinds: Sequence[str]
 ) -> tuple[list[Barrier], list[str]]:
     """Return the barriers that `decode` builds, and the dropped ones, each with the reason."""
     built: list[Barrier] = []
@@ -134,12 +134,12 @@ def make(zone: BarrierZone, kind: str, station: float, height: float, size: floa
     return KINDS[kind].of_shares(zone, x, height, size)
 
 
-def encode(place: Room, layout: Layout, slots: int, kinds: Sequence[str]) -> Floats:
+def encode(place: FeasiblePlaces, layout: Layout, slots: int, kinds: Sequence[str]) -> Floats:
     """Return a vector that `decode` turns into `layout`; empty slots come last.
 
     Parameters
     ----------
-    place : Room
+    place : FeasiblePlaces
         Finds feasible places on the site.
     layout : tuple of Barrier
         Feasible barriers of the given kinds, at most `slots`.
@@ -163,7 +163,7 @@ def encode(place: Room, layout: Layout, slots: int, kinds: Sequence[str]) -> Flo
     return np.clip(out.ravel(), -1.0, 1.0)
 
 
-def _numbers(place: Room, i: int, barrier: Barrier) -> list[float]:
+def _numbers(place: FeasiblePlaces, i: int, barrier: Barrier) -> list[float]:
     """Return the station, height and size of a barrier, each from -1 to 1."""
     zone = place.zone
     if isinstance(barrier, Mesh):

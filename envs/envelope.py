@@ -78,7 +78,7 @@ class Transit(NamedTuple):
     deposit: Floats
 
 
-class Kept(NamedTuple):
+class StoredEnvelope(NamedTuple):
     """An envelope as stored on disk, with lists instead of arrays."""
 
     often: list[list[float]]
@@ -87,7 +87,7 @@ class Kept(NamedTuple):
     deposit: list[float]
 
     @classmethod
-    def of(cls, found: Envelope) -> Kept:
+    def of(cls, found: Envelope) -> StoredEnvelope:
         """Return the stored form of an envelope."""
         parts = (found.often, found.energy, found.bounce, found.deposit)
         return cls(*(part.tolist() for part in parts))
@@ -146,9 +146,9 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
     keys = [fingerprint(site) for site in sites]
     known = memory.recall(keys)
     for key in {*keys} - known.keys():
-        kept = site_store.read(NAME, key, Kept)
-        if kept is not None:
-            known[key] = kept.envelope
+        stored = site_store.read(NAME, key, StoredEnvelope)
+        if stored is not None:
+            known[key] = stored.envelope
             memory.remember({key: known[key]})
     new = {key: site for key, site in zip(keys, sites, strict=True) if key not in known}
     jobs = {key: _jobs(site) for key, site in new.items()}
@@ -159,7 +159,7 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
             for key, own in jobs.items()
         }
     for key, found in fresh.items():
-        site_store.write(NAME, key, Kept.of(found))
+        site_store.write(NAME, key, StoredEnvelope.of(found))
     memory.remember(fresh)
     known |= fresh
     return [known[key] for key in keys]

@@ -28,7 +28,7 @@ from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.recorder import Recorder, Shown, Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import EpisodeRecord, Versions, as_json
-from rigdda.envs.site_sampling import Places, Slots, Venue
+from rigdda.envs.site_sampling import EpisodeSites, Places, Slots
 
 
 class Ask(NamedTuple):
@@ -44,12 +44,12 @@ class Answer(NamedTuple):
     """Result of simulating an `Ask`.
 
     `evaluation` is the evaluation on the releases of the seeds, or None if there are no seeds.
-    `looked` holds the outcomes of the observation releases, which are not scored and are the same
+    `observed` holds the outcomes of the observation releases, which are not scored and are the same
     releases for all layouts of a site.
     """
 
     evaluation: Evaluation | None
-    looked: Sample
+    observed: Sample
 
 
 def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> list[Answer | None]:
@@ -78,19 +78,19 @@ def _looks(ask: Ask) -> list[tuple[int, str]]:
     return [(seed, name) for name in ask.problem.site.event_names for seed in seeds]
 
 
-def _answer(ask: Ask, scored: Sample, looked: Sample) -> Answer:
+def _answer(ask: Ask, scored: Sample, observed: Sample) -> Answer:
     judged = ask.problem.judge(ask.layout, scored, ask.seeds) if ask.seeds else None
-    return Answer(judged, looked)
+    return Answer(judged, observed)
 
 
-def look_ahead(
-    sights: Sequence[tuple[DesignProblem, int]], executor: Executor | None = None
+def simulate_observations(
+    episodes: Sequence[tuple[DesignProblem, int]], executor: Executor | None = None
 ) -> list[Sample]:
     """Simulate the envelopes and the barrier-free observation releases of new episodes together.
 
     Parameters
     ----------
-    sights : sequence of (DesignProblem, int)
+    episodes : sequence of (DesignProblem, int)
         For each episode its problem and the number of observation releases per event.
     executor : Executor, optional
         Where to run the simulations; by default in threads on all cores.
@@ -100,9 +100,9 @@ def look_ahead(
     Diverged
         If a simulation diverges.
     """
-    barrier_free([problem.site for problem, _ in sights], executor)
-    answers = simulate([Ask(problem, (), (), looks) for problem, looks in sights], executor)
-    return [answer.looked for answer in answers if answer is not None]
+    barrier_free([problem.site for problem, _ in episodes], executor)
+    answers = simulate([Ask(problem, (), (), looks) for problem, looks in episodes], executor)
+    return [answer.observed for answer in answers if answer is not None]
 
 
 def plain(outcomes: Sequence[Outcome]) -> tuple[dict[str, Any], ...]:
@@ -136,7 +136,7 @@ MOST_LOOKS = 4
 """Maximum number of observation releases per event; it is also limited to the number of scored
 ones."""
 
-TOLD = ("objective", "capital", "harm", "repair", "debris", "debris_share", "cost")
+COSTS_IN_INFO = ("objective", "capital", "harm", "repair", "debris", "debris_share", "cost")
 """Fields of the evaluation that `info` contains."""
 
 
@@ -225,7 +225,7 @@ class BarrierEnv(LayoutEnv):
     ----------
     problem : DesignProblem
         The problem of the current episode.
-    venue : Venue
+    sites : EpisodeSites
         Provides the site of each episode.
     """
 
@@ -246,8 +246,8 @@ class BarrierEnv(LayoutEnv):
         record_trigger: Trigger | None = None,
         render_mode: str | None = None,
     ):
-        self.venue = Venue(site, max_barriers, kinds, fidelity, targets, max_cost)
-        self.problem, slots = self.venue.first, self.venue.slots
+        self.sites = EpisodeSites(site, max_barriers, kinds, fidelity, targets, max_cost)
+        self.problem, slots = self.sites.first, self.sites.slots
         space = observation.space(slots.size, max_barriers, self.looks)
         options = record, record_trigger, render_mode
         super().__init__(slots, self.width_of(slots), space, releases, flat, *options)
@@ -257,7 +257,7 @@ class BarrierEnv(LayoutEnv):
         self.seeds: tuple[int, ...] = ()
         self._stages: list[Evaluation] = []  # without barriers, then after each step
         self._rewards: list[float] = []  # one per step
-        self._looked = Sample()  # outcomes of the current layout in the observation releases
+        self._observed = Sample()  # outcomes of the current layout in the observation releases
         self._wanted: bool | None = None  # whether to record the episode; None: not yet known
         self._shown: Run | None = None
 
@@ -278,22 +278,22 @@ class BarrierEnv(LayoutEnv):
 
     def begin(self) -> tuple[Observation, Info]:
         """Simulate the observation releases of the drawn episode and start it."""
-        (looked,) = look_ahead([(self.problem, self.sights)])
-        return self.start(looked)
+        (observed,) = simulate_observations([(self.problem, self.observed_releases)])
+        return self.start(observed)
 
     def draw(self, seed: int | None, options: Mapping[str, Any] | None = None) -> None:
         """Draw a new episode."""
         self._cut_off()
         super().reset(seed=seed)
         self.open, self._seed = False, seed
-        self.problem = self.venue.draw(self.np_random, options)
+        self.problem = self.sites.draw(self.np_random, options)
         self.seeds = tuple(self.np_random.integers(SCORED_SEEDS, size=self.releases).tolist())
 
-    def start(self, looked: Sample) -> tuple[Observation, Info]:
+    def start(self, observed: Sample) -> tuple[Observation, Info]:
         """Start the drawn episode and return its first observation and info."""
         self._numbers = self._asked = np.zeros(0)
         self._stages, self.open, self._wanted = [self.problem.nothing], True, None
-        self._rewards, self._looked = [], looked
+        self._rewards, self._observed = [], observed
         return self._show()
 
     def ask(self, action: Action) -> Ask | None:
@@ -311,10 +311,10 @@ class BarrierEnv(LayoutEnv):
         self._asked = asked
         if layout == self._stages[-1].layout:
             return None
-        return Ask(self.problem, layout, self.seeds, self.sights)
+        return Ask(self.problem, layout, self.seeds, self.observed_releases)
 
     @property
-    def sights(self) -> int:
+    def observed_releases(self) -> int:
         """Number of observation releases per event."""
         return min(self.releases, MOST_LOOKS) if self.looks else 0
 
@@ -323,7 +323,7 @@ class BarrierEnv(LayoutEnv):
         before = now = self._stages[-1]
         if answer is not None:
             assert answer.evaluation is not None  # every episode has releases
-            now, self._looked = answer.evaluation, answer.looked
+            now, self._observed = answer.evaluation, answer.observed
         self._numbers = self._asked
         self._stages.append(now)
         reward = self.problem.reward(now) - self.problem.reward(before)
@@ -341,8 +341,8 @@ class BarrierEnv(LayoutEnv):
         if self.looks:
             left = 1.0 - len(self._numbers) / self.slots.size
             stands = self.slots.encode(self.problem, observation.mesh_last(now.layout))
-            seen |= observation.looked(
-                self.problem, now, stands, self._looked, self.slots.count, left
+            seen |= observation.of_layout(
+                self.problem, now, stands, self._observed, self.slots.count, left
             )
         info: Info = {
             "site": self.problem.site.name,
@@ -350,7 +350,7 @@ class BarrierEnv(LayoutEnv):
             "dropped": self.slots.dropped(self.problem, self._numbers),
             "targets": now.targets,
             "outcomes": plain(now.outcomes),
-            **{name: float(getattr(now, name)) for name in TOLD},
+            **{name: float(getattr(now, name)) for name in COSTS_IN_INFO},
         }
         return self._packed(seen), info
 
@@ -385,9 +385,9 @@ class BarrierEnv(LayoutEnv):
             max_barriers=self.slots.count,
             kinds=list(self.slots.kinds),
             releases=self.releases,
-            targets=self.venue.targets,
-            max_cost=self.venue.max_cost,
-            fidelity=self.venue.fidelity,
+            targets=self.sites.targets,
+            max_cost=self.sites.max_cost,
+            fidelity=self.sites.fidelity,
             site=self.problem.site,
             episode=self._episode,
             seed=self._seed,

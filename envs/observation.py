@@ -91,7 +91,7 @@ FIELDS: dict[str, Field] = {
 }  # fmt: skip
 """Observation of a site, in both environments."""
 
-LOOKED: dict[str, Field] = {
+LAYOUT_FIELDS: dict[str, Field] = {
     "spent": Field(1, 0.0, 0.5, "annual cost of the layout divided by Z without barriers"),
     "layout": Field(
         0, 0.0, 1.0, "the layout, sorted downhill with mesh last, encoded like actions"
@@ -129,7 +129,7 @@ memory: Memory[bytes, Arrays] = Memory(4096)
 
 def space(size: int, slots: int, looks: bool) -> spaces.Dict:
     """Return the observation space for `slots` slots whose layout vector has `size` entries."""
-    fields = FIELDS | LOOKED if looks else FIELDS
+    fields = FIELDS | LAYOUT_FIELDS if looks else FIELDS
     sizes = {0: size, -1: slots}
     bounds = {name: 1.0 if name == "layout" else BOUND for name in fields}
     return spaces.Dict(
@@ -162,7 +162,7 @@ def mesh_last(layout: Layout) -> Layout:
     return tuple(sorted(layout, key=lambda barrier: (not isinstance(barrier, Built), barrier.x)))
 
 
-def looked(
+def of_layout(
     problem: DesignProblem, now: Evaluation, stands: ArrayLike, outcomes: Sequence[Outcome],
     slots: int, left: float,
 ) -> Arrays:  # fmt: skip
@@ -220,7 +220,7 @@ def _scaled(values: Values) -> Arrays:
     """Return (value - centre) / spread of each field as float32, clipped to its bound."""
     out = {}
     for name, value in values.items():
-        field = FIELDS.get(name) or LOOKED[name]
+        field = FIELDS.get(name) or LAYOUT_FIELDS[name]
         scaled = (np.asarray(value, dtype=np.float64).ravel() - field.centre) / field.spread
         bound = 1.0 if name == "layout" else BOUND
         out[name] = np.clip(scaled, -bound, bound).astype(np.float32)

@@ -25,7 +25,7 @@ from rigdda.envs import cost, encoding, ensemble, intervals, outcome_cache
 from rigdda.envs.cost import Evaluation, Risk
 from rigdda.envs.intervals import Estimate, Mean, total
 from rigdda.envs.outcome_cache import Sample, fingerprint
-from rigdda.envs.siting import Room
+from rigdda.envs.siting import FeasiblePlaces
 from rigdda.model.site_tables import BarrierZone
 
 MET, MISSED, UNDECIDED = "met", "missed", "undecided"
@@ -344,7 +344,7 @@ class DesignProblem:
     fidelity: str
     zone: BarrierZone
     max_cost: float | None
-    place: Room = field(compare=False, repr=False)
+    place: FeasiblePlaces = field(compare=False, repr=False)
     key: bytes = field(compare=False, repr=False)
 
     def __init__(
@@ -367,7 +367,7 @@ class DesignProblem:
             "fidelity": fidelity,
             "zone": limits,
             "max_cost": most,
-            "place": Room(where, limits, most),
+            "place": FeasiblePlaces(where, limits, most),
             "key": fingerprint(where),
         }
         for name, value in values.items():

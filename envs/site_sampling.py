@@ -37,7 +37,7 @@ RANDOM = "random"
 SPLITS = ("train", "validation", "test")
 """Splits of the generated sites."""
 
-MOST_POSED = 512
+MOST_PROBLEMS = 512
 """Number of problems kept in memory, because checking a site takes longer than an episode."""
 
 
@@ -154,7 +154,7 @@ def drawn_from(site: Places) -> tuple[Place, ...]:
     return tuple(site)
 
 
-def pose(
+def problem_of(
     site: Place,
     slots: int,
     kinds: Sequence[str] | None,
@@ -174,7 +174,7 @@ def pose(
     return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost)
 
 
-@lru_cache(MOST_POSED)
+@lru_cache(MOST_PROBLEMS)
 def _named(
     site: str,
     slots: int,
@@ -186,7 +186,7 @@ def _named(
     return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost)
 
 
-class Venue:
+class EpisodeSites:
     """Sites on which an environment plays its episodes, and the slots that its actions fill.
 
     Parameters
@@ -226,36 +226,36 @@ class Venue:
         self._drawn = drawn_from(site)
         if self._drawn:
             self.slots = Slots(named(KINDS if kinds is None else kinds), max_barriers)
-            self.first = self.pose(self._drawn[0])
+            self.first = self.problem_of(self._drawn[0])
             if not isinstance(site, str):
                 self._check(self._drawn[1:])
         else:
             assert isinstance(site, str | os.PathLike | Site)
             limits = self.targets, self.max_cost
-            self.first = self.home = pose(site, max_barriers, kinds, fidelity, *limits)
+            self.first = self.home = problem_of(site, max_barriers, kinds, fidelity, *limits)
             self.slots = Slots(self.first.kinds, max_barriers)
 
-    def pose(self, site: Place) -> DesignProblem:
+    def problem_of(self, site: Place) -> DesignProblem:
         """Return the problem of a site with those kinds that the site offers."""
         count = self.slots.count
-        whole = pose(site, count, None, self.fidelity)
+        whole = problem_of(site, count, None, self.fidelity)
         kinds = self.slots.shared(whole.site)
-        return pose(site, count, kinds, self.fidelity, self.targets, self.max_cost)
+        return problem_of(site, count, kinds, self.fidelity, self.targets, self.max_cost)
 
     def _check(self, places: Sequence[Place]) -> None:
         """Raise an error if there is no problem of one of some sites."""
         for i, place in enumerate(places, 1):
             try:
-                self.pose(place)
+                self.problem_of(place)
             except BadInput as bad:
                 raise BadInput(f"site[{i}].{bad.field}", bad.value, bad.mend) from None
 
-    def settle(self, site: Places) -> None:
+    def change(self, site: Places) -> None:
         """Change the site, split or sequence from the next episode on."""
         self.home, self._drawn = None, drawn_from(site)
         if not self._drawn:
             assert isinstance(site, str | os.PathLike | Site)
-            self.home = self.pose(site)
+            self.home = self.problem_of(site)
 
     def draw(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> DesignProblem:
         """Return the problem of an episode; `options` may specify its site.
@@ -274,4 +274,4 @@ class Venue:
         if site is None and self.home is not None:
             return self.home
         names = self._drawn if site is None else drawn_from(site)
-        return self.pose(names[int(rng.integers(len(names)))] if names else site)
+        return self.problem_of(names[int(rng.integers(len(names)))] if names else site)

@@ -1,6 +1,6 @@
 """Rules for layouts: where barriers may stand on a site, their sizes, distances and cost.
 
-`Rules` checks layouts, and `Room` finds the nearest feasible places.
+`Rules` checks layouts, and `FeasiblePlaces` finds the nearest feasible places.
 """
 
 from __future__ import annotations
@@ -308,7 +308,7 @@ NEAR_ZERO = 1e-3
 """Tolerance of the slope when candidate places are preselected [-]."""
 
 
-class Room(Rules):
+class FeasiblePlaces(Rules):
     """Rules for layouts on a site, and the search for feasible places.
 
     The parameters are those of `Rules`.

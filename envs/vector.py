@@ -22,8 +22,8 @@ from rigdda.envs.environments import (
     Info,
     Observation,
     Step,
-    look_ahead,
     simulate,
+    simulate_observations,
 )
 from rigdda.envs.recorder import Recorder
 
@@ -260,9 +260,9 @@ class BarrierVector(VectorEnv[Any, NDArray[np.float32], Any]):
         """Start an episode in the chosen copies; return their observations and infos."""
         for i in chosen:
             self.copies[i].draw(seeds[i], options[i])
-        sights = [(self.copies[i].problem, self.copies[i].sights) for i in chosen]
-        looked = look_ahead(sights)
-        starts = {i: self.copies[i].start(seen) for i, seen in zip(chosen, looked, strict=True)}
+        episodes = [(self.copies[i].problem, self.copies[i].observed_releases) for i in chosen]
+        observed = simulate_observations(episodes)
+        starts = {i: self.copies[i].start(seen) for i, seen in zip(chosen, observed, strict=True)}
         self._seen = self._seen or [seen for seen, _ in starts.values()]
         for i, (seen, _) in starts.items():
             self._seen[i], self._elapsed[i], self._ended[i] = seen, 0, False

@@ -34,7 +34,7 @@ def catalogue(menu: Menu, stations: int) -> list[Layout]:
     own = menu.stations[:: max(1, len(menu.stations) // stations)].tolist()
     singles: list[Barrier] = []
     for kind in menu.problem.kinds:
-        found = menu.lone(kind)
+        found = menu.singles(kind)
         ends = {b.x for b in found} - set(menu.stations.tolist())
         singles += [b for b in found if kind == "mesh" or b.x in ends or b.x in own]
     return [(barrier,) for barrier in singles]

@@ -98,7 +98,7 @@ class Pool:
         """Return the layouts of the constants by name; empty if one does not fit on the site."""
         menu = Menu(self.problem)
         found = {name: place(menu, *constant) for name, constant in CONSTANTS.items()}
-        return found | {"mesh": tuple(menu.lone("mesh")[:1])}
+        return found | {"mesh": tuple(menu.singles("mesh")[:1])}
 
     def _file(self, kind: str, *asked: object) -> Path:
         """Return the file of results that depend on the site and on some values."""

@@ -81,7 +81,7 @@ def measure(layout: str, dt_s: float, releases: int) -> Row:
     }
 
 
-def told(row: Row) -> str:
+def sentence(row: Row) -> str:
     """Return a progress message for a row."""
     words = f"{row['layout']}, {1e3 * row['dt_s']:g} ms"
     return f"{words}: debris {row['debris']:.3f}, failures {row['failures']:.2f}"
@@ -124,7 +124,7 @@ def run(quick: bool, out: Path) -> Number:
     steps = QUICK_STEPS if quick else STEPS
     releases = QUICK_RELEASES if quick else RELEASES
     cases = [{"layout": k, "dt_s": dt, "releases": releases} for k in LAYOUTS for dt in steps]
-    rows = tabulate(out / "fence_step.csv", cases, measure, told)
+    rows = tabulate(out / "fence_step.csv", cases, measure, sentence)
     draw(out / "fence_step.png", (11.0, 4.5), lambda figure: picture(figure, rows))
     most = difference(rows)
     return Number("greatest difference from the shortest step, over its interval", most, high=MOST)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.script import Number, interval, main, say, write
-from experiments.search_gain import FRESH, QUICK_VERIFY, VERIFY, load, posed
+from experiments.search_gain import FRESH, QUICK_VERIFY, VERIFY, load, problems_of
 from rigdda import Layout, sites
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Value
@@ -95,7 +95,7 @@ def run(quick: bool, out: Path) -> Number:
     path = out / "no_search.csv"
     rows: list[Any] = load(path)
     known = {r["site"] for r in rows}
-    for problem in posed(QUICK_SITES if quick else SITES, sites.split("test")):
+    for problem in problems_of(QUICK_SITES if quick else SITES, sites.split("test")):
         if problem.site.name not in known:
             rows += study(problem, QUICK_VERIFY if quick else VERIFY)
             write(path, rows)

@@ -61,7 +61,7 @@ def measure(site: str, dt_s: float, releases: int) -> Row:
     return {"share": share, "half_interval": half}
 
 
-def told(row: Row) -> str:
+def sentence(row: Row) -> str:
     """Return a progress message for a row."""
     return f"{row['site']}, {1e3 * row['dt_s']:g} ms: {row['share']:.3f}"
 
@@ -100,7 +100,7 @@ def run(quick: bool, out: Path) -> Number:
     releases = QUICK_RELEASES if quick else RELEASES
     steps = QUICK_STEPS if quick else STEPS
     cases = [{"site": s, "dt_s": dt, "releases": releases[s]} for s in SITES for dt in steps]
-    rows = tabulate(out / "outcome_step.csv", cases, measure, told)
+    rows = tabulate(out / "outcome_step.csv", cases, measure, sentence)
     draw(out / "outcome_step.png", (7.0, 4.5), lambda figure: picture(figure, rows))
     most = difference(rows)
     return Number("greatest difference from the shortest step, over its interval", most, high=MOST)

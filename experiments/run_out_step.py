@@ -80,7 +80,7 @@ def measure(
     }  # fmt: skip
 
 
-def told(row: Row) -> str:
+def sentence(row: Row) -> str:
     """Return a progress message for a row."""
     what = f"{row['area_m2']:g} m2, restitution {row['restitution']:g}, {1e3 * row['dt_s']:.3g} ms"
     return f"{what}: {row['run_out_m']:.2f} m, {row['difference_m']:+.2f} m"
@@ -134,7 +134,7 @@ def run(quick: bool, out: Path) -> Number:
         for e in (QUICK_RESTITUTIONS if quick else RESTITUTIONS)
         for dt in steps
     ]  # fmt: skip
-    rows = tabulate(out / "run_out_step.csv", cases, measure, told)
+    rows = tabulate(out / "run_out_step.csv", cases, measure, sentence)
     draw(out / "run_out_step.png", (12.0, 4.2), lambda figure: picture(figure, rows))
     what = "greatest difference from the shortest step beyond its interval, over the mean run-out"
     return Number(what, excess(rows), high=MOST)

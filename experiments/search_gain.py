@@ -39,7 +39,7 @@ MOST = 100
 """Number of blocks of an event from which a site is left out."""
 
 
-def posed(count: int, names: Sequence[str]) -> list[DesignProblem]:
+def problems_of(count: int, names: Sequence[str]) -> list[DesignProblem]:
     """Return the problems of the first sites without large masses, those of few blocks first."""
     found: list[DesignProblem] = []
     for name in names:
@@ -94,7 +94,7 @@ def run(quick: bool, out: Path) -> Number:
     known = {(r["site"], r["designer"], int(r["budget"])) for r in rows}
     budgets = QUICK_BUDGETS if quick else BUDGETS
     names = sites.split("validation")[SKIPPED:]
-    problems = posed(QUICK_SITES if quick else SITES, names)
+    problems = problems_of(QUICK_SITES if quick else SITES, names)
     for budget in budgets:
         for problem in problems:
             for name in NAMES:

@@ -78,7 +78,7 @@ def measure(site: str, barrier: str, dt_ms: float, releases: int) -> Row:
     }
 
 
-def told(row: Row) -> str:
+def sentence(row: Row) -> str:
     """Return a progress message for a row."""
     words = f"{row['site']}, {row['barrier']}, {row['dt_ms']:g} ms"
     return f"{words}: fails in {row['failed']:g} of {row['releases']:g} releases"
@@ -117,7 +117,7 @@ def run(quick: bool, out: Path) -> Number:
         for dt in steps
         for site, barrier in catalogue()
     ]
-    rows = tabulate(out / "thrust.csv", cases, measure, told)
+    rows = tabulate(out / "thrust.csv", cases, measure, sentence)
     draw(out / "thrust.png", (11.0, 4.5), lambda figure: picture(figure, rows))
     wrong = sum(r["stand_beyond_resistance"] for r in rows)
     ratio = [r["greatest_thrust_kn"] / r["resistance_kn"] for r in rows]

@@ -1,7 +1,7 @@
 """Releases by the lumped-mass model: a quick estimate, and the baseline of the block model.
 
 A notch of a millimetre would stop a point, but not a block. Each point therefore moves on a ground
-without features that are much smaller than the block it represents, see `felt`.
+without features that are much smaller than the block it represents, see `smoothed`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 STEEPEST_DEG = 80.0
 """Upper limit of the friction angle of a surface with random deviations [deg]."""
 
-UNFELT = 0.1
+SMOOTHING = 0.1
 """Depth of ground features over block size below which a block is not affected by them [-]: a block
 rolls over a step of a tenth of its size. Features consist of segments shorter than the block; a
 bend between two longer segments always counts."""
@@ -82,7 +82,7 @@ def lumped(
     """Simulate releases by the lumped-mass model, of a given event or of events drawn by the seeds.
 
     Blocks start where `Site.draw` places them, each on the ground felt by a block of its size (see
-    `felt`), which is the side of a square of equal area. Rebound coefficients are those of
+    `smoothed`), which is the side of a square of equal area. Rebound coefficients are those of
     `site.lumped`; for surfaces not listed there, normal restitution and friction are those of
     `site.surfaces`. Friction and restitution vary randomly as those of the site and its surfaces
     do; the ground is smooth.
@@ -141,12 +141,12 @@ def _deviations(site: Site, drawn: Drawn) -> list[tuple[float, float]]:
     ]
 
 
-def felt(ground: Terrain, size: float) -> tuple[Floats, tuple[str, ...]]:
+def smoothed(ground: Terrain, size: float) -> tuple[Floats, tuple[str, ...]]:
     """Return the ground without features that are much smaller than a block.
 
     Corners between two segments that are at least as long as the block are kept. Between these
-    corners, the ground is simplified (Douglas and Peucker 1973) with a tolerance of `UNFELT` times
-    the size of the block.
+    corners, the ground is simplified (Douglas and Peucker 1973) with a tolerance of `SMOOTHING`
+    times the size of the block.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def felt(ground: Terrain, size: float) -> tuple[Floats, tuple[str, ...]]:
     for low, high in pairwise(np.flatnonzero(kept).tolist()):
         if high > low + 1:
             piece = shapely.LineString(points[low : high + 1])
-            left = shapely.simplify(piece, UNFELT * size, preserve_topology=False)
+            left = shapely.simplify(piece, SMOOTHING * size, preserve_topology=False)
             x = shapely.get_coordinates(left)[:, 0]
             kept[low : high + 1] = np.isin(points[low : high + 1, 0], x)
     level = np.interp(points[:, 0], *points[kept].T)
@@ -205,7 +205,7 @@ def _follow(
     grounds: dict[bytes, tuple[Floats, tuple[str, ...]]] = {}
     members: dict[bytes, list[int]] = {}
     for i, size in enumerate(sizes.tolist()):
-        corners, surfaces = felt(ground, size)
+        corners, surfaces = smoothed(ground, size)
         key = corners.tobytes()
         grounds[key] = corners, surfaces
         members.setdefault(key, []).append(i)

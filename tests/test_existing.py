@@ -24,7 +24,7 @@ from rigdda.envs import DesignProblem
 from rigdda.envs.rendering import picture
 from rigdda.envs.repetition import repeat
 from rigdda.envs.replay_record import ReleaseRecord, release_record
-from rigdda.envs.site_sampling import Venue
+from rigdda.envs.site_sampling import EpisodeSites
 from rigdda.model.existing import Existing
 
 OLD = Existing("fence", 20.0, 2.0, energy_class=250, condition=0.5, removable=True, removal=60.0)
@@ -143,7 +143,7 @@ def test_designers_keep_clear_of_what_stays() -> None:
     menu = Menu(problem)
     old = 20.0, 22.7
     for kind in problem.kinds:
-        for barrier in menu.lone(kind):
+        for barrier in menu.singles(kind):
             if kind != "mesh":
                 start, end = problem.place.works(barrier)
                 assert start >= old[1] or end + barrier.deflection <= old[0]
@@ -247,7 +247,7 @@ def test_a_record_of_a_release_is_repeated(site: Site) -> None:
 
 
 def test_an_environment_takes_sites_with_and_without_it(site: Site) -> None:
-    slots = Venue(site, 2, None, "full").slots
+    slots = EpisodeSites(site, 2, None, "full").slots
     assert slots.kinds[-1] == "removal"
     assert "removal" not in slots.shared(LIGHT)
     assert slots.shared(site) == slots.kinds

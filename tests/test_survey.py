@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from rigdda import BadInput, Site
 from rigdda.agents import new_site
-from rigdda.agents.new_site import Wanted, compose
+from rigdda.agents.new_site import SiteRequest, compose
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.survey import Survey, parse_table, profile_of
 from rigdda.sites.schema import schema
@@ -95,7 +95,7 @@ def test_the_profile_of_a_site_is_that_of_its_survey(
         columns = "x y"
     text = table(listed, columns, separator, decimal)
     file = survey_file(tmp_path, text, "round trip.txt")
-    written, _ = compose("made", file, Wanted(road=asked))
+    written, _ = compose("made", file, SiteRequest(road=asked))
     site = loaded(written)
     given_back = [
         (site.origin.chainage_of(x), y + site.origin.elevation) for x, y in site.slope.points
@@ -159,7 +159,9 @@ def test_doubts_about_a_survey_are_told():
 
 def test_ground_that_overhangs_gives_a_site(tmp_path):
     points = [(0, 50), (10, 48), (9, 30), (30, 10), (40, 9), (47, 9), (90, 8)]
-    text, profile = compose("over", survey_file(tmp_path, table(points)), Wanted(road=(40, 47)))
+    text, profile = compose(
+        "over", survey_file(tmp_path, table(points)), SiteRequest(road=(40, 47))
+    )
     site = loaded(text)
     assert len(site.slope.points) == 7 and any("overhangs" in note for note in profile.notes)
     assert site.realise().blocks
@@ -167,14 +169,14 @@ def test_ground_that_overhangs_gives_a_site(tmp_path):
 
 def test_grounds_sources_and_zone_are_where_they_were_given(tmp_path):
     grid = np.add(TALUS, [2_683_400.0, 1_800.0])
-    wanted = Wanted(
+    request = SiteRequest(
         road=(2_683_512.0, 2_683_521.0),
         toe=2_683_494.0,
         zone=(2_683_480.0, 2_683_511.0),
         grounds=("talus:2683422-2683490", "meadow:2683490-2683512", "weathered rock"),
         sources=("upper cliff:2683412-2683418", "talus:2683430-2683440"),
     )
-    text, _ = compose("grid", survey_file(tmp_path, table(grid)), wanted)
+    text, _ = compose("grid", survey_file(tmp_path, table(grid)), request)
     site = loaded(text)
     assert site.slope.toe == 94.0
     assert (site.barrier_zone.start, site.barrier_zone.end) == (80.0, 111.0)
@@ -188,7 +190,7 @@ def test_grounds_sources_and_zone_are_where_they_were_given(tmp_path):
 
 
 def test_each_value_is_commented_with_its_unit_and_how_sure_it_is(tmp_path):
-    text, _ = compose("made", survey_file(tmp_path, table(TALUS)), Wanted(road=ROAD))
+    text, _ = compose("made", survey_file(tmp_path, table(TALUS)), SiteRequest(road=ROAD))
     lines = text.splitlines()
     words = (new_site.SURVEYED, new_site.GIVEN, new_site.PLACEHOLDER, new_site.DEFAULT)
     ends = tuple(f"{word}." for word in words)
@@ -207,10 +209,10 @@ def test_each_value_is_commented_with_its_unit_and_how_sure_it_is(tmp_path):
 def test_ground_that_ends_close_beyond_the_road_is_not_extended(tmp_path):
     short = [*TALUS[:-1], (140.0, 3.0)]
     with pytest.raises(BadInput) as caught:
-        compose("short", survey_file(tmp_path, table(short)), Wanted(road=ROAD))
+        compose("short", survey_file(tmp_path, table(short)), SiteRequest(road=ROAD))
     assert caught.value.field == "--profile" and "140" in str(caught.value)
     assert "add the point 151, 2.42105" in caught.value.mend
     text, _ = compose(
-        "long", survey_file(tmp_path, table([*short, (151.0, 2.42105)])), Wanted(ROAD)
+        "long", survey_file(tmp_path, table([*short, (151.0, 2.42105)])), SiteRequest(ROAD)
     )
     assert loaded(text).slope.points[-1] == (151.0, 2.421)

@@ -260,7 +260,7 @@ def tabulate(
 
 def whole(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Catalogue:
     """Return the catalogue of all barriers of a menu."""
-    barriers = [b for kind in problem.kinds for b in menu.lone(kind)]
+    barriers = [b for kind in problem.kinds for b in menu.singles(kind)]
     return tabulate(problem, ensemble, barriers)
 
 

@@ -57,7 +57,7 @@ def constant(problem: DesignProblem, menu: Menu) -> Layout:
         found = place(menu, barrier, share) if barrier.kind in problem.kinds else ()
         if found:
             return found
-    first = next(iter(menu.lone("mesh")), None)
+    first = next(iter(menu.singles("mesh")), None)
     return () if first is None else (first,)
 
 

@@ -51,7 +51,7 @@ class Menu:
         rounded = np.round([*apart, *corners], 2)
         return np.unique(np.clip(rounded, zone.start, zone.end))  # the ends of the zone exactly
 
-    def lone(self, kind: str) -> list[Barrier]:
+    def singles(self, kind: str) -> list[Barrier]:
         """Return all barriers of a kind that may be built, at all stations and of all sizes."""
         if kind == "mesh":
             options = (self.room.mesh(i) for i in range(len(self.problem.site.meshes)))
@@ -106,7 +106,7 @@ class Menu:
     def _moved(self, barrier: Barrier, step: float, level: int) -> Iterator[Barrier]:
         """Yield a barrier at other stations and of other sizes, including some that do not fit."""
         if isinstance(barrier, Mesh):
-            yield from (b for b in self.lone("mesh") if b != barrier)
+            yield from (b for b in self.singles("mesh") if b != barrier)
             return
         if isinstance(barrier, Removal):
             yield from (b for b in self.problem.site.removals if b != barrier)

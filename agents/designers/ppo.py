@@ -176,7 +176,7 @@ def pool(names: Sequence[str], fidelity: str) -> VecEnv:
         max_barriers=SLOTS.count, releases=1, fidelity=fidelity,
     )  # fmt: skip
     for i, name in enumerate(names):
-        copies.get_attr("venue", i)[0].settle(name)
+        copies.get_attr("sites", i)[0].change(name)
     return copies
 
 

@@ -101,7 +101,7 @@ def forecast_pool(
 
 def single_barriers(menu: Menu) -> list[Layout]:
     """Return all layouts of one barrier."""
-    return [(b,) for kind in menu.problem.kinds for b in menu.lone(kind)]
+    return [(b,) for kind in menu.problem.kinds for b in menu.singles(kind)]
 
 
 def forecasts_of(forecast: Forecast, menu: Menu, known: Sequence[Layout]) -> Surrogate:

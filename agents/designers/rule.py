@@ -64,7 +64,7 @@ class RuleAnswer:
     envelope: DesignEnvelope
 
     @property
-    def doubt(self) -> str:
+    def caveat(self) -> str:
         """A note if the fence fits at one end of the intervals only; empty if not."""
         if self.check is None:
             return ""

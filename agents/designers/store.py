@@ -26,7 +26,7 @@ from rigdda.files import atomic
 FILE = "problem.json"
 
 
-def claim(folder: Path, problem: DesignProblem, *files: str) -> None:
+def record_problem(folder: Path, problem: DesignProblem, *files: str) -> None:
     """Write `problem.json` into a folder to record the problem of its results.
 
     Parameters
@@ -43,7 +43,7 @@ def claim(folder: Path, problem: DesignProblem, *files: str) -> None:
     BadInput
         If the folder contains results of another problem or of an unknown problem.
     """
-    file, asked = folder / FILE, posed(problem)
+    file, asked = folder / FILE, identity(problem)
     if file.exists():
         known = _read(file)
         other = _differ(known, asked) if known else f"{FILE}, which is damaged"
@@ -56,7 +56,7 @@ def claim(folder: Path, problem: DesignProblem, *files: str) -> None:
         part.write_text(json.dumps(asked, indent=2) + "\n", encoding="utf-8")
 
 
-def posed(problem: DesignProblem) -> dict[str, Any]:
+def identity(problem: DesignProblem) -> dict[str, Any]:
     """Return the values that identify a problem.
 
     `content` is a hash of the site including its prices and rates.
@@ -99,7 +99,7 @@ CONSTANTS = {"Infinity": math.inf, "-Infinity": -math.inf, "NaN": math.nan}
 releases. The same NaN object is used everywhere, so that the values read equal those written."""
 
 
-LENT = (0, 1)
+SUBSTITUTES = (0, 1)
 """Seeds of releases without barriers that are used for an event without releases."""
 
 
@@ -134,7 +134,7 @@ class StoredEvaluation:
     outcomes: bytes = b""
 
 
-class KeptReleases(NamedTuple):
+class StoredReleases(NamedTuple):
     """Releases of a layout, in the order of their packed outcomes."""
 
     layout: Layout
@@ -251,7 +251,9 @@ class Store:
             for outcome in outcomes:
                 found[outcome.event].append(_release(problem, layout, outcome))
             kept = {name: tuple(releases) for name, releases in found.items()}
-            missing = {name: LENT for name in problem.site.event_names if not asked.get(name)}
+            missing = {
+                name: SUBSTITUTES for name in problem.site.event_names if not asked.get(name)
+            }
             sample = problem.sample((), missing) if missing else ()
             lent = [replace(outcome, barriers=()) for outcome in sample]  # existing barriers
             judged = problem.judge(layout, (*outcomes, *lent))
@@ -265,13 +267,13 @@ class Store:
         found = self._recall(key, layout, drawn, simulate)
         return replace(found, evaluation=replace(found.evaluation, layout=layout))
 
-    def kept(self) -> Iterator[KeptReleases]:
+    def stored_releases(self) -> Iterator[StoredReleases]:
         """Yield the releases of each evaluation in the order in which they were requested.
 
         Only a store with `outcomes` keeps them. A release can be in several evaluations.
         """
         for key, (layout, drawn) in self._asked.items():
-            yield KeptReleases(layout, drawn, self._known[key].outcomes)
+            yield StoredReleases(layout, drawn, self._known[key].outcomes)
 
     def _stored(self, key: str) -> StoredEvaluation | None:
         """Return the stored evaluation with a key, with its outcomes if the store keeps them."""

@@ -27,7 +27,7 @@ from rigdda.agents.exam.messages import (
     decode_reply,
     encode,
 )
-from rigdda.agents.exam.task import CorridorTask, Task, posed
+from rigdda.agents.exam.task import CorridorTask, Task, make_task
 from rigdda.barriers import as_layout, to_tables
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.envs.problem import is_vector
@@ -112,7 +112,7 @@ def _submission(
     order: TaskOrder, line: PipeLine, entry: Entry, corridor_entry: Entry
 ) -> SubmitRequest:
     """Let the entry work on a task and return what it submits."""
-    task = posed(order, line)
+    task = make_task(order, line)
     if isinstance(task, CorridorTask):
         sections: Sequence[Task] = task.sections
         _ask_scorer(sections)

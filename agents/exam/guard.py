@@ -49,7 +49,7 @@ def install(report: Report, secrets: tuple[str, ...]) -> None:
     _watch(SingleBlock, "run", "rigdda.release", report)
     hidden = tuple(os.path.realpath(path) for path in secrets)
 
-    def hear(event: str, arguments: tuple[Any, ...]) -> None:
+    def audit(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open":
             path = _secret(arguments[0], hidden)
             if path:
@@ -60,7 +60,7 @@ def install(report: Report, secrets: tuple[str, ...]) -> None:
         elif event == "import" and str(arguments[0]).startswith("multiprocessing.popen_"):
             report(STARTED.format(event="multiprocessing"))
 
-    sys.addaudithook(hear)
+    sys.addaudithook(audit)
 
 
 def _watch(kind: type, method: str, name: str, report: Report) -> None:

@@ -47,7 +47,7 @@ from rigdda.kernel import kernels_hash
 
 Tick = Callable[[int, str], None]
 
-SUBMISSIONS, CLAIM, EVALUATIONS = "submissions.json", "exam.json", "evaluations.jsonl"
+SUBMISSIONS, IDENTITY, EVALUATIONS = "submissions.json", "exam.json", "evaluations.jsonl"
 """Files of a run from which it continues."""
 
 TOLERANCE = 1e-6
@@ -264,7 +264,7 @@ class Scorer:
     ):
         self.asked, self.references, self.folder, self.tick = asked, references, folder, tick
         self.entry, self.corridor_entry = entry, corridor_entry
-        own = (folder / name for name in (SUBMISSIONS, CLAIM, EVALUATIONS))
+        own = (folder / name for name in (SUBMISSIONS, IDENTITY, EVALUATIONS))
         self._secrets = tuple(str(path) for path in (*secrets, *own))
         self._store = Store(folder / EVALUATIONS)
         self._done: dict[tuple[str, int], Submission] = {}
@@ -289,24 +289,24 @@ class Scorer:
         BadInput
             As `run` does.
         """
-        self._claim()
+        self._check_folder()
         for budget in self.asked.budgets:
             self._play(budget)
 
-    def _claim(self) -> None:
+    def _check_folder(self) -> None:
         """Read what the folder has of this run, and note to which run it belongs."""
         names = self.entry, self.corridor_entry
         code = [source_hash_of(name) for name in names if name]
         own = [self.asked.specification.key, self.asked.seed, *names, *code, kernels_hash()]
-        file, claim = (
-            self.folder / CLAIM,
+        file, identity = (
+            self.folder / IDENTITY,
             {"run": msgspec.json.encode([__version__, *own]).decode()},
         )
-        if file.is_file() and msgspec.json.decode(file.read_bytes()) != claim:
+        if file.is_file() and msgspec.json.decode(file.read_bytes()) != identity:
             mend = "it contains an exam of another entry, seed or version: name another folder"
             raise BadInput("--out", str(self.folder), mend)
         with atomic(file) as fresh:
-            fresh.write_bytes(msgspec.json.encode(claim))
+            fresh.write_bytes(msgspec.json.encode(identity))
         known = self.folder / SUBMISSIONS
         if known.is_file():
             rows = msgspec.json.decode(known.read_bytes(), type=list[Submission])

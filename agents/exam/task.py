@@ -326,7 +326,7 @@ class CorridorTask:
         return sum(length * own.site.capital(layout) for length, own, layout in pairs)
 
 
-def posed(order: TaskOrder, line: Line) -> Task | CorridorTask:
+def make_task(order: TaskOrder, line: Line) -> Task | CorridorTask:
     """Return the task of an order."""
     if order.money is not None:
         return CorridorTask(order, line)

@@ -124,14 +124,14 @@ def along_slope(problem: DesignProblem, envelope: DesignEnvelope) -> Iterator[di
 
 def rule_words(answer: RuleAnswer) -> str:
     """Return in words what the rule asks for, or what stands in its place and why."""
-    doubt = f"; {answer.doubt}" if answer.doubt else ""
+    caveat = f"; {answer.caveat}" if answer.caveat else ""
     if answer.name == rule.NAME and answer.check is not None:
         check = answer.check
         uses = ", ".join(f"{name} {_figure(use)}" for name, use in check.uses.items())
         place = f"{check.fence.label}, at {check.fence.x:.1f} m"
-        return f"rule (UNI 11211-4): {place}; utilisation: {uses}{doubt}"
+        return f"rule (UNI 11211-4): {place}; utilisation: {uses}{caveat}"
     stands = "" if not answer.layout else f"; shown instead: {answer.layout[0].label}"
-    return f"the rule (UNI 11211-4) gives no fence: {answer.reason}{doubt}{stands}"
+    return f"the rule (UNI 11211-4) gives no fence: {answer.reason}{caveat}{stands}"
 
 
 def table(checks: LayoutChecks) -> Table:

@@ -12,7 +12,7 @@ from rigdda.agents.reports.wording import at_most, before, euros, percent, span
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.problem import MET, MISSED, UNDECIDED
-from rigdda.envs.siting import Room
+from rigdda.envs.siting import FeasiblePlaces
 
 
 def unbuildable(site: Site, layout: Layout) -> str:
@@ -25,7 +25,9 @@ def unbuildable(site: Site, layout: Layout) -> str:
 
 def violations(site: Site, layout: Layout) -> list[BadInput]:
     """Return an error for each siting rule that a layout violates."""
-    return list(Room(site, site.barrier_zone).violations(layout, list(KINDS), len(layout)))
+    return list(
+        FeasiblePlaces(site, site.barrier_zone).violations(layout, list(KINDS), len(layout))
+    )
 
 
 def of_layout(site: Site, layout: Layout, event: str | None) -> str:
@@ -40,7 +42,7 @@ def of_layout(site: Site, layout: Layout, event: str | None) -> str:
     return "; ".join(words)
 
 
-def kept(site: Site, layout: Layout) -> list[str]:
+def existing_barriers(site: Site, layout: Layout) -> list[str]:
     """Return lines on what happens to the existing barriers of a site with a layout."""
     stand = site.standing(layout)
     return [
@@ -88,7 +90,7 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
         Text on the remaining risk.
     """
     chosen = cases[-1][1]
-    parts = [pays(result.site, cases)]
+    parts = [no_layout_pays(result.site, cases)]
     parts += [_costs_less(name, other, cases[-1]) for name, other in cases[1:-1]]
     if chosen.layout and result.on_bound:
         parts.append(f"the layout lies on a bound of the search: {', '.join(result.on_bound)}")
@@ -114,7 +116,7 @@ def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> s
     return f"{line}: use a larger --budget"
 
 
-def pays(site: Site, cases: Sequence[tuple[str, Evaluation]]) -> str:
+def no_layout_pays(site: Site, cases: Sequence[tuple[str, Evaluation]]) -> str:
     """Return a text if no layout pays or if this is not shown; otherwise an empty text.
 
     Parameters

@@ -10,7 +10,15 @@ from rigdda.agents import archive
 from rigdda.agents.design_study import SHED, DesignStudy, VerifiedLayout
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.reports import checks, findings, frontier_report, layout_tables, pictures
-from rigdda.agents.reports.pictures import DRAWN, ENOUGH, Flights, Panel, envelopes, fly, section
+from rigdda.agents.reports.pictures import (
+    DRAWN,
+    ENOUGH,
+    Panel,
+    Trajectories,
+    envelopes,
+    section,
+    trajectories,
+)
 from rigdda.agents.reports.simulation_folder import along
 from rigdda.agents.reports.tables import known_risks, write_risks, write_rows
 from rigdda.agents.reports.wording import before, euros, span, unchanged
@@ -63,10 +71,10 @@ def _section(done: DesignStudy, path: Path, seed: int) -> None:
     section(path, site, done.problem.zone, panels, found, bare)
 
 
-def _all(site: Site, layout: Layout, seed: int) -> list[Flights]:
+def _all(site: Site, layout: Layout, seed: int) -> list[Trajectories]:
     """Simulate releases of every event of a site."""
     seeds = release_seeds("ensemble", seed, DRAWN)
-    return [fly(site, layout, event.name, seeds) for event in site.events]
+    return [trajectories(site, layout, event.name, seeds) for event in site.events]
 
 
 def _words(case: VerifiedLayout) -> str:

@@ -60,7 +60,7 @@ EVERY = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Flights:
+class Trajectories:
     """Trajectories in releases of one event.
 
     Parameters
@@ -108,7 +108,7 @@ class PassageEnvelope:
         return cls(event, stations, lines("height_top"), lines("energy"))
 
 
-def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -> Flights:
+def trajectories(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -> Trajectories:
     """Simulate releases of an event in threads on all cores, for their trajectories.
 
     The seeds are used in order until `DRAWN` blocks have been released.
@@ -125,7 +125,7 @@ def fly(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -> Flights
     with ThreadPoolExecutor() as pool:
         runs = [first, *pool.map(lambda seed: _run(site, layout, event, seed), more)]
     ways = [run.poses[:, i, :2] for run in runs for i in range(run.poses.shape[1])]
-    return Flights(event, tuple(ways[:: max(1, len(ways) // DRAWN)]))
+    return Trajectories(event, tuple(ways[:: max(1, len(ways) // DRAWN)]))
 
 
 def _run(site: Site, layout: Layout, event: str, seed: int) -> Run:
@@ -333,7 +333,7 @@ class Panel:
 
     title: str
     layout: Layout
-    flights: Sequence[Flights]
+    shown: Sequence[Trajectories]
 
 
 def section(
@@ -450,17 +450,17 @@ def released(path: str | os.PathLike[str], passing: Passing, layout: Layout, row
     Raises
     ------
     BadInput, Diverged
-        The same errors as `fly`.
+        The same errors as `trajectories`.
     """
     site, drawn = passing.site, [name for name in passing.events if name not in passing.not_drawn]
-    flights = []
+    shown = []
     for name in drawn:
         seeds = [passing.found.seed[i] for i in passing.releases(name).tolist()]
-        flights.append(fly(site, layout, name, seeds))
+        shown.append(trajectories(site, layout, name, seeds))
     count = len(passing.found.seed)
     title = f"{site.name}: {count:,} releases; some trajectories of each event"
     words = f"With the layout, {count:,} releases" if layout else f"{count:,} releases"
-    panels = [Panel(title, layout, flights)]
+    panels = [Panel(title, layout, shown)]
     section(
         path, site, site.barrier_zone, panels, [PassageEnvelope.of(n, rows) for n in drawn], words
     )
@@ -469,7 +469,7 @@ def released(path: str | os.PathLike[str], passing: Passing, layout: Layout, row
 def _window(site: Site, panels: Sequence[Panel]) -> tuple[float, float, float, float]:
     """Return left, right, bottom, top of the whole profile and all trajectories [m]."""
     x, y = np.array(site.slope.points).T
-    ways = (way for panel in panels for flights in panel.flights for way in flights.ways)
+    ways = (way for panel in panels for shown in panel.shown for way in shown.ways)
     shown = (y, *(piece[:, 1] for piece in sources(site)), *(way[:, 1] for way in ways))
     high = max(float(part.max()) for part in shown)
     low = float(y.min())
@@ -489,9 +489,9 @@ def _slope(
     axes.plot(*site.ground_between(site.road.start, site.road.end).T, color=ROAD, linewidth=5,
               zorder=3, solid_capstyle="butt")  # fmt: skip
     name_places(axes, site, (zone.start, zone.end))
-    for flights in panel.flights:
-        for way in flights.ways:
-            axes.plot(*way.T, color=colour_of(site, flights.event), linewidth=0.6, alpha=0.55,
+    for shown in panel.shown:
+        for way in shown.ways:
+            axes.plot(*way.T, color=colour_of(site, shown.event), linewidth=0.6, alpha=0.55,
                       zorder=4)  # fmt: skip
     for corners in sources(site):
         axes.plot(*corners.T, color="black", linewidth=2.0, zorder=4.5)

@@ -131,15 +131,15 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
     else:
         yield Paragraph("Build nothing: no layout was found that is worth its cost.", "answer")
     if site is not None and site.existing:
-        yield Items(findings.kept(site, layout))
+        yield Items(findings.existing_barriers(site, layout))
     if targets:
         asked = _asked(folder)
         mood = "good" if targets == "met" else "warning"
         yield Paragraph(_verdict(targets, asked), mood)
     z, nothing = _money_of(chosen), _money_of(rows[0])
     bare = before(site) if site is not None else "without barriers"
-    if layout and (doubt := _doubt(chosen, rows[0], bool(targets), bare)):
-        yield Paragraph(doubt, "warning")
+    if layout and (warning := _warning(chosen, rows[0], bool(targets), bare)):
+        yield Paragraph(warning, "warning")
     yield Figures([
         ("To build", f"{euros(float(chosen['cost']))} EUR", "per metre of road"),
         ("Annual cost Z", f"{z} EUR", f"per metre and year with it ({_ends_of(chosen)})"),
@@ -149,7 +149,7 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
     ])  # fmt: skip
 
 
-def _doubt(chosen: Row, nothing: Row, targets: bool, bare: str) -> str:
+def _warning(chosen: Row, nothing: Row, targets: bool, bare: str) -> str:
     """Return a warning if a layout costs more than it saves, or is not shown to save anything.
 
     `bare` is what the case without the layout is called.

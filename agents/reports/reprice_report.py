@@ -85,7 +85,7 @@ def sentences(done: Repriced) -> list[str]:
         line += "too low; `rigdda design` with site.toml searches and verifies again"
     lines = [line]
     lines += findings.over_the_cap(done.problem, cases)
-    lines.append(findings.pays(done.problem.site, cases))
+    lines.append(findings.no_layout_pays(done.problem.site, cases))
     lines += [*findings.failing(done.problem.site, chosen)]
     lines.append(findings.undecided(done.problem, chosen))
     lines.append(findings.left_over(chosen))

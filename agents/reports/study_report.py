@@ -258,10 +258,10 @@ def sections(path: Path, results: StudyResults, seed: int) -> None:
     site, seeds = results.site, range(seed, seed + pictures.DRAWN)
     panels = []
     for one in results.layouts:
-        flights = [pictures.fly(site, one.layout, name, seeds) for name in site.event_names]
+        shown = [pictures.trajectories(site, one.layout, name, seeds) for name in site.event_names]
         z, low, high = results.objective(one)
         title = f"{one.name}: Z = {euros(z)} ({span((low, high))})"
-        panels.append(pictures.Panel(title, one.layout, flights))
+        panels.append(pictures.Panel(title, one.layout, shown))
     pictures.slopes(path, site, site.barrier_zone, panels)
 
 

@@ -70,7 +70,7 @@ def allowed(refused: bool, dt: float) -> tuple[str, ...]:
     return (HOLDS,) if dt <= DEFAULT else (HOLDS, REFUSES)
 
 
-def told(row: Row) -> str:
+def sentence(row: Row) -> str:
     """Return a progress message for a trial."""
     return f"{row['case']} {1e3 * row['dt']:g} ms {row['verdict']} {row['note']}"
 
@@ -87,7 +87,7 @@ def run(quick: bool, out: Path) -> Number:
     steps = QUICK_STEPS if quick else STEPS
     cases = [{"case": case.name, "dt": dt} for case in CASES for dt in steps]
     with Worker(QUICK_LIMIT if quick else LIMIT) as worker:
-        rows = tabulate(out / "hard_cases.csv", cases, worker.measure, told)
+        rows = tabulate(out / "hard_cases.csv", cases, worker.measure, sentence)
     results = [Result(**row) for row in rows]
     with atomic(out / "hard_cases.md") as part:
         part.write_text(table(results), encoding="utf-8")

@@ -200,7 +200,7 @@ def check_existing(
 
 
 @lru_cache(maxsize=4096)
-def kept(existing: tuple[Existing, ...], ground: Terrain, layout: Layout) -> tuple[Built, ...]:
+def remaining(existing: tuple[Existing, ...], ground: Terrain, layout: Layout) -> tuple[Built, ...]:
     """Return the existing barriers that a layout neither removes nor replaces.
 
     Raises

@@ -265,7 +265,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         own = as_layout(layout)
         if not self.existing and not any(isinstance(barrier, Removal) for barrier in own):
             return own
-        return (*own, *existing.kept(self.existing, self.profile, own))
+        return (*own, *existing.remaining(self.existing, self.profile, own))
 
     def standing(self, layout: Sequence[Barrier] = ()) -> tuple[Built, ...]:
         """Return all barriers that stand with a layout, in the order of `Outcome.barriers`.
@@ -303,7 +303,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If there is none that may be removed.
         """
-        existing.kept(self.existing, self.profile, (Removal(x),))
+        existing.remaining(self.existing, self.profile, (Removal(x),))
         near = min(self.existing, key=lambda one: abs(one.x - x))
         return near.removal or 0.0
 

@@ -50,20 +50,20 @@ def check_site(site: SiteTables) -> None:
     _check_meshes(site)
     motion = site.motion
     if motion.damping and motion.damping_when == "always" and site.family != "paper":
-        _doubt(
+        _warn(
             "motion.damping_when",
             "give 'contact': with 'always', energies at a barrier are four to ten times too low",
         )
     steps = motion.duration / motion.dt
     if steps > MANY_STEPS:
-        _doubt("motion.dt", f"increase it or shorten the duration: a release takes {steps:g} steps")
+        _warn("motion.dt", f"increase it or shorten the duration: a release takes {steps:g} steps")
     for source in site.sources:
         blocks = source.area / source.mean_block_area if source.band is None else 0.0
         if blocks > MANY_BLOCKS:
             where = "joints.spacing" if source.block_area is None else "block_area"
-            _doubt(f"{source.words}.{where}", f"increase it: a release has {blocks:.0f} blocks")
+            _warn(f"{source.words}.{where}", f"increase it: a release has {blocks:.0f} blocks")
     if 0.0 < site.consequences.closure < CHEAPEST:
-        _doubt("consequences.closure", "give EUR per day, not thousands of EUR")
+        _warn("consequences.closure", "give EUR per day, not thousands of EUR")
     Settings(dt=motion.dt)
 
 
@@ -80,7 +80,7 @@ def check_damping(motion: Motion) -> None:
         raise BadInput("motion.damping_when", motion.damping_when, mend)
 
 
-def _doubt(field: str, mend: str) -> None:
+def _warn(field: str, mend: str) -> None:
     warnings.warn(f"{field}: {mend}", DoubtfulInput, stacklevel=6)
 
 

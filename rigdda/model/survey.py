@@ -311,7 +311,7 @@ def profile_of(name: str, survey: Survey, road: tuple[float, float] | None = Non
             f"x = 0 is chainage {origin.chainage:,.10g} of the survey, and y = 0 is elevation "
             f"{origin.elevation:,.10g}"
         )
-    _doubt(moved, notes)
+    _add_warnings(moved, notes)
     return Profile(moved, origin, tuple(notes))
 
 
@@ -392,7 +392,7 @@ def _origin(points: Floats, is_reversed: bool, plan: tuple[float, float, float] 
     )
 
 
-def _doubt(points: Floats, notes: list[str]) -> None:
+def _add_warnings(points: Floats, notes: list[str]) -> None:
     """Add what about a profile is doubtful."""
     steps = np.diff(points, axis=0)
     near = np.flatnonzero(np.hypot(*steps.T) < CLOSE)

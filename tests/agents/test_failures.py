@@ -13,7 +13,7 @@ import pytest
 import rigdda
 from rigdda import BadInput, Diverged, Run, Site
 from rigdda.agents import cli
-from rigdda.agents.terminal import Stopped, folder_for, kept
+from rigdda.agents.terminal import Stopped, folder_for, recorded_run
 from rigdda.files import atomic
 
 
@@ -149,7 +149,7 @@ def test_only_what_a_run_has_written_is_said_to_be_kept(tmp_path: Path) -> None:
     for name in ("outcomes.csv", "evaluations.jsonl", "same.csv"):
         (tmp_path / name).write_text("former\n")
     with pytest.raises(Stopped, match=r"kept in .*: evaluations\.jsonl, new\.csv, same\.csv$"):
-        with kept(tmp_path):
+        with recorded_run(tmp_path):
             (tmp_path / "new.csv").touch()
             with (tmp_path / "evaluations.jsonl").open("a") as file:
                 file.write("more\n")
@@ -159,10 +159,13 @@ def test_only_what_a_run_has_written_is_said_to_be_kept(tmp_path: Path) -> None:
 
 
 def test_a_folder_is_written_by_one_run_at_a_time(tmp_path: Path) -> None:
-    with kept(tmp_path):
-        with pytest.raises(BadInput, match="another run is writing into it"), kept(tmp_path):
+    with recorded_run(tmp_path):
+        with (
+            pytest.raises(BadInput, match="another run is writing into it"),
+            recorded_run(tmp_path),
+        ):
             pass
-    with kept(tmp_path):
+    with recorded_run(tmp_path):
         pass
 
 
@@ -175,7 +178,7 @@ def test_temporary_files_of_a_killed_run_are_removed(tmp_path: Path) -> None:
         subprocess.run([sys.executable, "-c", script, tmp_path / name], check=False)
     (tmp_path / ".notes.personal").write_text("mine")
     assert len([*tmp_path.rglob(".*")]) == 3
-    with kept(tmp_path):
+    with recorded_run(tmp_path):
         pass
     assert [path.name for path in tmp_path.rglob(".*")] == [".notes.personal"]
 

@@ -9,7 +9,7 @@ from valley import SITE, Barren, Valley
 
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, History
-from rigdda.agents.jobs import tried, unheld
+from rigdda.agents.jobs import failed_trials, trial_layouts
 from rigdda.agents.reports import findings
 from rigdda.envs import DesignProblem, Evaluation
 
@@ -51,13 +51,13 @@ def test_nothing_pays_only_if_nothing_that_was_verified_does(problem: DesignProb
 def test_what_a_single_barrier_holds_is_not_said_to_be_held_by_none(name: str, kind: str) -> None:
     problem = DesignProblem(name, kinds=(kind,))
     event = next(event.name for event in problem.site.events if event.design)
-    assert {barrier.kind for (barrier,) in tried(problem)} == {kind}
-    assert unheld(problem, event, 0) == ""
+    assert {barrier.kind for (barrier,) in trial_layouts(problem)} == {kind}
+    assert failed_trials(problem, event, 0) == ""
 
 
 def test_what_nothing_holds_is_said() -> None:
-    assert unheld(Valley(SITE), "block", 0) == ""
-    assert "large single barriers that were tried stops the event 'block'" in unheld(
+    assert failed_trials(Valley(SITE), "block", 0) == ""
+    assert "large single barriers that were tried stops the event 'block'" in failed_trials(
         Barren(SITE), "block", 0
     )
 
@@ -65,7 +65,7 @@ def test_what_nothing_holds_is_said() -> None:
 def test_every_kind_that_may_be_built_is_tried() -> None:
     for name in ("verge", "cliff", "talus"):
         problem = DesignProblem(name)
-        found = {barrier.kind for (barrier,) in tried(problem)}
+        found = {barrier.kind for (barrier,) in trial_layouts(problem)}
         menu = Menu(problem)
-        assert found == {kind for kind in problem.kinds if kind != "mesh" and menu.lone(kind)}
-        assert all(problem.fits(layout) for layout in tried(problem))
+        assert found == {kind for kind in problem.kinds if kind != "mesh" and menu.singles(kind)}
+        assert all(problem.fits(layout) for layout in trial_layouts(problem))

@@ -34,7 +34,7 @@ def test_two_barriers_stop_what_either_stops(
     problem: DesignProblem, crossings: CrossingEnsemble
 ) -> None:
     forecast, menu = Forecast(problem, crossings), Menu(problem)
-    fences = [(b,) for b in menu.lone("fence")[::9]]
+    fences = [(b,) for b in menu.singles("fence")[::9]]
     pairs = [(a[0], b[0]) for a in fences for b in fences if problem.fits((a[0], b[0]))]
     assert pairs
     for a, b in pairs[:20]:
@@ -49,7 +49,7 @@ def test_features_are_finite_and_forecasts_are_shares(
     problem: DesignProblem, crossings: CrossingEnsemble
 ) -> None:
     forecast, menu = Forecast(problem, crossings, value_network()), Menu(problem)
-    layouts = [(), *((b,) for kind in problem.kinds for b in menu.lone(kind)[::25])]
+    layouts = [(), *((b,) for kind in problem.kinds for b in menu.singles(kind)[::25])]
     features = np.array([forecast.features(layout) for layout in layouts])
     assert features.shape == (len(layouts), len(problem.site.events), WIDTH)
     assert np.isfinite(features).all()
@@ -62,7 +62,7 @@ def test_the_surrogate_believes_what_it_has_seen(
 ) -> None:
     """Layouts near a simulated one follow it; its own deviation falls the most."""
     surrogate = Surrogate(problem, Forecast(problem, crossings, value_network()))
-    layouts = [(b,) for b in Menu(problem).lone("ditch")]
+    layouts = [(b,) for b in Menu(problem).singles("ditch")]
     surrogate.add(layouts)
     before, spread = surrogate.mean.copy(), surrogate.deviation.copy()
     chosen = surrogate.promising(4, 1.0)

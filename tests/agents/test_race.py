@@ -23,7 +23,7 @@ from rigdda.envs.problem import Targets
 def least(valley: Valley) -> float:
     """Return the least Z of all single barriers of the menu."""
     menu = Menu(valley)
-    return min(valley.truth((b,)) for kind in valley.kinds for b in menu.lone(kind))
+    return min(valley.truth((b,)) for kind in valley.kinds for b in menu.singles(kind))
 
 
 def test_the_race_finds_a_known_optimum(valley: Valley) -> None:
@@ -135,7 +135,7 @@ def test_what_lies_on_a_bound_is_named(site: Site) -> None:
 def test_all_on_the_menu_may_be_built(kind: str) -> None:
     problem = DesignProblem(SITE, kinds=(kind,))
     menu = Menu(problem)
-    found = menu.lone(kind)
+    found = menu.singles(kind)
     assert found and all(problem.fits((b,)) for b in found[::7])
     some = spread(found, 5)
     assert len(set(some)) == len(some) <= 5

@@ -15,6 +15,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -267,7 +268,7 @@ def test_a_layout_that_does_not_pay_is_warned_of(low: float, high: float, words:
 
     nothing = row(100.0, 95.0, 105.0)
     chosen = row(0.5 * (low + high), low, high)
-    found = report_sections._doubt(chosen, nothing, targets=True, bare="without barriers")
+    found = report_sections._warning(chosen, nothing, targets=True, bare="without barriers")
     assert words in found and bool(found) == bool(words)
 
 
@@ -498,6 +499,38 @@ def fetch(address: str, **headers: str) -> tuple[bytes, Any]:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sends signals as POSIX has them")
+def leave(port: int, asked: str, host: str = "localhost") -> None:
+    """Ask for a page and close the connection before the answer, as a browser may."""
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        client.sendall(f"GET /{asked} HTTP/1.1\r\nHost: {host}:1\r\n\r\n".encode())
+
+
+def test_connections_that_end_early_are_no_error(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    missing = tmp_path / "missing.html"
+    with report_server._Server(("127.0.0.1", 0), report_server._Handler) as server:
+        page = ("text/html", b"-" * 100_000)
+        files: dict[str, tuple[str, bytes | Path]] = {"/": page, "/gone": ("text/html", missing)}
+        server.shown = report_server._Shown(files, "http://127.0.0.1:1")
+        serving = threading.Thread(target=server.serve_forever)
+        serving.start()
+        for _ in range(20):
+            leave(server.server_port, "")
+            leave(server.server_port, "", host="evil.example")
+            leave(server.server_port, "nothing")
+        for asked, code in (("gone", 404), ("viewer/", 502)):
+            with pytest.raises(urllib.error.HTTPError) as error:
+                fetch(f"http://127.0.0.1:{server.server_port}/{asked}")
+            assert error.value.code == code
+            error.value.close()
+        assert len(fetch(f"http://127.0.0.1:{server.server_port}/")[0]) == 100_000
+        server.shutdown()
+        serving.join()
+    assert capfd.readouterr() == ("", "")
+
+
 def test_the_server_shows_both_and_ends_on_ctrl_c(made: Made) -> None:
     command = [sys.executable, "-m", "rigdda.agents.cli", "report", "decision", "--serve"]
     default = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
@@ -528,11 +561,6 @@ def test_the_server_shows_both_and_ends_on_ctrl_c(made: Made) -> None:
                 fetch(address + asked, Host=host)
             assert error.value.code == code
             error.value.close()
-        for asked in ("", "run.json", "episode.rrd"):  # browsers that leave before the answer
-            port = int(address[:-1].rpartition(":")[2])
-            with socket.create_connection(("127.0.0.1", port)) as client:
-                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                client.sendall(f"GET /{asked} HTTP/1.1\r\nHost: localhost:1\r\n\r\n".encode())
     finally:
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=30)

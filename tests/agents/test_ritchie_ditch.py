@@ -22,10 +22,10 @@ def test_the_inclination_is_that_of_the_cut_not_of_the_plateau_above_it() -> Non
 
 def test_slopes_beyond_the_chart_are_marked() -> None:
     talus = RitchieDitch.of(Site.load("talus"))
-    assert "outside the range of the chart" in talus.doubt
-    assert RitchieDitch(15.0, 63.0, 4.6, 1.8).doubt == ""
-    assert "height 60 m" in RitchieDitch(60.0, 63.0, 7.6, 2.7).doubt
-    assert "inclination 30 deg" in RitchieDitch(15.0, 30.0, 3.7, 1.5).doubt
+    assert "outside the range of the chart" in talus.caveat
+    assert RitchieDitch(15.0, 63.0, 4.6, 1.8).caveat == ""
+    assert "height 60 m" in RitchieDitch(60.0, 63.0, 7.6, 2.7).caveat
+    assert "inclination 30 deg" in RitchieDitch(15.0, 30.0, 3.7, 1.5).caveat
 
 
 def test_only_a_ditch_as_large_bears_the_name() -> None:

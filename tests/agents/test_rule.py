@@ -195,7 +195,7 @@ def test_what_stands_where_no_fence_fits_is_not_called_the_rule(site: Site) -> N
     )  # 5 m high at most
     ditch = build(huge, ("fence", "ditch", "embankment"))
     assert isinstance(ditch.layout[0], Ditch)
-    assert RitchieDitch.of(site).doubt and ditch.name == "ditch"  # the cut is too high for a name
+    assert RitchieDitch.of(site).caveat and ditch.name == "ditch"  # the cut is too high for a name
     assert abs(ditch.layout[0].x - site.slope.toe) < 1.0
     dam = build(huge, ("fence", "embankment"))
     assert isinstance(dam.layout[0], Embankment) and dam.name == "embankment"
@@ -292,9 +292,9 @@ def test_a_close_call_is_told() -> None:
     speed = Quantile(0.99 * edge, 0.97 * edge, 1.02 * edge)
     close = msgspec.structs.replace(event([1.0]), speed=[speed])
     found = build(DesignEnvelope([20.0], 0.95, [close], [1.0]))
-    assert found.name == "rule" and "energy 0.94 to 1.04" in found.doubt
-    assert build(envelope({20.0: 0.9 * edge})).doubt == ""
-    assert build(envelope({20.0: 90.0}, mass=1e6)).doubt == ""
+    assert found.name == "rule" and "energy 0.94 to 1.04" in found.caveat
+    assert build(envelope({20.0: 0.9 * edge})).caveat == ""
+    assert build(envelope({20.0: 90.0}, mass=1e6)).caveat == ""
 
 
 def test_the_answer_does_not_depend_on_the_seed_of_the_search(site: Site) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rigdda.envs import corridor_environment
-from rigdda.envs.observation import BOUND, FIELDS, LOOKED
+from rigdda.envs.observation import BOUND, FIELDS, LAYOUT_FIELDS
 
 DOCS = Path(__file__).parents[2] / "docs/environments"
 ROW = re.compile(
@@ -21,7 +21,7 @@ SIZES = {0: "size of all slots", -1: "`max_barriers`"}
     "page, fields",
     [
         ("BarrierDesign-v0", FIELDS),
-        ("BarrierPlacement-v0", LOOKED),
+        ("BarrierPlacement-v0", LAYOUT_FIELDS),
         ("Corridor-v0", corridor_environment.FIELDS),
     ],
 )

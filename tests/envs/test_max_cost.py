@@ -111,6 +111,6 @@ def test_the_race_spends_what_it_may() -> None:
 def test_the_menu_offers_only_what_can_be_paid() -> None:
     whole, few = Menu(DesignProblem("cliff")), Menu(DesignProblem("cliff", max_cost=900.0))
     for kind in ("fence", "ditch", "mesh"):
-        paid = [b for b in whole.lone(kind) if whole.problem.site.capital((b,)) <= 900.0]
-        assert few.lone(kind) == paid
-    assert rigdda.Mesh in {type(b) for b in whole.lone("mesh")}
+        paid = [b for b in whole.singles(kind) if whole.problem.site.capital((b,)) <= 900.0]
+        assert few.singles(kind) == paid
+    assert rigdda.Mesh in {type(b) for b in whole.singles("mesh")}

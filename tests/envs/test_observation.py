@@ -14,7 +14,7 @@ from rigdda import Site, sites
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import FIRST, STATIONS, barrier_free, envelope, largest, stations
 from rigdda.envs.environments import SCORED_SEEDS, BarrierDesign, BarrierEnv, BarrierPlacement
-from rigdda.envs.observation import BOUND, FIELDS, LOOKED, observe, space
+from rigdda.envs.observation import BOUND, FIELDS, LAYOUT_FIELDS, observe, space
 
 CUT = cut()
 SEEN_AT_SITES = 30
@@ -22,7 +22,7 @@ SEEN_AT_SITES = 30
 
 def raw(seen: dict[str, np.ndarray], name: str) -> np.ndarray:
     """Return what an array says, in its own units."""
-    field = (FIELDS | LOOKED)[name]
+    field = (FIELDS | LAYOUT_FIELDS)[name]
     return field.centre + field.spread * seen[name].astype(float)
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rigdda import BadInput, Ditch, Embankment, GravityWall, Site, Terrain, lumped
 from rigdda.dynamics.point_mass import trajectories
-from rigdda.lumped_mass import felt
+from rigdda.lumped_mass import smoothed
 
 G = 9.81
 
@@ -154,11 +154,11 @@ def test_ground_that_a_block_feels():
         (9.0, 3),
     ]
     names = ["rock", "soil", "soil", "rock", "rock", "grass"]
-    corners, surfaces = felt(Terrain(points, names), 1.0)
+    corners, surfaces = smoothed(Terrain(points, names), 1.0)
     exact = [(0.0, 10.0), (4.0, 6.0), (4.02, 5.98), (6.0, 4.0), (6.1, 3.6), (9.0, 3.0)]
     np.testing.assert_allclose(corners, exact, atol=1e-12)
     assert surfaces == ("rock", "soil", "rock", "rock", "grass")
-    everything, _ = felt(Terrain(points, names), 0.005)
+    everything, _ = smoothed(Terrain(points, names), 0.005)
     np.testing.assert_array_equal(everything, points)
 
 

@@ -180,7 +180,7 @@ FILES: dict[str, tuple[str, Reader, Callable[[str], list[str]]]] = {
     "corridor.toml": (CORRIDOR, Corridor.load, lambda f: ["corridor", f]),
     "survey.csv": (
         SURVEY,
-        lambda path: new_site.compose("a", path, new_site.Wanted()),
+        lambda path: new_site.compose("a", path, new_site.SiteRequest()),
         lambda f: ["new", "a", "--profile", f],
     ),
     "observed.csv": (

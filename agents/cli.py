@@ -663,7 +663,7 @@ def reprice(
     max_cost: float | None,
     out: Path | None,
 ) -> None:
-    """Answer for other prices, rates, targets or caps from the folder RESULTS of a design.
+    """Evaluate the design in the folder RESULTS again with other prices, rates, targets or caps.
 
     Nothing is simulated: the outcomes of all releases of the design are evaluated with the new
     values. The last row of the table is the best of all layouts that the search evaluated. Keys
@@ -758,8 +758,8 @@ def study(file: str, seed: int, out: Path | None) -> None:
               help="Budget for construction. May be repeated.  [default: those of the "
               "file]")  # fmt: skip
 @count_option("--releases", 200, 4_000, "Number of releases per section.")
-@click.option("--robust", is_flag=True, help="Choose by the mean of the worst fifth of what the "
-              "cost of the layouts may be (conditional value at risk).")  # fmt: skip
+@click.option("--robust", is_flag=True, help="Choose by the mean of the highest fifth of the "
+              "estimates of the cost (conditional value at risk).")  # fmt: skip
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("corridor-NAME")
 @executor_option
@@ -795,9 +795,10 @@ def corridor(
         plan = Planner(problem, releases, seed, robust, stored, tick).plan()
         report.write(plan, folder)
     click.echo(
-        "thousand EUR and thousand EUR per year; share: of the gain of unlimited money, also if\n"
-        "same: every metre gets the same money; worst: the worst section comes first; ratio: the\n"
-        "greatest saving per cost comes first; 1 EUR: what one more EUR would save each year"
+        "Costs in thousand EUR, savings in thousand EUR per year. share: saving over that of\n"
+        "unlimited money; same, worst and ratio: the same share with equal money for every\n"
+        "metre, with the worst section first, and with the greatest saving per cost first;\n"
+        "1 EUR: what one more EUR would save each year."
     )
     show(report.table_of_budgets(plan))
     own = report.shown_budget(plan)
@@ -964,8 +965,8 @@ def train(model: str, sites: int | None, episodes: int, seed: int, out: Path | N
     barriers. It is trained on simulated layouts of every site, about half a minute each. Writes
     value.safetensors. The one that ships with the package is the prior of the designer `race`.
 
-    The agent for corridors needs to know what money will gain in the sections to come. This is
-    computed from forecasts of the value network on every site, about half a minute each. Writes
+    The agent for corridors needs to know how much money will save in the remaining sections. This
+    is computed from forecasts of the value network on every site, about half a minute each. Writes
     prospect.safetensors.
 
     An interrupted training continues where it stopped and gives the same result; the one of the

@@ -361,7 +361,7 @@ class _Draft:
         return points
 
     def _surveyed(self) -> str:
-        """Return how sure the points of the ground are."""
+        """Return the note on the origin of the points of the ground."""
         names = ", ".join(mass.name for mass in self.masses)
         return f"{SURVEYED}, without the rock of {names}" if names else SURVEYED
 
@@ -428,7 +428,7 @@ class _Draft:
         free += [mass.span[1] + CLEARANCE for mass in self.masses]
         low = max(self.toe - UPHILL, *free, float(self.x[0]))
         if not low < high:
-            mend = f"give where barriers may stand: loose rock lies up to {low:g}, near the road"
+            mend = f"give the zone for barriers: loose rock reaches x = {low:g}, close to the road"
             raise BadInput("--zone", None, mend)
         return round(low, 3), round(high, 3)
 

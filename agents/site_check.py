@@ -337,7 +337,7 @@ def time_of(site: Site, trials: Sequence[Trial]) -> str:
 
 
 def oddities(site: Site, trials: Sequence[Trial] = ()) -> list[str]:
-    """Return what about a site may not be meant: the field, its value, and what to check."""
+    """Return values of a site that may be mistakes, each with its field and what to check."""
     return [
         *_odd_profile(site),
         *_odd_zone(site),
@@ -484,7 +484,7 @@ def _odd_source(site: Site, source: Source) -> Iterator[str]:
 
 
 def _hanging(site: Site, source: Source) -> Iterator[tuple[str, float]]:
-    """Yield what errors call each heap of rock in mid-air, and its height above the ground [m]."""
+    """Yield the name of each heap of rock in mid-air and its height above the ground [m]."""
     ground = site.profile.solid
     names, rocks = zip(*source.pieces(), strict=True)
     shapes = [shapely.Polygon(rock) for rock in rocks]

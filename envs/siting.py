@@ -247,9 +247,7 @@ class Rules:
                 yield BadInput(f"{where}.x", barrier.x, mend)
             beside = float(self.beside(np.array([start]), np.array([end]), steepest)[0])
             if beside < MACHINE - TOLERANCE:
-                mend = (
-                    f"put it where {MACHINE:g} m beside it are free for a machine, not {beside:.1f}"
-                )
+                mend = f"put it where a machine has {MACHINE:g} m beside it, not {beside:.1f}"
                 yield BadInput(f"{where}.x", barrier.x, mend)
 
     def _wrong_sizes(self, where: str, barrier: Barrier) -> Iterator[BadInput]:

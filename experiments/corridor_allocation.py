@@ -6,7 +6,8 @@ are drawn with replacement, so that the best choice is known. A corridor has eig
 random lengths. `rigdda.agents.corridor.planning.Planner` evaluates the layouts with some releases
 per section, at the margin or evenly, and chooses for budgets of 100, 200 and 400 EUR per metre of
 road. The table has the gain as a share of that of the best choice, with 95 % intervals over
-corridors, and the difference from an even spread of twice the releases.
+corridors, and the differences from an even spread of the same number of releases and of twice as
+many.
 """
 
 from __future__ import annotations
@@ -148,11 +149,11 @@ def run(quick: bool, out: Path) -> Number:
         say(f"corridor {number + 1} of {corridors}")
     rows = table(found, corridors)
     write(out / "corridor_allocation.csv", rows)
-    last = [row for row in rows if not np.isnan(row["ahead"])][-1]
+    last = [row for row in rows if not np.isnan(row["ahead_of_twice"])][-1]
     return Number(
         f"upper limit of the share gained with {last['releases_per_section']} releases per section "
         "at the margin, less that of an even spread of twice as many [-]",
-        last["ahead"] + last["ahead_half_width"], low=0.0,
+        last["ahead_of_twice"] + last["ahead_of_twice_half_width"], low=0.0,
     )  # fmt: skip
 
 
@@ -164,12 +165,14 @@ def table(found: dict[tuple[str, int], list[float]], corridors: int) -> list[dic
         row: dict[str, Any] = {
             "releases_per_section": each, "allocation": name, "share": mean,
             "half_width": half, "corridors": corridors,
-            "ahead": np.nan, "ahead_half_width": np.nan,
+            "ahead_of_same": np.nan, "ahead_of_same_half_width": np.nan,
+            "ahead_of_twice": np.nan, "ahead_of_twice_half_width": np.nan,
         }  # fmt: skip
-        twice = found.get(("evenly", 2 * each))
-        if name != "evenly" and twice is not None:
-            ahead = np.subtract(shares, twice)
-            row["ahead"], row["ahead_half_width"] = interval(ahead)
+        for title, number in (("same", each), ("twice", 2 * each)):
+            even = found.get(("evenly", number))
+            if name != "evenly" and even is not None:
+                ahead = interval(np.subtract(shares, even))
+                row[f"ahead_of_{title}"], row[f"ahead_of_{title}_half_width"] = ahead
         rows.append(row)
     return rows
 

@@ -9,9 +9,11 @@ Without a search, a method chooses the layout of a section from its site alone:
 - nothing; the best constant; the best constant of the family, chosen on ten training sites; the
   engineering rule. Money is either shared (a section may spend the money left per metre of road
   left, for each of its metres) or spent in the order of the sections until it ends;
-- threshold: the constant with the greatest predicted benefit less threshold x cost, in order. The
-  benefit is predicted by the mean share of the harm that a constant prevents on the training sites
-  of the family. The threshold of each budget is tuned on training corridors.
+- threshold: the layout with the greatest predicted benefit less threshold x cost, in order. The
+  threshold of each budget is tuned on training corridors. The layouts are either constants, whose
+  benefit is predicted by the mean share of the harm that they prevent on the training sites of the
+  family, or those on offer to the agent, whose benefit is forecast by the value network;
+- the agent that ships with the package.
 
 With a search, the layouts of a section are those of a front (1,000 releases), each evaluated on
 40 more releases, the same number in every section: the integer programme, and the worst section
@@ -19,12 +21,13 @@ first. The reference is the offline optimum, the integer programme with all layo
 half of the outcomes.
 
 The table has the mean relative reduction of the annual cost by budget and its share of that of the
-offline optimum, with 95 % intervals over corridors, and the paired difference from the threshold.
+offline optimum, with 95 % intervals over corridors, and by how much the agent is ahead of each
+method in the same corridors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -218,6 +221,16 @@ def by_threshold(course: Course, left: dict[tuple[str, str], float], threshold: 
     return policy
 
 
+def by_forecast(course: Course, threshold: float) -> Policy:
+    """Return the policy that builds the layout with the greatest forecast less its price."""
+
+    def policy(env: CorridorDesign, pool: Pool) -> Layout:
+        own = course.agent.offer(env.problem)
+        return own.layouts[int(np.argmax(own.gain - threshold * own.cost))]
+
+    return policy
+
+
 def layout_policies(course: Course, best: dict[str, str]) -> dict[str, Policy]:
     """Return the policies that do not consider money."""
     return {
@@ -248,29 +261,40 @@ def run(quick: bool, out: Path) -> Number:
     rows = []
     for budget in BUDGETS[: 1 if quick else None]:
 
-        def tuned(threshold: float, budget: float = budget) -> float:
-            policy = by_threshold(school, left, threshold)
-            return float(np.mean([school.play(seed, budget, policy) for seed in range(training)]))
+        def tuned(kind: Callable[[float], Policy], budget: float = budget) -> float:
+            """Return the threshold that is best on training corridors."""
+            rewards = {
+                threshold: np.mean(
+                    [school.play(seed, budget, kind(threshold)) for seed in range(training)]
+                )
+                for threshold in THRESHOLDS
+            }
+            return max(rewards, key=lambda threshold: float(rewards[threshold]))
 
-        threshold = max(THRESHOLDS, key=tuned)
-        say(f"{budget:g} EUR/m: threshold {threshold:.3g} a year")
+        constants = tuned(lambda threshold: by_threshold(school, left, threshold))
+        forecasts = tuned(lambda threshold: by_forecast(school, threshold))
+        say(f"{budget:g} EUR/m: thresholds {constants:.3g} and {forecasts:.3g} a year")
+        thresholds = {
+            "threshold": by_threshold(course, left, constants),
+            "threshold on forecasts": by_forecast(course, forecasts),
+        }
         found: dict[tuple[str, str, str], list[float]] = {}
         for seed in range(corridors):
-            reward = scores(course, seed, budget, best, by_threshold(course, left, threshold))
+            reward = scores(course, seed, budget, best, thresholds)
             for key, value in reward.items():
                 found.setdefault(key, []).append(value)
         optimum = np.mean(found[OPTIMUM])
         for (track, method, money), values in found.items():
             mean, half = interval(values)
             behind, behind_half = interval(np.subtract(found[OPTIMUM], values))
-            ahead, ahead_half = interval(np.subtract(values, found[THRESHOLD]))
+            ahead, ahead_half = interval(np.subtract(found[AGENT], values))
             rows.append(
                 {
                     "budget": budget, "track": track, "method": method, "money": money,
                     "reduction": mean, "half_width": half,
                     "share_of_optimum": float(mean / optimum), "behind_optimum": behind,
-                    "behind_half_width": behind_half, "ahead_of_threshold": ahead,
-                    "ahead_half_width": ahead_half, "corridors": corridors,
+                    "behind_half_width": behind_half, "agent_ahead": ahead,
+                    "agent_ahead_half_width": ahead_half, "corridors": corridors,
                 }
             )  # fmt: skip
             say(f"{budget:g} EUR/m, {track}: {method}, {money}: {mean:.3f} +- {half:.3f}")
@@ -283,12 +307,16 @@ def run(quick: bool, out: Path) -> Number:
 OPTIMUM = "reference", "offline optimum", ""
 """Track, method and use of money of the reference."""
 
-THRESHOLD = "no search", "threshold", "in order"
-"""The same of the best method without a search besides the agent."""
+AGENT = "no search", "agent", "in order"
+"""The same of the agent that ships with the package."""
 
 
 def scores(
-    course: Course, seed: int, budget: float, best: dict[str, str], threshold: Policy
+    course: Course,
+    seed: int,
+    budget: float,
+    best: dict[str, str],
+    thresholds: Mapping[str, Policy],
 ) -> dict[tuple[str, str, str], float]:
     """Return the reward of an episode of each method, by track, method and use of money."""
     out = {}
@@ -296,10 +324,9 @@ def scores(
         out["no search", name, "in order"] = course.play(seed, budget, policy)
         if name != "nothing":
             out["no search", name, "shared"] = course.play(seed, budget, shared(policy))
-    out[THRESHOLD] = course.play(seed, budget, threshold)
-    out["no search", "agent", "in order"] = course.play(
-        seed, budget, lambda env, pool: course.agent.layout(env)
-    )
+    for name, policy in thresholds.items():
+        out["no search", name, "in order"] = course.play(seed, budget, policy)
+    out[AGENT] = course.play(seed, budget, lambda env, pool: course.agent.layout(env))
     for name, method in (
         ("integer programme", programme.optimum),
         ("worst section first", programme.worst_first),

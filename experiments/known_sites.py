@@ -78,7 +78,7 @@ def keys(site: Site) -> tuple[str, str]:
 def statistics(site: Site) -> dict[str, Any]:
     """Return the ensemble and the envelope of a site by key."""
     found = ensemble.of(site, outcome_cache.fingerprint(site))
-    seen = envelope.Kept.of(envelope.envelope(site))
+    seen = envelope.StoredEnvelope.of(envelope.envelope(site))
     return dict(zip(keys(site), (found, seen), strict=True))
 
 

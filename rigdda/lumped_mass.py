@@ -99,9 +99,11 @@ def lumped(
     for i, barrier in enumerate(layout):
         if not isinstance(barrier, Earthwork | Mesh | Removal):
             if i >= new:
-                mend = "use the block model: points know only what is cut or filled"
+                mend = "use the block model: points only react to ditches and embankments"
                 raise BadInput(f"existing {barrier.words}", f"x = {barrier.x:g}", mend)
-            mend = "leave it out, or use the block model: points know only what is cut or filled"
+            mend = (
+                "leave it out, or use the block model: points only react to ditches and embankments"
+            )
             raise BadInput(f"barriers[{i}]", barrier.kind, mend)
     site.built(layout, 1.0)
     check_known(site.surfaces, "barrier surface", site.soil)

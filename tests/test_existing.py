@@ -225,17 +225,17 @@ def test_an_earthwork_that_stands_changes_the_ground() -> None:
 
 
 def test_reports_say_what_happens_to_it(site: Site) -> None:
-    assert findings.kept(site, (NEW,)) == [
+    assert findings.existing_barriers(site, (NEW,)) == [
         "existing fence 250 kJ at 50 %, 2.0 m high, at x = 20.0 m: kept"
     ]
-    assert findings.kept(site, (REPLACING,))[0].endswith(": removed")
+    assert findings.existing_barriers(site, (REPLACING,))[0].endswith(": removed")
     assert order(Removal(20.0), site) == (
         "remove the existing barrier at x = 20.0 m: 60 EUR per metre"
     )
     bare = LIGHT
     assert (unchanged(site), before(site)) == ("as it stands", "as it stands")
     assert (unchanged(bare), before(bare)) == ("no barrier", "without barriers")
-    assert findings.kept(bare, (NEW,)) == []
+    assert findings.existing_barriers(bare, (NEW,)) == []
 
 
 def test_a_record_of_a_release_is_repeated(site: Site) -> None:

@@ -359,7 +359,7 @@ class Scorer:
             mend = f"its process ended on {order.name}: return a layout instead"
             raise BadInput("--entry", self.entry, mend) from None
         except msgspec.MsgspecError as error:
-            mend = f"it sent something that is no request: use the methods of the task ({error})"
+            mend = f"it sent an unknown request: use the methods of the task ({error})"
             raise BadInput("--entry", self.entry, mend) from None
 
     def seeds(self, name: str, budget: int, chosen: int = 0) -> list[int]:
@@ -414,7 +414,7 @@ class Scorer:
 
 
 def prepare(problem: DesignProblem) -> None:
-    """Compute and store what a site is known by without barriers, which costs no releases."""
+    """Compute and store the statistics of a site without barriers, which cost no releases."""
     observe(problem)
     rule.answer(problem)
 

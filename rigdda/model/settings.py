@@ -66,8 +66,8 @@ class Settings:
     mode : {"dynamic", "static"}
         "static" starts every step at rest: steps are then increments of load instead of time.
     solver : {"pcg", "block-pcg", "sor", "direct"}
-        Solver for islands of more than two blocks at rest; smaller ones are solved directly,
-        including friction. "pcg": conjugate gradients preconditioned by the diagonal, as in the
+        Solver for islands of several blocks that are solved as a whole; a single block is solved
+        directly. "pcg": conjugate gradients preconditioned by the diagonal, as in the
         paper; "block-pcg": preconditioned by the 3x3 blocks; "sor": the original successive
         over-relaxation; "direct": Cholesky factorisation within the profile, which takes a third of
         the time for a stack of 100.

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from light_site import LIGHT
 from test_rule import envelope
 
 from rigdda import Fence
@@ -96,7 +97,7 @@ def test_a_design_writes_its_checks(tmp_path: Path) -> None:
     from rigdda.agents.reports.folder import FILES
 
     assert set(checks.FILES) <= set(FILES)
-    problem = DesignProblem("quick", kinds=("fence",))
+    problem = DesignProblem(LIGHT, kinds=("fence",))
     done, _ = jobs.study(problem, "rule", 40, 0, 20, tmp_path, lambda *_: None)
     checks.write(done, tmp_path)
     with (tmp_path / "checks.csv").open(newline="", encoding="utf-8") as file:

@@ -229,6 +229,7 @@ def test_a_folder_that_does_not_tell_its_problem_is_left_alone(tmp_path: Path) -
     assert [path.name for path in tmp_path.iterdir()] == ["layout.toml"]
 
 
+@pytest.mark.slow
 def test_kinds_zone_and_target_are_kept_to(toml: Path, tmp_path: Path) -> None:
     options = ("--kinds", "ditch,embankment", "--zone", 25, 34, "--target", 0.9)
     words = run("design", toml, *TINY, *options, "--out", "o", folder=tmp_path)

@@ -23,7 +23,7 @@ from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.cost import judge
 
-VERIFIED = 60
+VERIFIED = 40
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def with_traffic(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("traffic")
     busy = msgspec.structs.replace(site, traffic=rigdda.Traffic(8000.0, 80.0, 250.0))
     problem = DesignProblem(busy, targets={"individual": 1e-5})
-    jobs.study(problem, "race", 400, 0, VERIFIED, folder, lambda *_: None)
+    jobs.study(problem, "race", 700, 0, VERIFIED, folder, lambda *_: None)
     return folder
 
 

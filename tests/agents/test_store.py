@@ -131,12 +131,12 @@ def test_a_store_keeps_outcomes_exactly(problem: DesignProblem, tmp_path: Path) 
     again.evaluate(problem, layout, range(12))
     assert (again.simulated, again.resumed) == (0, 12)
     for one in (store, again):
-        (kept,) = one.kept()
+        (kept,) = one.stored_releases()
         assert (kept.layout, kept.seeds) == (layout, tuple(range(12)))
         assert tuple(unpack(kept.outcomes)) == evaluation.outcomes
     without = Store(tmp_path / "bare.jsonl")
     without.evaluate(problem, layout, range(12))
-    assert [*without.kept()] == []
+    assert [*without.stored_releases()] == []
     more = Store(tmp_path / "bare.jsonl", outcomes=True)
     more.evaluate(problem, layout, range(12))
     assert (more.simulated, more.resumed) == (12, 0)

@@ -67,6 +67,7 @@ def test_a_killed_training_goes_on(trained: tuple[Path, str], tmp_path: Path) ->
     assert "terms" in line and "another folder" in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rollouts", [1, 5])
 def test_a_training_that_was_stopped_ends_as_if_it_had_not_been(
     rollouts: int, tmp_path: Path

@@ -169,7 +169,7 @@ def test_a_machine_needs_room_beside_works() -> None:
     bench = DesignProblem("bench")
     assert bench.fits((Fence(14.5, 3.0, energy_class=1000),))
     for works in (GravityWall(14.2, 1.0, 0.5), Embankment(14.2, 0.5, 0.5)):
-        with pytest.raises(BadInput, match="3 m beside it are free for a machine"):
+        with pytest.raises(BadInput, match="a machine has 3 m beside it"):
             bench.check((works,))
     assert bench.fits((GravityWall(31.0, 1.0, 0.5),))
 

@@ -95,7 +95,9 @@ def ship(cache: Path, sources: str | None = None) -> tuple[ensemble.Ensemble, en
     """Write the file of the package, empty the user's cache; return what it holds."""
     found, seen = known()
     key = DesignProblem(CUT).key.hex()
-    packed = site_store.pack({f"ensemble-{key}": found, f"envelope-{key}": envelope.Kept.of(seen)})
+    packed = site_store.pack(
+        {f"ensemble-{key}": found, f"envelope-{key}": envelope.StoredEnvelope.of(seen)}
+    )
     if sources is not None:
         content = msgspec.msgpack.decode(lzma.decompress(packed), type=site_store.Content)
         other = msgspec.structs.replace(content, sources=sources)

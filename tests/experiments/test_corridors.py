@@ -39,12 +39,13 @@ def test_outcomes_are_read_again(tmp_path: Path) -> None:
     assert again.outcomes(layout) == found and len(found) == 20
 
 
-def test_ways_are_compared_with_an_even_spread_of_twice_the_releases() -> None:
+def test_ways_are_compared_with_an_even_spread_of_the_same_and_twice_the_releases() -> None:
     found = {("evenly", 120): [0.8, 0.9], ("evenly", 240): [0.9, 0.92],
              ("at the margin", 120): [0.89, 0.94]}  # fmt: skip
     rows = corridor_allocation.table(found, 2)
-    assert rows[2]["ahead"] == pytest.approx(np.mean([-0.01, 0.02]))
-    assert np.isnan(rows[0]["ahead"])
+    assert rows[2]["ahead_of_twice"] == pytest.approx(np.mean([-0.01, 0.02]))
+    assert rows[2]["ahead_of_same"] == pytest.approx(np.mean([0.09, 0.04]))
+    assert np.isnan(rows[0]["ahead_of_twice"])
 
 
 def test_the_recorded_reference_is_ahead_of_all_methods() -> None:

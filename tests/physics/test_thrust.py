@@ -112,3 +112,15 @@ def test_nothing_low_holds_a_jammed_mass(barrier, dt):
     assert found.failed and found.state in ("pushed", "slid", "overturned")
     # a wall may be knocked over before anything thrusts
     assert found.state == "overturned" or found.thrust > found.resistance
+
+
+@pytest.mark.filterwarnings("ignore:motion.duration")
+@pytest.mark.parametrize("dt", [2e-2, 5e-3])
+@pytest.mark.parametrize(
+    "fence", [Fence(50.2, 2.5, energy_class=100), Fence(50.2, 3.0, energy_class=1000)]
+)
+def test_a_jammed_mass_spends_the_elongation_of_a_fence(fence, dt):
+    site = Site.load("shu-hwa")
+    site = replace(site, motion=replace(site.motion, dt=dt, damping_when="contact", duration=12.0))
+    (found,) = release(site, (fence,), 0, "mass")[1].barriers
+    assert found.failed and found.state == "failed"

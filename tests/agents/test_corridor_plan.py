@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 from test_command_line import png_size, refused, rig, rows, run
+from test_report import Page
 
 import rigdda
 from rigdda import BadInput, Corridor, CorridorSection, Ditch, Site, load_layout
@@ -213,6 +214,23 @@ def test_the_command_writes_what_its_tables_say(planned: tuple[Path, str]) -> No
         assert problem.cost(layouts) == pytest.approx(float(best["spent"]))
     assert png_size(out / "gain.png")[0] > 500 and png_size(out / "strip.png")[0] > 500
     assert "km 1.2" in words and "unlimited" in words
+
+
+def test_the_report_shows_what_each_budget_achieves(
+    planned: tuple[Path, str], tmp_path: Path
+) -> None:
+    out, _ = planned
+    run("report", out, "--out", "page", folder=tmp_path)
+    page = Page((tmp_path / "page/report.html").read_text(encoding="utf-8"))
+    assert page.heads[0] == "1. Corridor"
+    for file in ("budgets.csv", "sections.csv"):
+        assert len(page.tables[f"o/{file}"]) == len(rows(out / file))
+    budgets = rows(out / "budgets.csv")
+    for shown, row in zip(page.tables["o/budgets.csv"], budgets, strict=True):
+        assert shown["method"] == row["method"]
+        assert float(shown["spent"].replace(",", "")) == pytest.approx(float(row["spent"]), abs=0.5)
+    labels = {attrs.get("aria-label") for tag, attrs in page.tags if tag == "svg"}
+    assert {"Gain and budget", "What is built along the corridor"} <= labels
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ SITES, RELEASES = 10, 400
 SECTIONS = 8
 """Number of sections of a corridor."""
 
-SPREAD = (120, 240, 480, 960)
+SPREAD = (120, 240, 480, 960, 1_920)
 """Numbers of releases per section for the choice."""
 
 CORRIDORS, REPEATS = 10, 8

@@ -267,7 +267,7 @@ def test_an_action_of_nothing_builds_what_the_policy_starts_from(featured: ppo.F
 def test_what_is_learnt_from_is_what_the_policy_sees(featured: ppo.Featured) -> None:
     seen = featured.reset()
     for name, row in zip(NAMES, seen, strict=True):
-        see = np.clip(training.see(training.problem(name)), -3.0, 3.0)
+        see = np.clip(training.observed_features(training.problem(name)), -3.0, 3.0)
         np.testing.assert_allclose(row, see, rtol=1e-6)
 
 

@@ -119,7 +119,7 @@ def test_nothing_low_holds_a_jammed_mass(barrier, dt):
 @pytest.mark.parametrize(
     "fence", [Fence(50.2, 2.5, energy_class=100), Fence(50.2, 3.0, energy_class=1000)]
 )
-def test_a_jammed_mass_spends_the_elongation_of_a_fence(fence, dt):
+def test_a_fence_fails_under_a_jammed_mass(fence, dt):
     site = Site.load("shu-hwa")
     site = replace(site, motion=replace(site.motion, dt=dt, damping_when="contact", duration=12.0))
     (found,) = release(site, (fence,), 0, "mass")[1].barriers

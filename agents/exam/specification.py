@@ -48,16 +48,21 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     reference_releases: Annotated[int, about("Releases of the search for a reference.", ge=200)]
     sites: Annotated[tuple[str, ...], about("Names or files of the sites.", least=1)]
     corridors: Annotated[tuple[ExamCorridor, ...], about("The corridors.")] = ()
+    equivalent: Annotated[
+        tuple[str, ...], about("Hashes of other kernels with the same outcomes, bit for bit.")
+    ] = ()
 
     @property
     def current(self) -> bool:
-        """Whether the kernels of this installation are those of the references."""
-        return self.mechanics == kernels_hash()
+        """Whether the kernels of this installation have the outcomes of the references."""
+        return kernels_hash() in (self.mechanics, *self.equivalent)
 
     @property
     def key(self) -> str:
-        """Hash of all values of the specification."""
-        return hashlib.sha256(msgspec.json.encode(self)).hexdigest()[:16]
+        """Hash of all values of the specification except the equivalent kernels."""
+        values = msgspec.to_builtins(self)
+        del values["equivalent"]
+        return hashlib.sha256(msgspec.json.encode(values)).hexdigest()[:16]
 
     def problem(self, site: str) -> DesignProblem:
         """Return the design problem of a site."""

@@ -13,7 +13,7 @@ from rigdda.dynamics.contact.broad_phase import partners_of_bodies, sweep_and_pr
 from rigdda.dynamics.contact.joint import bond_joints
 from rigdda.dynamics.contact.law import prepare
 from rigdda.dynamics.contact.links import add_link
-from rigdda.dynamics.contact.narrow_phase import add_contact, collide_pair
+from rigdda.dynamics.contact.narrow_phase import collide_pair, copy_geometry
 from rigdda.dynamics.contact.terrain_phase import collide_terrain
 from rigdda.dynamics.contact.transfer import copy_contact, recall
 from rigdda.dynamics.monitors import barrier_contact
@@ -70,9 +70,7 @@ def keep_sideways(contacts: Contacts, low: int, high: int, most: float) -> int:
     for k in range(low, high):
         c = contacts[k]
         if abs(c.nx) >= SAME_NORMAL and c.gap > -most:
-            add_contact(
-                contacts[kept], c.a, c.b, c.key, c.owner, c.other, c.x, c.y, c.nx, c.ny, c.gap
-            )
+            copy_geometry(contacts[kept], c)
             kept += 1
     return kept
 

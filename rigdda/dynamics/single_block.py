@@ -45,12 +45,45 @@ def with_room(outlines: Outlines) -> Outlines:
     return Outlines(outlines.polygon, wide.view(np.recarray), wide_local.view(np.recarray))
 
 
+class Surroundings(NamedTuple):
+    """What is around a single block and does not change between releases."""
+
+    chain: NDArray
+    """Corners of the ground, (m, 2) [m]."""
+    boxes: NDArray
+    """Least x and y, greatest x and y of each barrier that is a body, (K, 4) [m]."""
+    stations: NDArray
+    """Chainages of the stations, (S,) [m]."""
+    gravity: float
+    """Acceleration that gives the block its weight [m/s2]."""
+
+
+class SingleArrays(NamedTuple):
+    """The arrays that depend on the block and on the properties of a release."""
+
+    bodies: Bodies
+    outlines: Outlines
+    interfaces: Interfaces
+    rock: NDArray  # (1,) of records.WATCHED
+    parameters: NDArray  # of records.PARAMETERS
+
+
+class PairProperties(NamedTuple):
+    """Properties of each pair of surfaces that releases vary, see `Meetings`; (n, n) each."""
+
+    friction_deg: NDArray
+    restitution: NDArray
+    damping: NDArray
+
+
 @short_kernel
 def start_single(
-    corners: NDArray, traits: NDArray, chain: NDArray, boxes: NDArray, friction_deg: NDArray,
-    restitution: NDArray, damping: NDArray, stations: NDArray, gravity: float, bodies: Bodies,
-    outlines: Outlines, interfaces: Interfaces, rock: NDArray, parameters: NDArray,
-) -> tuple[bool, float]:  # fmt: skip
+    corners: NDArray,
+    traits: NDArray,
+    around: Surroundings,
+    pairs: PairProperties,
+    arrays: SingleArrays,
+) -> tuple[bool, float]:
     """Write a block and the interface properties into arrays that are in their initial state.
 
     Parameters
@@ -59,17 +92,11 @@ def start_single(
         Corners of the block [m].
     traits : (1, 6) array
         Its other properties, see `packing.Trait`.
-    chain : (m, 2) array
-        Corners of the ground [m].
-    boxes : (K, 4) array
-        Least x and y, greatest x and y of each barrier that is a body [m].
-    friction_deg, restitution, damping : arrays
-        Properties of each pair of surfaces, see `Meetings` [deg, -, 1/s].
-    stations : (K,) array
-        Chainages of the stations [m].
-    gravity : float
-        Acceleration that gives the block its weight [m/s2].
-    bodies, outlines, interfaces, rock, parameters : arrays
+    around : Surroundings
+        Ground, barriers, stations and gravity.
+    pairs : PairProperties
+        Properties of each pair of surfaces.
+    arrays : SingleArrays
         Arrays that are written.
 
     Returns
@@ -79,21 +106,24 @@ def start_single(
     start : float
         Chainage of its centroid [m].
     """
-    if not is_sound(corners) or not surely_on_ground(chain, corners) or _near(corners, boxes):
+    if not is_sound(corners) or not surely_on_ground(around.chain, corners):
         return False, 0.0
+    if _near(corners, around.boxes):
+        return False, 0.0
+    bodies, outlines, stations = arrays.bodies, arrays.outlines, around.stations
     bodies[0].count = outlines.polygon[0].count = len(corners)
     write_bodies(corners, traits, bodies, outlines)
-    body, watched = bodies[0], rock[0]
+    body, watched = bodies[0], arrays.rock[0]
     watched.low, watched.high = body.x - body.radius, body.x + body.radius
     passed = 0
     while passed < len(stations) and stations[passed] <= body.x:
         passed += 1
     watched.next = passed
-    _set_interfaces(friction_deg, restitution, damping, interfaces)
+    _set_interfaces(pairs, arrays.interfaces)
     size = math.sqrt(body.mass / traits[0, 0])
-    for k in range(len(parameters)):
-        p = parameters[k]
-        p.block_weight = body.mass * gravity
+    for k in range(len(arrays.parameters)):
+        p = arrays.parameters[k]
+        p.block_weight = body.mass * around.gravity
         p.penetration, p.margin = PENETRATION_RATIO * size, MARGIN_RATIO * size
     return True, body.x
 
@@ -116,17 +146,15 @@ def _near(corners: NDArray, boxes: NDArray) -> bool:
 
 
 @kernel
-def _set_interfaces(
-    friction_deg: NDArray, restitution: NDArray, damping: NDArray, interfaces: Interfaces
-) -> None:
+def _set_interfaces(pairs: PairProperties, interfaces: Interfaces) -> None:
     """Write the interface properties that releases vary; fences come last, without friction."""
     for i in range(len(interfaces)):
         for j in range(len(interfaces)):
             interface = interfaces[i, j]
-            interface.damping = damping[i, j]
-            if i < len(restitution) and j < len(restitution):
-                interface.friction = math.tan(math.radians(friction_deg[i, j]))
-                interface.restitution = restitution[i, j]
+            interface.damping = pairs.damping[i, j]
+            if i < len(pairs.restitution) and j < len(pairs.restitution):
+                interface.friction = math.tan(math.radians(pairs.friction_deg[i, j]))
+                interface.restitution = pairs.restitution[i, j]
 
 
 @short_kernel
@@ -198,22 +226,27 @@ class SingleBlock:
         leave: float,
     ):
         assert len(scene.blocks) == 1 and scene.smooth_ground is not None
-        self._stations = stations
-        self._gravity = math.hypot(*scene.gravity_vector) or EARTH
         self._surfaces = {name: i for i, name in enumerate(scene.surfaces)}
         packed = pack(scene, settings, stations, watch, leave)
         packed = packed._replace(outlines=with_room(packed.outlines))
         self._memory, self._arrays = together(packed)
+        a = self._arrays
+        self._written = SingleArrays(
+            a.bodies, a.outlines, a.interfaces, a.monitors.rock, a.parameters
+        )
         self._fresh = self._memory.copy()
         self._loop = Loop(scene, self._arrays, settings.dt)
         self._no_frames = no_frames(packed.bodies)
         self._corners = np.zeros((MOST_CORNERS, 2))
         self._traits = np.zeros((1, 6))  # see `packing.Trait`
-        self._chain = np.array(scene.smooth_ground.points)
         outlines = [scene.outline(i) for i in scene.bodies]
-        self._boxes = np.array(
-            [[*corners.min(axis=0), *corners.max(axis=0)] for corners in outlines]
-        ).reshape(-1, 4)
+        boxes = [[*corners.min(axis=0), *corners.max(axis=0)] for corners in outlines]
+        self._around = Surroundings(
+            np.array(scene.smooth_ground.points),
+            np.array(boxes).reshape(-1, 4),
+            stations,
+            math.hypot(*scene.gravity_vector) or EARTH,
+        )
         self._target = self._arrays.monitors.target.view(np.ndarray)
         self._brake = self._arrays.bodies.view(np.ndarray)["brake"]
         self._fences = list(fences(scene))
@@ -258,10 +291,12 @@ class SingleBlock:
         corners[:] = block.vertices
         self._traits[0] = (block.density, *block.velocity, self._surfaces[block.surface], AWAKE)
         clear, start = start_single_directly.call(
-            corners, self._traits, self._chain, self._boxes, meetings.friction_deg,
-            meetings.restitution, meetings.damping, self._stations, self._gravity, a.bodies,
-            a.outlines, a.interfaces, a.monitors.rock, a.parameters,
-        )  # fmt: skip
+            corners,
+            self._traits,
+            self._around,
+            PairProperties(meetings.friction_deg, meetings.restitution, meetings.damping),
+            self._written,
+        )
         if not clear:
             return None
         try:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,31 +38,41 @@ DRAWN = 7
 """Number of these random numbers; those for the angles of the corners follow."""
 
 
+class ShapeLaw(NamedTuple):
+    """Distribution of the outlines of the blocks of an event."""
+
+    least_corners: int
+    """Range of the number of corners."""
+    most_corners: int
+    least_area: float
+    """Range of the areas of blocks that were not measured [m2]."""
+    greatest_area: float
+    power: float
+    """Exponent of the power law: the number of blocks larger than an area is proportional to the
+    area to the power of -`power` [-]."""
+    least_aspect: float
+    """Range of length over breadth of such blocks [-]."""
+    greatest_aspect: float
+    long: float
+    """Edges of the box around a measured block [m]."""
+    middle: float
+    short: float
+    measured: bool
+    """Whether blocks were measured."""
+
+
 @short_kernel
 def write_shapes(
-    numbers: NDArray, least_corners: int, most_corners: int, least_area: float,
-    greatest_area: float, power: float, least_aspect: float, greatest_aspect: float, long: float,
-    middle: float, short: float, measured: bool, corners: NDArray, count: NDArray, area: NDArray,
-) -> None:  # fmt: skip
+    numbers: NDArray, law: ShapeLaw, corners: NDArray, count: NDArray, area: NDArray
+) -> None:
     """Write the outlines of blocks about the origin, anticlockwise.
 
     Parameters
     ----------
     numbers : (N, DRAWN + most_corners) array
         Random numbers of each block, in [0, 1).
-    least_corners, most_corners : int
-        Range of the number of corners.
-    least_area, greatest_area : float
-        Range of the areas of blocks that were not measured [m2].
-    power : float
-        Exponent of the power law: the number of blocks larger than an area is proportional to the
-        area to the power of -`power` [-].
-    least_aspect, greatest_aspect : float
-        Range of length over breadth of such blocks [-].
-    long, middle, short : float
-        Edges of the box around a measured block [m].
-    measured : bool
-        Whether blocks were measured.
+    law : ShapeLaw
+        Distribution of the outlines.
     corners : (N, most_corners, 2) array
         Output: corners [m].
     count : (N,) array of int
@@ -71,18 +82,18 @@ def write_shapes(
     """
     for i in range(len(numbers)):
         u, corner = numbers[i], corners[i]
-        n = least_corners + int(u[CORNERS] * (most_corners - least_corners + 1))
+        n = law.least_corners + int(u[CORNERS] * (law.most_corners - law.least_corners + 1))
         gap = 2.0 * math.pi / n
         for k in range(n):
             corner[k, 0] = gap * (k + JITTER * (2.0 * u[DRAWN + k] - 1.0))
         double = math.sin(corner[0, 0] - corner[n - 1, 0])  # twice the area on a circle of radius 1
         for k in range(1, n):
             double += math.sin(corner[k, 0] - corner[k - 1, 0])
-        if measured:
-            half_long, half_short = _face(u, long, middle, short, corner, n)
+        if law.measured:
+            half_long, half_short = _face(u, law.long, law.middle, law.short, corner, n)
         else:
-            size = truncated_power(u[AREA], least_area, greatest_area, power)
-            aspect = least_aspect + u[ASPECT] * (greatest_aspect - least_aspect)
+            size = truncated_power(u[AREA], law.least_area, law.greatest_area, law.power)
+            aspect = law.least_aspect + u[ASPECT] * (law.greatest_aspect - law.least_aspect)
             root = math.sqrt(2.0 * size / double)
             half_long, half_short = root * math.sqrt(aspect), root / math.sqrt(aspect)
         turn = 2.0 * math.pi * u[TURN]
@@ -250,9 +261,9 @@ def draw(
     number, area = np.empty(count, dtype=np.int64), np.empty(count)
     least_area, greatest_area = event.area or (0.0, 0.0)
     long, middle, short = source.edges or (0.0, 0.0, 0.0)
-    write_shapes_directly.call(
-        numbers,
-        *map(int, source.corners),
+    law = ShapeLaw(
+        int(source.corners[0]),
+        int(most_corners),
         float(least_area),
         float(greatest_area),
         1.5 * event.exponent,  # volume = area ** 1.5
@@ -262,10 +273,8 @@ def draw(
         float(middle),
         float(short),
         source.edges is not None,
-        corners,
-        number,
-        area,
     )
+    write_shapes_directly.call(numbers, law, corners, number, area)
     areas: list[float] = area.tolist()
     start, end = source.band
     row = 1  # number of blocks side by side

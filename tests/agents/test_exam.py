@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -311,3 +312,10 @@ def test_an_exam_without_references_is_refused(folder: Path) -> None:
         scorer.check_references(scorer.part(asked), References("", {}))
     with pytest.raises(BadInput, match="sites"):
         scorer.part(asked, sites=3)
+
+
+def test_equivalent_kernels_keep_the_specification_current() -> None:
+    known = specification.load()
+    other = msgspec.structs.replace(known, mechanics="0ld", equivalent=(kernels_hash(),))
+    assert other.current and not msgspec.structs.replace(other, equivalent=()).current
+    assert msgspec.structs.replace(known, equivalent=("0ther",)).key == known.key != other.key

@@ -50,13 +50,22 @@ class Window(NamedTuple):
 
 
 @kernel
-def add_contact(
-    c: Contact, a: int, b: int, key: int, owner: int, other: int,
-    x: float, y: float, nx: float, ny: float, gap: float,
-) -> None:  # fmt: skip
-    """Write the geometry of a contact."""
+def write_parties(c: Contact, a: int, b: int, key: int, owner: int, other: int) -> None:
+    """Write the bodies of a contact, its vertex and the surface of b."""
     c.a, c.b, c.key, c.owner, c.other = a, b, key, owner, other
+
+
+@inlined
+def write_geometry(c: Contact, x: float, y: float, nx: float, ny: float, gap: float) -> None:
+    """Write the vertex, the normal and the gap of a contact."""
     c.x, c.y, c.nx, c.ny, c.gap = x, y, nx, ny, gap
+
+
+@kernel
+def copy_geometry(c: Contact, was: Contact) -> None:
+    """Copy what contact detection writes from one contact to another."""
+    write_parties(c, was.a, was.b, was.key, was.owner, was.other)
+    write_geometry(c, was.x, was.y, was.nx, was.ny, was.gap)
 
 
 @inlined
@@ -167,10 +176,9 @@ def add_corner(
     body = outlines.polygon[owner].body
     own, face = outlines.corner[owner, corner], outlines.corner[i, edge]
     key = body * outlines.corner.shape[1] + own.number
-    add_contact(
-        contacts[k], a, b, key, 1 if body == a else 0, bodies[b].surface,
-        own.x, own.y, sign * face.normal_x, sign * face.normal_y, gap,
-    )  # fmt: skip
+    c = contacts[k]
+    write_parties(c, a, b, key, 1 if body == a else 0, bodies[b].surface)
+    write_geometry(c, own.x, own.y, sign * face.normal_x, sign * face.normal_y, gap)
     return k + 1
 
 
@@ -248,7 +256,7 @@ def keep_nearest(contacts: Contacts, first: int, k: int, new: int) -> int:
             if other.gap <= c.gap:
                 return k
             place = m
-    add_contact(contacts[place], c.a, c.b, c.key, c.owner, c.other, c.x, c.y, c.nx, c.ny, c.gap)
+    copy_geometry(contacts[place], c)
     return max(k, place + 1)
 
 

@@ -11,7 +11,11 @@ import math
 
 from rigdda.dynamics.arrays import GroundArrays, Outlines
 from rigdda.dynamics.constants import IMPACT_STEPS, SAME_FACE, TERRAIN
-from rigdda.dynamics.contact.narrow_phase import add_contact, keep_nearest
+from rigdda.dynamics.contact.narrow_phase import (
+    keep_nearest,
+    write_geometry,
+    write_parties,
+)
 from rigdda.dynamics.contact.separating_axes import edge_over_point, following
 from rigdda.dynamics.records import Bodies, Box, Contacts, Parameters
 from rigdda.kernel import inlined, kernel, variable
@@ -228,9 +232,11 @@ def corners_on_segment(
             if c.owner == 1 and c.key == key and c.nx * nx + c.ny * ny > SAME_FACE:
                 again = True
                 if gap < c.gap:
-                    add_contact(c, a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
+                    write_parties(c, a, TERRAIN, key, 1, surface)
+                    write_geometry(c, x, y, nx, ny, gap)
         if not again:
-            add_contact(contacts[k], a, TERRAIN, key, 1, surface, x, y, nx, ny, gap)
+            write_parties(contacts[k], a, TERRAIN, key, 1, surface)
+            write_geometry(contacts[k], x, y, nx, ny, gap)
             k += 1
     return k
 
@@ -317,7 +323,8 @@ def edge_on_ridge(
     if gap > -p.penetration and (along < 0.0 or along > ex * ex + ey * ey):
         return k
     key = len(bodies) * outlines.corner.shape[1] + corner
-    add_contact(contacts[k], a, TERRAIN, key, 0, right.surface, x, y, -nx, -ny, gap)
+    write_parties(contacts[k], a, TERRAIN, key, 0, right.surface)
+    write_geometry(contacts[k], x, y, -nx, -ny, gap)
     return k + 1
 
 

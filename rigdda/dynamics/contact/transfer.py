@@ -9,6 +9,7 @@ from __future__ import annotations
 from numpy.typing import NDArray
 
 from rigdda.dynamics.constants import OPEN, SAME_FACE, SAME_NORMAL, TERRAIN
+from rigdda.dynamics.contact.narrow_phase import copy_geometry
 from rigdda.dynamics.records import Contact, Contacts
 from rigdda.kernel import inlined, kernel
 
@@ -79,8 +80,7 @@ def recall(
 @kernel
 def copy_contact(c: Contact, was: Contact) -> None:
     """Copy a contact of the last step, as contacts of sleeping bodies do not change."""
-    c.a, c.b, c.key, c.owner, c.other = was.a, was.b, was.key, was.owner, was.other
-    c.x, c.y, c.nx, c.ny, c.gap = was.x, was.y, was.nx, was.ny, was.gap
+    copy_geometry(c, was)
     c.state, c.kind = was.state, was.kind
     c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
     c.stiffness, c.normal, c.shear = was.stiffness, was.normal, was.shear

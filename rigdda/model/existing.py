@@ -48,11 +48,11 @@ Class = Annotated[int, about(ge=1)]
 
 @documented
 class Existing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A barrier that stands already.
+    """A barrier that already stands on the slope.
 
-    Its kind, station and sizes are those of a layout file, as they are today: a sagging net has the
-    height that is left, a ditch the depth above the rock that lies in it. The profile of the slope
-    is the ground without it.
+    Its kind, station and sizes are given as in a layout file, with the present sizes: for a sagging
+    net, the height that is left; for a ditch, the depth above the rock that lies in it. The profile
+    of the slope is the ground without the barrier.
 
     Raises
     ------
@@ -94,8 +94,8 @@ class Existing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     condition: Annotated[
         Condition,
         about(
-            "Share of the energy of its class that a fence still absorbs. The height is not "
-            "reduced: give that of today. Other kinds have no condition, but the sizes of today.",
+            "Share of the energy of its class that a fence still absorbs. It does not reduce the "
+            "height; give the present height. For other kinds, give the present sizes instead.",
             "-",
         ),
     ] = 1.0

@@ -90,7 +90,7 @@ class PartialFactors(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         str,
         about(
             'Energy level at which a fence is used: "MEL", the energy of its class, or "SEL", a '
-            "third of it, which it takes twice without repair.",
+            "third of this energy, which the fence withstands twice without repair.",
             choices=LEVELS,
         ),
     ] = "MEL"

@@ -333,8 +333,8 @@ class Drawn(NamedTuple):
 class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where the survey has the point x = 0, y = 0 of the site.
 
-    Computation uses short coordinates that grow downhill. This table keeps what was taken off those
-    of a survey, so that results can be given back on its grid.
+    Computation uses short coordinates that increase downhill. This table stores the offsets that
+    were subtracted from the survey coordinates, so that results can also be given in the latter.
 
     Raises
     ------
@@ -345,7 +345,7 @@ class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     chainage: Annotated[float, about("Chainage of the survey at x = 0.", "m")] = 0.0
     elevation: Annotated[float, about("Elevation of the survey at y = 0.", "m")] = 0.0
     reversed: Annotated[
-        bool, about("Whether the chainage of the survey falls where x grows, which is downhill.")
+        bool, about("Whether the chainage of the survey decreases where x increases (downhill).")
     ] = False
     easting: Annotated[
         float | None,

@@ -169,7 +169,11 @@ class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     friction_deg: Annotated[float, about("Coulomb friction angle.", "deg", ge=0.0, le=89.9)] = 30.0
     cohesion: Annotated[
         float,
-        about("Shear strength, besides friction, of a joint closed at the start.", "Pa", ge=0.0),
+        about(
+            "Shear strength, in addition to friction, of a joint that is closed at the start.",
+            "Pa",
+            ge=0.0,
+        ),
     ] = 0.0
     tension: Annotated[
         float, about("Tensile strength of a joint that is closed at the start.", "Pa", ge=0.0)

@@ -70,8 +70,8 @@ FEWER = {
 """What is shorter in the Python of a page than the reader has it."""
 
 SLOW = {
-    "README.md",
     "PYPI.md",
+    "README.md",
     "docs/environments/Corridor-v0.md",
     "docs/howto/checks.md",
     "docs/howto/compare_layouts.md",
@@ -85,6 +85,7 @@ SLOW = {
     "docs/howto/step_and_fidelity.md",
     "docs/howto/traffic.md",
     "docs/howto/what_if.md",
+    "docs/tutorials/engineer.md",
     "docs/tutorials/researcher.md",
 }
 """Pages that take much processor time."""

@@ -88,6 +88,7 @@ def test_a_release_equals_that_of_the_same_barrier_in_a_layout(site: Site) -> No
     assert list(found) == release_many(jobs)
 
 
+@pytest.mark.slow
 def test_its_capital_is_sunk_and_its_upkeep_counts(site: Site) -> None:
     """1.5 % a year of the price of a new fence of 250 kJ: (200 * 2 + 300) EUR times access."""
     bare = LIGHT
@@ -172,7 +173,8 @@ def test_layouts_with_removals_are_encoded() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param("race", marks=pytest.mark.slow), "random", "rule", "constant"]
+    "name",
+    [*(pytest.param(n, marks=pytest.mark.slow) for n in ("race", "rule")), "random", "constant"],
 )
 def test_designers_choose(name: str, site: Site) -> None:
     problem = DesignProblem(site, max_barriers=2)

@@ -74,6 +74,7 @@ def test_shipped_prospect_names_its_command() -> None:
     assert Network.load(FILE).notes["command"].startswith("rigdda train --model corridor")
 
 
+@pytest.mark.slow
 def test_layouts_on_offer_are_feasible_and_none_is_dominated() -> None:
     problem = DesignProblem("quick")
     found = offer(problem)

@@ -215,6 +215,7 @@ def test_the_command_flags_a_cheat(folder: Path, entry: str, reason: str) -> Non
     assert all(int(row["used"]) <= int(row["budget"]) for row in rows)
 
 
+@pytest.mark.slow
 def test_an_entry_that_fails_is_one_line(folder: Path) -> None:
     done = exam(folder, "broken", "--sites", "1")
     assert done.returncode == 2

@@ -238,6 +238,7 @@ def featured() -> ppo.Featured:
     return ppo.Featured(ppo.pool(NAMES, training.FIDELITY), zeros, ones)
 
 
+@pytest.mark.slow
 def test_every_copy_of_the_pool_keeps_its_site() -> None:
     copies = ppo.pool(NAMES, training.FIDELITY)
     copies.seed(0)

@@ -338,6 +338,21 @@ def test_what_comes_of_a_group_does_not_depend_on_the_step(dt):
     assert 0.0 < mean[0] < 0.5 and 0.2 < mean[2] < 0.8
 
 
+@at_all_steps
+def test_the_work_taken_from_a_group_is_the_energy_it_lost(dt):
+    """The ledger closes. The fence takes F times its path and what the blows on its plate take."""
+    for seed in range(6):
+        scene = group(seed)
+        (fence,) = scene.barriers
+        sim = in_motion(scene, dt)
+        had, place = start_energy(sim), sim.barrier_poses[0, 0]
+        sim.step(round(6.0 / dt))
+        assert open_ledger(sim, had) == pytest.approx(0.0, abs=1e-9 * had), seed
+        absorbed = float(sim.loop.arrays.monitors.target["absorbed"][0])
+        braked = fence.braking_force * (sim.barrier_poses[0, 0] - place)
+        assert braked * (1.0 - 1e-9) <= absorbed < 1.25 * braked, seed
+
+
 # what lies against it
 
 

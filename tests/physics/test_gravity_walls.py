@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from physics.helpers import FLAT, GRAVITY, box, rock
-from rigdda import Fence, GravityWall, Run, Scene, Simulation, Site, Terrain, Wall, release
+from rigdda import Block, Fence, GravityWall, Run, Scene, Simulation, Site, Terrain, Wall, release
 from rigdda.releases import release_many
 from rigdda.validation.case import Lab
 from rigdda.validation.gravity_walls import DURATION, FACE, Push, displacement
@@ -71,6 +71,24 @@ def test_the_energy_of_a_pushed_wall_is_in_the_ledger():
     before, after = (e.kinetic + e.potential for e in (start, end))
     work = end.friction + end.impact + end.damping
     assert after - before == pytest.approx(work, rel=2e-3)
+
+
+@pytest.mark.parametrize("dt", [1.25e-3, 2.5e-3, 5e-3, 1e-2, 2e-2])
+@pytest.mark.parametrize("size", [0.7, 1.0, 2.0])
+@pytest.mark.parametrize("speed", [3.0, 10.0])
+def test_a_wall_that_is_struck_flat_slides_on_with_the_block(size, speed, dt):
+    """By momentum and friction: V = v m/(m + M) after a plastic blow, then V^2/(2 g tan phi)."""
+    friction_deg, gap = 30.0, 0.5
+    mu = math.tan(math.radians(friction_deg))
+    wall = GravityWall(0.0, size, 1.5 * size)
+    corners = size * np.array([(-1.0, 0.0), (0.0, 0.0), (0.0, 1.0), (-1.0, 1.0)]) - [gap, 0.0]
+    block = Block(corners, velocity=(speed, 0.0, 0.0))
+    scene = Scene(Terrain(FLAT), (block,), rock(friction_deg, 0.0), barriers=(wall,))
+    x, _, turn = displacement(Lab(dt), scene)
+    hit = math.sqrt(speed**2 - 2.0 * mu * GRAVITY * gap)
+    share = block.density / (block.density + 1.5 * wall.density)
+    assert x == pytest.approx((share * hit) ** 2 / (2.0 * mu * GRAVITY), rel=0.02)
+    assert turn == pytest.approx(0.0, abs=1e-3)
 
 
 def test_runs_with_every_kind_are_stored(tmp_path):

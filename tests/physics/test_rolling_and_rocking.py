@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from scipy.optimize import brentq
 
@@ -45,6 +46,40 @@ def steady_roll(sides: int, share: float) -> tuple[float, float]:
 def test_a_wheel_rolls_as_fast_as_mcgeer_says(sides, share, dt):
     wanted = (sides, 1.0, *steady_roll(sides, share), 3.0)
     assert roll(Lab(dt), *wanted) == pytest.approx(wheel(*wanted), rel=5e-3)
+
+
+def faces_passed(sides: int, rate: float) -> tuple[int, float]:
+    """Return how many faces a wheel of radius 1 m passes on level ground, and its least margin.
+
+    It passes a corner if w^2 (k^2 + r^2)/2 exceeds g r (1 - cos(pi/n)), and every impact reduces w
+    as McGeer (1990) says. The margin is that of w^2, as a share of the least w^2.
+    """
+    half = math.pi / sides
+    k2 = (1.0 + 2.0 * math.cos(half) ** 2) / 6.0
+    kept = (k2 + math.cos(2.0 * half)) / (k2 + 1.0)
+    least = 2.0 * GRAVITY * (1.0 - math.cos(half)) / (k2 + 1.0)
+    passed, squared, margin = 0, rate**2, math.inf
+    while True:
+        margin = min(margin, abs(squared / least - 1.0))
+        if squared < least:
+            return passed, margin
+        passed, squared = passed + 1, kept**2 * squared
+
+
+@pytest.mark.parametrize("dt", [2e-3, 5e-3, 1e-2])
+def test_a_wheel_stops_on_the_face_that_its_energy_allows(dt):
+    """In 60 rolls on level ground; rates within 2 % of a limit are left out."""
+    rng, rolls = np.random.default_rng(3), 0
+    while rolls < 60:
+        sides = int(rng.integers(5, 13))
+        half = math.pi / sides
+        slowest = math.sqrt(GRAVITY * (1.0 - math.cos(half)))
+        rate = rng.uniform(slowest, math.sqrt(GRAVITY * math.cos(half)))
+        passed, margin = faces_passed(sides, rate)
+        if margin > 0.02:
+            rolls += 1
+            way = roll(Lab(dt), sides, 1.0, 0.0, rate, 30.0)
+            assert way / (2.0 * math.sin(half)) == pytest.approx(passed, abs=0.02), (sides, rate)
 
 
 def tilts_of_rocking(height: float, dt: float, impacts: int) -> list[float]:

@@ -4,10 +4,8 @@
 `experiments.search_gain` with budgets of 500 and 2,000 releases, each time without one part:
 
 - network: the analytic estimate of the passages takes the place of the value network;
-- pairs: only single barriers, the rule and the constant are forecast and combined;
-- neighbours: no other stations and sizes of the best layouts join the pool;
+- pairs: only single barriers, the rule and the constant are forecast;
 - batches: all layouts are simulated in one batch, before the forecasts are updated;
-- contenders: no layout is simulated only because its kind might be better than its forecast;
 - final: the exploration takes the releases of the final, and its best layout is chosen.
 
 The layouts are verified on the same fresh releases. The table has one row per search. Judged by the
@@ -63,9 +61,7 @@ PATCHES: Mapping[str, Mapping[str, Any]] = {
     WHOLE: {},
     "network": {"value_network": Analytic},
     "pairs": {"joined": no_layouts},
-    "neighbours": {"around": no_layouts},
     "batches": {"BATCHES": 1},
-    "contenders": {"contenders": lambda surrogate: []},
 }
 """What takes the place of names of the module `race` without each part."""
 
@@ -76,7 +72,7 @@ def without_final(problem: DesignProblem, simulations: int, seed: int) -> Design
     menu, track = Menu(problem), Track(ledger)
     surrogate = race.forecast_pool(ledger, menu, unsearched(problem, menu))
     track.expect = surrogate.expect
-    race.explore(track, menu, surrogate, int((race.EXPLORE + race.FINAL) * simulations))
+    race.explore(track, surrogate, int((race.EXPLORE + race.FINAL) * simulations))
     chosen = surrogate.best(1)[0] if surrogate.value().min() < 1.0 else ()
     return ledger.result(ledger.evaluate(chosen, "report", ledger.left))
 
@@ -98,11 +94,16 @@ def designer(part: str) -> Callable[[DesignProblem, int, int], DesignResult]:
 PARTS = (*PATCHES, "final")
 
 
-def row(problem: DesignProblem, part: str, budget: int, releases: int) -> dict[str, Any]:
-    """Return the row of a search without a part, with its verified layout."""
+def row(
+    problem: DesignProblem, part: str, budget: int, releases: int, store: Store
+) -> dict[str, Any]:
+    """Return the row of a search without a part, with its verified layout.
+
+    `store` keeps the releases of verified layouts, since several searches find the same.
+    """
     say(f"{problem.site.name}: without {part}, {budget} releases")
     found = designer(part)(problem, budget, SEED)
-    e = verify(problem, found.layout, releases, FRESH, Store())
+    e = verify(problem, found.layout, releases, FRESH, store)
     return {
         "site": problem.site.name, "without": part, "budget": budget,
         "releases": found.simulations, "cpu_s": found.seconds, "z": e.objective,
@@ -127,11 +128,13 @@ def run(quick: bool, out: Path) -> Number:
     known = {(r["site"], r["without"], int(r["budget"])) for r in rows}
     budgets = QUICK_BUDGETS if quick else BUDGETS
     names = sites.split("validation")[SKIPPED:]
+    verified = QUICK_VERIFY if quick else VERIFY
     for problem in problems_of(QUICK_SITES if quick else SITES, names):
+        store = Store()
         for budget in budgets:
             for part in PARTS:
                 if (problem.site.name, part, budget) not in known:
-                    rows.append(row(problem, part, budget, QUICK_VERIFY if quick else VERIFY))
+                    rows.append(row(problem, part, budget, verified, store))
                     write(path, rows)
     ends = {
         (budget, part): interval(losses(rows, part, budget))

@@ -54,10 +54,12 @@ def blocks(problem: DesignProblem) -> int:
     return max(largest(problem.site, name) for name in problem.site.event_names)
 
 
-def row(problem: DesignProblem, name: str, budget: int, releases: int) -> dict[str, Any]:
-    """Return the row of one search with its verified layout."""
+def row(
+    problem: DesignProblem, name: str, budget: int, releases: int, store: Store
+) -> dict[str, Any]:
+    """Return the row of one search with its verified layout, whose releases `store` keeps."""
     say(f"{problem.site.name}: {name}, {budget} releases")
-    found, store = designers.module(name).design(problem, budget, SEED), Store()
+    found = designers.module(name).design(problem, budget, SEED)
     e = verify(problem, found.layout, releases, FRESH, store)
     return {
         "site": problem.site.name, "designer": name, "budget": budget,
@@ -94,13 +96,13 @@ def run(quick: bool, out: Path) -> Number:
     known = {(r["site"], r["designer"], int(r["budget"])) for r in rows}
     budgets = QUICK_BUDGETS if quick else BUDGETS
     names = sites.split("validation")[SKIPPED:]
-    problems = problems_of(QUICK_SITES if quick else SITES, names)
-    for budget in budgets:
-        for problem in problems:
+    releases = QUICK_VERIFY if quick else VERIFY
+    for problem in problems_of(QUICK_SITES if quick else SITES, names):
+        store = Store()
+        for budget in budgets:
             for name in NAMES:
                 if (problem.site.name, name, budget) not in known:
-                    releases = QUICK_VERIFY if quick else VERIFY
-                    rows.append(row(problem, name, budget, releases))
+                    rows.append(row(problem, name, budget, releases, store))
                     write(path, rows)
     found = {budget: gains(rows, budget) for budget in budgets}
     ends = {budget: interval(values) for budget, values in found.items()}

@@ -47,7 +47,7 @@ def layouts(
     known = unsearched(problem, menu)
     surrogate = forecast_pool(ledger, menu, known)
     track.expect = surrogate.expect
-    explore(track, menu, surrogate, ledger.left, PRICES)
+    explore(track, surrogate, ledger.left, PRICES)
     found = dict.fromkeys([(), *known, *front(surrogate, MOST - 1 - len(known))])
     return tuple(sorted(found, key=lambda layout: (problem.site.capital(layout), len(layout))))
 

@@ -3,9 +3,9 @@
 Releases without barriers tell which blocks pass each station and how. From them, a network
 forecasts Z for every single barrier that may be built and for pairs of the best ones
 (`rigdda.agents.designers.forecast`). The layouts with the least forecast minus one standard
-deviation are simulated in a few batches. After each batch, a Gaussian process updates the forecasts
-of all layouts (`rigdda.agents.designers.surrogate`), and the neighbours of the best layouts and
-their combinations with other barriers join the pool.
+deviation are simulated in three batches. After each batch, a Gaussian process updates the forecasts
+of all layouts (`rigdda.agents.designers.surrogate`), and combinations of the best layout with
+another barrier join the pool.
 
 The best layouts, the rule, the constant and no barrier race on separate releases
 (`rigdda.agents.designers.racing`). The chosen layout is evaluated on further releases that did not
@@ -22,7 +22,7 @@ from rigdda import Layout
 from rigdda.agents.designers.catalogue import ensemble_for
 from rigdda.agents.designers.convex import offered, unsearched
 from rigdda.agents.designers.forecast import Forecast, Value, value_network
-from rigdda.agents.designers.menu import FINEST, Menu
+from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, search
 from rigdda.agents.designers.racing import Arm, Track, best_of_ends
 from rigdda.agents.designers.store import Store
@@ -36,16 +36,12 @@ LEAST = 160
 """Least budget for a final. With less, the layouts with the best forecasts are compared at once."""
 EACH, FEWEST, MOST = 0.9, 10, 100
 """Releases of a layout in the exploration over the square root of the budget, and their bounds."""
-BATCHES = 8
-"""Largest number of batches."""
+BATCHES = 3
+"""Number of batches."""
 BOLD = 1.0
 """Number of standard deviations below the mean by which layouts are ranked for simulation [-]."""
-BOLDEST = 3.0
-"""The same for the first barrier of each kind."""
 BEST_OF = 12
-"""Number of single barriers of each kind from which pairs are formed."""
-CENTRES = 2
-"""Number of layouts whose neighbours join the pool after a batch."""
+"""Number of single barriers of each kind with which combinations are formed."""
 FINALISTS = 10
 """Largest number of layouts in the final besides no barrier, the rule and the constant."""
 AS_GOOD = 0.005
@@ -76,7 +72,7 @@ def design(
     known = unsearched(problem, menu)
     surrogate = forecast_pool(ledger, menu, known)
     track.expect = surrogate.expect
-    explore(track, menu, surrogate, int(EXPLORE * simulations))
+    explore(track, surrogate, int(EXPLORE * simulations))
     budget, least = int(FINAL * simulations), 3 * len(problem.site.events)
     found = surrogate.best(min(FINALISTS, max(1, budget // (4 * least) - 1)))
     finalists = list(dict.fromkeys([(), *found, *known]))
@@ -125,16 +121,6 @@ def firsts(surrogate: Surrogate, n: int) -> list[Layout]:
     return [layout for own in kept.values() for layout in own.values()]
 
 
-def contenders(surrogate: Surrogate) -> list[Layout]:
-    """Return the best single barrier of each kind that may be better than the best of all.
-
-    A forecast may be wrong for a whole kind of barrier.
-    """
-    most = float(surrogate.value().min()) if surrogate.layouts else 0.0
-    hoped = surrogate.value(hope=BOLDEST)
-    return [x for x in firsts(surrogate, 1) if hoped[surrogate.place[x]] <= most]
-
-
 def joined(
     problem: DesignProblem, some: Sequence[Layout], others: Sequence[Layout]
 ) -> Iterator[Layout]:
@@ -147,7 +133,6 @@ def joined(
 
 def explore(
     track: Track,
-    menu: Menu,
     surrogate: Surrogate,
     budget: int,
     prices: Sequence[float] = (0.0,),
@@ -156,8 +141,8 @@ def explore(
 
     Parameters
     ----------
-    track, menu, surrogate : Track, Menu, Surrogate
-        The releases, the barriers that may be built and the forecasts.
+    track, surrogate : Track, Surrogate
+        The releases and the forecasts.
     budget : int
         Number of releases.
     prices : sequence of float
@@ -166,38 +151,24 @@ def explore(
     problem, ledger = track.problem, track.ledger
     end = ledger.left - budget
     each = min(max(FEWEST, 2 * len(problem.site.events), int(EACH * math.sqrt(budget))), MOST)
-    batches = min(BATCHES, max(2, budget // (5 * each)))
-    step, level, arms = (menu.zone.end - menu.zone.start) / 16.0, 2, list[Arm]()
-    for i in range(batches):
-        count = (ledger.left - end) // (each * (batches - i)) - 1
+    arms: list[Arm] = []
+    for i in range(BATCHES):
+        count = (ledger.left - end) // (each * (BATCHES - i)) - 1
         if count < 1:
             break
-        wanted = dict.fromkeys(contenders(surrogate)[: count // 2] if i == 0 else ())
-        share = max(1, (count - len(wanted)) // len(prices))
-        for price in prices:
-            wanted |= dict.fromkeys(surrogate.promising(share, BOLD, price))
+        share = max(1, count // len(prices))
+        wanted = dict.fromkeys(
+            layout for price in prices for layout in surrogate.promising(share, BOLD, price)
+        )
         found = track.look([(), *wanted], each, ledger.left - end)
         if not found:
             break
         nothing, more = found[0], found[1:]
         arms += more
         surrogate.learn(more, nothing)
-        for price in prices:
-            for centre in surrogate.best(CENTRES, price):
-                surrogate.add(around(menu, surrogate, centre, step, level))
-        step, level = max(FINEST, 0.6 * step), 1
+        best = [layout for price in prices for layout in surrogate.best(1, price)]
+        surrogate.add(joined(problem, best, firsts(surrogate, BEST_OF)))
     return arms
-
-
-def around(
-    menu: Menu, surrogate: Surrogate, layout: Layout, step: float, level: int
-) -> Iterator[Layout]:
-    """Yield the neighbours of a layout: other stations and sizes, one barrier less, one more."""
-    if len(layout) > 1:
-        yield from ((*layout[:i], *layout[i + 1 :]) for i in range(len(layout)))
-    yield from menu.neighbours(layout, step, level)
-    if len(layout) < menu.problem.max_barriers:
-        yield from joined(menu.problem, [layout], firsts(surrogate, BEST_OF))
 
 
 def choose(surrogate: Surrogate, ends: Sequence[Arm], nothing: Arm) -> Layout:

@@ -156,17 +156,15 @@ class Surrogate:
         t = self.problem.targets
         return any(v is not None for v in (t.reach, t.failure, t.individual))
 
-    def value(self, price: float = 0.0, hope: float = 0.0) -> Floats:
+    def value(self, price: float = 0.0) -> Floats:
         """Return Z of every layout over the risk without barriers, (M,) [-].
 
         Parameters
         ----------
         price : float
             Additional annual cost per capital cost [1/year], as scarce money has it.
-        hope : float
-            Number of standard deviations below the mean.
         """
-        return self._hoped(self.deviation, hope, price)
+        return self._hoped(self.deviation, 0.0, price)
 
     def _hoped(self, deviation: Floats, hope: float, price: float) -> Floats:
         """Return Z of every layout at `hope` standard deviations below the mean, (M,) [-]."""

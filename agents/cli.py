@@ -20,8 +20,11 @@ from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.agents.limits import SEED
 from rigdda.agents.terminal import (
     Folder,
+    RealNumber,
     Stopped,
+    WholeNumber,
     count_option,
+    counted,
     executor_option,
     fail,
     finding,
@@ -424,23 +427,23 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--kinds", callback=_kinds, metavar="KIND,...",
               help="Allowed kinds of barrier: fence, ditch, embankment, gravity_wall, mesh, wall, "
               "removal (of a removable existing barrier).  [default: all except wall]")  # fmt: skip
-@click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+@click.option("--target", type=RealNumber(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that rock of a design event reaches the "
               "road.")  # fmt: skip
-@click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+@click.option("--failure", type=RealNumber(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that a barrier fails in a design "
               "event.")  # fmt: skip
-@click.option("--target-risk", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+@click.option("--target-risk", type=RealNumber(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable individual risk of a commuter [1/year]. The site must have "
               "a table [traffic].")  # fmt: skip
-@click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
+@click.option("--max-cost", type=RealNumber(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
 @click.option("--zone", type=float, nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m], as in the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
-@click.option("--ground-samples", "grounds", type=click.IntRange(0, 1000), default=6,
+@click.option("--ground-samples", "grounds", type=WholeNumber(0, 1000), default=6,
               show_default=True, help="Number of grounds within the plausible range on which the "
               "layouts are compared at the end; 0 for none.")  # fmt: skip
 @posterior_option
@@ -641,16 +644,16 @@ def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) 
 @click.option("--set", "settings", multiple=True, metavar="PATH=VALUE",
               help="New value of a key of the site file, such as consequences.closure=20000. May "
               "be repeated.")  # fmt: skip
-@click.option("--target", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+@click.option("--target", type=RealNumber(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that rock of a design event reaches the "
               "road.  [default: that of the design]")  # fmt: skip
-@click.option("--failure", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+@click.option("--failure", type=RealNumber(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable probability that a barrier fails in a design event.  "
               "[default: that of the design]")  # fmt: skip
-@click.option("--target-risk", type=click.FloatRange(0.0, 1.0, min_open=True), metavar="P",
+@click.option("--target-risk", type=RealNumber(0.0, 1.0, min_open=True), metavar="P",
               help="Largest acceptable individual risk of a commuter [1/year].  [default: that of "
               "the design]")  # fmt: skip
-@click.option("--max-cost", type=click.FloatRange(min=0.0), metavar="EUR_PER_M",
+@click.option("--max-cost", type=RealNumber(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.  [default: that of "
               "the design]")  # fmt: skip
 @out_option("reprice-RESULTS")
@@ -754,7 +757,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
 @cli.command()
 @click.argument("file", metavar="CORRIDOR")
-@click.option("--budget", "budgets", type=click.FloatRange(0.0, 1e12), multiple=True, metavar="EUR",
+@click.option("--budget", "budgets", type=RealNumber(0.0, 1e12), multiple=True, metavar="EUR",
               help="Budget for construction. May be repeated.  [default: those of the "
               "file]")  # fmt: skip
 @count_option("--releases", 200, 4_000, "Number of releases per section.")
@@ -882,7 +885,7 @@ def fit(
 @click.option("--method", type=click.Choice(("morris", "sobol")), default="morris",
               show_default=True, help="Screening by the method of Morris, or indices of Sobol', "
               "which take several times as many releases.")  # fmt: skip
-@click.option("--samples", type=click.IntRange(2), metavar="N",
+@click.option("--samples", type=WholeNumber(2), metavar="N",
               help="Number of trajectories (morris), or of points from which indices are computed "
               "(sobol), a power of two.  [default: 20 for morris, 64 for sobol]")  # fmt: skip
 @count_option("--releases", 2, 200, "Number of releases at each point, over all events.")
@@ -943,18 +946,23 @@ def sensitivity(
 TRAINING_SITES = {"policy": 512, "value": 96, "corridor": 12}
 """Default number of training sites by model."""
 
+EPISODES = 49_152
+"""Default number of episodes of a policy."""
+
 
 @cli.command()
 @click.option("--model", type=click.Choice(tuple(TRAINING_SITES)),
               default="policy", show_default=True,
               help="A policy trained with PPO, the value network, or the agent for "
               "corridors.")  # fmt: skip
-@click.option("--sites", type=click.IntRange(2), show_default="512, 96 or 12, by model",
-              help="Number of random sites to train on.")  # fmt: skip
-@count_option("--episodes", 0, 49152, "Number of episodes, for a policy.")
+@click.option("--sites", type=WholeNumber(2), metavar="N",
+              help="Number of random sites to train on.  [default: 512 for a policy, 96 for the "
+              "value network, 12 for corridors]")  # fmt: skip
+@click.option("--episodes", type=WholeNumber(0, limits.RELEASES), metavar="N",
+              help="Number of episodes, for a policy.  [default: 49152]")  # fmt: skip
 @seed_option("Seed of all random numbers.", SEED)
 @out_option("train")
-def train(model: str, sites: int | None, episodes: int, seed: int, out: Path | None) -> None:
+def train(model: str, sites: int | None, episodes: int | None, seed: int, out: Path | None) -> None:
     """Train a network that designs layouts without a search.
 
     A policy observes the ground, the prices and the rockfall without barriers, and is improved by
@@ -976,6 +984,8 @@ def train(model: str, sites: int | None, episodes: int, seed: int, out: Path | N
     from rigdda.agents.corridor import agent
 
     sites = sites or TRAINING_SITES[model]
+    if model != "policy" and episodes is not None:
+        raise click.UsageError("--episodes is for --model policy: leave it out")
     if model == "corridor":
         folder = folder_for(out, "train", agent.FILE.name)
         with recorded_run(folder), progress(sites) as tick:
@@ -993,7 +1003,7 @@ def train(model: str, sites: int | None, episodes: int, seed: int, out: Path | N
             value_training.train(asked, folder, tick)
         click.echo(f"value network of {asked.sites} sites; value.safetensors is in {folder}")
         return
-    terms = training.Terms(sites, episodes, seed)
+    terms = training.Terms(sites, EPISODES if episodes is None else episodes, seed)
     folder = folder_for(out, "train", *training.FILES)
     with recorded_run(folder), progress(terms.episodes) as tick:
         trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
@@ -1053,10 +1063,12 @@ def evaluate(
     with recorded_run(folder), progress(len(places) * len(entrants)) as tick:
         scores = contest.hold(places, entrants, budget, verify, seed, store, tick)
     tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
-    click.echo("EUR per metre of road and year; best: the best of these designers on each site")
+    click.echo("EUR per metre of road and year; best: the cheapest of these designers and of no "
+               "barrier on each site")  # fmt: skip
     show(contest.table(scores))
     resumed = f", {store.resumed:,} releases from an earlier run" if store.resumed else ""
-    click.echo(f"{len(places)} sites of {split}, verified on {verify:,} releases each{resumed}; "
+    click.echo(f"{counted(len(places), 'site')} of {split}, verified on {verify:,} releases each"
+               f"{resumed}; "
                f"scores.csv is in {folder}")  # fmt: skip
 
 
@@ -1069,15 +1081,15 @@ def evaluate(
               "the entry, with the same money for every metre of road]")  # fmt: skip
 @click.option("--spec", type=click.Path(path_type=Path), metavar="FILE",
               help="Specification of another exam.  [default: the one of the package]")  # fmt: skip
-@click.option("--sites", type=click.IntRange(1), metavar="N",
+@click.option("--sites", type=WholeNumber(1), metavar="N",
               help="Play only the first N sites, and no corridor unless --corridors is "
               "given.")  # fmt: skip
-@click.option("--corridors", type=click.IntRange(0), metavar="N",
+@click.option("--corridors", type=WholeNumber(0), metavar="N",
               help="Play only the first N corridors.")  # fmt: skip
-@click.option("--budget", "budgets", type=click.IntRange(0, limits.RELEASES), multiple=True,
+@click.option("--budget", "budgets", type=WholeNumber(0, limits.RELEASES), multiple=True,
               metavar="N", help="Releases per section. May be repeated.  [default: those of the "
               "specification]")  # fmt: skip
-@click.option("--verify", type=click.IntRange(10, limits.RELEASES), metavar="N",
+@click.option("--verify", type=WholeNumber(10, limits.RELEASES), metavar="N",
               help="Releases for the verification of each layout.  [default: that of the "
               "specification]")  # fmt: skip
 @seed_option("Seed of the tasks and of their releases.", SEED)
@@ -1118,17 +1130,20 @@ def exam(
         job = scorer.Scorer(part, references, entry, corridor_entry, folder, secrets, tick)
         scores = job.run()
         found = ranking.write(folder, scores, part, entry)
-    click.echo("score: 1 for the reference, 0 for random layouts; distance: 0 and 1 for no barrier")
+    click.echo(
+        "score: 1 for the reference, 0 for random layouts; distance: 0 for the reference, 1 for no "
+        "barrier"
+    )
     show(ranking.table(found))
     for line in ranking.remarks(part, references):
         note(line)
-    click.echo(f"{part.size} tasks, verified on {part.verification:,} releases each; "
+    click.echo(f"{counted(part.size, 'task')}, verified on {part.verification:,} releases each; "
                f"{', '.join(ranking.FILES)} are in {folder}")  # fmt: skip
     flags = ranking.broken(scores)
     for line in flags:
         finding(line)
     if flags:
-        raise Stopped(f"{entry} is disqualified: {len(flags)} rules are broken", 1)
+        raise Stopped(f"{entry} is disqualified: {counted(len(flags), 'broken rule')}", 1)
 
 
 @cli.command()
@@ -1157,7 +1172,8 @@ def dataset(
     folder = folder_for(out, f"dataset-{split}", job.RECIPE)
     with recorded_run(folder), progress(len(names)) as tick:
         rows = job.write(recipe, sites, folder, tick)
-    click.echo(f"{rows:,} releases on {len(names)} sites of {split}; outcomes and sites are in "
+    click.echo(f"{rows:,} releases on {counted(len(names), 'site')} of {split}; outcomes and "
+               "sites are in "
                f"{folder}")  # fmt: skip
 
 

@@ -128,8 +128,9 @@ def hold(
 def table(scores: Sequence[Score]) -> Table:
     """Return the table of designers with means over sites [EUR per metre of road and year].
 
-    "behind the best" is the difference of Z from the best designer of each site. "share" is the
-    total gain of a designer divided by the total gain of the best designers.
+    "behind the best" is the difference of Z from the best designer of each site, or from no barrier
+    if that is better. "share" is the total gain of a designer divided by the total gain of the best
+    designers; it is not defined if no designer gains.
     """
     head = ("designer", "releases", "Z", "fall of Z (95 %)", "behind the best (95 %)", "share")
     out = empty_table(head)
@@ -137,14 +138,16 @@ def table(scores: Sequence[Score]) -> Table:
     gains = {n: np.array([s.gain for s in scores if s.designer == n]) for n in names}
     best = np.maximum.reduce([*gains.values(), np.zeros(len(gains[names[0]]))])
     nothing = np.mean([s.nothing.objective for s in scores if s.designer == names[0]])
-    out.add_row("nothing", "0", euros(float(nothing)), "-", *_behind(best), "0 %")
+    out.add_row(
+        "nothing", "0", euros(float(nothing)), "-", *_behind(best), "0 %" if best.any() else "-"
+    )
     for name in names:
         own = [score for score in scores if score.designer == name]
         used = round(float(np.mean([score.simulations for score in own])))
         z = float(np.mean([score.built.objective for score in own]))
-        share = gains[name].sum() / best.sum() if best.sum() > 0.0 else 0.0
+        share = percent(float(gains[name].sum() / best.sum())) if best.any() else "-"
         fall, behind = _behind(gains[name]), _behind(best - gains[name])
-        out.add_row(name, f"{used:,}", euros(z), *fall, *behind, percent(float(share)))
+        out.add_row(name, f"{used:,}", euros(z), *fall, *behind, share)
     return out
 
 

@@ -161,7 +161,23 @@ def write(recipe: Recipe, count: int, folder: Path, tick: Tick = lambda done, wo
                 fresh.write_bytes(content)
         done += 1
     tick(done, "counting rows")
-    return sum(parquet.read_metadata(_files(folder, name)[0]).num_rows for name in names)
+    return sum(len(_read(_files(folder, name)[0])) for name in names)
+
+
+def _read(file: Path) -> pa.Table:
+    """Read a part of a data set.
+
+    Raises
+    ------
+    BadInput
+        If the part is missing or damaged.
+    """
+    try:
+        return parquet.read_table(file)
+    except (OSError, pa.ArrowException) as error:
+        mend = "this part is missing or damaged: remove the files of this site from outcomes/ and "
+        mend += f"sites/, and repeat the command that wrote the data set ({str(error)[:80]})"
+        raise BadInput("data set", str(file), mend) from None
 
 
 def _files(folder: Path, name: str) -> tuple[Path, Path]:
@@ -173,9 +189,16 @@ def _check_folder(recipe: Recipe, folder: Path) -> None:
     """Record what a folder contains."""
     content = {**msgspec.to_builtins(recipe), "version": __version__, "kernels": kernels_hash()}
     file = folder / RECIPE
-    if file.is_file() and json.loads(file.read_text(encoding="utf-8")) != content:
-        mend = "it contains a data set of other terms or of another version: name another folder"
-        raise BadInput("--out", str(folder), mend)
+    if file.is_file():
+        try:
+            found = msgspec.json.decode(file.read_bytes(), type=dict[str, Any])
+        except msgspec.MsgspecError as error:
+            mend = f"this is damaged: remove the data set, or name another folder ({error})"
+            raise BadInput("data set", str(file), mend) from None
+        for name, value in content.items():
+            if found.get(name) != value:
+                mend = f"the data set in {folder} has {found.get(name)}: name another folder"
+                raise BadInput(name, value, mend)
     with atomic(file) as fresh:
         fresh.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
@@ -293,12 +316,14 @@ def read(folder: Path | str) -> tuple[pa.Table, pa.Table]:
     Raises
     ------
     BadInput
-        If the folder contains no data set.
+        If the folder contains no data set, or a part of it is missing or damaged.
     """
     parts = [sorted((Path(folder) / name).glob("*.parquet")) for name in ("outcomes", "sites")]
-    if not all(parts):
-        raise BadInput("dataset", str(folder), "name a folder that `rigdda dataset` wrote")
-    outcomes, places = (pa.concat_tables([parquet.read_table(f) for f in own]) for own in parts)
+    names = sorted({file.stem for own in parts for file in own})
+    if not names:
+        raise BadInput("data set", str(folder), "name a folder that `rigdda dataset` wrote")
+    files = zip(*(_files(Path(folder), name) for name in names), strict=True)
+    outcomes, places = (pa.concat_tables([_read(file) for file in own]) for own in files)
     return outcomes, places
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -91,6 +92,9 @@ class Network:
         BadInput
             If there is no such file or if it does not contain a valid network.
         """
+        if os.path.isdir(path):
+            mend = "this is a folder: name the file in it that `rigdda train` wrote"
+            raise BadInput("policy", str(path), mend)
         try:
             with safe_open(path, framework="numpy") as file:
                 count = sum(key.startswith("weight") for key in file.keys())
@@ -99,6 +103,10 @@ class Network:
                 network = cls(get("mean"), get("scale"), layers, file.metadata() or {})
         except (OSError, SafetensorError) as error:
             mend = f"name a file that `rigdda train` wrote ({error})"
+            if zipfile.is_zipfile(path):
+                mend = (
+                    "this is a model of Stable-Baselines3: evaluate it as an entry of `rigdda exam`"
+                )
             raise BadInput("policy", str(path), mend) from None
         if not network.finite:
             mend = "name a file with finite numbers and positive scales, as `rigdda train` writes"
@@ -208,6 +216,7 @@ def load(path: str | os.PathLike[str]) -> Network:
     network = Network.load(path)
     sizes, wanted = network.sizes, (WIDTH, SLOTS.size)
     if not sizes or (sizes[0], sizes[-1]) != wanted:
-        mend = f"name a network with {wanted[0]} features and {wanted[1]} outputs"
+        mend = "this is no policy of this version: name a file policy.safetensors that "
+        mend += "`rigdda train` wrote"
         raise BadInput("policy", str(path), mend)
     return network

@@ -81,13 +81,7 @@ class RunRecord(msgspec.Struct, kw_only=True):
 
     def write(self, folder: Path) -> None:
         """Write the record into a results folder, beside those of other commands."""
-        try:
-            known = read(folder)
-        except BadInput:  # damaged or of another version: it is replaced
-            known = {}
-        text = msgspec.json.format(msgspec.json.encode(known | {self.command: self}), indent=2)
-        with atomic(folder / FILE) as part:
-            part.write_bytes(text + b"\n")
+        write_records(folder, read(folder) | {self.command: self})
 
 
 def read(folder: Path) -> dict[str, RunRecord]:
@@ -104,8 +98,18 @@ def read(folder: Path) -> dict[str, RunRecord]:
     try:
         return msgspec.json.decode(file.read_bytes(), type=dict[str, RunRecord])
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        mend = f"run the command that made this folder again: the file is damaged ({error})"
+        mend = f"remove this file, then repeat the command that wrote the folder ({error})"
         raise BadInput("RESULTS", str(file), mend) from None
+
+
+def write_records(folder: Path, records: dict[str, RunRecord]) -> None:
+    """Write the records of a results folder; without any, there is no file."""
+    if not records:
+        (folder / FILE).unlink(missing_ok=True)
+        return
+    text = msgspec.json.format(msgspec.json.encode(records), indent=2)
+    with atomic(folder / FILE) as part:
+        part.write_bytes(text + b"\n")
 
 
 def as_toml(site: Site) -> str:

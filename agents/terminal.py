@@ -50,6 +50,45 @@ class Folder(click.Path):
         return super().convert(value, param, context)
 
 
+class _InRange(click.ParamType):
+    """Option type for a number, whose error says which numbers are accepted."""
+
+    what: str
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, context: click.Context | None
+    ) -> Any:
+        """Return the number."""
+        try:
+            return super().convert(value, param, context)
+        except click.BadParameter:
+            from rigdda import BadInput
+
+            name = param.opts[0] if param else "number"
+            raise BadInput(name, value, f"give {self.what}{self._bounds()}") from None
+
+    def _bounds(self) -> str:
+        own: Any = self
+        ends = []
+        if own.min is not None:
+            ends.append(f"{'above' if own.min_open else 'of at least'} {own.min:,}")
+        if own.max is not None:
+            ends.append(f"{'below' if own.max_open else 'at most'} {own.max:,}")
+        return " " + " and ".join(ends)
+
+
+class WholeNumber(_InRange, click.IntRange):
+    """Option type for a whole number."""
+
+    what = "a whole number"
+
+
+class RealNumber(_InRange, click.FloatRange):
+    """Option type for a number."""
+
+    what = "a number"
+
+
 def out_option(default: str) -> Callable[..., Any]:
     """Return the option --out; the default is a folder in runs/."""
     return click.option(
@@ -61,7 +100,7 @@ def out_option(default: str) -> Callable[..., Any]:
 
 def seed_option(words: str, most: int | None = None) -> Callable[..., Any]:
     """Return the option --seed with a help text; `most` is the largest seed that is accepted."""
-    kind = click.IntRange(0, most)
+    kind = WholeNumber(0, most)
     return click.option("--seed", type=kind, default=0, show_default=True, help=words)
 
 
@@ -85,8 +124,13 @@ executor_option = click.option(
 
 def count_option(name: str, least: int, default: int, words: str) -> Callable[..., Any]:
     """Return an option that takes a count, for example of releases."""
-    kind = click.IntRange(least, RELEASES)
+    kind = WholeNumber(least, RELEASES)
     return click.option(name, type=kind, default=default, show_default=True, help=words)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, which is in the plural unless the number is 1."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def read_layout(path: str | None) -> Layout:
@@ -247,7 +291,8 @@ def recorded_run(folder: Path, site: Site | None = None) -> Iterator[None]:
 @contextmanager
 def _recorded(folder: Path, site: Site | None, before: set[Stamp]) -> Iterator[None]:
     """Write the record of the command into its folder, and complete it when the command ends."""
-    from rigdda.agents.run_record import RunRecord, read
+    from rigdda import BadInput
+    from rigdda.agents.run_record import RunRecord, read, write_records
 
     context = click.get_current_context(silent=True)
     if context is None:  # a function that is called from Python has no command to record
@@ -255,9 +300,15 @@ def _recorded(folder: Path, site: Site | None, before: set[Stamp]) -> Iterator[N
         return
     command, typed = str(context.info_name), context.find_root().obj or []
     record = RunRecord.begin(command, list(typed), context.params, site)
-    earlier = _earlier(read(folder), command)
+    known = read(folder)
+    earlier = _earlier(known, command)
     record.write(folder)
-    yield
+    try:
+        yield
+    except BadInput:  # a refused command does not replace the record of the results
+        if _stamps(folder) == before:
+            write_records(folder, known)
+        raise
     written = {name for name, _ in _stamps(folder) - before}
     record.end(sorted(written | {name for name in earlier if (folder / name).exists()}))
     record.write(folder)

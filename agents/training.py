@@ -178,9 +178,7 @@ def _stages(terms: Terms, out: Path) -> list[int]:
             before = msgspec.convert(found.pop("episodes"), list[int])
         except (msgspec.MsgspecError, KeyError, RecursionError) as error:
             raise BadInput("terms", str(file), f"{ANEW} ({error})") from None
-        if found != asked:
-            mend = f"use the terms of the training in {out} ({found}) or name another folder"
-            raise BadInput("terms", asked, mend)
+        check_terms(asked, found, out)
         if terms.episodes < before[-1]:
             mend = f"give at least {before[-1]}, as for the training in {out}, or another folder"
             raise BadInput("episodes", terms.episodes, mend)
@@ -190,6 +188,28 @@ def _stages(terms: Terms, out: Path) -> list[int]:
     with atomic(file) as part:
         part.write_bytes(msgspec.json.encode(asked | {"episodes": stages}))
     return stages
+
+
+def check_terms(asked: dict[str, Any], found: dict[str, Any], out: Path) -> None:
+    """Check that the terms of a training are those of the training in its folder.
+
+    Raises
+    ------
+    BadInput
+        If they differ; the message names the first term that does.
+    """
+    for name in (*asked, *found):
+        own, other = asked.get(name), found.get(name)
+        if own != other:
+            chosen = f"give {other}, as for the training in {out}, or " if name in CHOSEN else ""
+            mend = f"{chosen}name another folder with --out"
+            raise BadInput(
+                name, own, mend if chosen else f"the training in {out} has {other}: {mend}"
+            )
+
+
+CHOSEN = ("sites", "seed")
+"""Terms that the user of a training chooses."""
 
 
 def _whole(checkpoint: Path) -> None:

@@ -7,6 +7,7 @@ site with the features and the outcomes of its layouts, and `value.safetensors`.
 from __future__ import annotations
 
 import itertools
+import zipfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import joined
 from rigdda.agents.policy import Network
-from rigdda.agents.training import scaling
+from rigdda.agents.training import check_terms, scaling
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.envs.outcome_cache import mechanics
@@ -103,9 +104,19 @@ class Samples:
 
     @classmethod
     def load(cls, path: Path) -> Samples:
-        """Read samples from a file."""
-        with np.load(path) as file:
-            return cls(file["features"], file["share"], file["weight"])
+        """Read samples from a file.
+
+        Raises
+        ------
+        BadInput
+            If the file is damaged.
+        """
+        try:
+            with np.load(path) as file:
+                return cls(file["features"], file["share"], file["weight"])
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            mend = f"this is damaged: remove this file and repeat the command ({error})"
+            raise BadInput("samples", str(path), mend) from None
 
 
 def train(terms: ValueTerms, out: Path, tick: Tick) -> Network:
@@ -141,9 +152,7 @@ def _agree(terms: ValueTerms, out: Path) -> None:
         except msgspec.MsgspecError as error:
             mend = f"remove the damaged training, or name another folder with --out ({error})"
             raise BadInput("terms", str(file), mend) from None
-        if found != asked:
-            mend = f"use the terms of the training in {out} ({found}) or name another folder"
-            raise BadInput("terms", asked, mend)
+        check_terms(asked, found, out)
     with atomic(file) as part:
         part.write_bytes(msgspec.json.encode(asked))
 

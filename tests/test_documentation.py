@@ -37,7 +37,7 @@ SMALL = {
     "design": ["--budget", "60", "--verify", "20", "--ground-samples", "0"],
     "corridor": ["--releases", "200"],
     "exam": ["--sites", "1", "--budget", "20", "--verify", "10"],
-    "dataset": ["--sites", "1", "--layouts", "4", "--releases", "10"],
+    "dataset": ["--sites", "2", "--layouts", "4", "--releases", "10"],
     "evaluate": ["--budget", "30", "--sites", "1", "--verify", "20"],
     "fidelity": ["--releases", "10"],
     "fit": ["--budget", "8", "--releases", "10"],

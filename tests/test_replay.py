@@ -262,6 +262,7 @@ def fake_viewer(monkeypatch: pytest.MonkeyPatch, folder: Path, script: str) -> N
     starter.write_text(f"#!/bin/sh\n{script}\n")
     starter.chmod(0o755)
     monkeypatch.setattr(viewer.sys, "executable", str(starter))
+    monkeypatch.setenv("DISPLAY", ":0")
 
 
 def interrupted(file: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> int:
@@ -321,6 +322,14 @@ def test_viewer_is_local_and_its_failure_is_told(
     with pytest.raises(Error, match="code 3"):
         open_viewer(file)
     assert "--bind 127.0.0.1" in (tmp_path / "command").read_text()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such variables")
+def test_a_machine_without_a_screen_is_told(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(Error, match=r"no screen: open .*\.rrd on a machine"):
+        open_viewer(file)
 
 
 def test_save_and_load_is_exact(run: Run, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,7 +18,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from rigdda import BadInput, Layout, Outcome, __version__, distribution
+from rigdda import BadInput, DoubtfulInput, Layout, Outcome, __version__, distribution
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.intervals import estimate
 from rigdda.envs.outcome_cache import mechanics, pack
@@ -180,16 +181,29 @@ class Store:
             self._read(self.path)
 
     def _read(self, path: Path) -> None:
-        """Read the complete lines of the file and cut off an incomplete last line."""
+        """Read the complete lines of the file and cut off an incomplete last line.
+
+        Warns
+        -----
+        DoubtfulInput
+            If complete lines are damaged.
+        """
         text = path.read_bytes()
-        whole = text.rfind(b"\n") + 1
+        whole, damaged = text.rfind(b"\n") + 1, 0
         for line in text[:whole].splitlines():
             try:
                 data = json.loads(line, parse_constant=CONSTANTS.__getitem__)
-                if data["sum"] == _sum(data["key"], data["batch"]):
+                sound = data["sum"] == _sum(data["key"], data["batch"])
+                if sound:
                     self._known[data["key"]] = msgspec.convert(data["batch"], StoredEvaluation)
             except (ValueError, KeyError, TypeError, RecursionError, msgspec.ValidationError):
-                continue
+                sound = False
+            damaged += not sound
+        if damaged:
+            told = (
+                f"{path}: {damaged:,} damaged lines are ignored: their releases are simulated again"
+            )
+            warnings.warn(told, DoubtfulInput, stacklevel=3)
         self._kept = set(self._known)
         os.truncate(path, whole)
 

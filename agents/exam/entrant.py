@@ -92,7 +92,7 @@ def run(pipe: Connection, entry: str, corridor_entry: str, secrets: tuple[str, .
     secrets : tuple of str
         Files and folders that the entry must not open.
     """
-    line = PipeLine(pipe)
+    line, at = PipeLine(pipe), ""
     sys.stdout = sys.stderr  # tables of the command are on standard output
     sys.path.insert(0, os.getcwd())
     guard.install(lambda reason: line.tell(FlagRequest(reason)), secrets)
@@ -100,12 +100,21 @@ def run(pipe: Connection, entry: str, corridor_entry: str, secrets: tuple[str, .
         function = load(entry)
         other = load(corridor_entry) if corridor_entry else equal_shares(function)
         while (order := line.order()) is not None:
+            at = f"on {order.name}: "
             line.tell(_submission(order, line, function, other))
     except BadInput as bad:
-        line.tell(FailRequest(str(bad)))
+        line.tell(FailRequest(at + (bad.mend if bad.field == "--entry" else str(bad))))
     except BaseException as error:
-        traceback.print_exc()
-        line.tell(FailRequest(f"{type(error).__name__}: {error}"))
+        print_own_frames(error)
+        line.tell(FailRequest(f"{at}{type(error).__name__}: {error}"))
+
+
+def print_own_frames(error: BaseException) -> None:
+    """Print an error with the frames of the entry, without those of its import and of the exam."""
+    told = traceback.TracebackException.from_exception(error)
+    own = [f for f in told.stack if f.filename != __file__ and not f.filename.startswith("<frozen")]
+    told.stack = traceback.StackSummary.from_list(own)
+    print("".join(told.format()), end="", file=sys.stderr)
 
 
 def _submission(

@@ -220,6 +220,12 @@ def remarks(asked: ExamPart, references: References) -> list[str]:
         )
     elif not asked.complete:
         found.append("a part of the exam was played: the result cannot enter the leaderboard")
+    if asked.verification < asked.specification.verification:
+        most = asked.specification.verification
+        found.append(
+            f"each layout was verified on fewer than {most:,} releases: the score of a single site "
+            "is mostly noise"
+        )
     wanting = len(references.provisional(asked.specification))
     if wanting:
         found.append(

@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -302,14 +303,17 @@ class Scorer:
             self.folder / IDENTITY,
             {"run": msgspec.json.encode([__version__, *own]).decode()},
         )
-        if file.is_file() and msgspec.json.decode(file.read_bytes()) != identity:
-            mend = "it contains an exam of another entry, seed or version: name another folder"
+        if file.is_file() and _decoded(file, dict[str, str]) != identity:
+            mend = (
+                "it contains an exam of another entry, seed or version, or of an earlier version "
+            )
+            mend += "of the file of the entry: name another folder"
             raise BadInput("--out", str(self.folder), mend)
         with atomic(file) as fresh:
             fresh.write_bytes(msgspec.json.encode(identity))
         known = self.folder / SUBMISSIONS
         if known.is_file():
-            rows = msgspec.json.decode(known.read_bytes(), type=list[Submission])
+            rows = _decoded(known, list[Submission])
             self._done = {(row.name, row.budget): row for row in rows}
 
     def _keep(self, submission: Submission) -> None:
@@ -352,7 +356,7 @@ class Scorer:
                 elif isinstance(request, FlagRequest):
                     counter.flag(request.reason)
                 elif isinstance(request, FailRequest):
-                    raise BadInput("--entry", self.entry, f"on {order.name}: {request.error}")
+                    raise BadInput("--entry", self.entry, request.error)
                 else:
                     return _submission(order, problems, counter, request)
         except (EOFError, ConnectionError, OSError):
@@ -447,6 +451,21 @@ def _submission(
     )
 
 
+def _decoded(file: Path, of: type[Any]) -> Any:
+    """Return the content of a JSON file of an exam.
+
+    Raises
+    ------
+    BadInput
+        If the file is damaged.
+    """
+    try:
+        return msgspec.json.decode(file.read_bytes(), type=of)
+    except msgspec.MsgspecError as error:
+        mend = f"this is damaged: remove the exam in its folder, or name another folder ({error})"
+        raise BadInput("exam", str(file), mend) from None
+
+
 @contextmanager
 def _process(entry: str, corridor_entry: str, secrets: tuple[str, ...]) -> Iterator[Connection]:
     """Start a process of an entry and yield the connection to it."""
@@ -481,6 +500,7 @@ def source_hash_of(entry: str) -> str:
         spec = importlib.machinery.PathFinder.find_spec(".".join(names[: i + 1]), places)
         if spec is None:
             mend = "name package.module:function of a module in this folder or an installed one"
+            mend += ", without .py" if entry.partition(":")[0].endswith(".py") else ""
             raise BadInput("--entry", entry, mend)
         places = spec.submodule_search_locations
     file = Path(spec.origin or "") if spec is not None else Path()

@@ -27,6 +27,8 @@ def open_viewer(path: str | os.PathLike[str]) -> None:
     with file.open("rb") as head:
         if head.read(3) != b"RRF":
             raise BadInput("replay file", str(path), "name a .rrd file that Run.to_rerun wrote")
+    if sys.platform.startswith("linux") and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+        raise Error(f"there is no screen: open {file} on a machine that has one, with rerun FILE")
     command = [sys.executable, "-m", "rerun", str(file.absolute()), "--new", "--bind", "127.0.0.1"]
     viewer = subprocess.Popen(command, start_new_session=True)
     try:

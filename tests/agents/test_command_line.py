@@ -415,7 +415,7 @@ def test_a_bad_layout_file_is_one_line(
         (("simulate", "quick", "--seed", "-1"), ("--seed", "-1")),
         (("simulate", "quick", "--releases", 10**9), ("--releases", "1000000000")),
         (("design", "quick", "--budget", 10**9), ("--budget", "1000000000")),
-        (("design", "quick", "--seed", 2**32), ("--seed", "4294967296", "4294967295")),
+        (("design", "quick", "--seed", 2**32), ("--seed", "4294967296", "4,294,967,295")),
         (("train", "--seed", 10**22), ("--seed",)),
         (("evaluate", "--seed", 2**32), ("--seed", "4294967296")),
         (("evaluate", "--sites", 10**5), ("sites", "100000", "at most")),
@@ -460,3 +460,25 @@ def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:
     process.communicate(timeout=300)
     assert process.returncode == 0
     assert b"tables and pictures" in seen and b"3/3" in seen  # the last state is always drawn
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (
+            ("evaluate", "--budget", "1e4"),
+            "--budget = '1e4': give a whole number of at least 2 and",
+        ),
+        (("evaluate", "--sites", "0"), "--sites = '0': give a whole number of at least 1 and"),
+        (
+            ("design", "quick", "--target", "0"),
+            "--target = '0': give a number above 0.0 and at most",
+        ),
+        (("design", "quick", "--seed", "-1"), "--seed = '-1': give a whole number of at least 0"),
+        (("train", "--model", "value", "--episodes", "3"), "--episodes is for --model policy"),
+    ],
+)
+def test_an_option_outside_its_range_says_which_numbers_are_accepted(
+    arguments: tuple[str, ...], line: str, tmp_path: Path
+) -> None:
+    assert line in refused(*arguments, folder=tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,33 @@ def test_a_run_continues_and_other_terms_are_refused(
         dataset.write(Recipe("validation", 7, 8), 1, folder)
     with pytest.raises(BadInput, match="sites"):
         RECIPE.names(61)
+
+
+def test_a_refused_command_leaves_the_record_of_the_results(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (folder / "run.json").read_bytes()
+    assert cli.main(["dataset", "--split", "validation", "--sites", "1", "--layouts", "7",
+                     "--releases", "8", "--out", str(folder)]) == 2  # fmt: skip
+    assert "layouts = 7: the data set in" in capsys.readouterr().err
+    assert (folder / "run.json").read_bytes() == before
+
+
+@pytest.mark.parametrize("file", ["dataset.json", f"outcomes/{SITE}.parquet"])
+def test_a_damaged_file_is_named(file: str, folder: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "data"
+    shutil.copytree(folder, copy)
+    (copy / file).write_bytes(b"junk")
+    with pytest.raises(BadInput, match=f"{file}.*damaged"):
+        dataset.write(RECIPE, 1, copy)
+
+
+def test_a_missing_part_is_named(folder: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "data"
+    shutil.copytree(folder, copy)
+    (copy / "sites" / f"{SITE}.parquet").unlink()
+    with pytest.raises(BadInput, match=rf"sites/{SITE}.parquet.*missing"):
+        dataset.read(copy)
 
 
 def features(row: dict, place: dict) -> list[float]:

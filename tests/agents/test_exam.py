@@ -221,6 +221,7 @@ def test_an_entry_that_fails_is_one_line(folder: Path) -> None:
     assert done.returncode == 2
     last = done.stderr.strip().splitlines()[-1]
     assert last.startswith("rigdda: ") and "RuntimeError: no idea" in last
+    assert "entries_of_test.py" in done.stderr and "entrant.py" not in done.stderr
     missing = exam(folder, "nowhere", "--sites", "1")
     assert missing.returncode == 2
     assert "name a function that can be imported" in missing.stderr
@@ -248,6 +249,9 @@ def test_a_part_is_marked_and_an_exam_continues(folder: Path) -> None:
     assert (folder / "out-part" / "submissions.json").stat().st_mtime_ns == kept
     other = exam(folder, "honest", "--sites", "1", "--seed", "5", "--out", "out-part")
     assert other.returncode == 2 and "name another folder" in other.stderr
+    (folder / "out-part" / "submissions.json").write_text("junk")
+    damaged = exam(folder, "honest", "--sites", "1", "--budget", "60", "--out", "out-part")
+    assert damaged.returncode == 2 and "submissions.json': this is damaged" in damaged.stderr
 
 
 def test_seeds_of_the_verification_follow_from_the_layouts(folder: Path, tmp_path: Path) -> None:

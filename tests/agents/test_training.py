@@ -64,7 +64,7 @@ def test_a_killed_training_goes_on(trained: tuple[Path, str], tmp_path: Path) ->
     last = Network.load(tmp_path / "o/policy.safetensors").layers[-1][0]
     assert (last != Network.load(trained[0] / "policy.safetensors").layers[-1][0]).any()
     line = refused("train", *more, "--seed", 1, "--out", "o", folder=tmp_path)
-    assert "terms" in line and "another folder" in line
+    assert "seed = 1" in line and "another folder" in line
 
 
 @pytest.mark.slow
@@ -134,7 +134,7 @@ def test_a_damaged_training_is_one_line(name: str, content: bytes | None, tmp_pa
         file.write_bytes(content)
     line = refused("train", *SMALL, "--out", ".", folder=tmp_path)
     assert name in line and "another folder" in line
-    assert sorted(tmp_path.iterdir()) == sorted([file, tmp_path / "run.json"])
+    assert list(tmp_path.iterdir()) == [file]
 
 
 @pytest.mark.slow

@@ -439,8 +439,13 @@ def _places(site: Any) -> tuple[Corridor | None, tuple[Place, ...]]:
         return site, ()
     if isinstance(site, str) and site in corridor_names():
         return Corridor.load(site), ()
-    if isinstance(site, str | os.PathLike) and is_corridor(site):
-        return Corridor.load(site), ()
+    if isinstance(site, str | os.PathLike):
+        try:
+            if is_corridor(site):
+                return Corridor.load(site), ()
+        except BadInput as bad:
+            field = "site" if bad.field == "corridor" else bad.field
+            raise BadInput(field, bad.value, bad.mend) from None
     drawn = drawn_from(site)
     if drawn and isinstance(site, str):
         return None, drawn
@@ -455,9 +460,12 @@ def _range(field: str, value: Any) -> tuple[float, float]:
     if isinstance(value, int | float | np.number):
         number = check.number(field, value, 0.0, 1e9)
         return number, number
-    low, high = check.interval(field, value, 0.0, 1e9)
+    try:
+        low, high = check.interval(field, value, 0.0, 1e9)
+    except BadInput:
+        low = 0.0
     if low <= 0.0:
-        raise BadInput(field, value, "give numbers above 0")
+        raise BadInput(field, value, "give a number, or two numbers [low, high] above 0")
     return low, high
 
 

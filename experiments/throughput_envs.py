@@ -3,9 +3,10 @@
 Batches as Stable-Baselines3 steps them play at least 256 episodes (16 with --quick) of random
 actions with one release each, in threads on all cores. No two batches share a seed, so that none
 finds the cached outcomes of another. The site is quick with its groups and its jointed mass, or
-with single blocks only. `times_before`: episodes per second of processor time, which other jobs
-affect less, over those of 64 copies at commit 78de9db, when every episode was one release of the
-mass of quick at fidelity "fast".
+with single blocks only. Corridors have twelve sections of the validation split without large
+masses, and four releases of each section. `times_before`: episodes per second of processor time,
+which other jobs affect less, over those of 64 copies at commit 78de9db, when every episode was one
+release of the mass of quick at fidelity "fast".
 
 Variance: of the reward of one release relative to the site's mean without barriers, compared with
 that relative to the same release without barriers, as before; means over random layouts, and for
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 import os
 import time
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ import rigdda.envs
 from experiments.script import folder, options, write
 from rigdda import Layout, Site, sites
 from rigdda.envs import DesignProblem
+from rigdda.envs.envelope import largest
 from rigdda.envs.environments import Ask, simulate
 
 BATCHES = (1, 8, 64, 1)
@@ -55,6 +58,19 @@ def places() -> dict[str, Site]:
     return {"quick": quick, "quick, single blocks": alone}
 
 
+CORRIDOR = "rigdda/Corridor-v0"
+
+SECTIONS, RELEASES = 12, 4
+"""Number of sections of a corridor, and of releases of each."""
+
+
+def sections() -> tuple[Site, ...]:
+    """Return the first sites of the validation split whose events have fewer than 100 blocks."""
+    every = (sites.load(name) for name in sites.split("validation"))
+    small = (s for s in every if max(largest(s, name) for name in s.event_names) < 100)
+    return tuple(islice(small, SECTIONS))
+
+
 def play(env: Any, episodes: int) -> tuple[int, int]:
     """Play at least this number of episodes; return the number of episodes and of steps."""
     ended = steps = 0
@@ -65,9 +81,12 @@ def play(env: Any, episodes: int) -> tuple[int, int]:
     return ended, steps
 
 
-def measure(name: str, site: Site, copies: int, episodes: int, seed: int) -> dict[str, Any]:
+def measure(
+    name: str, site: Site | tuple[Site, ...], copies: int, episodes: int, seed: int
+) -> dict[str, Any]:
     """Return the measurements of one batch."""
-    env = rigdda.envs.sb3_vec_env(name, copies, site=site, releases=1)
+    releases = RELEASES if name == CORRIDOR else 1
+    env = rigdda.envs.sb3_vec_env(name, copies, site=site, releases=releases)
     env.seed(seed)
     env.action_space.seed(seed)
     env.reset()
@@ -76,7 +95,7 @@ def measure(name: str, site: Site, copies: int, episodes: int, seed: int) -> dic
     ended, steps = play(env, episodes)
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
     env.close()
-    comparable = len(site.events) > 1  # earlier episodes were of a mass
+    comparable = isinstance(site, Site) and len(site.events) > 1  # earlier episodes were of a mass
     return {
         "environment": name,
         "copies": copies,
@@ -102,6 +121,11 @@ def throughput(episodes: int) -> list[dict[str, Any]]:
                 row = {"site": label} | measure(name, site, copies, episodes, seed)
                 rows.append(row)
                 click.echo(row)
+    for copies in BATCHES:
+        seed, few = 1000 * (len(rows) + 1), -(-episodes // SECTIONS)
+        row = {"site": "validation"} | measure(CORRIDOR, sections(), copies, few, seed)
+        rows.append(row)
+        click.echo(row)
     return rows
 
 

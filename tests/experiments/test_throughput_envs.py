@@ -20,8 +20,9 @@ def test_every_batch_is_measured(tmp_path, monkeypatch):
     with (tmp_path / "throughput_envs.csv").open() as file:
         rows = list(csv.DictReader(file))
     batches = [(row["environment"], row["copies"]) for row in rows]
-    assert batches == 2 * [(name, copies) for name in BEFORE for copies in ("1", "2")]
-    assert all(int(row["episodes"]) >= 16 for row in rows)
+    names = [*BEFORE, *BEFORE, throughput_envs.CORRIDOR]
+    assert batches == [(name, copies) for name in names for copies in ("1", "2")]
+    assert all(int(row["steps"]) >= 16 for row in rows)
     assert all(float(row["episodes_per_second"]) > 0.0 for row in rows)
     with (tmp_path / "reward_variance.csv").open() as file:
         (row,) = csv.DictReader(file)

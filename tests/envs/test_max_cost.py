@@ -103,7 +103,7 @@ def test_the_race_spends_what_it_may() -> None:
     problem = DesignProblem(LIGHT, max_cost=400.0)
     result = module("race").design(problem, 600, seed=0)
     costs = [e.evaluation.cost for e in result.history.entries]
-    assert len({e.evaluation.layout for e in result.history.entries}) > 10
+    assert len({e.evaluation.layout for e in result.history.entries}) >= 8
     assert 0.0 < max(costs) <= 400.0
     assert result.evaluation.objective < problem.nothing.objective
 

@@ -28,6 +28,7 @@ from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.limits import RELEASES, SEED
 from rigdda.agents.policy import features
+from rigdda.agents.run_record import check_terms
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import observe
@@ -195,10 +196,7 @@ def _check_folder(recipe: Recipe, folder: Path) -> None:
         except msgspec.MsgspecError as error:
             mend = f"this is damaged: remove the data set, or name another folder ({error})"
             raise BadInput("data set", str(file), mend) from None
-        for name, value in content.items():
-            if found.get(name) != value:
-                mend = f"the data set in {folder} has {found.get(name)}: name another folder"
-                raise BadInput(name, value, mend)
+        check_terms(content, found, f"the data set in {folder}")
     with atomic(file) as fresh:
         fresh.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 

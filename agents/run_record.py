@@ -112,6 +112,27 @@ def write_records(folder: Path, records: dict[str, RunRecord]) -> None:
         part.write_bytes(text + b"\n")
 
 
+def check_terms(asked: dict[str, Any], found: dict[str, Any], what: str) -> None:
+    """Check that a command continues what is in its folder on the same terms.
+
+    Parameters
+    ----------
+    asked, found : dict
+        Terms of the command, and those that are recorded in the folder.
+    what : str
+        What the folder contains, such as "the training in runs/train".
+
+    Raises
+    ------
+    BadInput
+        If they differ; the message names the first term that does.
+    """
+    for name in (*asked, *found):
+        own, other = asked.get(name), found.get(name)
+        if own != other:
+            raise BadInput(name, own, f"{what} has {other}: name another folder with --out")
+
+
 def as_toml(site: Site) -> str:
     """Return a site as the text of a site file, with all defaults; empty if TOML cannot hold it."""
     with tempfile.TemporaryDirectory() as folder:

@@ -22,6 +22,7 @@ from rigdda import BadInput, __version__, check, sites
 from rigdda.agents import designers, limits
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.policy import SLOTS, Network, decide, features
+from rigdda.agents.run_record import check_terms
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import barrier_free
 from rigdda.envs.observation import observe
@@ -178,7 +179,7 @@ def _stages(terms: Terms, out: Path) -> list[int]:
             before = msgspec.convert(found.pop("episodes"), list[int])
         except (msgspec.MsgspecError, KeyError, RecursionError) as error:
             raise BadInput("terms", str(file), f"{ANEW} ({error})") from None
-        check_terms(asked, found, out)
+        check_terms(asked, found, f"the training in {out}")
         if terms.episodes < before[-1]:
             mend = f"give at least {before[-1]}, as for the training in {out}, or another folder"
             raise BadInput("episodes", terms.episodes, mend)
@@ -188,28 +189,6 @@ def _stages(terms: Terms, out: Path) -> list[int]:
     with atomic(file) as part:
         part.write_bytes(msgspec.json.encode(asked | {"episodes": stages}))
     return stages
-
-
-def check_terms(asked: dict[str, Any], found: dict[str, Any], out: Path) -> None:
-    """Check that the terms of a training are those of the training in its folder.
-
-    Raises
-    ------
-    BadInput
-        If they differ; the message names the first term that does.
-    """
-    for name in (*asked, *found):
-        own, other = asked.get(name), found.get(name)
-        if own != other:
-            chosen = f"give {other}, as for the training in {out}, or " if name in CHOSEN else ""
-            mend = f"{chosen}name another folder with --out"
-            raise BadInput(
-                name, own, mend if chosen else f"the training in {out} has {other}: {mend}"
-            )
-
-
-CHOSEN = ("sites", "seed")
-"""Terms that the user of a training chooses."""
 
 
 def _whole(checkpoint: Path) -> None:

@@ -26,7 +26,8 @@ from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import joined
 from rigdda.agents.policy import Network
-from rigdda.agents.training import check_terms, scaling
+from rigdda.agents.run_record import check_terms
+from rigdda.agents.training import scaling
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.envs.outcome_cache import mechanics
@@ -152,7 +153,7 @@ def _agree(terms: ValueTerms, out: Path) -> None:
         except msgspec.MsgspecError as error:
             mend = f"remove the damaged training, or name another folder with --out ({error})"
             raise BadInput("terms", str(file), mend) from None
-        check_terms(asked, found, out)
+        check_terms(asked, found, f"the training in {out}")
     with atomic(file) as part:
         part.write_bytes(msgspec.json.encode(asked))
 

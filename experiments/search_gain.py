@@ -2,9 +2,10 @@
 
 `python -m experiments.search_gain [--quick] [--out DIR]`. Both search on the same sites with three
 budgets. The sites are of the validation split, without its first 20, which served in the
-development of the designer. The layouts are verified on the same fresh releases. The difference of
-Z is divided by Z without barriers and averaged over the sites. Sites with an event of 100 blocks or
-more are left out, since a release takes as long as hundreds of others.
+development of the designer. The others decided only which of its parts were removed. The layouts
+are verified on the same fresh releases. The difference of Z is divided by Z without barriers and
+averaged over the sites. Sites with an event of 100 blocks or more are left out, since a release
+takes as long as hundreds of others.
 
 Writes search_gain.csv, one row per search. An interrupted run is resumed. Judged by the lower end
 of the 95 % interval of the mean gain, the least of the budgets.

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import os
 import time
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +27,9 @@ import numpy as np
 
 import rigdda.envs
 from experiments.script import folder, options, write
+from experiments.search_gain import problems_of
 from rigdda import Layout, Site, sites
 from rigdda.envs import DesignProblem
-from rigdda.envs.envelope import largest
 from rigdda.envs.environments import Ask, simulate
 
 BATCHES = (1, 8, 64, 1)
@@ -66,9 +65,8 @@ SECTIONS, RELEASES = 12, 4
 
 def sections() -> tuple[Site, ...]:
     """Return the first sites of the validation split whose events have fewer than 100 blocks."""
-    every = (sites.load(name) for name in sites.split("validation"))
-    small = (s for s in every if max(largest(s, name) for name in s.event_names) < 100)
-    return tuple(islice(small, SECTIONS))
+    found = problems_of(SECTIONS, sites.split("validation"))
+    return tuple(problem.site for problem in found)
 
 
 def play(env: Any, episodes: int) -> tuple[int, int]:

@@ -305,9 +305,9 @@ class Scorer:
         )
         if file.is_file() and _decoded(file, dict[str, str]) != identity:
             mend = (
-                "it contains an exam of another entry, seed or version, or of an earlier version "
+                "it contains an exam of another entry, source file, seed or version: name another"
             )
-            mend += "of the file of the entry: name another folder"
+            mend += " folder"
             raise BadInput("--out", str(self.folder), mend)
         with atomic(file) as fresh:
             fresh.write_bytes(msgspec.json.encode(identity))

@@ -374,6 +374,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
     if words := findings.of_layout(where, barriers, event):
         notes["note"] = words
+        note(words)
     road, labels = (where.road.start, where.road.end), where.labels(barriers)
     record = release_record(where, barriers, seed, event, outcome)
     run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels, record))

@@ -16,11 +16,11 @@ import numpy as np
 from rigdda import BadInput, Layout, Outcome, Site, __version__
 from rigdda.barriers import to_tables
 from rigdda.envs.problem import Targets
-from rigdda.kernel import source_hash
+from rigdda.kernel import kernels_hash
 
 
 class Versions(msgspec.Struct, frozen=True):
-    """Versions of the programs that computed a record, and a hash of the kernel sources."""
+    """Versions of the programs that computed a record, and the hash of the kernels."""
 
     rigdda: str
     kernels: str
@@ -34,7 +34,7 @@ class Versions(msgspec.Struct, frozen=True):
         """Return the versions of this process."""
         return cls(
             rigdda=__version__,
-            kernels=source_hash(),
+            kernels=kernels_hash(),
             numba=numba.__version__,
             numpy=np.__version__,
             python=platform.python_version(),

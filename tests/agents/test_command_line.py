@@ -295,6 +295,14 @@ def test_replay_makes_an_episode_and_says_where(toml: Path, tmp_path: Path) -> N
     assert any(chunk.entity_path == "/world/road" for chunk in RrdReader(file).stream())
 
 
+def test_replay_says_that_a_layout_may_not_be_built(tmp_path: Path) -> None:
+    rigdda.save_layout((rigdda.Fence(9.5, 2.0, energy_class=100),), tmp_path / "layout.toml")
+    words = run("replay", "quick", "--layout", "layout.toml", "--out", "o", folder=tmp_path)
+    note, file = words.strip().splitlines()
+    assert note.startswith("note: the layout is simulated as given but may not be built")
+    assert "within 11.3 to 34.3 m" in note and (tmp_path / file).is_file()
+
+
 def test_releases_of_one_event_are_of_that_event(tmp_path: Path) -> None:
     options = ("--event", "group", "--releases", 3, "--out", "o")
     run("simulate", "quick", *options, folder=tmp_path)

@@ -319,8 +319,8 @@ class Value:
 
 
 FILE = Path(__file__).parent / "value.safetensors"
-"""The network that ships with the package. It was trained with seed 1 by the method of
-`rigdda train --model value`. This command did not exist yet, so the file names none."""
+"""The network that ships with the package. It was trained with seed 1 and the method of
+`rigdda train --model value`, which was added later, so that its metadata contain only the seed."""
 
 
 @lru_cache(maxsize=1)

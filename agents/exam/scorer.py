@@ -304,10 +304,8 @@ class Scorer:
             {"run": msgspec.json.encode([__version__, *own]).decode()},
         )
         if file.is_file() and _decoded(file, dict[str, str]) != identity:
-            mend = (
-                "it contains an exam of another entry, source file, seed or version: name another"
-            )
-            mend += " folder"
+            mend = "it contains an exam of another entry, source file, seed or version: "
+            mend += "name another folder"
             raise BadInput("--out", str(self.folder), mend)
         with atomic(file) as fresh:
             fresh.write_bytes(msgspec.json.encode(identity))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import shutil
@@ -16,12 +17,27 @@ from rigdda import kernel
 from rigdda.errors import Error
 
 SOURCE = """
-from rigdda.kernel import entry_kernel
+from rigdda.kernel import arithmetic_kernel, entry_kernel, kernel, stage
+
+
+@arithmetic_kernel
+def add(x: float, y: float) -> float:
+    return x + y
+
+
+@kernel
+def twice(x: float) -> float:
+    return add(x, x)
+
+
+@stage
+def whole(x: float) -> float:
+    return twice(x)
 
 
 @entry_kernel
 def double(x: float) -> float:
-    return 2.0 * x
+    return whole(x)
 """
 
 
@@ -55,6 +71,26 @@ def double(places, tmp_path):
 def hits(entry) -> int:
     """Return how many versions of a kernel came from the cache."""
     return sum(entry.stats.cache_hits.values())
+
+
+def test_only_entry_kernels_become_machine_code(double):
+    entry = double()
+    assert entry(3.0) == 6.0 and hits(entry) == 0
+    inner = entry.py_func.__globals__["twice"].overloads
+    assert [type(part.library) for part in inner.values()] == [kernel.LinkedLibrary]
+    again = double()
+    assert again(3.0) == 6.0 and hits(again) == 1
+
+
+@pytest.mark.parametrize("collecting", [True, False])
+def test_compilation_leaves_garbage_collection_as_it_was(double, collecting):
+    before = gc.isenabled()
+    try:
+        (gc.enable if collecting else gc.disable)()
+        double()(3.0)
+        assert gc.isenabled() is collecting
+    finally:
+        (gc.enable if before else gc.disable)()
 
 
 def test_the_users_cache_is_taken_where_it_can_be_written(places):

@@ -105,7 +105,7 @@ def run(quick: bool, out: Path) -> Number:
         mean, half = interval(relative(rows, other) - value)
         lines.append(f"value ahead of {other}: {mean:.3f} +- {half:.3f}")
         least = min(least, mean - half) if other in ("constant", "rule") else least
-    what = "gain of the value network over constant and rule over Z of nothing, lower end"
+    what = "gain of the value network over constant and rule over Z without barriers, lower end"
     note = f"{len(value)} sites\n" + "\n".join(lines)
     return Number(what, least, low=-1.0 if quick else 0.0, note=note)
 

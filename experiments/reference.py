@@ -66,8 +66,9 @@ def single(site: Site, event: str) -> bool:
 def settle(
     problem: DesignProblem, layouts: Iterable[Layout], wanted: float, most: int
 ) -> dict[Layout, Evaluation]:
-    """Verify layouts on the same fresh releases until the best is known to `wanted` of nothing.
+    """Verify layouts on the same fresh releases until the best is known well enough.
 
+    That is when its half interval is the fraction `wanted` of Z without barriers.
     Layouts that are already distinguishable from the best get no further releases.
     """
     store, half = Store(), wanted * problem.nothing.objective
@@ -156,7 +157,8 @@ def picture(figure: Figure, rows: list[Row]) -> None:
             axes.errorbar(z, y, xerr=[[z - low], [high - z]], fmt="o", color=colour, capsize=2)
         axes.set_yticks(range(len(own)), [words(r) for r in reversed(own)], fontsize=7)
         axes.axvline(1.0, color="0.8", zorder=0)
-        axes.set(title=f"{name}: Z of nothing {base:.0f}", xlabel="Z over that of nothing [-]")
+        title = f"{name}: {base:.0f} without barriers"
+        axes.set(title=title, xlabel="Z over Z without barriers [-]")
         axes.set_xlim(left=0.0)
     for axes in grid[len(names) :]:
         axes.set_visible(False)
@@ -187,7 +189,7 @@ def run(quick: bool, out: Path) -> Number:
         for r in best
     )
     return Number(
-        "greatest half interval of a reference over Z of nothing",
+        "greatest half interval of a reference over Z without barriers",
         max(half), high=QUICK_WANTED if quick else WANTED, note=note,
     )  # fmt: skip
 

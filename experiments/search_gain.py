@@ -112,7 +112,7 @@ def run(quick: bool, out: Path) -> Number:
         for budget, (mean, half) in ends.items()
     )
     least = min(mean - half for mean, half in ends.values())
-    what = "gain of the default over random search over Z of nothing, lower end, least of budgets"
+    what = "gain over random search, of Z without barriers, lower end, least of budgets"
     return Number(what, least, low=-1.0 if quick else 0.0, note=note)
 
 

@@ -282,7 +282,7 @@ class LinkedLibrary(JITCodeLibrary):
 
     @property
     def codegen(self) -> LinkedLibrary:
-        """Return this library, whose `set_env` replaces that of numba."""
+        """Return the object on which numba calls `set_env`, which is this library."""
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
@@ -331,9 +331,9 @@ INSIDE: dict[str, Any] = {
 """Compiler options of kernels that are called by kernels only.
 
 Kernels allocate nothing, so reference counting is disabled by `_nrt=False`; its atomic operations
-on every array argument would take four fifths of a step. Compilation without machine code and
-without wrappers for calls from Python and C takes half the time. Calling such a kernel from Python
-crashes, see `from_python`.
+on every array argument would take four fifths of a step. Compilation without wrappers for calls
+from Python and C takes two thirds of the time. Calling such a kernel from Python crashes, see
+`from_python`.
 """
 
 

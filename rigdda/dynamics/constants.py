@@ -20,9 +20,9 @@ IMPACT_STEPS = 3.0
 
 AT_ONCE = 1e-4
 """Shortest substep of a lone body over the step [-]. Corners that strike within this time strike
-simultaneously. With 2e-2, a square that lands on one corner while the next corner is 1 mm above the
-ground has a velocity error of 5 %, and of 43 % at most, in steps of 10 ms with a restitution of
-0.5."""
+simultaneously. With 2e-2, in steps of 10 ms with a restitution of 0.5, the velocity of a square
+that lands on one corner is wrong by 5 % if the next corner is 1 mm above the ground, and by up to
+43 % at other heights."""
 
 RECOVERY_SWEEPS = 6
 """Number of sweeps over the contacts of an island in position correction."""

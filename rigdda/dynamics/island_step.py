@@ -161,8 +161,9 @@ def settle_island(
 ) -> bool:
     """Compute the contact forces of an island and move its slots through the step.
 
-    Islands are relaxed. If relaxation does not converge, an island at rest is solved as a whole.
-    Returns whether any contact had an impact.
+    Some islands are solved as a whole first (`is_tried_whole`). All others, and those for which
+    this fails, are relaxed. If relaxation does not converge, an island at rest is solved as a
+    whole. Returns whether any contact had an impact.
     """
     counters, ledger = totals.counters, totals.ledger
     islands, rows, m = work.islands, work.rows, work.matrix

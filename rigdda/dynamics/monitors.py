@@ -8,8 +8,9 @@ lies.
 
 Rock that is jammed between two rigid faces may press on both with any force, which vanishes as soon
 as one of them yields. Contacts at rest therefore count for no more than the weight of the blocks
-that lean on the barrier: this is the driving force of rock on a slope 45 degrees steeper than its
-friction angle.
+that lean on the barrier. A smooth vertical wall that retains rock of weight W on a slope beta with
+the friction angle phi carries W tan(beta - phi), which reaches W where beta exceeds phi by 45
+degrees.
 """
 
 from __future__ import annotations

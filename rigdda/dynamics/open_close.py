@@ -2,9 +2,10 @@
 
 `next_state` decides the state of each contact: a closed contact must press, an open contact must
 not overlap, a sticking contact must stay within its friction limit, and a slipping contact must
-slip against its friction. In static mode all islands are solved this way, otherwise islands at rest
-for which relaxation does not converge. All other islands are relaxed, see
-`rigdda.dynamics.relaxation`.
+slip against its friction. `island_step.is_tried_whole` lists the islands that are solved this way
+first, such as all islands in static mode. Otherwise, an island is relaxed
+(`rigdda.dynamics.relaxation`), and solved this way only if it is at rest and relaxation does not
+converge.
 """
 
 from __future__ import annotations

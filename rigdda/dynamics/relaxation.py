@@ -11,10 +11,10 @@ where F is weight and loads, p_c the impulse of a contact and e_c its row. (A bo
 impulses moves with the mean of its old and new velocity, as under a constant force.) Linear and
 angular momentum are conserved for any impulses.
 
-A lone body takes a single substep, or several that end at its impacts. Because no impact occurs
-within a substep, its contacts act with the geometry of the middle of the substep, which is accurate
-to second order. A wheel of sixteen sides rolls 1e-4 too far; with ten substeps and the geometry of
-their start, 8e-4.
+A lone body takes a single substep, or several that end at its impacts. Its contacts act with the
+geometry of the middle of the substep. This is accurate to second order, because no impact occurs
+within the substep. The distance that a wheel of sixteen sides rolls is too large by a fraction of
+1e-4; with ten substeps and the geometry of their start, it would be too large by 8e-4.
 
 The impulses are found by projected Gauss-Seidel sweeps, which decide the state of each contact as
 they visit it. The normal impulse cannot pull. It limits the closing velocity of an open contact to
@@ -258,8 +258,8 @@ def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
 
     Contacts that cannot close before substep idle[k] are skipped. After the first sweep of a
     substep, so are contacts of which neither body moved in the last sweep; moved_in[s] is the last
-    sweep of the substep in which slot s moved. Every contact is written, and overwritten by the
-    next one if it is to be skipped, because unpredictable branches would cost more than the visits.
+    sweep of the substep in which slot s moved. A contact to be skipped is also written, but the
+    next one overwrites it. This avoids a branch that the processor cannot predict.
     """
     visits = 0
     for place in range(count):

@@ -8,9 +8,9 @@ with the value at end 1
 
 .. math:: \sigma_1 = \frac{N}{L} + \frac{6 M}{L^2} = \frac{2 (2 N_1 - N_2)}{L} .
 
-Where the traction exceeds the tensile strength, the joint opens: along its whole length if N is
-tensile, because the traction increases as the joint becomes shorter, and at that end only if N is
-compressive. The shear strength is the sum of cohesion and friction.
+A joint opens where the traction exceeds the tensile strength. If N is tensile, it opens along its
+whole length, because the traction increases as the joint becomes shorter. If N is compressive, it
+opens at that end only. The shear strength is the sum of cohesion and friction.
 """
 
 from __future__ import annotations

@@ -11,9 +11,10 @@ at any stiffness. The kinds of contact differ in the bias b:
 
 =======  ====================================================================================
 at rest  b = N_0 / kappa, with N_0 the force of the last step. kappa = k_n; in steps shorter
-         than the retardation time tau, kappa = k_n tau / dt, of which k_n is elastic and
-         carried over and the rest is viscous (a Kelvin-Voigt solid). An open gap has b = -g:
-         a contact that would close within the step is slowed to close one step later.
+         than the retardation time tau, kappa = k_n tau / dt (a Kelvin-Voigt solid): the force
+         of the part k_n is elastic and carried over to the next step, and that of the rest is
+         viscous. An open gap has b = -g: a contact that would close within the step is slowed
+         to close one step later.
 new      As at rest with N_0 = 0, but stiff in its first step: it finds the force that stops the
          bodies, and continues with it as if they had always been in contact.
 plain    b = -2 g with w_0 taken as 0: a penalty spring on the gap, the paper's contact.
@@ -22,6 +23,7 @@ plain    b = -2 g with w_0 taken as 0: a penalty spring on the gap, the paper's 
 The shear spring acts in the same way on the shear velocity, starting from the shear force of the
 last step, and is limited by Coulomb friction in a return mapping. Islands in motion, and at first
 also islands at rest, are relaxed instead, with rigid contacts (`rigdda.dynamics.relaxation`).
+Restitution acts only there (`relaxation.rebound`).
 """
 
 from __future__ import annotations

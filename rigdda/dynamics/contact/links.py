@@ -36,8 +36,8 @@ def arm(body: Body, x: float, y: float, dt: float) -> tuple[float, float]:
     """Return the lever arm of a point in body coordinates, averaged over a step [m].
 
     It is the mean of the arms before and after the step at the current rate of rotation. A point
-    that is at rest before the step, and does not move by the displacement along this arm, is at
-    rest after the step: exactly so if the rate of rotation is constant.
+    that is at rest before the step and whose displacement, computed with this arm, is zero is also
+    at rest after the step. This is exact for a constant rate of rotation.
     """
     half = 0.5 * dt * body.omega
     theta, mean = body.theta + half, math.cos(half)

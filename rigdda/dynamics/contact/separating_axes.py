@@ -20,8 +20,8 @@ from rigdda.dynamics.records import Corners
 from rigdda.kernel import inlined, kernel, variable
 
 TOUCH = 2e-3
-"""Distance over the margin at which a face is entered in an impact [-]. The more oblique the face,
-the earlier it is reached, so that of an edge and the corner at its end the edge is hit."""
+"""Distance over the margin at which a face is entered in an impact [-]. It exceeds zero so that a
+more oblique face is entered earlier, and an edge is hit rather than the corner at its end."""
 
 SQUARE = 0.2
 """Ratio of the approach normal to a face to the total relative displacement, above which the face

@@ -32,7 +32,7 @@ from rigdda.errors import BadInput, Diverged, SoftContacts
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings
 
-MOST_STEPS, PIECE = 1e9, 10_000
+MOST_STEPS, STEPS_PER_CALL = 1e9, 10_000
 """Maximum number of steps of a run, which take a day or more for a single block, and maximum number
 of steps between which a run cannot be interrupted."""
 
@@ -173,8 +173,8 @@ class Simulation:
         Diverged
             If the velocity of a block is not finite or exceeds that of any rockfall.
         """
-        for done in range(0, check.integer("n", n, 0, int(MOST_STEPS)), PIECE):
-            self.loop.advance(min(n - done, PIECE), self._no_frames)
+        for done in range(0, check.integer("n", n, 0, int(MOST_STEPS)), STEPS_PER_CALL):
+            self.loop.advance(min(n - done, STEPS_PER_CALL), self._no_frames)
 
     def run(self, duration: float, every: float = 0.05, progress: bool = False) -> Run:
         """Simulate `duration` seconds and record frames at regular intervals, including the start.

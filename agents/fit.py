@@ -233,7 +233,8 @@ def quality(
 def seen(observed: Mapping[str, Floats], toe: float) -> Quality:
     """Return the statistics of the observed run-outs."""
     every = np.concatenate(list(observed.values()))
-    quantiles = tuple(float(q) for q in np.quantile(every, QUANTILES))
+    found = np.quantile(every, QUANTILES, method="inverted_cdf")  # as in `quality`
+    quantiles = tuple(float(q) for q in found)
     means = {event: float(values.mean()) for event, values in observed.items()}
     return Quality(0.0, float(every.mean()), quantiles, means, float((every < toe).mean()))
 

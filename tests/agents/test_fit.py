@@ -36,6 +36,16 @@ def test_scores_are_least_for_the_distribution_that_was_drawn_from():
     assert mean[10.0, 2.0] == pytest.approx(2.0 / np.sqrt(np.pi), rel=0.03)  # Gneiting, eq. 5
 
 
+@pytest.mark.parametrize("runs", [7, 33])
+def test_an_exact_prediction_has_the_statistics_of_the_observations(runs):
+    observed = {"block": np.random.default_rng(runs).uniform(0.0, 120.0, runs)}
+    seen = fit.seen(observed, 60.0)
+    exact = fit.quality(observed, [observed["block"]] * runs, 0.0, 60.0)
+    assert exact.quantiles == seen.quantiles
+    assert exact.mean == pytest.approx(seen.mean)
+    assert exact.stopped == pytest.approx(seen.stopped)
+
+
 def test_values_are_found_again_with_what_they_predict():
     parameters, real = truth()
     events = ["block", "small, face"]

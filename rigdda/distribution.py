@@ -133,8 +133,3 @@ class _Worker:
             return self.function(item)
         finally:
             _remote = before
-
-
-def parts(count: int, most: int) -> list[range]:
-    """Return ranges that cover `count` items, of at most `most` items each."""
-    return [range(i, min(i + most, count)) for i in range(0, count, most)]

@@ -21,7 +21,7 @@ from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
 from rigdda.measurement import AT_REST
 from rigdda.model.site import Site
-from rigdda.releases import SENT, Batch, as_site
+from rigdda.releases import SENT, Batch, as_site, by_size
 
 PASSAGE = np.dtype(
     [
@@ -129,6 +129,19 @@ class Passages:
             rows("stops"),
         )
 
+    def moved(self, places: Sequence[int]) -> Passages:
+        """Return the same releases in another order, release i at position places[i]."""
+        place = np.array(places, dtype=np.int64)
+        order = np.argsort(place)
+
+        def rows(table: NDArray[np.void]) -> NDArray[np.void]:
+            table = table.copy()
+            table["release"] = place[table["release"]]
+            return table[np.argsort(table["release"], kind="stable")]
+
+        seeds = tuple(self.seed[i] for i in order)
+        return Passages(self.stations, seeds, self.event[order], rows(self.table), rows(self.stops))
+
 
 def check_stations(site: Site, stations: Sequence[float]) -> NDArray[np.float64]:
     """Return stations in ascending order, each once (K,) [m].
@@ -188,12 +201,19 @@ def passages(
     site, built = as_site(site), as_layout(layout)
     lines = check_stations(site, stations)
     if threads is None and distribution.current() is not None:
-        pieces = [releases[r.start : r.stop] for r in distribution.parts(len(releases), SENT)]
-        sent = [(site, built, lines, piece) for piece in pieces]
-        return Passages.join([_none(lines), *distribution.mapped(_sent, sent)])
+        parts = _parts(site, built, releases, SENT)
+        sent = [(site, built, lines, [releases[place] for place in part]) for part in parts]
+        found = Passages.join([_none(lines), *distribution.mapped(_sent, sent)])
+        return found.moved([place for part in parts for place in part])
     usual = distribution.threads()
     count = usual if threads is None else check.integer("threads", threads, 1)
     return _in_threads(site, built, lines, releases, count)
+
+
+def _parts(site: Site, built: Layout, releases: Sequence[Release], most: int) -> list[list[int]]:
+    """Return the positions of releases in parts of at most `most`, those of large events first."""
+    large, small = by_size([(site, built, *release) for release in releases])
+    return [[place] for place in large] + [small[i : i + most] for i in range(0, len(small), most)]
 
 
 def _in_threads(
@@ -204,17 +224,17 @@ def _in_threads(
     threads: int,
 ) -> Passages:
     """Return the passages of releases, computed in threads of this process."""
-    places = range(0, len(releases), max(1, min(TOGETHER, len(releases) // (4 * threads))))
-    queue = iter([(at, releases[at : at + places.step]) for at in places])
+    most = max(1, min(TOGETHER, len(releases) // (4 * threads)))
+    queue = iter(_parts(site, built, releases, most))
 
-    def work(_: int) -> list[tuple[int, Passages]]:
+    def work(_: int) -> list[tuple[list[int], Passages]]:
         watch = _Watch(site, built, lines)
-        return [(at, watch.passages(part)) for at, part in queue]
+        return [(part, watch.passages([releases[place] for place in part])) for part in queue]
 
     with ThreadPoolExecutor(threads) as pool:
         done = [pair for found in pool.map(work, range(threads)) for pair in found]
-    done.sort(key=lambda pair: pair[0])
-    return Passages.join([_none(lines), *(found for _, found in done)])
+    joined = Passages.join([_none(lines), *(found for _, found in done)])
+    return joined.moved([place for part, _ in done for place in part])
 
 
 def _sent(sent: tuple[Site, Layout, NDArray[np.float64], Sequence[Release]]) -> Passages:

@@ -406,6 +406,9 @@ blocks."""
 TOGETHER = 16
 """Maximum number of releases that a thread takes at a time."""
 
+LARGE = 16.0
+"""Mean number of blocks of an event from which its releases are distributed one by one."""
+
 
 def release(
     site: Site,
@@ -529,16 +532,39 @@ def check_duration(sites: Sequence[Site], outcomes: Sequence[Outcome]) -> None:
         _doubt_duration(cut[0])
 
 
+def by_size(jobs: Sequence[CheckedJob]) -> tuple[list[int], list[int]]:
+    """Return the positions of the releases of large events, and those of all others.
+
+    A release of a mass takes up to a thousand times as long as that of a single block. Threads and
+    workers compute such releases first and one by one, because all would have to wait for one that
+    starts last. An event that the seed draws counts as the largest event of the site.
+    """
+    counts: dict[int, dict[Any, float]] = {}
+    large: list[int] = []
+    small: list[int] = []
+    for place, (site, _, _, event) in enumerate(jobs):
+        if id(site) not in counts:
+            every = site.events if isinstance(site, Site) else ()  # a wrong site is refused later
+            known: dict[Any, float] = {e.name: e.block_count(site.source(e.source)) for e in every}
+            counts[id(site)] = known | {None: max(known.values(), default=0.0)}
+        named = event is None or isinstance(event, str)
+        blocks = counts[id(site)].get(event, 0.0) if named else 0.0
+        (large if blocks >= LARGE else small).append(place)
+    return large, small
+
+
 def _in_threads(jobs: Sequence[CheckedJob], threads: int) -> list[Outcome | Error]:
     """Return the outcome or the error of each job, computed in threads of this process."""
+    large, small = by_size(jobs)
     groups: dict[tuple[int, Layout], list[int]] = {}
-    for place, (site, layout, _, _) in enumerate(jobs):
+    for place in small:
+        site, layout, _, _ = jobs[place]
         groups.setdefault((id(site), layout), []).append(place)
     threads = max(1, min(threads, len(jobs)))
     most = max(1, min(TOGETHER, len(jobs) // (8 * threads)))
-    queue = iter(
-        [group[i : i + most] for group in groups.values() for i in range(0, len(group), most)]
-    )
+    parts = [[place] for place in large]
+    parts += [group[i : i + most] for group in groups.values() for i in range(0, len(group), most)]
+    queue = iter(parts)
     with ThreadPoolExecutor(threads) as pool:
         done = list(pool.map(lambda _: outcomes(jobs, queue), range(threads)))
     found = sorted((pair for part in done for pair in part), key=lambda pair: pair[0])
@@ -551,9 +577,16 @@ SENT = 64
 
 def _distributed(jobs: Sequence[CheckedJob]) -> list[Outcome | Error]:
     """Return the outcome or the error of each job, computed by the workers of the executor."""
-    places = distribution.parts(len(jobs), SENT)
-    done = distribution.mapped(_sent, [jobs[part.start : part.stop] for part in places])
-    return [outcome for part in done for outcome in part]
+    large, small = by_size(jobs)
+    parts = [[place] for place in large]
+    parts += [small[i : i + SENT] for i in range(0, len(small), SENT)]
+    done = distribution.mapped(_sent, [[jobs[place] for place in part] for part in parts])
+    found = sorted(
+        (pair for part, outcomes in zip(parts, done, strict=True)
+         for pair in zip(part, outcomes, strict=True)),
+        key=lambda pair: pair[0],
+    )  # fmt: skip
+    return [outcome for _, outcome in found]
 
 
 def _sent(jobs: Sequence[CheckedJob]) -> list[Outcome | Error]:

@@ -305,6 +305,12 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             return math.prod(self.area) ** 0.25
         return math.sqrt(source.mean_block_area)
 
+    def block_count(self, source: Source) -> float:
+        """Return the mean number of its blocks from `source`."""
+        if source.band is not None:
+            return 0.5 * sum(self.number)
+        return source.area / source.mean_block_area
+
     def width_of(self, areas: list[float]) -> float:
         """Return the width of a release with blocks of these areas [m]."""
         if self.width is not None:

@@ -1,0 +1,45 @@
+"""Distribution of releases to threads: large events first, results in the order of the releases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigdda import Ditch, Site
+from rigdda.errors import BadInput
+from rigdda.passages import Passages, passages
+from rigdda.releases import by_size, release_many, release_outcome
+
+QUICK = Site.load("quick")
+EVENTS = ("block", "mass", "group", "block", None, "mass", "block")
+DITCH = (Ditch(QUICK.barrier_zone.end - 3.0, 1.0, 3.0),)
+
+
+def test_releases_of_masses_come_first_and_outcomes_keep_their_order():
+    jobs = [
+        (QUICK, layout, seed, event) for layout in ((), DITCH) for seed, event in enumerate(EVENTS)
+    ]
+    large, small = by_size(jobs)
+    assert [jobs[place][3] for place in large] == ["mass", None, "mass"] * 2
+    assert sorted(large + small) == list(range(len(jobs)))
+    alone = [release_outcome(*job) for job in jobs]
+    assert release_many(jobs, threads=2) == alone
+    assert release_many(jobs, threads=1) == alone
+
+
+def test_the_first_wrong_release_is_reported_although_masses_come_first():
+    jobs = [(QUICK, (), 0, "mass"), (QUICK, (), 1, "slide"), (QUICK, (), -1, "mass")]
+    with pytest.raises(BadInput, match="slide"):
+        release_many(jobs)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_passages_keep_the_order_of_the_releases(threads):
+    releases = list(enumerate(EVENTS))
+    stations = [QUICK.slope.toe, QUICK.road.start]
+    found = passages(QUICK, DITCH, releases, stations, threads=threads)
+    alone = Passages.join([passages(QUICK, DITCH, [one], stations) for one in releases])
+    assert found.seed == alone.seed == tuple(range(len(EVENTS)))
+    for name in ("event", "table", "stops"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(alone, name))
+    assert len(np.unique(found.table["release"])) > 3

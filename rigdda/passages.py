@@ -135,9 +135,11 @@ class Passages:
         order = np.argsort(place)
 
         def rows(table: NDArray[np.void]) -> NDArray[np.void]:
-            table = table.copy()
-            table["release"] = place[table["release"]]
-            return table[np.argsort(table["release"], kind="stable")]
+            release = place[table["release"]]
+            first = np.argsort(release, kind="stable")
+            table = table[first]
+            table["release"] = release[first]
+            return table
 
         seeds = tuple(self.seed[i] for i in order)
         return Passages(self.stations, seeds, self.event[order], rows(self.table), rows(self.stops))

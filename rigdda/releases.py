@@ -407,7 +407,7 @@ TOGETHER = 16
 """Maximum number of releases that a thread takes at a time."""
 
 LARGE = 16.0
-"""Mean number of blocks of an event from which its releases are distributed one by one."""
+"""Releases of events with at least this mean number of blocks are distributed one by one."""
 
 
 def release(
@@ -477,8 +477,8 @@ def release_many(jobs: Sequence[Job], threads: int | None = None) -> list[Outcom
     """Return the outcomes of many releases (site, layout, seed, event).
 
     They are computed in threads, or in the executor of `rigdda.distribution.using`. Each outcome
-    equals that of `release`. Releases of a site with a layout share everything that does not depend
-    on the seed.
+    equals that of `release`. Releases of a site with a layout that the same thread computes share
+    everything that does not depend on the seed.
 
     Parameters
     ----------
@@ -537,20 +537,22 @@ def by_size(jobs: Sequence[CheckedJob]) -> tuple[list[int], list[int]]:
 
     A release of a mass takes up to a thousand times as long as that of a single block. Threads and
     workers compute such releases first and one by one, because all would have to wait for one that
-    starts last. An event that the seed draws counts as the largest event of the site.
+    starts last. Those of one site and layout follow one another. Releases that will be refused
+    count as small.
     """
-    counts: dict[int, dict[Any, float]] = {}
-    large: list[int] = []
+    counts: dict[int, dict[str, float]] = {}
+    large: dict[tuple[int, Layout], list[int]] = {}
     small: list[int] = []
-    for place, (site, _, _, event) in enumerate(jobs):
+    for place, (site, layout, seed, event) in enumerate(jobs):
         if id(site) not in counts:
-            every = site.events if isinstance(site, Site) else ()  # a wrong site is refused later
-            known: dict[Any, float] = {e.name: e.block_count(site.source(e.source)) for e in every}
-            counts[id(site)] = known | {None: max(known.values(), default=0.0)}
-        named = event is None or isinstance(event, str)
-        blocks = counts[id(site)].get(event, 0.0) if named else 0.0
-        (large if blocks >= LARGE else small).append(place)
-    return large, small
+            every = site.events if isinstance(site, Site) else ()
+            counts[id(site)] = {e.name: e.block_count(site.source(e.source)) for e in every}
+        name = _tried(site.pick, seed) if event is None and counts[id(site)] else event
+        if isinstance(name, str) and counts[id(site)].get(name, 0.0) >= LARGE:
+            large.setdefault((id(site), layout), []).append(place)
+        else:
+            small.append(place)
+    return [place for group in large.values() for place in group], small
 
 
 def _in_threads(jobs: Sequence[CheckedJob], threads: int) -> list[Outcome | Error]:

@@ -306,7 +306,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return math.sqrt(source.mean_block_area)
 
     def block_count(self, source: Source) -> float:
-        """Return the mean number of its blocks from `source`."""
+        """Return the mean number of its blocks from `source`; the nominal one of a jointed mass."""
         if source.band is not None:
             return 0.5 * sum(self.number)
         return source.area / source.mean_block_area

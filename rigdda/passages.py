@@ -21,7 +21,7 @@ from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
 from rigdda.measurement import AT_REST
 from rigdda.model.site import Site
-from rigdda.releases import SENT, Batch, as_site, by_size
+from rigdda.releases import SENT, TOGETHER, Batch, as_site, divided
 
 PASSAGE = np.dtype(
     [
@@ -75,9 +75,6 @@ AT_END, MOVING, LEFT = range(3)
 MEMORY = 64e6
 """Size of the frames of a part of a run [bytes]."""
 
-TOGETHER = 16
-"""Maximum number of releases that a thread takes at a time."""
-
 Release = tuple[int, str | None]
 """A seed and the name of an event, or None for an event drawn by the seed."""
 
@@ -129,8 +126,8 @@ class Passages:
             rows("stops"),
         )
 
-    def moved(self, places: Sequence[int]) -> Passages:
-        """Return the same releases in another order, release i at position places[i]."""
+    def reordered(self, places: Sequence[int]) -> Passages:
+        """Return the same R releases in another order, release i at position places[i], (R,)."""
         place = np.array(places, dtype=np.int64)
         order = np.argsort(place)
 
@@ -203,19 +200,13 @@ def passages(
     site, built = as_site(site), as_layout(layout)
     lines = check_stations(site, stations)
     if threads is None and distribution.current() is not None:
-        parts = _parts(site, built, releases, SENT)
+        parts = divided([(site, built, *release) for release in releases], SENT)
         sent = [(site, built, lines, [releases[place] for place in part]) for part in parts]
         found = Passages.join([_none(lines), *distribution.mapped(_sent, sent)])
-        return found.moved([place for part in parts for place in part])
+        return found.reordered([place for part in parts for place in part])
     usual = distribution.threads()
     count = usual if threads is None else check.integer("threads", threads, 1)
     return _in_threads(site, built, lines, releases, count)
-
-
-def _parts(site: Site, built: Layout, releases: Sequence[Release], most: int) -> list[list[int]]:
-    """Return the positions of releases in parts of at most `most`, those of large events first."""
-    large, small = by_size([(site, built, *release) for release in releases])
-    return [[place] for place in large] + [small[i : i + most] for i in range(0, len(small), most)]
 
 
 def _in_threads(
@@ -227,7 +218,7 @@ def _in_threads(
 ) -> Passages:
     """Return the passages of releases, computed in threads of this process."""
     most = max(1, min(TOGETHER, len(releases) // (4 * threads)))
-    queue = iter(_parts(site, built, releases, most))
+    queue = iter(divided([(site, built, *release) for release in releases], most))
 
     def work(_: int) -> list[tuple[list[int], Passages]]:
         watch = _Watch(site, built, lines)
@@ -236,7 +227,7 @@ def _in_threads(
     with ThreadPoolExecutor(threads) as pool:
         done = [pair for found in pool.map(work, range(threads)) for pair in found]
     joined = Passages.join([_none(lines), *(found for _, found in done)])
-    return joined.moved([place for part, _ in done for place in part])
+    return joined.reordered([place for part, _ in done for place in part])
 
 
 def _sent(sent: tuple[Site, Layout, NDArray[np.float64], Sequence[Release]]) -> Passages:

@@ -404,10 +404,8 @@ blocks."""
 
 
 TOGETHER = 16
-"""Maximum number of releases that a thread takes at a time."""
-
-LARGE = 16.0
-"""Releases of events with at least this mean number of blocks are distributed one by one."""
+"""Maximum number of releases that a thread takes at a time. Releases of events with at least this
+mean number of blocks are taken one by one."""
 
 
 def release(
@@ -548,11 +546,20 @@ def by_size(jobs: Sequence[CheckedJob]) -> tuple[list[int], list[int]]:
             every = site.events if isinstance(site, Site) else ()
             counts[id(site)] = {e.name: e.block_count(site.source(e.source)) for e in every}
         name = _tried(site.pick, seed) if event is None and counts[id(site)] else event
-        if isinstance(name, str) and counts[id(site)].get(name, 0.0) >= LARGE:
+        if isinstance(name, str) and counts[id(site)].get(name, 0.0) >= TOGETHER:
             large.setdefault((id(site), layout), []).append(place)
         else:
             small.append(place)
     return [place for group in large.values() for place in group], small
+
+
+def divided(jobs: Sequence[CheckedJob], most: int) -> list[list[int]]:
+    """Return the positions of jobs in parts of at most `most`, see `by_size`.
+
+    A part may contain jobs of several sites and layouts.
+    """
+    large, small = by_size(jobs)
+    return [[place] for place in large] + [small[i : i + most] for i in range(0, len(small), most)]
 
 
 def _in_threads(jobs: Sequence[CheckedJob], threads: int) -> list[Outcome | Error]:
@@ -579,16 +586,12 @@ SENT = 64
 
 def _distributed(jobs: Sequence[CheckedJob]) -> list[Outcome | Error]:
     """Return the outcome or the error of each job, computed by the workers of the executor."""
-    large, small = by_size(jobs)
-    parts = [[place] for place in large]
-    parts += [small[i : i + SENT] for i in range(0, len(small), SENT)]
-    done = distribution.mapped(_sent, [[jobs[place] for place in part] for part in parts])
-    found = sorted(
-        (pair for part, outcomes in zip(parts, done, strict=True)
-         for pair in zip(part, outcomes, strict=True)),
-        key=lambda pair: pair[0],
-    )  # fmt: skip
-    return [outcome for _, outcome in found]
+    parts = divided(jobs, SENT)
+    sent = [[jobs[place] for place in part] for part in parts]
+    done = [outcome for found in distribution.mapped(_sent, sent) for outcome in found]
+    places = [place for part in parts for place in part]
+    at = dict(zip(places, done, strict=True))
+    return [at[place] for place in range(len(jobs))]
 
 
 def _sent(jobs: Sequence[CheckedJob]) -> list[Outcome | Error]:

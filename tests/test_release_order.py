@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
-from rigdda import Ditch, Site
+from rigdda import Ditch, Site, distribution
 from rigdda.errors import BadInput
 from rigdda.passages import Passages, passages
 from rigdda.releases import by_size, release_many, release_outcome
@@ -28,6 +30,8 @@ def test_releases_of_masses_come_first_and_outcomes_keep_their_order():
     alone = [release_outcome(*job) for job in jobs]
     assert release_many(jobs, threads=2) == alone
     assert release_many(jobs, threads=1) == alone
+    with ThreadPoolExecutor(1) as pool, distribution.using(pool):
+        assert release_many(jobs) == alone
 
 
 def test_the_first_wrong_release_is_reported_although_masses_come_first():
@@ -36,13 +40,16 @@ def test_the_first_wrong_release_is_reported_although_masses_come_first():
         release_many(jobs)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_passages_keep_the_order_of_the_releases(threads):
+def test_passages_keep_the_order_of_the_releases():
     releases = list(enumerate(EVENTS))
     stations = [QUICK.slope.toe, QUICK.road.start]
-    found = passages(QUICK, DITCH, releases, stations, threads=threads)
     alone = Passages.join([passages(QUICK, DITCH, [one], stations) for one in releases])
-    assert found.seed == alone.seed == tuple(range(len(EVENTS)))
-    for name in ("event", "table", "stops"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(alone, name))
-    assert len(np.unique(found.table["release"])) > 3
+    assert alone.seed == tuple(range(len(EVENTS)))
+    assert len(np.unique(alone.table["release"])) > 3
+    with ThreadPoolExecutor(1) as pool, distribution.using(pool):
+        distributed = passages(QUICK, DITCH, releases, stations)
+    threaded = [passages(QUICK, DITCH, releases, stations, threads=n) for n in (1, 2)]
+    for found in (distributed, *threaded):
+        assert found.seed == alone.seed
+        for name in ("event", "table", "stops"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(alone, name))

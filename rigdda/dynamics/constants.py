@@ -14,15 +14,13 @@ NEW_SHARE = 1e-3
 """Stiffness of a contact that forms after the first step of a simulation, as a fraction of the
 stiffness set by `RIGID` [-]."""
 
-IMPACT_STEPS = 3.0
-"""Lowest closing speed of an impact in units of g dt; for a lone body, in units of g dt /
-`SUBSTEPS` [-]. Slower closing is what gravity alone causes within a few steps in a body at rest."""
-
 AT_ONCE = 1e-4
-"""Shortest substep of a lone body over the step [-]. Corners that strike within this time strike
-simultaneously. With 2e-2, in steps of 10 ms with a restitution of 0.5, the velocity of a square
-that lands on one corner is wrong by 5 % if the next corner is 1 mm above the ground, and by up to
-43 % at other heights."""
+"""Shortest substep of a lone body over the step [-], which is that of an impact. With 2e-2, in steps
+of 10 ms with a restitution of 0.5, the velocity of a square that lands on one corner is wrong by 5 %
+if the next corner is 1 mm above the ground, and by up to 43 % at other heights."""
+
+ROUNDING = 1e-12
+"""Relative error of sums of work [-], by which the energy of an elastic impact may seem to grow."""
 
 RECOVERY_SWEEPS = 6
 """Number of sweeps over the contacts of an island in position correction."""
@@ -76,12 +74,6 @@ SLEEP_TIME = 0.5
 GROWN = 0.1
 """Increase in speed, over `SLEEP_SPEED`, above which a block is not quiet [-]. Without it, blocks
 on a slope 0.2 deg too steep for them fell asleep before they slid."""
-
-APART = 0.1
-"""Time since the last contact after which a block counts as separated [s]. Separated from a
-barrier, it can hit that barrier again; separated from everything, it is no longer damped by
-surfaces. If damping ended with the contact itself, the damping of a block that rattles downhill
-would depend on the time step."""
 
 LONGEST_FLIGHT = 64
 """Maximum number of steps of a free flight. Longer flights require a wider search for obstacles."""

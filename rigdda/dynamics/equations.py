@@ -3,8 +3,8 @@
 A spring of stiffness k along a direction (l, m), the normal or the shear direction, adds k e_i^t
 e_j to the stiffness matrix, where e_i = (l, m, r x (l, m)) is the row of T_i along that direction.
 `assemble_contact` adds the springs of a contact, including the friction submatrix.
-Mass-proportional damping is added with the inertia (`inertia_stiffness`, with the coefficient from
-`damping_of`); relaxation applies it in `relaxation.pull`.
+Mass-proportional damping is added with the inertia (`inertia_stiffness`); relaxation applies it in
+`relaxation.fade`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import Islands, Matrix
-from rigdda.dynamics.constants import APART, BOLT, OPEN, SLIP, STICK
+from rigdda.dynamics.constants import BOLT, OPEN, SLIP, STICK
 from rigdda.dynamics.records import Bodies, Body, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
@@ -52,6 +52,12 @@ def shear_row(c: Contact, of_a: bool) -> tuple[float, float, float]:
 
 
 @kernel
+def rolling_row(c: Contact, of_a: bool) -> tuple[float, float, float]:
+    """Return e along the relative rotation times R for body a, or else for body b."""
+    return 0.0, 0.0, c.radius if of_a else -c.radius
+
+
+@kernel
 def add_block(
     matrix: NDArray, stiffness: float, e: tuple[float, float, float], f: tuple[float, float, float]
 ) -> None:
@@ -76,32 +82,27 @@ def along(e: tuple[float, float, float], d: NDArray) -> float:
 
 
 @kernel
-def relative_displacement(c: Contact, d: NDArray, i: int, j: int) -> tuple[float, float]:
-    """Return the normal and shear displacement at a contact of slots i and j (-1: at rest) [m]."""
-    dn, ds = along(normal_row(c, True), d[i]), along(shear_row(c, True), d[i])
+def relative_displacement(
+    c: Contact, d: NDArray, i: int, j: int
+) -> tuple[float, float, float]:
+    """Return the normal, shear and rolling displacement at a contact of slots i and j [m].
+
+    Slot -1 is at rest. The rolling displacement is R times the relative rotation.
+    """
+    dn, ds, dr = along(normal_row(c, True), d[i]), along(shear_row(c, True), d[i]), d[i, 2]
     if j >= 0:
         dn += along(normal_row(c, False), d[j])
         ds += along(shear_row(c, False), d[j])
-    return dn, ds
+        dr -= d[j, 2]
+    return dn, ds, c.radius * dr
 
 
 @kernel
-def damping_of(body: Body, p: Parameters) -> float:
-    """Return the damping coefficient of a block in this step [1/s].
-
-    It is that of the surface that the block touched last, until `APART` after that contact. The
-    time since then already includes this step. Its value in the middle of the step counts, so that
-    the duration does not depend on the step length.
-    """
-    return p.damping_in_flight if body.apart - 0.5 * p.dt > APART else body.damping
-
-
-@kernel
-def load_moment(body: Body) -> float:
-    """Return the moment of the dead loads of a block about its centroid [N m]."""
+def load_moment(body: Body, dt: float) -> float:
+    """Return the moment of the dead loads of a block about its centroid in mid-step [N m]."""
     if body.moment_cos == 0.0 and body.moment_sin == 0.0:
         return 0.0
-    theta = body.theta
+    theta = body.theta + 0.5 * dt * body.omega
     return body.moment_cos * math.cos(theta) + body.moment_sin * math.sin(theta)
 
 
@@ -112,9 +113,8 @@ def assemble_blocks(
     """Set the diagonal blocks and the forces from inertia, damping, weight and loads."""
     for place in range(low, high):
         body, s = bodies[islands.block_item[place]], place - low
-        alpha = damping_of(body, p)
-        inertia = inertia_stiffness(body.inertia, alpha, p.dt)
-        mass = inertia_stiffness(body.mass, alpha, p.dt)
+        inertia = inertia_stiffness(body.inertia, p.damping, p.dt)
+        mass = inertia_stiffness(body.mass, p.damping, p.dt)
         for a in range(3):
             for b in range(3):
                 m.diagonal[s, a, b] = 0.0
@@ -125,7 +125,21 @@ def assemble_blocks(
         m.rhs[s, 2] = inertia_force(body.inertia, body.omega, p.dt)
         m.rhs[s, 0] += body.mass * p.field_x + body.force_x
         m.rhs[s, 1] += body.mass * p.field_y + body.force_y
-        m.rhs[s, 2] += load_moment(body)
+        m.rhs[s, 2] += load_moment(body, p.dt)
+
+
+@kernel
+def add_spring(
+    m: Matrix, stiffness: float, force: float, i: int, j: int, pair: int,
+    e: tuple[float, float, float], f: tuple[float, float, float],
+) -> None:  # fmt: skip
+    """Add a spring between slots i and j (-1: no unknowns), with rows e and f, and its force."""
+    add_block(m.diagonal[i], stiffness, e, e)
+    add_force(m.rhs[i], force, e)
+    if j >= 0:
+        add_block(m.diagonal[j], stiffness, f, f)
+        add_block(m.off[pair], stiffness, e, f)
+        add_force(m.rhs[j], force, f)
 
 
 @inlined
@@ -134,39 +148,29 @@ def assemble_contact(c: Contact, m: Matrix, i: int, j: int, dt: float) -> None:
 
     In terms of the displacement d of the step, the spring N = kappa (b - dt w_1) has stiffness 2
     kappa and force kappa (b + dt w_0). The friction of a slipping contact is a given force, that of
-    the last iteration. A bolt has no shear force; a yielding bolt is a given force.
+    the last iteration, and so is rolling resistance at its limit. A bolt has no shear force; a
+    yielding bolt is a given force.
     """
-    stiffness = 2.0 * c.kappa
-    normal = c.kappa * (c.bias + dt * c.un)
-    shear = c.accumulated_shear + c.kappa * dt * c.us
-    en, es = normal_row(c, True), shear_row(c, True)
-    bolt = c.kind == BOLT
-    if bolt and c.state == SLIP:  # the bolt yields
-        stiffness, normal = 0.0, -c.tension
-    add_block(m.diagonal[i], stiffness, en, en)
-    add_force(m.rhs[i], normal, en)
-    stick = c.state == STICK
-    if bolt:
-        pass
-    elif stick:
-        add_block(m.diagonal[i], stiffness, es, es)
-        add_force(m.rhs[i], shear, es)
-    else:
-        add_force(m.rhs[i], c.lag, es)
-    if j < 0:
+    stiffness, normal = 2.0 * c.kappa, c.kappa * (c.bias + dt * c.un)
+    if c.kind == BOLT:
+        if c.state == SLIP:  # the bolt yields
+            stiffness, normal = 0.0, -c.tension
+        add_spring(m, stiffness, normal, i, j, c.pair, normal_row(c, True), normal_row(c, False))
         return
-    fn, fs = normal_row(c, False), shear_row(c, False)
-    add_block(m.diagonal[j], stiffness, fn, fn)
-    add_block(m.off[c.pair], stiffness, en, fn)
-    add_force(m.rhs[j], normal, fn)
-    if bolt:
-        return
-    if stick:
-        add_block(m.diagonal[j], stiffness, fs, fs)
-        add_block(m.off[c.pair], stiffness, es, fs)
-        add_force(m.rhs[j], shear, fs)
+    add_spring(m, stiffness, normal, i, j, c.pair, normal_row(c, True), normal_row(c, False))
+    es, fs = shear_row(c, True), shear_row(c, False)
+    if c.state == STICK:
+        shear = c.accumulated_shear + c.kappa * dt * c.us
+        add_spring(m, stiffness, shear, i, j, c.pair, es, fs)
     else:
-        add_force(m.rhs[j], c.lag, fs)
+        add_spring(m, 0.0, c.lag, i, j, c.pair, es, fs)
+    if c.rolling == 0.0:
+        return
+    er, fr = rolling_row(c, True), rolling_row(c, False)
+    if c.turns == 0:
+        add_spring(m, stiffness, c.accumulated_roll + c.kappa * dt * c.ur, i, j, c.pair, er, fr)
+    else:
+        add_spring(m, 0.0, c.roll, i, j, c.pair, er, fr)
 
 
 @inlined
@@ -189,7 +193,7 @@ def assemble_island(
     for item in range(islands.contact_start[island], islands.contact_start[island + 1]):
         c = contacts[islands.contact_item[item]]
         if c.state == OPEN:
-            c.normal = c.shear = 0.0
+            c.normal = c.shear = c.roll = 0.0
         else:
             j = islands.slot[c.b] if c.pair >= 0 else -1
             assemble_contact(c, m, islands.slot[c.a], j, p.dt)

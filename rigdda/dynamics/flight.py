@@ -157,7 +157,6 @@ def fly(bodies: Bodies, i: int, p: Parameters, ledger: NDArray) -> int:
 
     Its corners are not updated until `land`.
     """
-    bodies[i].apart += p.dt
     fall(bodies[i], p, ledger)
     bodies[i].quiet = 0.0
     return check_body(bodies, i, p, ledger)

@@ -20,7 +20,7 @@ from rigdda.dynamics.constants import (
     STICK,
 )
 from rigdda.dynamics.contact.joint import joint_breaks
-from rigdda.dynamics.equations import damping_of, inertia_force, inertia_stiffness, load_moment
+from rigdda.dynamics.equations import inertia_force, inertia_stiffness, load_moment
 from rigdda.dynamics.islands import pair_blocks
 from rigdda.dynamics.monitors import barrier_contact, note_hits, press
 from rigdda.dynamics.motion import retire, top_speed
@@ -36,7 +36,6 @@ from rigdda.dynamics.records import (
     Contact,
     Contacts,
     Floats,
-    Interfaces,
     Parameters,
 )
 from rigdda.dynamics.relaxation import relax, start_slots
@@ -47,6 +46,7 @@ from rigdda.dynamics.rows import (
     IMPULSE,
     MOVES,
     NOW,
+    ROLLED,
     SIN,
     STRUCK,
     SUM,
@@ -64,12 +64,12 @@ from rigdda.kernel import inlined, kernel, stage
 @inlined
 def fall(body: Body, p: Parameters, ledger: NDArray) -> None:
     """Move a body without contacts; weight, loads and damping are constant over the step."""
-    alpha, dt = damping_of(body, p), p.dt
+    alpha, dt = p.damping, p.dt
     mass, inertia = (
         inertia_stiffness(body.mass, alpha, dt),
         inertia_stiffness(body.inertia, alpha, dt),
     )
-    moment = load_moment(body)
+    moment = load_moment(body, p.dt)
     fx, fy = body.mass * p.field_x + body.force_x, body.mass * p.field_y + body.force_y
     dx = (inertia_force(body.mass, body.vx, dt) + fx) / mass
     dy = (inertia_force(body.mass, body.vy, dt) + fy) / mass
@@ -111,7 +111,7 @@ def take_slot(body: Body, slot: Floats, scale: Floats, p: Parameters, ledger: ND
         return
     dx, dy, turn = slot[X] - body.x, slot[Y] - body.y, slot[TURN]
     fx, fy = body.mass * p.field_x + body.force_x, body.mass * p.field_y + body.force_y
-    moment = load_moment(body)
+    moment = load_moment(body, p.dt)
     ledger[1] += slot[FIELD] - (fx * dx + fy * dy + moment * turn)
     ledger[3] += (fx - body.mass * p.gravity_x) * dx + (fy - body.mass * p.gravity_y) * dy
     ledger[3] += moment * turn
@@ -157,7 +157,7 @@ def is_tried_whole(
 
 @stage
 def settle_island(
-    bodies: Bodies, contacts: Contacts, work: Work, island: int, p: Parameters, totals: Totals
+    world: World, contacts: Contacts, work: Work, island: int, p: Parameters, totals: Totals
 ) -> bool:
     """Compute the contact forces of an island and move its slots through the step.
 
@@ -165,6 +165,7 @@ def settle_island(
     this fails, are relaxed. If relaxation does not converge, an island at rest is solved as a
     whole. Returns whether any contact had an impact.
     """
+    bodies, links = world.bodies, world.links
     counters, ledger = totals.counters, totals.ledger
     islands, rows, m = work.islands, work.rows, work.matrix
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
@@ -175,7 +176,7 @@ def settle_island(
     whole = struck = False
     tried = is_tried_whole(bodies, contacts, islands, island, quiet, p)
     if tried:
-        whole = solve_states(bodies, contacts, work, island, pairs, p, counters)
+        whole = solve_states(bodies, links, contacts, work, island, pairs, p, counters)
         whole = whole or p.static
     start_slots(bodies, islands, rows, island, p)
     count = pack_rows(contacts, islands, rows, island)
@@ -185,7 +186,7 @@ def settle_island(
         sweeps, struck, settled = relax(rows, b1 - b0, count, speed, p, ledger)
         counters[SWEEPS] += sweeps
         if quiet and not (settled or tried or has_fence(bodies, islands, b0, b1)):
-            whole = solve_states(bodies, contacts, work, island, pairs, p, counters)
+            whole = solve_states(bodies, links, contacts, work, island, pairs, p, counters)
             if whole:
                 ledger[2] = damped
                 start_slots(bodies, islands, rows, island, p)
@@ -227,8 +228,9 @@ def take_impulses(
     for item in range(low, high):
         c, k = contacts[islands.contact_item[item]], rows.place[item]
         row, fact = rows.row[k], rows.fact[k]
-        c.normal, c.shear = fact[SUM] / dt, fact[SUM + 1] / dt
+        c.normal, c.shear, c.roll = fact[SUM] / dt, fact[SUM + 1] / dt, fact[SUM + 2] / dt
         c.accumulated_normal, c.accumulated_shear = row[IMPULSE], row[IMPULSE + 1]
+        c.accumulated_roll = row[ROLLED]
         c.struck = int(fact[STRUCK])
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
@@ -248,26 +250,20 @@ def accumulate_force(c: Contact) -> None:
     """Carry the force of a contact of an island that was solved as a whole to the next step."""
     c.struck = 0
     if c.state == OPEN:
-        c.accumulated_normal = c.accumulated_shear = 0.0
+        c.accumulated_normal = c.accumulated_shear = c.accumulated_roll = 0.0
     else:
         elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
         c.accumulated_normal += elastic * (c.normal - c.accumulated_normal)
         c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)
-
-
-@inlined
-def note_touch(body: Body, damping: float) -> None:
-    """Set the damping of a block to the greatest of the surfaces that it touches in this step."""
-    body.damping = max(body.damping, damping) if body.apart == 0.0 else damping
-    body.apart = 0.0
+        c.accumulated_roll += elastic * (c.roll - c.accumulated_roll)
 
 
 @inlined
 def account_contacts(
-    bodies: Bodies, interfaces: Interfaces, contacts: Contacts, islands: Islands, rows: Rows,
-    low: int, high: int, monitors: Monitors, p: Parameters, ledger: NDArray,
+    bodies: Bodies, contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int,
+    monitors: Monitors, p: Parameters, ledger: NDArray,
 ) -> None:  # fmt: skip
-    """Add the work of contacts to the ledger and the barriers, and set the damping of blocks."""
+    """Add the work of contacts to the ledger and the barriers, and note which bodies touch."""
     for item in range(low, high):
         c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
         if c.state == OPEN:
@@ -285,10 +281,9 @@ def account_contacts(
             ledger[1] += row[WORK]
         if len(monitors.target) > 0:
             press(c, monitors, p.dt)
-        damping = p.damping if support else interfaces[bodies[c.a].surface, c.other].damping
-        note_touch(bodies[c.a], damping)
+        bodies[c.a].touching = True
         if c.b >= 0:
-            note_touch(bodies[c.b], damping)
+            bodies[c.b].touching = True
 
 
 @inlined
@@ -328,21 +323,21 @@ def step_island(
 
     Returns a body that diverged, or -1.
     """
-    bodies, outlines, interfaces = world.bodies, world.outlines, world.interfaces
+    bodies, outlines = world.bodies, world.outlines
     counters, ledger = totals.counters, totals.ledger
     islands, rows = work.islands, work.rows
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     bad = -1
     for place in range(b0, b1):
-        bodies[islands.block_item[place]].apart += p.dt
+        bodies[islands.block_item[place]].touching = False
     if c1 > c0:
-        struck = settle_island(bodies, contacts, work, island, p, totals)
+        struck = settle_island(world, contacts, work, island, p, totals)
         if len(monitors.target) > 0:
             counters[EVENTS] = note_hits(
                 bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time
             )
-        account_contacts(bodies, interfaces, contacts, islands, rows, c0, c1, monitors, p, ledger)
+        account_contacts(bodies, contacts, islands, rows, c0, c1, monitors, p, ledger)
         push_out(contacts, islands, rows, island, struck, p)
     for place in range(b0, b1):
         i = islands.block_item[place]

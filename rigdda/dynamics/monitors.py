@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from rigdda import check
 from rigdda.dynamics.arrays import Islands, Monitors
-from rigdda.dynamics.constants import APART, ASLEEP, AWAKE, BOLT, FIXED, OPEN, PIN, TERRAIN
+from rigdda.dynamics.constants import ASLEEP, AWAKE, BOLT, FIXED, OPEN, PIN, TERRAIN
 from rigdda.dynamics.islands import root
 from rigdda.dynamics.motion import kinetic_energy
 from rigdda.dynamics.records import STILL, Bodies, Body, Contact, Contacts, Ints, Parameters
@@ -47,6 +47,9 @@ def chainages(stations: Sequence[float]) -> NDArray[np.float64]:
         raise BadInput("stations", lines.tolist(), "give them in ascending order")
     return lines
 
+
+BETWEEN_HITS = 0.1
+"""Time without contact after which a block that touches a barrier again hits it again [s]."""
 
 HIT, CROSSING, FAILED = 0, 1, 2
 """Kinds of event: a block touches a barrier; the centroid of a block first passes a station; a
@@ -94,7 +97,7 @@ def note_hits(
         i, barrier = barrier_contact(monitors, c.a, c.b)
         if barrier < 0 or c.state == OPEN:
             continue
-        if time - monitors.last_touch[i, barrier] > APART:
+        if time - monitors.last_touch[i, barrier] > BETWEEN_HITS:
             height = c.y - monitors.target[barrier].ground
             events = write_event(
                 monitors, events, time, HIT, bodies[i], i, barrier, c.x, c.y, height

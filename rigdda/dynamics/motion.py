@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.constants import RETIRED
-from rigdda.dynamics.records import Body
+from rigdda.dynamics.records import Body, Parameters
 from rigdda.kernel import kernel
 
 
@@ -14,6 +14,15 @@ def top_speed(body: Body) -> float:
     """Return an upper bound on the speed of any point of a body [m/s]."""
     spin = abs(body.omega) * body.radius
     return math.sqrt(body.vx**2 + body.vy**2) + spin
+
+
+@kernel
+def impact_speed(p: Parameters) -> float:
+    """Return the closing speed above which a contact undergoes an impact [m/s].
+
+    It is the speed of a body that has fallen by the target penetration.
+    """
+    return math.sqrt(2.0 * p.gravity * p.penetration)
 
 
 @kernel

@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from rigdda.dynamics.arrays import Islands, Matrix, Rows, Scratch, Work
 from rigdda.dynamics.constants import BLOCK_PCG, BOLT, DIRECT, OPEN, PIN, SETTLED, SLIP, SOR, STICK
 from rigdda.dynamics.contact.joint import joint_breaks
+from rigdda.dynamics.contact.links import bend_bolt
 from rigdda.dynamics.equations import (
     add_force,
-    along,
     assemble_blocks,
     assemble_island,
-    damping_of,
     load_moment,
     normal_row,
     relative_displacement,
+    rolling_row,
     shear_row,
 )
 from rigdda.dynamics.records import (
@@ -35,6 +35,7 @@ from rigdda.dynamics.records import (
     Bodies,
     Contact,
     Contacts,
+    Links,
     Parameters,
 )
 from rigdda.dynamics.rows import FIELD, NOW, TURN, WORK, WORK_ON_A, X, Y
@@ -43,12 +44,15 @@ from rigdda.kernel import inlined, kernel
 
 
 @inlined
-def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[float, float]:
-    """Return the normal force of a contact, and its shear force if it sticks [N]."""
-    dn, ds = relative_displacement(c, d, i, j)
+def spring_forces(
+    c: Contact, d: NDArray, i: int, j: int, dt: float
+) -> tuple[float, float, float]:
+    """Return the normal force of a contact, and its shear and rolling force if it sticks [N]."""
+    dn, ds, dr = relative_displacement(c, d, i, j)
     normal = c.kappa * (c.bias - (2.0 * dn - dt * c.un))
     shear = c.accumulated_shear - c.kappa * (2.0 * ds - dt * c.us)
-    return normal, shear
+    roll = c.accumulated_roll - c.kappa * (2.0 * dr - dt * c.ur)
+    return normal, shear, roll
 
 
 @kernel
@@ -77,8 +81,19 @@ def next_friction(c: Contact, shear: float) -> bool:
     return change > SETTLED * limit
 
 
+@kernel
+def next_rolling(c: Contact, roll: float) -> bool:
+    """Apply rolling resistance to a closed contact as friction; return whether it changed."""
+    turned, before, limit = c.turns, c.roll, c.rolling * c.normal
+    c.roll = min(max(roll, -limit), limit)
+    c.turns = int(abs(roll) > limit)
+    if c.turns != turned:
+        return True
+    return c.turns == 1 and abs(c.roll - before) > SETTLED * limit
+
+
 @inlined
-def next_state(c: Contact, normal: float, shear: float, breaks: bool) -> bool:
+def next_state(c: Contact, normal: float, shear: float, roll: float, breaks: bool) -> bool:
     """Update the state of a contact from its forces; return whether it changed.
 
     `breaks` is whether these forces have broken the joint of the contact.
@@ -98,7 +113,8 @@ def next_state(c: Contact, normal: float, shear: float, breaks: bool) -> bool:
         c.state = OPEN
         return True
     c.normal = normal
-    return next_friction(c, shear)
+    slips = next_friction(c, shear)
+    return next_rolling(c, roll) or slips
 
 
 @inlined
@@ -111,15 +127,31 @@ def update_states(
         c = contacts[islands.contact_item[item]]
         if c.bond > 0.0:
             j = islands.slot[c.b] if c.pair >= 0 else -1
-            c.normal, c.shear = spring_forces(c, d, islands.slot[c.a], j, p.dt)
+            c.normal, c.shear, _ = spring_forces(c, d, islands.slot[c.a], j, p.dt)
     for item in range(low, high):
         c = contacts[islands.contact_item[item]]
         i = islands.slot[c.a]
         j = islands.slot[c.b] if c.pair >= 0 else -1
-        normal, shear = spring_forces(c, d, i, j, p.dt)
+        normal, shear, roll = spring_forces(c, d, i, j, p.dt)
         breaks = c.bond > 0.0 and joint_breaks(contacts, islands, low, high, item)
-        changed = next_state(c, normal, shear, breaks) or changed
+        changed = next_state(c, normal, shear, roll, breaks) or changed
     return changed
+
+
+@kernel
+def bend_bolts(
+    bodies: Bodies, links: Links, contacts: Contacts, d: NDArray, islands: Islands, low: int,
+    high: int,
+) -> float:  # fmt: skip
+    """Set the directions of all bolts of an island; return the greatest change [-]."""
+    most = 0.0
+    for item in range(low, high if len(links) > 0 else low):
+        c = contacts[islands.contact_item[item]]
+        if c.kind == BOLT:
+            j = islands.slot[c.b] if c.pair >= 0 else -1
+            link = links[-1 - c.key]
+            most = max(most, bend_bolt(bodies, link, c, d, islands.slot[c.a], j))
+    return most
 
 
 @kernel
@@ -140,8 +172,8 @@ def solve_system(m: Matrix, scratch: Scratch, n: int, pairs: int, p: Parameters)
 
 @kernel
 def solve_states(
-    bodies: Bodies, contacts: Contacts, work: Work, island: int, pairs: int, p: Parameters,
-    counters: NDArray,
+    bodies: Bodies, links: Links, contacts: Contacts, work: Work, island: int, pairs: int,
+    p: Parameters, counters: NDArray,
 ) -> bool:  # fmt: skip
     """Iterate until no contact of the island changes its state; return whether that was reached.
 
@@ -154,13 +186,19 @@ def solve_states(
     for s in range(n):
         body = bodies[islands.block_item[b0 + s]]
         m.d[s, 0], m.d[s, 1], m.d[s, 2] = body.vx * p.dt, body.vy * p.dt, body.omega * p.dt
+    bend_bolts(bodies, links, contacts, m.d, islands, c0, c1)
     for _ in range(p.iterations):
         assemble_island(bodies, contacts, m, islands, island, pairs, p)
         counters[ITERATIONS] += 1
         counters[SOLVES] += 1
         counters[SOLVER_ITERATIONS] += solve_system(m, work.scratch, n, pairs, p)
-        if not update_states(contacts, m.d, islands, c0, c1, p):
+        changed = update_states(contacts, m.d, islands, c0, c1, p)
+        bent = bend_bolts(bodies, links, contacts, m.d, islands, c0, c1)
+        if not changed and bent <= p.tolerance:
             return True
+    for s in range(n):
+        m.d[s, 0] = m.d[s, 1] = m.d[s, 2] = 0.0
+    bend_bolts(bodies, links, contacts, m.d, islands, c0, c1)  # back to the start of the step
     return False
 
 
@@ -182,19 +220,21 @@ def take_solution(
             i = islands.slot[c.a]
             add_force(m.rhs[i], c.normal, normal_row(c, True))
             add_force(m.rhs[i], c.shear, shear_row(c, True))
+            add_force(m.rhs[i], c.roll, rolling_row(c, True))
             if c.pair >= 0:
                 j = islands.slot[c.b]
                 add_force(m.rhs[j], c.normal, normal_row(c, False))
                 add_force(m.rhs[j], c.shear, shear_row(c, False))
+                add_force(m.rhs[j], c.roll, rolling_row(c, False))
     for s in range(b1 - b0):
         for q in range(3):
             m.d[s, q] = m.rhs[s, q] / m.diagonal[s, q, q]
     for s in range(b1 - b0):
         body, d, slot = bodies[islands.block_item[b0 + s]], m.d[s], rows.slot[s]
         slow = body.mass * (d[0] ** 2 + d[1] ** 2) + body.inertia * d[2] ** 2
-        ledger[2] -= damping_of(body, p) * slow / p.dt
+        ledger[2] -= p.damping * slow / p.dt
         slot[FIELD] = (body.mass * p.field_x + body.force_x) * d[0]
-        slot[FIELD] += (body.mass * p.field_y + body.force_y) * d[1] + load_moment(body) * d[2]
+        slot[FIELD] += (body.mass * p.field_y + body.force_y) * d[1] + load_moment(body, p.dt) * d[2]
         for q in range(3):
             slot[NOW + q] = 2.0 * d[q] / (p.dt * rows.scale[s, q]) - slot[NOW + q]
         slot[X] += d[0]
@@ -204,10 +244,8 @@ def take_solution(
         c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
         if c.state == OPEN:
             continue
-        dn = along(normal_row(c, True), m.d[islands.slot[c.a]])
-        ds = along(shear_row(c, True), m.d[islands.slot[c.a]])
-        row[WORK_ON_A] = c.normal * dn + c.shear * ds
-        if c.pair >= 0:
-            dn += along(normal_row(c, False), m.d[islands.slot[c.b]])
-            ds += along(shear_row(c, False), m.d[islands.slot[c.b]])
-        row[WORK], row[WORK + 1] = c.normal * dn, c.shear * ds
+        i, j = islands.slot[c.a], islands.slot[c.b] if c.pair >= 0 else -1
+        dn, ds, dr = relative_displacement(c, m.d, i, -1)
+        row[WORK_ON_A] = c.normal * dn + c.shear * ds + c.roll * dr
+        dn, ds, dr = relative_displacement(c, m.d, i, j)
+        row[WORK], row[WORK + 1] = c.normal * dn, c.shear * ds + c.roll * dr

@@ -314,7 +314,7 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
             plain = surface.restitution is None
             found["restitution"][i, j] = PLAIN_CONTACT if plain else surface.restitution
             found["cohesion"][i, j], found["tension"][i, j] = surface.cohesion, surface.tension
-    found["damping"] = dampings(scene, len(every))
+    found["rolling"], found["restitution_speed"] = 0.0, math.inf
     return found.view(np.recarray)
 
 
@@ -367,7 +367,6 @@ def pack_parameters(
         "field_x": gx,
         "field_y": gy,
         "damping": scene.damping,
-        "damping_in_flight": scene.damping if scene.damping_when == "always" else 0.0,
         "tolerance": settings.tolerance,
         "sweep_tolerance": settings.sweep_tolerance,
         "iterations": settings.open_close_iterations,
@@ -490,7 +489,6 @@ def write_bodies(corners: NDArray, traits: NDArray, bodies: Bodies, outlines: Ou
         body.mass, body.inertia = density * area, density * second
         body.vx, body.vy, body.omega = traits[i, 1], traits[i, 2], traits[i, 3]
         body.surface, body.status = int(traits[i, 4]), int(traits[i, 5])
-        body.apart = math.inf
         farthest = 0.0
         for k in range(low, high):
             dx, dy = corners[k, 0] - body.x, corners[k, 1] - body.y

@@ -23,8 +23,15 @@ shear impulse stops slip within the friction limit. Many short substeps with few
 path of an impact better than one step with many sweeps (Macklin et al. 2019, Small steps in physics
 simulation).
 
-A contact that closes faster than gravity would accelerate it in `IMPACT_STEPS` steps undergoes an
-impact. The impact is plastic during its substep. At the end of the substep, all contacts with an
+Rolling resistance is a moment of at most c N R against the relative rotation of the bodies of a
+contact, where R is the radius of gyration of `law.rolling_radius`. As an impulse along e_r = (0, 0,
+R), it acts like friction. Within the sweeps, its limit follows a decreasing normal impulse but not
+an increasing one, as this could diverge. Therefore the substep is first settled with the limits of
+the last one, and then with the limits of the normal impulses that it found (`limit_rolling`).
+
+A contact that closes faster than a body that has fallen by the target penetration undergoes an
+impact, together with all other contacts that are closing and whose gap is at most that. The impact
+is plastic during its substep. At the end of the substep, all contacts with an
 impact open with the velocities given by their restitution; the sum of both impulses of a contact
 obeys Coulomb friction. If the impact would gain energy, restitution is reduced.
 
@@ -42,12 +49,13 @@ from numpy.typing import NDArray
 from rigdda.dynamics.arrays import Islands, Rows
 from rigdda.dynamics.constants import (
     AT_ONCE,
-    IMPACT_STEPS,
     MOST_SWEEPS,
+    ROUNDING,
     SETTLED,
     SUBSTEPS,
 )
-from rigdda.dynamics.equations import damping_of, load_moment
+from rigdda.dynamics.equations import load_moment
+from rigdda.dynamics.motion import impact_speed
 from rigdda.dynamics.records import Bodies, Body, Floats, Parameters
 from rigdda.dynamics.rows import (
     AIM,
@@ -79,7 +87,13 @@ from rigdda.dynamics.rows import (
     NORMAL,
     NOW,
     PULL,
+    REBOUND,
     RESTITUTION,
+    RESTITUTION_SPEED,
+    ROLL,
+    ROLL_LIMIT,
+    ROLLED,
+    ROLLING,
     SHEAR,
     SIN,
     START,
@@ -108,9 +122,9 @@ def start_slot(body: Body, slot: Floats, scale: Floats, p: Parameters) -> None:
     slot[NOW], slot[NOW + 1], slot[NOW + 2] = root * body.vx, root * body.vy, spin * body.omega
     slot[PULL] = p.field_x * root + body.force_x / root
     slot[PULL + 1] = p.field_y * root + body.force_y / root
-    slot[PULL + 2] = load_moment(body) / spin
+    slot[PULL + 2] = load_moment(body, p.dt) / spin
     slot[X], slot[Y], slot[TURN], slot[COS], slot[SIN] = body.x, body.y, 0.0, 1.0, 0.0
-    slot[DAMPING], slot[FIELD] = damping_of(body, p), 0.0
+    slot[DAMPING], slot[FIELD] = p.damping, 0.0
     slot[BRAKE], slot[MOVES], slot[LEFT] = body.brake, scale[0], body.elongation
     slot[START] = body.x
     if body.brake > 0.0:
@@ -132,15 +146,32 @@ def start_slots(bodies: Bodies, islands: Islands, rows: Rows, island: int, p: Pa
 
 
 @kernel
-def pull(slots: Floats, n: int, h: float) -> None:
-    """Apply weight, loads and damping for a substep."""
+def fade(slots: Floats, n: int, time: float) -> float:
+    """Damp the velocities of the bodies for a time [s]; return the work of damping [J].
+
+    Damping acts for half of a substep before all other impulses and for half of it after them, so
+    that it does not change the forces on bodies at rest.
+    """
+    lost = 0.0
     for s in range(n):
         slot = slots[s]
-        half = 0.5 * h * slot[DAMPING]
+        if slot[DAMPING] > 0.0:
+            left = math.exp(-slot[DAMPING] * time)
+            for q in range(3):
+                lost -= 0.5 * (1.0 - left * left) * slot[NOW + q] * slot[NOW + q]
+                slot[NOW + q] *= left
+    return lost
+
+
+@kernel
+def pull(slots: Floats, n: int, h: float) -> None:
+    """Apply weight and loads for a substep."""
+    for s in range(n):
+        slot = slots[s]
         for q in range(3):
             slot[BEFORE + q] = slot[NOW + q]
-            after = ((1.0 - half) * slot[NOW + q] + h * slot[PULL + q]) / (1.0 + half)
-            slot[NOW + q] = slot[FREE + q] = after
+            slot[NOW + q] += h * slot[PULL + q]
+            slot[FREE + q] = slot[NOW + q]
         slot[HELD] = 0.0
 
 
@@ -165,33 +196,32 @@ def drift_half(slots: Floats, scale: Floats, n: int, h: float) -> None:
 
 
 @kernel
-def drift(slots: Floats, scale: Floats, n: int, h: float, gone: float) -> float:
+def drift(slots: Floats, scale: Floats, n: int, h: float, gone: float) -> None:
     """Move the bodies for a substep, and sum up the work of weight and loads.
 
     Every impulse, including those of contacts, does work along the mean of the velocities before
     and after the substep. `gone` is the fraction of the substep for which the bodies have already
-    moved. Returns the work of damping [J].
+    moved.
     """
-    lost = 0.0
     for s in range(n):
         slot = slots[s]
         new = 0.5 + 0.5 * slot[HELD]
         for q in range(3):
             mean = 0.5 * (slot[BEFORE + q] + slot[NOW + q])
             slot[FIELD] += h * slot[PULL + q] * mean
-            lost -= 0.5 * h * slot[DAMPING] * (slot[BEFORE + q] + slot[FREE + q]) * mean
             way = h * (new * slot[NOW + q] + (1.0 - new - gone) * slot[BEFORE + q])
             slot[X + q] += way * scale[s, q]
         slot[COS], slot[SIN] = math.cos(slot[TURN]), math.sin(slot[TURN])
-    return lost
 
 
 @arithmetic_kernel
-def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float, left: float) -> None:
+def aim_row(
+    row: Floats, fact: Floats, a: Floats, b: Floats, h: float, left: float, touch: float
+) -> None:
     """Set the quantities that a visit of a row needs in a substep h.
 
-    An open contact may close by its gap in the time `left` [s], corrected for the opening that
-    rotation of the bodies causes. A spring acts with its force in the middle of the substep, so
+    An open contact may close by what its gap exceeds `touch` [m] in the time `left` [s], corrected
+    for the opening that rotation of the bodies causes. A spring acts with its force in the middle of the substep, so
     that it conserves energy at any step length.
     """
     flexible = rolling = cross = 0.0
@@ -217,7 +247,7 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float, left: flo
         if fact[STRENGTH] == math.inf:  # a pin; `mend_links` removes its drift
             row[AIM_SHEAR] = -0.5 * h * row[BEND + 1]
         elif row[GAP] > 0.0 and fact[STRENGTH + 1] == 0.0:  # an open contact without a joint
-            row[AIM] -= row[GAP] / left
+            row[AIM] -= max(row[GAP] - touch, 0.0) / left
     else:
         give = 0.25 * row[STIFFNESS] * h * h
         row[KEEP] = give * flexible / (1.0 + give * flexible)
@@ -231,7 +261,9 @@ def aim_row(row: Floats, fact: Floats, a: Floats, b: Floats, h: float, left: flo
 
 
 @kernel
-def start_rows(rows: Rows, count: int, number: int, h: float, left: float, ratio: float) -> None:
+def start_rows(
+    rows: Rows, count: int, number: int, h: float, left: float, ratio: float, touch: float
+) -> None:
     """Start a substep for all contacts that may close in it, with the impulses of the last one.
 
     `left` is the time for which the bodies still have to move in the substep [s], and `ratio` its
@@ -244,12 +276,37 @@ def start_rows(rows: Rows, count: int, number: int, h: float, left: float, ratio
         i, j = np.uintp(rows.row_i[k]), np.uintp(rows.row_j[k])
         row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
         place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
-        aim_row(row, fact, a, b, h, left)
+        aim_row(row, fact, a, b, h, left, touch)
+        row[ROLL_LIMIT] = 0.0
         if row[IMPULSE] != 0.0 or row[IMPULSE + 1] != 0.0:
             row[IMPULSE] *= ratio
             row[IMPULSE + 1] *= ratio
             push(row, NORMAL, a, b, NOW, row[IMPULSE])
             push(row, SHEAR, a, b, NOW, row[IMPULSE + 1])
+        if row[ROLLING] > 0.0:
+            limit = row[ROLL_LIMIT] = row[ROLLING] * max(row[IMPULSE], 0.0)
+            row[ROLLED] = min(max(ratio * row[ROLLED], -limit), limit)
+            turn(row, a, b, row[ROLLED])
+
+
+@arithmetic_kernel
+def turn(row: Floats, a: Floats, b: Floats, impulse: float) -> None:
+    """Add a rolling impulse to the slots of both bodies."""
+    a[NOW + 2] += impulse * row[ROLL]
+    b[NOW + 2] += impulse * row[ROLL + 1]
+
+
+@kernel
+def limit_rolling(rows: Rows, count: int, number: int) -> bool:
+    """Limit rolling impulses by the present normal impulses; return whether any limit grew."""
+    grew = False
+    for k in range(count):
+        row = rows.row[k]
+        if row[ROLLING] > 0.0 and rows.idle[k] <= number:
+            limit = row[ROLLING] * max(row[IMPULSE], 0.0)
+            grew = grew or limit > row[ROLL_LIMIT]
+            row[ROLL_LIMIT] = limit
+    return grew
 
 
 @kernel
@@ -316,14 +373,25 @@ def sweep(
         b[0], b[1] = (u2 + more * n[3]) + drag * s[3], (v2 + more * n[4]) + drag * s[4]
         a[2], b[2] = (w + more * n[2]) + drag * s[2], (w2 + more * n[5]) + drag * s[5]
         r[IMPULSE], r[IMPULSE + 1] = normal, shear
+        if r[ROLL_LIMIT] > 0.0:
+            limit = min(r[ROLL_LIMIT], r[ROLLING] * max(normal, 0.0))
+            light = r[ROLL] * r[ROLL] + r[ROLL + 1] * r[ROLL + 1]
+            spin = r[ROLL] * a[2] + r[ROLL + 1] * b[2]
+            rolled = min(max(r[ROLLED] - spin / light, -limit), limit)
+            worst = max(worst, abs(rolled - r[ROLLED]) * light)
+            turn(r, a, b, rolled - r[ROLLED])
+            r[ROLLED] = rolled
     return worst
 
 
 @arithmetic_kernel
-def count_row(row: Floats, fact: Floats, a: Floats, b: Floats, normal: float, shear: float) -> None:
+def count_row(
+    row: Floats, fact: Floats, a: Floats, b: Floats, normal: float, shear: float, rolled: float
+) -> None:
     """Add impulses of a contact to its sums, together with their work."""
     fact[SUM] += normal
     fact[SUM + 1] += shear
+    fact[SUM + 2] += rolled
     own = along = other = across = 0.0
     for q in range(3):
         mean, mean_b = 0.5 * (a[NOW + q] + a[BEFORE + q]), 0.5 * (b[NOW + q] + b[BEFORE + q])
@@ -331,9 +399,21 @@ def count_row(row: Floats, fact: Floats, a: Floats, b: Floats, normal: float, sh
         along += row[SHEAR + q] * mean
         other += row[NORMAL + 3 + q] * mean_b
         across += row[SHEAR + 3 + q] * mean_b
+    spin = 0.5 * rolled * row[ROLL] * (a[NOW + 2] + a[BEFORE + 2])
+    spin_b = 0.5 * rolled * row[ROLL + 1] * (b[NOW + 2] + b[BEFORE + 2])
     fact[WORK] += normal * (own + other)
-    fact[WORK + 1] += shear * (along + across)
-    fact[WORK_ON_A] += normal * own + shear * along
+    fact[WORK + 1] += shear * (along + across) + (spin + spin_b)
+    fact[WORK_ON_A] += normal * own + shear * along + spin
+
+
+@kernel
+def restitution(fact: Floats, speed: float) -> float:
+    """Return the coefficient of restitution of a contact at a closing speed [m/s].
+
+    It decreases as e / (1 + (v / K)^2) (Pfeiffer and Bowen 1989).
+    """
+    ratio = speed / fact[RESTITUTION_SPEED]
+    return fact[RESTITUTION] / (1.0 + ratio * ratio)
 
 
 @kernel
@@ -355,7 +435,7 @@ def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple
         if rows.idle[k] > number or (normal == 0.0 and shear == 0.0):
             continue
         a, b = rows.slot[np.uintp(rows.row_i[k])], rows.slot[np.uintp(rows.row_j[k])]
-        count_row(row, fact, a, b, normal, shear)
+        count_row(row, fact, a, b, normal, shear, row[ROLLED])
         if row[STIFFNESS] > 0.0:
             continue
         # at an impact or between two bodies, impulses act at the start of the substep
@@ -364,8 +444,9 @@ def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple
             a[HELD] = b[HELD] = 1.0
         if sudden:
             opening = along_six(row[NORMAL : NORMAL + 6], a, b, FREE)
-            struck, fact[STRUCK], fact[BOUNCE] = True, 1.0, -fact[RESTITUTION] * opening
-            fact[LOAD] = fact[LOAD + 1] = 0.0
+            fact[REBOUND] = restitution(fact, -opening)
+            struck, fact[STRUCK], fact[BOUNCE] = True, 1.0, -fact[REBOUND] * opening
+            fact[LOAD] = fact[LOAD + 1] = fact[LOAD + 2] = 0.0
             bouncing = bouncing or fact[BOUNCE] > 0.0
     return struck, bouncing
 
@@ -387,10 +468,13 @@ def work_from(rows: Rows, count: int, number: int, first: int) -> float:
         slip = along_six(row[SHEAR : SHEAR + 6], a, b, first)
         opening += along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
         slip += along_six(row[SHEAR : SHEAR + 6], a, b, NOW)
-        normal, shear = row[IMPULSE], row[IMPULSE + 1]
+        spin = row[ROLL] * (a[first + 2] + a[NOW + 2])
+        spin += row[ROLL + 1] * (b[first + 2] + b[NOW + 2])
+        normal, shear, rolled = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
         if fact[BOUNCE] > 0.0:
             normal, shear = normal - fact[LOAD], shear - fact[LOAD + 1]
-        work += 0.5 * (normal * opening + shear * slip)
+            rolled -= fact[LOAD + 2]
+        work += 0.5 * (normal * opening + shear * slip + rolled * spin)
     return work
 
 
@@ -408,17 +492,21 @@ def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> No
         row, fact = rows.row[k], rows.fact[k]
         if rows.idle[k] > number or row[STIFFNESS] > 0.0:
             continue
+        row[ROLL_LIMIT] = row[ROLLING] * max(fact[LOAD], 0.0)
         if fact[BOUNCE] > 0.0:
             row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
+            row[ROLLED] = fact[LOAD + 2]
+            row[ROLL_LIMIT] *= 1.0 + share * fact[REBOUND]
             row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # in sum no tension
         else:
-            row[IMPULSE] = row[IMPULSE + 1] = 0.0
+            row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
 
 
 @kernel
 def rebound(
-    rows: Rows, n: int, count: int, number: int, h: float, reach: float, tolerance: float
-) -> int:
+    rows: Rows, n: int, count: int, number: int, h: float, reach: float, tolerance: float,
+    touch: float,
+) -> int:  # fmt: skip
     """Open all contacts with an impact at the end of the substep; return the number of sweeps.
 
     `h` is the least length of the next substep [s], within which open contacts may close.
@@ -437,8 +525,9 @@ def rebound(
             i, j = rows.row_i[k], rows.row_j[k]
             row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
             place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
-            aim_row(row, fact, a, b, h, h)
+            aim_row(row, fact, a, b, h, h, touch)
             fact[LOAD], fact[LOAD + 1] = row[IMPULSE], row[IMPULSE + 1]
+            fact[LOAD + 2] = row[ROLLED]
             if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
                 row[KEEP] = row[KEEP_SHEAR] = 1.0
                 row[GAIN] = row[GAIN_SHEAR] = row[CROSS] = 0.0
@@ -447,7 +536,7 @@ def rebound(
         aim_rebound(rows, n, count, number, share)
         sweeps += settle(rows, n, count, number, reach, tolerance)
         work = work_from(rows, count, number, BEFORE)
-        if lost + work <= 0.0:
+        if lost + work <= -ROUNDING * lost:
             break
         share = min(max(-lost / work, 0.0), 1.0) if attempt == 0 else 0.0
     for k in range(count):
@@ -457,17 +546,31 @@ def rebound(
         a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
         if fact[BOUNCE] > 0.0:
             normal, shear = row[IMPULSE] - fact[LOAD], row[IMPULSE + 1] - fact[LOAD + 1]
-            count_row(row, fact, a, b, normal, shear)
-            fact[BOUNCE] = row[IMPULSE] = row[IMPULSE + 1] = 0.0
+            count_row(row, fact, a, b, normal, shear, row[ROLLED] - fact[LOAD + 2])
+            fact[BOUNCE] = row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
         else:
-            count_row(row, fact, a, b, row[IMPULSE], row[IMPULSE + 1])
+            count_row(row, fact, a, b, row[IMPULSE], row[IMPULSE + 1], row[ROLLED])
             row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
+            row[ROLLED] = fact[LOAD + 2]
     return sweeps
 
 
 @kernel
 def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float) -> int:
-    """Sweep until no normal velocity changes by more than a tolerance; return the sweeps."""
+    """Sweep until no velocity changes by more than a tolerance; return the sweeps.
+
+    Normal velocities count, and R times rates of rotation where rolling is resisted. See the module
+    docstring on the second set of sweeps.
+    """
+    sweeps = sweep_until(rows, n, count, number, reach, tolerance)
+    if limit_rolling(rows, count, number):
+        sweeps = max(sweeps, sweep_until(rows, n, count, number, reach, tolerance))
+    return sweeps
+
+
+@kernel
+def sweep_until(rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float) -> int:
+    """Sweep until no velocity changes by more than a tolerance, or `MOST_SWEEPS` times."""
     for s in range(n + 1):
         rows.moved_in[s] = -1
     for tries in range(MOST_SWEEPS):
@@ -521,7 +624,7 @@ def rest_on(rows: Rows, count: int, number: int, s: int, share: float) -> None:
 
 @kernel
 def release_fences(
-    rows: Rows, n: int, count: int, number: int, h: float, ledger: NDArray
+    rows: Rows, n: int, count: int, number: int, h: float, touch: float, ledger: NDArray
 ) -> bool:  # fmt: skip
     """Release fences that contacts push harder than their brakes; return whether any was released.
 
@@ -554,7 +657,7 @@ def release_fences(
                 continue
             row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
             place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
-            aim_row(row, fact, a, b, h, h)
+            aim_row(row, fact, a, b, h, h, touch)
             slot[NOW] += row[IMPULSE] * row[0 if i == s else 3]
     return released
 
@@ -586,15 +689,18 @@ def stop_uphill(slots: Floats, n: int) -> float:
 
 
 @kernel
-def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
-    """Return the time, at most `most`, until a contact closes faster than `least` [m/s]."""
+def time_to_blow(rows: Rows, count: int, most: float, least: float, touch: float) -> float:
+    """Return the time, at most `most`, until a contact closes faster than `least` [m/s].
+
+    It then has a gap of half of `touch` [m]; a contact with a gap of at most `touch` closes now.
+    """
     for k in range(count):
         i, j = rows.row_i[k], rows.row_j[k]
         row, a, b = rows.row[k], rows.slot[i], rows.slot[j]
         place_row(row, rows.fact[k], rows.form[k], a, b, rows.scale[i], rows.scale[j])
         closing = -along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
         pulling = -along_six(row[NORMAL : NORMAL + 6], a, b, PULL)
-        gap = max(row[GAP], 0.0)
+        gap = row[GAP] - 0.5 * touch if row[GAP] > touch else 0.0
         root = math.sqrt(max(closing * closing + 2.0 * pulling * gap, 0.0))
         if root > least and closing + root > 0.0 and row[STIFFNESS] == 0.0:
             most = min(most, 2.0 * gap / (closing + root))
@@ -602,15 +708,16 @@ def time_to_blow(rows: Rows, count: int, most: float, least: float) -> float:
 
 
 @kernel
-def part_of_step(rows: Rows, count: int, left: float, least: float, shortest: float) -> float:
+def part_of_step(
+    rows: Rows, count: int, left: float, least: float, shortest: float, touch: float
+) -> float:
     """Return the length of the next substep of a lone body, with a time `left` in the step [s].
 
     The substep ends just before a contact closes faster than `least` [m/s]. A substep that begins
-    there has the shortest permitted length, so that contacts that close at nearly the same time
-    undergo the impact together.
+    there has the shortest permitted length. All contacts with a gap of at most `touch` [m] undergo
+    the impact together.
     """
-    time = time_to_blow(rows, count, left + 0.5 * shortest, least) - 0.5 * shortest
-    return min(left, max(time, shortest))
+    return min(left, max(time_to_blow(rows, count, left, least, touch), shortest))
 
 
 @kernel
@@ -639,11 +746,11 @@ def relax(
     settled : bool
         Whether the sweeps of the last substep converged to the tolerance.
     """
-    alone, fenced, shortest = n == 1, False, AT_ONCE * p.dt
+    alone, fenced, shortest, touch = n == 1, False, AT_ONCE * p.dt, p.penetration
     usual, reach = p.dt / SUBSTEPS, speed + greatest_pull(rows, n) * p.dt
-    least, gone = IMPACT_STEPS * p.gravity * p.dt, 0.0
+    least, gone = max(impact_speed(p), p.tolerance * speed), 0.0
     if alone:
-        usual, reach, least, gone = p.dt, math.inf, least / SUBSTEPS, 0.5
+        usual, reach, gone = p.dt, math.inf, 0.5
     tolerance = max(min(p.sweep_tolerance * (n - 1), SETTLED * speed), p.tolerance * speed)
     for s in range(n):
         fenced = fenced or rows.slot[s, BRAKE] > 0.0
@@ -651,26 +758,28 @@ def relax(
     while left > 0.0:
         h = min(usual, left)
         if alone:
-            h = part_of_step(rows, count, h, least, shortest)
+            h = part_of_step(rows, count, h, least, shortest, touch)
         if left - h < 0.5 * shortest:
             h = left
         if alone:
             drift_half(rows.slot, rows.scale, n, h)
+        ledger[2] += fade(rows.slot, n, 0.5 * h)
         pull(rows.slot, n, h)
         if fenced:
             ledger[1] -= hold_fences(rows.slot, rows.scale, n)
-        start_rows(rows, count, number, h, h - gone * h, h / last)
+        start_rows(rows, count, number, h, h - gone * h, h / last, touch)
         swept = settle(rows, n, count, number, reach, tolerance)
         sweeps += swept
-        while fenced and release_fences(rows, n, count, number, h, ledger):
+        while fenced and release_fences(rows, n, count, number, h, touch, ledger):
             sweeps += settle(rows, n, count, number, reach, tolerance)
         if fenced:
             end_fences(rows.slot, rows.scale, n, ledger)
         hit, bouncing = end_rows(rows, n, count, number, least)
-        ledger[2] += drift(rows.slot, rows.scale, n, h, gone)
+        drift(rows.slot, rows.scale, n, h, gone)
+        ledger[2] += fade(rows.slot, n, 0.5 * h)
         if bouncing:
             following = shortest if alone else h
-            sweeps += rebound(rows, n, count, number, following, reach, tolerance)
+            sweeps += rebound(rows, n, count, number, following, reach, tolerance, touch)
             ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1
@@ -678,4 +787,5 @@ def relax(
         lasts = 0.0 if rows.fact[place, STRUCK] > 0.0 and last < 0.5 * usual else 1.0 / last
         rows.row[place, IMPULSE] *= lasts
         rows.row[place, IMPULSE + 1] *= lasts
+        rows.row[place, ROLLED] *= lasts
     return sweeps, struck, swept < MOST_SWEEPS

@@ -34,22 +34,28 @@ FRICTION, STIFFNESS = 25, 26
 # GAP [m]. BEND: second time derivative of the gap due to rotation [m/s2]; + 1: along shear.
 GAP, BEND = 27, 28
 
-COLUMNS = 32
+# ROLL and + 1: e_r, R times the rates of rotation of a and b. ROLLED: rolling impulse, the moment
+# impulse over R [N s], at most ROLL_LIMIT and at most ROLLING [-] times the normal impulse.
+ROLL, ROLLED, ROLL_LIMIT, ROLLING = 29, 31, 32, 33
+
+COLUMNS = 34
 
 # Columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: position of the vertex and of the
 # point of the face, and the normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR: displacements at
 # which a spring is force-free [m]. STRENGTH and + 1: cohesion and tension of a contact [N].
 VERTEX, FACE, DIRECTION, FREE_GAP, FREE_SHEAR, STRENGTH = 0, 2, 4, 6, 7, 8
 
-# RESTITUTION [-]. BOUNCE: opening velocity after an impact in this substep [m/s], 0 without one.
-# STRUCK: 1 after an impact in this step, else 0. LOAD and + 1: impulses before a rebound [N s].
-RESTITUTION, BOUNCE, STRUCK, LOAD = 11, 12, 13, 14
+# RADIUS: R [m]. RESTITUTION [-], which has fallen to half at RESTITUTION_SPEED [m/s]. REBOUND:
+# restitution of the impact in this substep [-]. BOUNCE: opening velocity after it [m/s], 0 without
+# one. STRUCK: 1 after an impact in this step, else 0. LOAD, + 1 and + 2: normal, shear and rolling
+# impulse before a rebound [N s].
+RADIUS, RESTITUTION, RESTITUTION_SPEED, REBOUND, BOUNCE, STRUCK, LOAD = 10, 11, 12, 13, 14, 15, 16
 
-# SUM and + 1: sum of impulses since the start of the step [N s]. WORK and + 1: work of the normal
-# and the shear force [J]. WORK_ON_A: work of both on body a [J].
-SUM, WORK, WORK_ON_A = 16, 18, 20
+# SUM, + 1 and + 2: sums of these impulses since the start of the step [N s]. WORK: work of the
+# normal force; + 1: of the shear and the rolling force [J]. WORK_ON_A: work of all on body a [J].
+SUM, WORK, WORK_ON_A = 19, 22, 24
 
-FACTS = 21
+FACTS = 25
 
 # Columns of rows.slot, one slot per body. NOW, FREE, BEFORE: scaled velocities at the end of this
 # substep, the same without contacts, and in the substep before [kg^1/2 m/s]. X, Y: centroid [m].
@@ -104,8 +110,11 @@ def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, still: int) -
     fact[FACE] = c.x - side * c.gap * c.nx - slot[face, X]
     fact[FACE + 1] = c.y - side * c.gap * c.ny - slot[face, Y]
     fact[DIRECTION], fact[DIRECTION + 1] = c.nx, c.ny
-    row[FRICTION], fact[RESTITUTION] = c.friction, max(c.restitution, 0.0)
+    row[FRICTION], row[ROLLING] = c.friction, c.rolling
+    fact[RADIUS], fact[RESTITUTION] = c.radius, max(c.restitution, 0.0)
+    fact[RESTITUTION_SPEED] = c.restitution_speed
     row[IMPULSE], row[IMPULSE + 1] = c.accumulated_normal, c.accumulated_shear
+    row[ROLLED] = c.accumulated_roll
     support = c.kind == PIN
     fact[STRENGTH] = math.inf if support else c.cohesion
     fact[STRENGTH + 1] = c.tension
@@ -116,7 +125,7 @@ def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, still: int) -
     elif c.kind == PLAIN:
         row[STIFFNESS] = c.stiffness
         fact[FREE_SHEAR] = c.accumulated_shear / c.stiffness
-    for q in range(BOUNCE, FACTS):
+    for q in range(REBOUND, FACTS):
         fact[q] = 0.0
 
 
@@ -151,6 +160,7 @@ def place_row(
     row[SHEAR + 2] = (ax * nx + ay * ny) * one[2]
     row[SHEAR + 3], row[SHEAR + 4] = ny * two[0], -nx * two[1]
     row[SHEAR + 5] = -(bx * nx + by * ny) * two[2]
+    row[ROLL], row[ROLL + 1] = fact[RADIUS] * one[2], -fact[RADIUS] * two[2]
     # velocity of the vertex relative to the centroid of the face, and the second time derivative
     # of the gap due to rotation
     spin, turn = a[BEFORE + 2] * one[2], b[BEFORE + 2] * two[2]

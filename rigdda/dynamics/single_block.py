@@ -151,7 +151,7 @@ def _set_interfaces(pairs: PairProperties, interfaces: Interfaces) -> None:
     for i in range(len(interfaces)):
         for j in range(len(interfaces)):
             interface = interfaces[i, j]
-            interface.damping = pairs.damping[i, j]
+            interface.rolling, interface.restitution_speed = 0.0, math.inf
             if i < len(pairs.restitution) and j < len(pairs.restitution):
                 interface.friction = math.tan(math.radians(pairs.friction_deg[i, j]))
                 interface.restitution = pairs.restitution[i, j]

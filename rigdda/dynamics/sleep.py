@@ -53,7 +53,7 @@ def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> 
             speed = top_speed(body)
             body.slowest = min(body.slowest, speed) if body.quiet > 0.0 else speed
             growing = speed > body.slowest + GROWN * SLEEP_SPEED
-            rests = body.apart == 0.0 or body.brake > 0.0
+            rests = body.touching or body.brake > 0.0
             quiet = rests and speed < SLEEP_SPEED and not growing
             body.quiet = body.quiet + p.dt if quiet else 0.0
             least = min(least, body.quiet)

@@ -21,7 +21,8 @@ plain    b = -2 g with w_0 taken as 0: a penalty spring on the gap, the paper's 
 =======  ====================================================================================
 
 The shear spring acts in the same way on the shear velocity, starting from the shear force of the
-last step, and is limited by Coulomb friction in a return mapping. Islands in motion, and at first
+last step, and is limited by Coulomb friction in a return mapping. So does a spring on R times the
+relative rate of rotation, limited by rolling resistance: its force times R is the moment. Islands in motion, and at first
 also islands at rest, are relaxed instead, with rigid contacts (`rigdda.dynamics.relaxation`).
 Restitution acts only there (`relaxation.rebound`).
 """
@@ -32,6 +33,7 @@ import math
 
 from rigdda.dynamics.constants import (
     AWAKE,
+    FIXED,
     NEW,
     NEW_SHARE,
     OPEN,
@@ -68,6 +70,20 @@ def point_velocity(bodies: Bodies, i: int, x: float, y: float) -> tuple[float, f
 
 
 @kernel
+def rolling_radius(bodies: Bodies, c: Contact) -> float:
+    """Return the radius R of the pair of bodies of a contact for rolling resistance [m].
+
+    For a block on the ground, it is that of a disc with the radius of gyration of the block, R_a =
+    sqrt(2 I / m). Between two blocks, 1 / R = 1 / R_a + 1 / R_b, as between two discs.
+    """
+    a, b = bodies[c.a], bodies[c.b]  # b is not read if it is the terrain
+    radius = math.sqrt(2.0 * a.inertia / a.mass)
+    if c.b >= 0 and b.status != FIXED:
+        radius = 1.0 / (1.0 / radius + 1.0 / math.sqrt(2.0 * b.inertia / b.mass))
+    return radius
+
+
+@kernel
 def set_arms(bodies: Bodies, c: Contact, time: float) -> None:
     """Set the lever arms at the positions after `time` [s], which conserves angular momentum."""
     a, b = bodies[c.a], bodies[c.b]
@@ -93,6 +109,7 @@ def set_velocities(bodies: Bodies, c: Contact, dt: float) -> None:
     if c.b >= 0 and b.status == AWAKE:
         vx -= b.vx - b.omega * c.rb_y
         vy -= b.vy + b.omega * c.rb_x
+    c.ur = c.radius * (a.omega - (b.omega if c.b >= 0 and b.status == AWAKE else 0.0))
     middle = c.nx * vx + c.ny * vy
     ax, ay = point_velocity(bodies, c.a, c.x, c.y)
     bx, by = point_velocity(bodies, c.b, c.x, c.y)
@@ -177,11 +194,16 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
     c.stiffness = max(c.stiffness, rest_stiffness(weight, c, p))
     interface = interfaces[a.surface, c.other]
     c.friction, c.restitution = interface.friction, interface.restitution
+    c.restitution_speed, c.rolling = interface.restitution_speed, interface.rolling
+    c.radius = rolling_radius(bodies, c) if c.rolling > 0.0 else 0.0
+    c.roll, c.turns = c.accumulated_roll, 0
     c.lag = c.accumulated_shear
     c.cohesion = c.bond * interface.cohesion
     c.tension = c.bond * interface.tension
     if c.cohesion == 0.0 and c.tension == 0.0:
         c.bond = 0.0
+    if c.bond > 0.0:
+        c.rolling = 0.0  # the ends of an unbroken joint bear its moment
     set_arms(bodies, c, 0.5 * p.dt)
     set_velocities(bodies, c, p.dt)
     if c.lag == 0.0:

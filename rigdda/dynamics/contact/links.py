@@ -2,8 +2,9 @@
 
 Supports enter the system of equations, the exchange of forces and the ledger like closed contacts
 and follow the same law (`contact.law`). A pin has b = 0. A bolt has w_0 = 0, kappa = k / 4 and b =
--T / kappa, so that N is minus its mean tension over the step, T + k d / 2; this conserves energy
-for any step length. The state of a support is decided in `open_close.next_state_of_link`, and in
+-T / kappa, so that N is minus its mean tension over the step, T + k d / 2. It acts along the mean
+of its directions before and after the step, so that d is its change of length. Both together
+conserve energy for any step length. The state of a support is decided in `open_close.next_state_of_link`, and in
 relaxation by `relaxation.aim_row` and the limits in `relaxation.sweep`.
 """
 
@@ -46,6 +47,44 @@ def arm(body: Body, x: float, y: float, dt: float) -> tuple[float, float]:
 
 
 @kernel
+def mean_arm(body: Body, x: float, y: float, turn: float) -> tuple[float, float]:
+    """Return the arm at which a constant force does its work as the body rotates by `turn` [m].
+
+    The point (x, y) in body coordinates moves on an arc relative to the centroid. Its chord is
+    `turn` times this arm, turned by 90 degrees.
+    """
+    half = 0.5 * turn
+    theta, mean = body.theta + half, math.sin(half) / half if half != 0.0 else 1.0
+    cos, sin = mean * math.cos(theta), mean * math.sin(theta)
+    return cos * x - sin * y, sin * x + cos * y
+
+
+@kernel
+def bend_bolt(bodies: Bodies, link: Link, c: Contact, d: NDArray, i: int, j: int) -> float:
+    """Set arms and direction of a bolt for the displacements of its blocks, slots i and j.
+
+    The direction is (r_0 + r_1) / (l_0 + l_1), with the vectors r and lengths l between the anchors
+    before and after the step. Returns the change of the direction [-].
+    """
+    ax, ay = anchor(bodies, link.a, link.ax, link.ay)
+    bx, by = anchor(bodies, link.b, link.bx, link.by)
+    x, y = ax - bx, ay - by
+    c.ra_x, c.ra_y = mean_arm(bodies[link.a], link.ax, link.ay, d[i, 2])
+    dx, dy = d[i, 0] - d[i, 2] * c.ra_y, d[i, 1] + d[i, 2] * c.ra_x
+    if link.b >= 0:
+        turn = d[j, 2] if j >= 0 else 0.0
+        c.rb_x, c.rb_y = mean_arm(bodies[link.b], link.bx, link.by, turn)
+        if j >= 0:
+            dx -= d[j, 0] - turn * c.rb_y
+            dy -= d[j, 1] + turn * c.rb_x
+    length = math.hypot(x, y) + math.hypot(x + dx, y + dy)
+    nx, ny = (2.0 * x + dx) / length, (2.0 * y + dy) / length
+    change = abs(nx - c.nx) + abs(ny - c.ny)
+    c.nx, c.ny = nx, ny
+    return change
+
+
+@kernel
 def tension(link: Link, length: float) -> float:
     """Return the tension of a bolt at a length [N]."""
     return link.prestress + link.stiffness * (length - link.length)
@@ -74,8 +113,9 @@ def add_link(bodies: Bodies, links: Links, q: int, c: Contact, p: Parameters) ->
     c.a, c.b, c.key, c.owner, c.kind = a, b, -1 - q, 1, link.kind
     c.other, c.gap = 0, 0.0
     c.x, c.y, c.state = ax, ay, STICK
-    c.accumulated_normal = c.accumulated_shear = 0.0
-    c.friction = c.restitution = c.bond = c.cohesion = 0.0
+    c.accumulated_normal = c.accumulated_shear = c.accumulated_roll = 0.0
+    c.friction = c.restitution = c.rolling = c.bond = c.cohesion = 0.0
+    c.turns = 0
     c.ra_x, c.ra_y = arm(bodies[a], link.ax, link.ay, p.dt)
     if b >= 0:
         c.rb_x, c.rb_y = arm(bodies[b], link.bx, link.by, p.dt)

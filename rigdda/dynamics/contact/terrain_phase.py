@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import GroundArrays, Outlines
-from rigdda.dynamics.constants import IMPACT_STEPS, SAME_FACE, TERRAIN
+from rigdda.dynamics.constants import SAME_FACE, TERRAIN
 from rigdda.dynamics.contact.narrow_phase import (
     keep_nearest,
     write_geometry,
     write_parties,
 )
 from rigdda.dynamics.contact.separating_axes import edge_over_point, following
+from rigdda.dynamics.motion import impact_speed
 from rigdda.dynamics.records import Bodies, Box, Contacts, Parameters
 from rigdda.kernel import inlined, kernel, variable
 
@@ -149,8 +150,8 @@ def place_of_hit(
     one, block = ground.segment[s], bodies[a]
     dx = (block.vx - block.omega * (y - block.y)) * p.dt
     dy = (block.vy + block.omega * (x - block.x)) * p.dt
-    least = IMPACT_STEPS * p.gravity * p.dt * p.dt  # an impact closes more than this in a step
-    if gap <= p.penetration and -(one.normal_x * dx + one.normal_y * dy) <= least:
+    closes = -(one.normal_x * dx + one.normal_y * dy)
+    if gap <= p.penetration and closes <= p.dt * impact_speed(p):
         return x, y
     if one.turn > 0.0:
         dx, dy = along_neighbour(ground, s - 1, x, y, dx, dy)

@@ -47,6 +47,7 @@ def recall_from(
             continue
         c.state = was.state
         c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
+        c.accumulated_roll = was.accumulated_roll
         c.stiffness, c.bond = was.stiffness, was.bond
         return True
     return False
@@ -67,7 +68,8 @@ def recall(
     for k in range(low, high):
         c = contacts[k]
         c.state = OPEN
-        c.accumulated_normal = c.accumulated_shear = c.stiffness = 0.0
+        c.accumulated_normal = c.accumulated_shear = c.accumulated_roll = 0.0
+        c.stiffness = 0.0
         c.bond = 0.0
         if c.gap > margin:
             continue
@@ -83,5 +85,6 @@ def copy_contact(c: Contact, was: Contact) -> None:
     copy_geometry(c, was)
     c.state, c.kind = was.state, was.kind
     c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
+    c.accumulated_roll, c.roll = was.accumulated_roll, was.roll
     c.stiffness, c.normal, c.shear = was.stiffness, was.normal, was.shear
     c.bond, c.struck = was.bond, was.struck

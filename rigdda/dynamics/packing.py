@@ -398,6 +398,7 @@ def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
     polygons = [b.vertices for b in scene.blocks] + [scene.outline(i) for i in scene.bodies]
     bodies = np.zeros(len(polygons), dtype=BODY)  # columns are faster to set than in a recarray
     outlines = pack_outlines(polygons, bodies)
+    mark_flush([b.vertices if b.fixed else None for b in scene.blocks], outlines)
     traits = block_traits(scene.blocks, names)
     traits += [barrier_trait(scene, i, names) for i in scene.bodies]
     bodies = bodies.view(np.recarray)
@@ -543,6 +544,60 @@ def pack_outlines(polygons: list[Floats], bodies: Bodies) -> Outlines:
         corners.view(np.recarray),
         points.view(np.recarray),
     )
+
+
+def mark_flush(fixed: Sequence[Floats | None], outlines: Outlines) -> None:
+    """Mark the corners and edges of fixed blocks that lie within the ground that these blocks form.
+
+    Where fixed blocks form a continuous ground, such as two blocks with flush tops, nothing can
+    strike the corners within its surface or the edges between two blocks. Around such a corner, the
+    angles that the fixed blocks fill add up to at least 180 degrees; beside such an edge, the other
+    side is filled as well, here at its middle and near its ends.
+
+    Parameters
+    ----------
+    fixed : sequence of (n, 2) array or None
+        Corners of each block [m]; None for a block that is not fixed.
+    outlines : Outlines
+        Outlines of the bodies and their parts; their corners are marked.
+    """
+    polygons = {i: corners for i, corners in enumerate(fixed) if corners is not None}
+    if len(polygons) < 2:
+        return
+    near = 1e-9 * max(float(np.ptp(corners)) for corners in polygons.values())
+
+    def filled(points: Floats) -> Floats:
+        return np.sum([angles_at(points, other, near) for other in polygons.values()], axis=0)
+
+    for i, corners in polygons.items():
+        flush = filled(corners) > math.pi - 1e-6
+        edges = np.roll(corners, -1, axis=0) - corners
+        places = (corners + share * edges for share in (0.01, 0.5, 0.99))
+        inner = np.all([filled(place) > 2.0 * math.pi - 1e-6 for place in places], axis=0)
+        for row in np.nonzero(outlines.polygon["body"] == i)[0]:
+            corner = outlines.corner[row, : outlines.polygon["count"][row]]
+            corner["flush"] = flush[corner["number"]]
+            corner["inner"] |= inner[corner["number"]]
+
+
+def angles_at(points: Floats, polygon: Floats, near: float) -> Floats:
+    """Return the angle that a polygon fills around each of some points on its outline, (n,) [rad].
+
+    Points farther than `near` [m] from the outline have an angle of 0.
+    """
+    polygon = polygon if polygon_properties(polygon)[0] > 0.0 else polygon[::-1]
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    before = np.roll(edges, 1, axis=0)
+    turn = np.arctan2(
+        before[:, 0] * edges[:, 1] - before[:, 1] * edges[:, 0], (before * edges).sum(axis=1)
+    )
+    from_start = points[:, None] - polygon
+    length = np.hypot(*edges.T)
+    along = (from_start * edges).sum(axis=2) / length
+    across = (from_start[..., 1] * edges[:, 0] - from_start[..., 0] * edges[:, 1]) / length
+    at_corner = np.hypot(*np.moveaxis(from_start, 2, 0)) <= near
+    on_edge = (np.abs(across) <= near) & (along > near) & (along < length - near)
+    return (at_corner * (np.pi - turn)).sum(axis=1) + np.pi * on_edge.any(axis=1)
 
 
 def pack_links(scene: Scene, bodies: Bodies) -> Links:

@@ -256,8 +256,9 @@ CORNER = _record(
     normal_x=float,  # current outward unit normal of the edge that starts here
     normal_y=float,
     number=np.int32,  # index of this corner in the outline of the body
-    inner=bool,  # whether the edge that starts here is inside the body
+    inner=bool,  # whether the edge that starts here is inside the body, or between fixed blocks
     reentrant=bool,  # whether the outline of the body is concave here
+    flush=bool,  # whether fixed bodies around this corner of a fixed body leave no convex corner
 )
 """One corner of a polygon."""
 

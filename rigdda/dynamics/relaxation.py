@@ -220,8 +220,8 @@ def aim_row(
 ) -> None:
     """Set the quantities that a visit of a row needs in a substep h.
 
-    An open contact may close by what its gap exceeds `touch` [m] in the time `left` [s], corrected
-    for the opening that rotation of the bodies causes. A spring acts with its force in the middle of the substep, so
+    A contact whose gap exceeds `touch` [m] may close by its gap in the time `left` [s], corrected for
+    the opening that rotation of the bodies causes. A spring acts with its force in the middle of the substep, so
     that it conserves energy at any step length.
     """
     flexible = rolling = cross = 0.0
@@ -246,8 +246,8 @@ def aim_row(
         row[AIM], row[AIM_SHEAR] = -0.5 * h * row[BEND], 0.0
         if fact[STRENGTH] == math.inf:  # a pin; `mend_links` removes its drift
             row[AIM_SHEAR] = -0.5 * h * row[BEND + 1]
-        elif row[GAP] > 0.0 and fact[STRENGTH + 1] == 0.0:  # an open contact without a joint
-            row[AIM] -= max(row[GAP] - touch, 0.0) / left
+        elif row[GAP] > touch and fact[STRENGTH + 1] == 0.0:  # an open contact without a joint
+            row[AIM] -= row[GAP] / left
     else:
         give = 0.25 * row[STIFFNESS] * h * h
         row[KEEP] = give * flexible / (1.0 + give * flexible)

@@ -169,8 +169,11 @@ def add_corner(
 ) -> int:  # fmt: skip
     """Add the contact of a corner of polygon `owner` with the contact face.
 
-    Its key is that of the corner of the body, so that parts share accumulated forces.
+    Its key is that of the corner of the body, so that parts share accumulated forces. A flush
+    corner has no contact.
     """
+    if outlines.corner[owner, corner].flush:
+        return k
     a, b, i, edge = meeting.a, meeting.b, meeting.i, meeting.edge
     sign = 1.0 if outlines.polygon[i].body == b else -1.0  # the normal points to a
     body = outlines.polygon[owner].body

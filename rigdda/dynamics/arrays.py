@@ -117,6 +117,7 @@ class Rows(NamedTuple):
     idle: Ints  # (C,) substep before which a contact cannot close
     visit: Ints  # (C,) contacts visited by a sweep
     place: Ints  # (C,) row of each contact
+    face: Ints  # (C,) 2 if a row is solved together with the next one, 0 for the latter, else 1
     height: Floats  # (C,) of each contact [m]; in `position_correction` the excess gap of each row
     layer: Ints  # (contacts + 1,) number of contacts below a height
     moved_in: Ints  # (G + 1,) last sweep in which a slot moved

@@ -139,6 +139,7 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
             idle=whole(room),
             visit=whole(room),
             place=whole(room),
+            face=whole(room),
             height=np.zeros(room),
             layer=whole(room + 1),
             moved_in=whole(blocks + 1),

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Islands, Rows
-from rigdda.dynamics.constants import BOLT, PIN, PLAIN
+from rigdda.dynamics.constants import BOLT, PIN, PLAIN, SAME_FACE
 from rigdda.dynamics.records import Contact, Contacts, Floats
 from rigdda.kernel import arithmetic_kernel, inlined, kernel
 
@@ -25,10 +25,9 @@ NORMAL, IMPULSE, AIM = 0, 6, 8
 # shear strength at zero pressure and of the tensile strength [N s].
 KEEP, GAIN, COHESION, TENSION = 9, 10, 11, 12
 
-# SHEAR to + 5, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR: the same for shear. CROSS: decrease of the shear
-# impulse per increase of the normal impulse [-]. FLEXIBLE: normal velocity per impulse [1/kg].
-# FRICTION: tan phi. STIFFNESS of a spring [N/m], 0 for a rigid contact.
-SHEAR, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR, CROSS, FLEXIBLE = 14, 20, 21, 22, 23, 24
+# SHEAR to + 5, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR: the same for shear. FLEXIBLE: normal velocity per
+# impulse [1/kg]. FRICTION: tan phi. STIFFNESS of a spring [N/m], 0 for a rigid contact.
+SHEAR, AIM_SHEAR, KEEP_SHEAR, GAIN_SHEAR, FLEXIBLE = 14, 20, 21, 22, 24
 FRICTION, STIFFNESS = 25, 26
 
 # GAP [m]. BEND: second time derivative of the gap due to rotation [m/s2]; + 1: along shear.
@@ -55,7 +54,10 @@ RADIUS, RESTITUTION, RESTITUTION_SPEED, REBOUND, BOUNCE, STRUCK, LOAD = 10, 11, 
 # normal force; + 1: of the shear and the rolling force [J]. WORK_ON_A: work of all on body a [J].
 SUM, WORK, WORK_ON_A = 19, 22, 24
 
-FACTS = 25
+# REACHED and + 1: impulses after the last extrapolation of sweeps; WAY and + 1: its direction [N s].
+REACHED, WAY = 25, 27
+
+FACTS = 29
 
 # Columns of rows.slot, one slot per body. NOW, FREE, BEFORE: scaled velocities at the end of this
 # substep, the same without contacts, and in the substep before [kg^1/2 m/s]. X, Y: centroid [m].
@@ -69,7 +71,10 @@ PULL, DAMPING, FIELD, HELD = 14, 17, 18, 19
 # x, used while it yields. LEFT, START: remaining elongation and x at the start of the step [m].
 BRAKE, MOVES, LEFT, START = 20, 21, 22, 23
 
-SLOT_COLUMNS = 24
+# ALONG: change of the scaled velocities along the direction of an extrapolation [kg^1/2 m/s].
+ALONG = 24
+
+SLOT_COLUMNS = 27
 
 # rows.form: the vertex belongs to a, to b, or the contact is a bolt between two points
 OF_A, OF_B, BETWEEN = 0, 1, 2
@@ -125,7 +130,7 @@ def pack_row(c: Contact, islands: Islands, rows: Rows, place: int, still: int) -
     elif c.kind == PLAIN:
         row[STIFFNESS] = c.stiffness
         fact[FREE_SHEAR] = c.accumulated_shear / c.stiffness
-    for q in range(REBOUND, FACTS):
+    for q in range(REBOUND, REACHED):
         fact[q] = 0.0
 
 
@@ -175,8 +180,17 @@ def place_row(
 
 
 @kernel
+def shares_face(c: Contact, other: Contact) -> bool:
+    """Return whether two successive contacts are the two ends of one contact face."""
+    same = c.a == other.a and c.b == other.b and not (is_elastic(c) or is_elastic(other))
+    return same and c.nx * other.nx + c.ny * other.ny > SAME_FACE
+
+
+@kernel
 def sort_by_height(contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int) -> None:
     """Assign the rows of the contacts low:high by height, lowest first.
+
+    The two contacts of a face have successive rows.
 
     In this order a sweep carries loads through a pile. The counting sort has as many layers as
     there are contacts; the order within a layer does not matter. The contacts themselves stay in
@@ -186,7 +200,12 @@ def sort_by_height(contacts: Contacts, islands: Islands, rows: Rows, low: int, h
     layers = high - low
     least, most = math.inf, -math.inf
     for q in range(low, high):
-        height[q] = contacts[islands.contact_item[q]].y
+        c = contacts[islands.contact_item[q]]
+        height[q], rows.face[q - low] = c.y, 1
+        if q > low and rows.face[q - 1 - low] == 1:
+            if shares_face(contacts[islands.contact_item[q - 1]], c):
+                height[q] = height[q - 1]
+                rows.face[q - 1 - low], rows.face[q - low] = 2, 0
         least, most = min(least, height[q]), max(most, height[q])
     scale = layers / (most - least) * (1.0 - 1e-9) if most > least else 0.0
     for s in range(layers + 1):
@@ -200,6 +219,10 @@ def sort_by_height(contacts: Contacts, islands: Islands, rows: Rows, low: int, h
         s = place[q]
         place[q] = layer[s]
         layer[s] += 1
+    for q in range(low, high):  # in the order of the rows
+        rows.visit[place[q]] = rows.face[q - low]
+    for k in range(layers):
+        rows.face[k] = rows.visit[k]
 
 
 @inlined

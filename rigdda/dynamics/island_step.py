@@ -137,11 +137,11 @@ def is_tried_whole(
     """Return whether an island is solved as a whole before relaxation is tried.
 
     That is the case in static mode, for islands with the paper's contacts, for a lone block with
-    supports, and for `quiet` islands with supports, with unbroken joints, or that were solved as a
+    supports, for blocks that touch nothing but their supports, and for `quiet` islands with supports, with unbroken joints, or that were solved as a
     whole in the last step. It is never the case for an island with a fence, because a fence has no
     entries in the system of equations.
     """
-    required, bonds, rested = p.static, False, True
+    required, bonds, rested, only = p.static, False, True, True
     low, high = islands.block_start[island], islands.block_start[island + 1]
     for place in range(low, high):
         body = bodies[islands.block_item[place]]
@@ -152,7 +152,8 @@ def is_tried_whole(
         c = contacts[islands.contact_item[item]]
         required = required or c.kind == PLAIN or (high - low == 1 and is_elastic(c))
         bonds = bonds or c.bond > 0.0 or is_elastic(c)
-    return required or (quiet and (bonds or rested))
+        only = only and is_elastic(c)
+    return required or only or (quiet and (bonds or rested))
 
 
 @stage

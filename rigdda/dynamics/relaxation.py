@@ -60,7 +60,6 @@ from rigdda.dynamics.records import Bodies, Body, Floats, Parameters
 from rigdda.dynamics.rows import (
     AIM,
     AIM_SHEAR,
-    ALONG,
     BEFORE,
     BEND,
     BOUNCE,
@@ -77,6 +76,7 @@ from rigdda.dynamics.rows import (
     GAIN,
     GAIN_SHEAR,
     GAP,
+    GOAL,
     HELD,
     IMPULSE,
     KEEP,
@@ -89,6 +89,7 @@ from rigdda.dynamics.rows import (
     PULL,
     REACHED,
     REBOUND,
+    RESIDUE,
     RESTITUTION,
     RESTITUTION_SPEED,
     ROLL,
@@ -104,7 +105,6 @@ from rigdda.dynamics.rows import (
     SUM,
     TENSION,
     TURN,
-    WAY,
     WORK,
     WORK_ON_A,
     X,
@@ -394,7 +394,8 @@ def press_face(row: Floats, other: Floats, a: Floats, b: Floats) -> float:
     low, low_2 = -row[TENSION], -other[TENSION]
     new, new_2 = solve_face(own, its, both, speed, speed_2, low, low_2)
     part = min(row[GAIN] * own, other[GAIN] * its)  # see aim_row
-    more, more_2 = part * (new - one), part * (new_2 - two)
+    more = max(part * (new - one), low - one)
+    more_2 = max(part * (new_2 - two), low_2 - two)
     if more != 0.0 or more_2 != 0.0:
         push(row, NORMAL, a, b, NOW, more)
         push(other, NORMAL, a, b, NOW, more_2)
@@ -669,68 +670,58 @@ def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance:
 
 
 @kernel
-def extrapolate(rows: Rows, n: int, count: int, number: int, before: float) -> float:
-    """Continue the changes of the impulses by the last sweeps, as conjugate gradients do.
+def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
+    """Extrapolate the impulses from their changes by the last sweeps and by those before.
 
-    The changes are the residual of a fixed-point iteration. The direction is the residual plus the
-    last direction times the ratio of the squares of successive residuals (Fletcher and Reeves), or
-    the residual alone if that ratio exceeds 1. The step is the one that minimises the kinetic
-    energy of the velocities that contacts miss. Sweeps alone converge slowly where a heavy body
-    rests or falls on light ones.
+    Sweeps are a fixed-point iteration x -> G(x) with the residual r = G(x) - x. In Anderson's method
+    of depth one, the next x is G - theta dG, where d is the change since the last extrapolation and
+    theta = r dr / dr^2. It removes the error that decreases most slowly, as that of a heavy body
+    that rests or falls on a light one. If the residual has grown, the last extrapolation is taken
+    back.
 
     Parameters
     ----------
     before : float
-        Square of the residual at the last extrapolation [J]; 0 at the first.
+        Square of the residual at the last extrapolation [J]; inf at the first.
 
     Returns
     -------
     float
-        Square of the residual [J].
+        Square of the residual [J], or -1 if it has grown.
     """
-    square = 0.0
+    square = slope = curvature = 0.0
     for k in range(count):
         row, fact = rows.row[k], rows.fact[k]
-        if rows.idle[k] <= number:
-            one, two = row[IMPULSE] - fact[REACHED], row[IMPULSE + 1] - fact[REACHED + 1]
-            square += row[FLEXIBLE] * (one * one + two * two)
-    share = square / before if 0.0 < square <= before else 0.0
-    for s in range(n + 1):
-        for q in range(3):
-            rows.slot[s, ALONG + q] = 0.0
-    slope = 0.0
-    for k in range(count):
-        row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
-        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+        if rows.idle[k] > number:
             continue
-        one = share * fact[WAY] + row[IMPULSE] - fact[REACHED]
-        two = share * fact[WAY + 1] + row[IMPULSE + 1] - fact[REACHED + 1]
-        push(row, NORMAL, a, b, ALONG, one)
-        push(row, SHEAR, a, b, ALONG, two)
-        slope += one * (row[AIM] - along_six(row[NORMAL : NORMAL + 6], a, b, NOW))
-        slope += two * (row[AIM_SHEAR] - along_six(row[SHEAR : SHEAR + 6], a, b, NOW))
-        fact[WAY], fact[WAY + 1] = one, two
-    curvature = 0.0
-    for s in range(n):
-        for q in range(3):
-            curvature += rows.slot[s, ALONG + q] * rows.slot[s, ALONG + q]
-    step = max(slope / curvature, 0.0) if curvature > 0.0 else 0.0
-    for s in range(n):
-        for q in range(3):
-            rows.slot[s, NOW + q] += step * rows.slot[s, ALONG + q]
+        for q in range(2):
+            residue = row[IMPULSE + q] - fact[REACHED + q]
+            change = residue - fact[RESIDUE + q]
+            square += row[FLEXIBLE] * residue * residue
+            slope += row[FLEXIBLE] * residue * change
+            curvature += row[FLEXIBLE] * change * change
+    grew = square > before
+    share = max(-slope / curvature, 0.0) if curvature > 0.0 and not grew else 0.0
     for k in range(count):
         row, fact = rows.row[k], rows.fact[k]
-        if rows.idle[k] <= number and row[STIFFNESS] == 0.0:
-            for q in range(2):
-                row[IMPULSE + q] += step * fact[WAY + q]
-                fact[REACHED + q] = row[IMPULSE + q]
-    return square
+        if rows.idle[k] > number:
+            continue
+        a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
+        for q in range(2):
+            goal = row[IMPULSE + q]
+            more = fact[GOAL + q] - goal if grew else share * (goal - fact[GOAL + q])
+            push(row, NORMAL if q == 0 else SHEAR, a, b, NOW, more)
+            fact[RESIDUE + q] = goal - fact[REACHED + q]
+            fact[GOAL + q] = goal
+            fact[REACHED + q] = row[IMPULSE + q] = goal + more
+    return -1.0 if grew else square
 
 
 @kernel
 def sweep_until(rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float) -> int:
     """Sweep until no velocity changes by more than a tolerance, or `MOST_SWEEPS` times."""
-    square = 0.0
+    square = math.inf
+    start_extrapolation(rows, count)
     for s in range(n + 1):
         rows.moved_in[s] = -1
     for tries in range(MOST_SWEEPS):
@@ -738,22 +729,20 @@ def sweep_until(rows: Rows, n: int, count: int, number: int, reach: float, toler
         worst = sweep(rows, n, visits, tries, number, reach, tolerance)
         if worst <= tolerance:
             return tries + 1
-        if tries == 1:
-            start_ways(rows, count)
-        elif tries % 2 == 1:
-            square = extrapolate(rows, n, count, number, square)
+        if tries % 2 == 1 and square >= 0.0 and tries < MOST_SWEEPS - 2:
+            square = extrapolate(rows, count, number, square)
             for s in range(n + 1):
                 rows.moved_in[s] = tries
     return MOST_SWEEPS
 
 
 @kernel
-def start_ways(rows: Rows, count: int) -> None:
-    """Begin the extrapolation of sweeps at the present impulses."""
+def start_extrapolation(rows: Rows, count: int) -> None:
+    """Begin to extrapolate the impulses from their present values."""
     for k in range(count):
         row, fact = rows.row[k], rows.fact[k]
         for q in range(2):
-            fact[REACHED + q], fact[WAY + q] = row[IMPULSE + q], 0.0
+            fact[REACHED + q], fact[RESIDUE + q], fact[GOAL + q] = row[IMPULSE + q], 0.0, 0.0
 
 
 @kernel

@@ -54,10 +54,11 @@ RADIUS, RESTITUTION, RESTITUTION_SPEED, REBOUND, BOUNCE, STRUCK, LOAD = 10, 11, 
 # normal force; + 1: of the shear and the rolling force [J]. WORK_ON_A: work of all on body a [J].
 SUM, WORK, WORK_ON_A = 19, 22, 24
 
-# REACHED and + 1: impulses after the last extrapolation of sweeps; WAY and + 1: its direction [N s].
-REACHED, WAY = 25, 27
+# REACHED and + 1: normal and shear impulse after the last extrapolation; RESIDUE and + 1, GOAL and
+# + 1: their changes by the sweeps before it, and their values after these [N s].
+REACHED, RESIDUE, GOAL = 25, 27, 29
 
-FACTS = 29
+FACTS = 31
 
 # Columns of rows.slot, one slot per body. NOW, FREE, BEFORE: scaled velocities at the end of this
 # substep, the same without contacts, and in the substep before [kg^1/2 m/s]. X, Y: centroid [m].
@@ -71,10 +72,7 @@ PULL, DAMPING, FIELD, HELD = 14, 17, 18, 19
 # x, used while it yields. LEFT, START: remaining elongation and x at the start of the step [m].
 BRAKE, MOVES, LEFT, START = 20, 21, 22, 23
 
-# ALONG: change of the scaled velocities along the direction of an extrapolation [kg^1/2 m/s].
-ALONG = 24
-
-SLOT_COLUMNS = 27
+SLOT_COLUMNS = 24
 
 # rows.form: the vertex belongs to a, to b, or the contact is a bolt between two points
 OF_A, OF_B, BETWEEN = 0, 1, 2

@@ -47,6 +47,10 @@ MOST_SWEEPS = 100
 """Maximum number of sweeps over the contacts of an island in a substep. Sweeps stop earlier when
 none changes a normal velocity by more than the tolerance."""
 
+SET_OF_SWEEPS = 10
+"""Number of sweeps between two extrapolations of impulses. Most substeps need fewer sweeps and no
+extrapolation. After two sweeps, several modes of error are left, and extrapolations may diverge."""
+
 SAME_NORMAL = 0.7
 """Least cosine of the angle between the normals of a vertex's contacts in two successive steps for
 them to count as the same contact [-]."""

@@ -51,6 +51,7 @@ from rigdda.dynamics.constants import (
     AT_ONCE,
     MOST_SWEEPS,
     ROUNDING,
+    SET_OF_SWEEPS,
     SETTLED,
     SUBSTEPS,
 )
@@ -673,8 +674,8 @@ def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance:
 def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
     """Extrapolate the impulses from their changes by the last sweeps and by those before.
 
-    Sweeps are a fixed-point iteration x -> G(x) with the residual r = G(x) - x. In Anderson's method
-    of depth one, the next x is G - theta dG, where d is the change since the last extrapolation and
+    `SET_OF_SWEEPS` sweeps are a step of a fixed-point iteration x -> G(x) with the residual r = G(x)
+    - x. In Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the change since the last extrapolation and
     theta = r dr / dr^2. It removes the error that decreases most slowly, as that of a heavy body
     that rests or falls on a light one. If the residual has grown, the last extrapolation is taken
     back.
@@ -729,7 +730,7 @@ def sweep_until(rows: Rows, n: int, count: int, number: int, reach: float, toler
         worst = sweep(rows, n, visits, tries, number, reach, tolerance)
         if worst <= tolerance:
             return tries + 1
-        if tries % 2 == 1 and square >= 0.0 and tries < MOST_SWEEPS - 2:
+        if (tries + 1) % SET_OF_SWEEPS == 0 and square >= 0.0 and tries + 1 < MOST_SWEEPS:
             square = extrapolate(rows, count, number, square)
             for s in range(n + 1):
                 rows.moved_in[s] = tries

@@ -158,7 +158,7 @@ def pressed(monitors: Monitors, c: Contact) -> int:
     if c.b != TERRAIN:
         return barrier_contact(monitors, c.a, c.b)[1]
     for barrier in range(len(monitors.target)):
-        if monitors.target[barrier].low <= c.x <= monitors.target[barrier].high:
+        if monitors.target[barrier].low <= c.face_x <= monitors.target[barrier].high:
             return barrier
     return -1
 

@@ -66,6 +66,7 @@ CONTACT = _record(
     struck=np.int32,  # 1 after an impact in this step, else 0
     turns=np.int32,  # 1 if rolling resistance is at its limit, else 0
     pair=np.int32,  # off-diagonal block of the pair of bodies, -1: no coupling
+    face_x=float,  # chainage of the middle of the terrain segment, else of the vertex [m]
     x=float,  # the vertex [m]
     y=float,
     nx=float,

@@ -56,16 +56,18 @@ def write_parties(c: Contact, a: int, b: int, key: int, owner: int, other: int) 
 
 
 @inlined
-def write_geometry(c: Contact, x: float, y: float, nx: float, ny: float, gap: float) -> None:
-    """Write the vertex, the normal and the gap of a contact."""
-    c.x, c.y, c.nx, c.ny, c.gap = x, y, nx, ny, gap
+def write_geometry(
+    c: Contact, x: float, y: float, nx: float, ny: float, gap: float, face_x: float
+) -> None:
+    """Write the vertex, the normal, the gap and the place of the face of a contact."""
+    c.x, c.y, c.nx, c.ny, c.gap, c.face_x = x, y, nx, ny, gap, face_x
 
 
 @kernel
 def copy_geometry(c: Contact, was: Contact) -> None:
     """Copy what contact detection writes from one contact to another."""
     write_parties(c, was.a, was.b, was.key, was.owner, was.other)
-    write_geometry(c, was.x, was.y, was.nx, was.ny, was.gap)
+    write_geometry(c, was.x, was.y, was.nx, was.ny, was.gap, was.face_x)
 
 
 @inlined
@@ -181,7 +183,7 @@ def add_corner(
     key = body * outlines.corner.shape[1] + own.number
     c = contacts[k]
     write_parties(c, a, b, key, 1 if body == a else 0, bodies[b].surface)
-    write_geometry(c, own.x, own.y, sign * face.normal_x, sign * face.normal_y, gap)
+    write_geometry(c, own.x, own.y, sign * face.normal_x, sign * face.normal_y, gap, own.x)
     return k + 1
 
 

@@ -209,7 +209,7 @@ def corners_on_segment(
     one, block = ground.segment[s], bodies[a]
     nx, ny, surface = one.normal_x, one.normal_y, one.surface
     reach = block.path + p.gravity * p.dt * p.dt + p.margin
-    concave = block.parts > 1
+    concave, middle = block.parts > 1, 0.5 * (one.left + one.right)
     lowest = below_segment(ground, s, block.x, block.y) - block.radius
     if lowest > reach:
         return k
@@ -234,10 +234,10 @@ def corners_on_segment(
                 again = True
                 if gap < c.gap:
                     write_parties(c, a, TERRAIN, key, 1, surface)
-                    write_geometry(c, x, y, nx, ny, gap)
+                    write_geometry(c, x, y, nx, ny, gap, middle)
         if not again:
             write_parties(contacts[k], a, TERRAIN, key, 1, surface)
-            write_geometry(contacts[k], x, y, nx, ny, gap)
+            write_geometry(contacts[k], x, y, nx, ny, gap, middle)
             k += 1
     return k
 
@@ -325,7 +325,7 @@ def edge_on_ridge(
         return k
     key = len(bodies) * outlines.corner.shape[1] + corner
     write_parties(contacts[k], a, TERRAIN, key, 0, right.surface)
-    write_geometry(contacts[k], x, y, -nx, -ny, gap)
+    write_geometry(contacts[k], x, y, -nx, -ny, gap, x)
     return k + 1
 
 

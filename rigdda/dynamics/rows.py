@@ -35,9 +35,9 @@ GAP, BEND = 27, 28
 
 # ROLL and + 1: e_r, R times the rates of rotation of a and b. ROLLED: rolling impulse, the moment
 # impulse over R [N s], at most ROLL_LIMIT and at most ROLLING [-] times the normal impulse.
-ROLL, ROLLED, ROLL_LIMIT, ROLLING = 29, 31, 32, 33
+ROLL, ROLLED, ROLL_LIMIT, ROLLING = 30, 32, 33, 34
 
-COLUMNS = 34
+COLUMNS = 35
 
 # Columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: position of the vertex and of the
 # point of the face, and the normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR: displacements at

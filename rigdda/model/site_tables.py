@@ -426,7 +426,7 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping: Annotated[
         float,
         about(
-            'Mass-proportional damping of all blocks, also in flight, as in the paper. It requires '
+            "Mass-proportional damping of all blocks, also in flight, as in the paper. It requires "
             '`damping_when` = "always".',
             "1/s",
             ge=0.0,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check
+from rigdda.errors import BadInput
 
 USUAL_DT = 5e-3
 """Default time step [s]. The error of the outcome of a rockfall is below the scatter between

@@ -67,9 +67,9 @@ GROUND_TEXT = """\
 The key `ground` of a surface refers to this library of typical values and, in brackets, plausible
 ranges. A surface takes the typical values except those that it specifies itself. The values are
 those of rigid blocks with corners, not those of a point mass, whose normal restitution also depends
-on the rotation of the block. Rolling resistance acts while a block touches the ground. It represents
-the losses of rotating blocks that friction and restitution do not cover, and is the least certain
-of the four properties. If you have no measurements, design for both ends of its range.
+on the rotation of the block. Rolling resistance acts while a block touches the ground. It is the
+loss of rotating blocks that friction and restitution do not cover, and the least certain of the
+four properties. If you have no measurements, design for both ends of its range.
 """
 
 LAYOUT = """\

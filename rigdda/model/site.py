@@ -164,7 +164,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                     if table.get(name) == value:
                         del table[name]
                 if table.get("restitution_speed", 0.0) is None:
-                    mend = "give a number: None is the value of a site file without ground only"
+                    mend = "give a number: a file without it means that of the ground"
                     raise BadInput(f"{where}.restitution_speed", None, mend)
             if table.get("restitution", 0.0) is None:
                 mend = "give a number: None (plain contact) is possible in Python only"

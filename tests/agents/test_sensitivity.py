@@ -199,7 +199,7 @@ def test_a_posterior_file_is_checked(text: str, named: str, tmp_path: Path) -> N
         (("--parameters", "weather"), ("--parameters", "weather=LOW:HIGH")),
         (("--parameters", "ground", "--parameters", "ground"), ("name each number once",)),
         (("--parameters", "surfaces.rock.rolling=2:1"), ("LOW below HIGH",)),
-        (("--parameters", "surfaces.rock.rolling=2:500"), ("surfaces.rock.rolling", "500")),
+        (("--parameters", "surfaces.rock.rolling=0.2:500"), ("surfaces.rock.rolling", "500")),
         (("--parameters", "events.none.rate=1:2"), ("events.none.rate", "name a number")),
         (("--posterior", "none.csv"), ("--posterior", "none.csv", "rigdda fit")),
         (("--layout", "none.toml"), ("none.toml",)),

@@ -51,7 +51,7 @@ def cut(prices: Prices | None = None, consequences: Consequences | None = None) 
         barrier_zone=BarrierZone(4.0, 17.8),
         surfaces={
             "rock": Surface(32.0, restitution=0.4, rolling=0.1),
-            "soil": Surface(30.0, restitution=0.2, rolling=0.2),
+            "soil": Surface(30.0, restitution=0.2, rolling=0.1),
         },
         meshes=(
             MeshOption("light", 10.0, 60.0, {"small": 0.4}),

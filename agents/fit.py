@@ -412,10 +412,6 @@ def fit(
         If a simulation diverges.
     """
     check_parameters(parameters, model)
-    own = all(surface.damping is not None for surface in site.surfaces.values())
-    if own and any(parameter.path == "motion.damping" for parameter in parameters):
-        mend = "fit surfaces.NAME.damping: every surface of the site has a damping of its own"
-        raise BadInput("--parameters", "motion.damping", mend)
     low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
     with_values(site, parameters, list(low)), with_values(site, parameters, list(high))
     middle = with_values(site, parameters, list(0.5 * (low + high)))

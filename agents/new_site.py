@@ -256,7 +256,6 @@ class _Draft:
                 {
                     "duration": (self._duration(), DEFAULT),
                     "dt": (STEP, DEFAULT),
-                    "damping_when": (Motion().damping_when, DEFAULT),
                 },
             ),
         ]
@@ -475,7 +474,7 @@ class _Draft:
         spans = {
             "friction_deg": ground.friction_deg,
             "restitution": ground.restitution,
-            "damping": ground.damping,
+            "rolling": ground.rolling,
             "roughness": ground.roughness,
         }
         lines = [

@@ -23,6 +23,7 @@ from rigdda import BadInput, Layout, Site, fields
 from rigdda.files import read as read_text
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.site_tables import VOLUME_EXPONENT, Rebound
+from rigdda.model.surface import RETIRED
 
 Floats = NDArray[np.float64]
 
@@ -30,10 +31,12 @@ RANGES = {
     "scatter.friction_deg": (0.0, 10.0),
     "friction_deg": (15.0, 65.0),
     "restitution": (0.0, 0.8),
-    "damping": (0.0, 3.0),
+    "rolling": (0.0, 1.0),
+    "motion.damping": (0.0, 3.0),
     "friction_sd_deg": (0.0, 10.0),
     "restitution_sd": (0.0, 0.2),
-    "damping_sd": (0.0, 1.0),
+    "rolling_sd": (0.0, 0.3),
+    "restitution_speed": (2.0, 50.0),
     "roughness": (0.0, 0.2),
     "normal": (0.0, 0.8),
     "tangential": (0.4, 1.0),
@@ -101,6 +104,7 @@ def parse(text: str, known: Mapping[str, Parameter] | None = None) -> Parameter:
         If it has another form, or if it has no limits and there are no default limits for it.
     """
     path, given, limits = text.partition("=")
+    _check_retired(path)
     if not given:
         if known and path in known:
             return known[path]
@@ -118,6 +122,20 @@ def parse(text: str, known: Mapping[str, Parameter] | None = None) -> Parameter:
     return Parameter(path, low, high)
 
 
+def _check_retired(path: str) -> None:
+    """Check that a path does not name a former key of a surface or an interface.
+
+    Raises
+    ------
+    BadInput
+        If it does.
+    """
+    top, last = path.partition(".")[0], path.rpartition(".")[2]
+    if top in ("surfaces", "interfaces") and last in RETIRED:
+        mend = f"name {path.rpartition('.')[0]}.{last.replace('damping', 'rolling')}: damping was "
+        raise BadInput("--parameters", path, mend + "replaced by rolling resistance")
+
+
 def check_once(parameters: Sequence[Parameter]) -> None:
     """Check that each number is named once.
 
@@ -132,7 +150,7 @@ def check_once(parameters: Sequence[Parameter]) -> None:
 
 
 def ground(site: Site) -> tuple[Parameter, ...]:
-    """Return damping, restitution and friction of each surface of the slope.
+    """Return rolling resistance, restitution and friction of each surface of the slope.
 
     The ranges are those of the ground of the surface in the library, or of the ground that a
     surface with this name usually has. They are extended to contain the value of the site.
@@ -141,7 +159,7 @@ def ground(site: Site) -> tuple[Parameter, ...]:
     for name in dict.fromkeys(site.slope.chain()[1]):
         surface = site.surfaces[name]
         spans = GROUNDS[surface.ground or USUAL.get(name, OTHER)]
-        for field in ("damping", "restitution", "friction_deg"):
+        for field in ("rolling", "restitution", "friction_deg"):
             value, span = getattr(surface, field), getattr(spans, field)
             if value is not None:
                 path = f"surfaces.{name}.{field}"
@@ -235,6 +253,10 @@ def set_numbers(site: Site, paths: Sequence[str], values: Sequence[float]) -> Si
 def _set(site: Site, tables: dict[str, Any], path: str, value: float) -> None:
     """Set a number in the tables of a site."""
     top, last = path.partition(".")[0], path.rpartition(".")[2]
+    _check_retired(path)
+    if path == "motion.damping" and site.motion.damping_when == "contact":
+        mend = "name surfaces.NAME.rolling: damping in contact was replaced by rolling resistance"
+        raise BadInput("--parameters", path, mend)
     if path == "prices.level":
         return _scale_prices(tables, value)
     table = _table(site, tables, path)

@@ -123,14 +123,16 @@ def checked(table: type[msgspec.Struct], value: Any, where: str = "") -> dict[st
     Raises
     ------
     BadInput
-        If it is not a table, a key is missing or unknown, or a value is of the wrong type or
-        outside its range.
+        If it is not a table, a key is missing, unknown or a former one (`retired` of the table, a
+        dict from key to advice), or a value is of the wrong type or outside its range.
     """
     if not isinstance(value, Mapping):
         raise BadInput(where, value, "give a table")
     prefix, checks = f"{where}." if where else "", _checks(table)
     for key in value:
         if key not in checks:
+            if key in getattr(table, "retired", {}):
+                raise BadInput(f"{prefix}{key}", value[key], table.retired[key])  # type: ignore[attr-defined]
             near = difflib.get_close_matches(str(key), checks, 1)
             mend = f"did you mean {near[0]}?" if near else f"use one of {', '.join(checks)}"
             raise BadInput(f"{prefix}{key}", value[key], f"there is no such key: {mend}")

@@ -104,8 +104,7 @@ class SingleReleases:
     def __init__(self, site: Site, layout: list[Built], scene: Scene):
         self._site, self._layout, self._scene = site, layout, scene
         names = list(scene.surfaces)
-        fences = any(isinstance(barrier, Fence) for barrier in layout)
-        self._meetings = Meetings(site, scene.barrier_surface if fences else None)
+        self._meetings = Meetings(site)
         self._gravity = -scene.gravity_vector[1]
         self._lines = stations(site, scene.barriers)
         self._leave = leave(site, scene)

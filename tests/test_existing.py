@@ -125,8 +125,8 @@ def test_a_barrier_in_its_place_replaces_it(site: Site) -> None:
 def test_its_repair_costs_the_price_of_a_new_one() -> None:
     weak = having(msgspec.structs.replace(OLD, condition=0.05))
     bare = LIGHT
-    seed = next(s for s in range(50) if release(weak, (), s, "block")[1].barriers[0].failed)
-    outcome = release(weak, (), seed, "block")[1]
+    seed = next(s for s in range(50) if release(weak, (), s, "group")[1].barriers[0].failed)
+    outcome = release(weak, (), seed, "group")[1]
     worth = (200.0 * 2.0 + 300.0) * bare.access(20.0)
     held = weak.prices.removal * outcome.held_fraction * outcome.released_volume
     assert weak.bill((), outcome).repair == pytest.approx(10.0 * worth + held, rel=1e-12)

@@ -16,13 +16,15 @@ from rigdda import (
     release,
     release_many,
     release_outcome,
+    sites,
 )
+from rigdda.dynamics.packing import pack_interfaces
 from rigdda.envs import outcome_cache
 from rigdda.envs.outcome_cache import Memory
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.site import FARTHEST
 from rigdda.model.site_tables import Motion
-from rigdda.model.surface import Interface
+from rigdda.model.surface import Interface, smaller
 from rigdda.model.terrain import REACH, Roughness, Terrain
 from rigdda.releases import Batch
 from rigdda.validation.scenes import box
@@ -38,25 +40,28 @@ def with_soil(site: Site, **values: float) -> Site:
     return replace(site, surfaces=surfaces)
 
 
-EVEN = with_soil(BENCH, friction_sd_deg=0.0, restitution_sd=0.0, damping_sd=0.0)
+EVEN = with_soil(BENCH, friction_sd_deg=0.0, restitution_sd=0.0, rolling_sd=0.0)
 
 
 @pytest.mark.parametrize("name", GROUNDS)
 def test_every_ground_has_ranges_about_its_values_and_sources(name):
     ground, surface = GROUNDS[name], Surface(ground=name)
-    for field in ("friction_deg", "restitution", "damping", "roughness"):
+    for field in ("friction_deg", "restitution", "rolling", "roughness"):
         span = getattr(ground, field)
         assert span.low <= span.typical <= span.high
         assert span.source
         assert getattr(surface, field) == span.typical
     assert surface.friction_sd_deg == ground.friction_sd_deg > 0.0
-    assert Surface(ground=name, damping=0.7, friction_deg=41.0).damping == 0.7
+    assert surface.rolling_sd == ground.rolling_sd > 0.0
+    assert surface.restitution_speed == ground.restitution_speed
+    assert Surface(ground=name, rolling=0.7, friction_deg=41.0).rolling == 0.7
     assert Surface(ground=name, friction_deg=41.0).restitution == ground.restitution.typical
 
 
 def test_a_surface_without_a_ground_is_plain():
     plain = Surface()
-    assert (plain.friction_deg, plain.restitution, plain.damping) == (30.0, 0.0, None)
+    assert (plain.friction_deg, plain.restitution, plain.rolling) == (30.0, 0.0, 0.0)
+    assert plain.restitution_speed is None
     assert not plain.varies
 
 
@@ -66,38 +71,99 @@ def test_unknown_grounds_are_refused_with_those_that_are_known():
     assert {*USUAL.values(), OTHER} <= set(GROUNDS)
 
 
-def test_a_site_that_states_no_damping_takes_that_of_its_ground_and_says_so():
-    bare = {name: Surface(damping=None) for name in BENCH.surfaces}
-    with pytest.warns(DoubtfulInput) as told:
-        site = replace(BENCH, surfaces=bare)
-    for name, surface in site.surfaces.items():
-        assert surface.damping == GROUNDS[USUAL[name]].damping.typical
-        assert any(f"surfaces.{name}.damping" in str(warning.message) for warning in told)
-    stated = replace(BENCH, surfaces=bare, motion=Motion(damping=0.4))  # warnings are errors here
-    assert all(surface.damping is None for surface in stated.surfaces.values())
-    assert stated.realise((), 1, "block").damping == 0.4
-    with pytest.raises(BadInput, match=r"damping_when = 'always': also give motion\.damping"):
-        replace(BENCH, motion=Motion(damping_when="always"))
+def bench(old: str, new: str) -> str:
+    """Return the text of the site BENCH with one change."""
+    text = sites.text("bench")
+    assert text.count(old) == 1
+    return text.replace(old, new)
 
 
-def test_an_interface_has_the_damping_of_its_pair_unless_it_states_its_own():
-    for stated, wanted in ((None, EVEN.surfaces["soil"].damping), (0.2, 0.2)):
-        pair = Interface("rock", "soil", 20.0, damping=stated)
+def test_a_site_file_without_rolling_resistance_takes_that_of_the_usual_ground():
+    bare = bench('[surfaces.rock]\nground = "hard_rock"\n', "[surfaces.rock]\n")
+    with pytest.warns(
+        DoubtfulInput, match=r"neither surfaces\.rock\.rolling nor \.ground .* 0\.1 "
+    ):
+        site = Site.parse(bare, "bench")
+    assert site.surfaces["rock"].rolling == GROUNDS[USUAL["rock"]].rolling.typical
+    stated = bare.replace("[surfaces.rock]\n", "[surfaces.rock]\nrolling = 0.0\n")
+    assert Site.parse(stated, "bench").surfaces["rock"].rolling == 0.0  # warnings are errors here
+
+
+@pytest.mark.parametrize("name", ["damping", "damping_sd"])
+def test_files_with_damping_of_grounds_are_refused(name):
+    text = bench("[surfaces.rock]\n", f"[surfaces.rock]\n{name} = 0.5\n")
+    words = rf"^surfaces\.rock\.{name} = 0\.5: remove it: .* give `rolling`, or name a ground$"
+    with pytest.raises(BadInput, match=words):
+        Site.parse(text, "bench")
+    table = f'[[interfaces]]\nfirst = "rock"\nsecond = "soil"\n{name} = 0.5\n\n[surfaces.rock]\n'
+    with pytest.raises(BadInput, match=rf"^interfaces\[0\]\.{name} = 0\.5: remove it"):
+        Site.parse(bench("[surfaces.rock]\n", table), "bench")
+
+
+def test_damping_in_contact_is_refused():
+    words = "damping_when = 'contact': .* give `rolling` to the surfaces, or use \"always\""
+    with pytest.raises(BadInput, match=rf"^motion\.{words}"):
+        Motion(damping=0.3)
+    with pytest.raises(BadInput, match=f"^{words}"):
+        Scene(None, (box(0.0, 0.5),), {"rock": Surface()}, damping=0.3, damping_when="contact")
+    assert Motion(damping=0.3, damping_when="always").damping == 0.3
+    assert (Motion().damping, Motion().damping_when) == (0.0, "contact")
+    text = bench("[motion]\n", '[motion]\ndamping = 0.0\ndamping_when = "contact"\n')
+    assert Site.parse(text, "bench") == BENCH
+    for when in ("contact", "always"):
+        assert Motion(0.0, when).damping_when == when
+
+
+def test_a_pair_has_the_smaller_rolling_resistance_and_speed():
+    one, other = Surface(rolling=0.3, restitution_speed=9.0), Surface(rolling=0.1)
+    assert smaller(one, other) == smaller(other, one)
+    assert smaller(one, other).rolling == 0.1
+    assert smaller(one, other).restitution_speed == 9.0  # None is infinite
+    assert smaller(one, replace(one, restitution_speed=5.0)).restitution_speed == 5.0
+    assert smaller(other, other).restitution_speed is None
+
+
+def test_an_interface_has_the_rolling_resistance_of_its_pair_unless_it_states_its_own():
+    for stated, wanted in ((None, EVEN.surfaces["soil"].rolling), (0.2, 0.2), (0.0, 0.0)):
+        pair = Interface("rock", "soil", 20.0, rolling=stated, restitution_speed=7.0)
         scene = replace(EVEN, interfaces=(pair,)).realise((), 1, "block")
-        assert scene.interface("soil", "rock").damping == wanted
-    with pytest.raises(BadInput, match=r"interfaces\[0\]\.damping = -1"):
-        replace(EVEN, interfaces=(Interface("rock", "soil", damping=-1.0),))
+        assert scene.interface("soil", "rock").rolling == wanted
+        assert scene.interface("soil", "rock").restitution_speed == 7.0
+    with pytest.raises(BadInput, match=r"interfaces\[0\]\.rolling = -1"):
+        replace(EVEN, interfaces=(Interface("rock", "soil", rolling=-1.0),))
 
 
-def test_scatter_of_damping_is_about_that_of_the_site_where_a_surface_has_none():
-    bare = {name: Surface(damping_sd=0.1) for name in BENCH.surfaces}
-    site = replace(BENCH, surfaces=bare, motion=Motion(damping=0.5))
-    drawn = [site.realise((), s, "block").surfaces["rock"].damping for s in range(100)]
+def test_packed_pairs_have_rolling_resistance_and_speed_but_fences_have_not():
+    soil = replace(EVEN.surfaces["soil"], restitution_speed=8.0)
+    scene = replace(EVEN, surfaces=EVEN.surfaces | {"soil": soil}).realise(FENCE, 1, "block")
+    names = list(scene.surfaces)
+    packed, rock, ground = pack_interfaces(scene, names), names.index("rock"), names.index("soil")
+    assert packed["rolling"][rock, ground] == soil.rolling
+    assert packed["restitution_speed"][rock, ground] == 8.0
+    assert packed["restitution_speed"][rock, rock] == np.inf
+    for fences in (packed[len(names) :], packed[:, len(names) :]):
+        assert fences.size
+        assert (fences["rolling"] == 0.0).all() and (fences["friction"] == 0.0).all()
+        assert (fences["restitution_speed"] == np.inf).all()
+
+
+def test_rolling_resistance_scatters_within_its_range():
+    site = with_soil(BENCH, rolling=0.5, rolling_sd=0.1)
+    drawn = [site.realise((), s, "block").surfaces["rock"].rolling for s in range(100)]
     assert np.mean(drawn) == pytest.approx(0.5, abs=0.04)
     assert np.std(drawn) == pytest.approx(0.1, rel=0.3)
-    wild = with_soil(BENCH, damping=99.0, damping_sd=50.0, friction_sd_deg=15.0)
-    for seed in range(20):
-        assert 0.0 <= wild.realise((), seed, "block").surfaces["rock"].damping <= 100.0
+    wild = with_soil(BENCH, rolling=0.9, rolling_sd=0.5, friction_sd_deg=15.0)
+    drawn = [wild.realise((), s, "block").surfaces["rock"].rolling for s in range(40)]
+    assert max(drawn) == 1.0 and 0.0 <= min(drawn) < 0.5
+
+
+def test_speeds_of_restitution_are_kept_in_files(tmp_path):
+    site = with_soil(BENCH, restitution_speed=9.144)
+    site.save(tmp_path / "site.toml")
+    assert Site.load(tmp_path / "site.toml") == site
+    for speed in (0.0, -1.0, "fast"):
+        with pytest.raises(BadInput, match="restitution_speed"):
+            Surface(restitution_speed=speed)
 
 
 def test_saved_sites_keep_their_grounds(tmp_path):
@@ -106,17 +172,17 @@ def test_saved_sites_keep_their_grounds(tmp_path):
     text = (tmp_path / "bench.toml").read_text()
     (tmp_path / "meadow.toml").write_text(text.replace("hard_soil", "meadow"))
     meadow = Site.load(tmp_path / "meadow.toml").surfaces["soil"]
-    assert meadow.damping == GROUNDS["meadow"].damping.typical
+    assert meadow.rolling == GROUNDS["meadow"].rolling.typical
     assert meadow.restitution == BENCH.surfaces["soil"].restitution  # which the site states
 
 
 def test_strengths_scatter_as_they_are_asked_to():
-    sd = {"friction_sd_deg": 3.0, "restitution_sd": 0.02, "damping_sd": 0.1}
-    site = with_soil(BENCH, **sd)
+    sd = {"friction_sd_deg": 3.0, "restitution_sd": 0.02, "rolling_sd": 0.1}
+    site = with_soil(BENCH, rolling=0.5, **sd)
     scenes = [site.realise((), seed, "block") for seed in range(400)]
     for name, surface in site.surfaces.items():
         drawn = [scene.surfaces[name] for scene in scenes]
-        for field, spread in zip(("friction_deg", "restitution", "damping"), sd.values(),
+        for field, spread in zip(("friction_deg", "restitution", "rolling"), sd.values(),
                                  strict=True):  # fmt: skip
             off = np.array([getattr(s, field) for s in drawn]) - getattr(surface, field)
             assert abs(off.mean()) < 4.0 * spread / 20.0
@@ -226,10 +292,10 @@ def test_what_an_evaluation_remembers_is_what_it_computes_on_rough_ground(monkey
 
 
 def test_what_a_ground_takes_decides_how_far_rock_comes():
-    """The same blocks on grounds of no and of much damping."""
+    """The same blocks on grounds of no and of much rolling resistance."""
     reached = []
-    for damping in (0.0, 2.0):
-        site = with_soil(EVEN, damping=damping)
+    for rolling in (0.0, 0.5):
+        site = with_soil(EVEN, rolling=rolling)
         reached.append(np.mean([release_outcome(site, (), s, "small").run_out[2]
                                 for s in range(40)]))  # fmt: skip
     assert reached[1] < reached[0] - 3.0

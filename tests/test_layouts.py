@@ -103,7 +103,7 @@ def test_every_kind_reports(released, seed):
     assert heavy.state in ("slid", "overturned") and heavy.displacement > 0.1
     assert fence.failed and fence.state == "failed" and fence.caught == 0.0
     # the force of its brakes over its elongation, and blows on the mass of its net
-    assert 1.0 <= fence.absorbed_energy / LAYOUT[2].capacity < 10.0
+    assert 1.0 <= fence.absorbed_energy / LAYOUT[2].capacity < 20.0
     assert fence.max_energy > 0.0
     for earthwork in (ditch, dam):
         assert (earthwork.hits, earthwork.absorbed_energy) == (0, 0.0)

@@ -77,7 +77,7 @@ def test_the_smaller_of_each_property_counts_where_two_surfaces_meet():
 
 def test_friction_scatters_as_it_is_asked_to():
     even = msgspec.structs.replace(
-        QUICK.surfaces["rock"], friction_sd_deg=0.0, restitution_sd=0.0, damping_sd=0.0
+        QUICK.surfaces["rock"], friction_sd_deg=0.0, restitution_sd=0.0, rolling_sd=0.0
     )
     site = msgspec.structs.replace(
         QUICK, surfaces={"rock": even}, scatter=Scatter(friction_deg=3.0)

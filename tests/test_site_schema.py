@@ -117,7 +117,7 @@ def test_booleans_and_arrays_are_no_numbers(value):
     for make in (
         lambda: Event("block", value),
         lambda: Surface(value),
-        lambda: Motion(damping=value),
+        lambda: Motion(duration=value),
         lambda: Wall(value, 1.0),
     ):
         with pytest.raises(BadInput, match="give a number"):
@@ -159,7 +159,7 @@ def test_fields_are_told_with_their_table(old, new, field, tmp_path):
 
 
 def test_the_plain_contact_has_no_word_in_a_file(tmp_path):
-    site = replace(QUICK, surfaces={"rock": Surface(28.0, restitution=None, damping=0.3)})
+    site = replace(QUICK, surfaces={"rock": Surface(28.0, restitution=None)})
     with pytest.raises(BadInput, match=r"surfaces\.rock\.restitution = None"):
         site.save(tmp_path / "site.toml")
     assert not list(tmp_path.iterdir())
@@ -175,7 +175,7 @@ def test_a_stretch_of_the_slope_has_its_own_surface():
 
 
 def test_the_surface_of_the_ground_decides():
-    soil = replace(VERGE.surfaces["soil"], friction_sd_deg=0.0, restitution_sd=0.0, damping_sd=0.0)
+    soil = replace(VERGE.surfaces["soil"], friction_sd_deg=0.0, restitution_sd=0.0, rolling_sd=0.0)
     even = replace(VERGE, surfaces={**VERGE.surfaces, "soil": soil})
     scene = even.realise((), 1, "block")
     assert scene.interface("rock", "soil") == soil
@@ -183,11 +183,9 @@ def test_the_surface_of_the_ground_decides():
     pair = Interface("soil", "rock", 12.0, restitution=0.01)
     other = replace(VERGE, interfaces=(pair,)).realise((), 1, "block")
     found = other.interface("rock", "soil")
-    assert replace(found, damping=None) == pair.surface
-    assert found.damping == VERGE.realise((), 1, "block").interface("rock", "soil").damping
-    stiff = replace(
-        VERGE, surfaces={**VERGE.surfaces, "soil": Surface(40.0, restitution=0.9, damping=0.3)}
-    )
+    assert replace(found, rolling=0.0) == pair.surface
+    assert found.rolling == VERGE.realise((), 1, "block").interface("rock", "soil").rolling
+    stiff = replace(VERGE, surfaces={**VERGE.surfaces, "soil": Surface(40.0, restitution=0.9)})
     assert stiff.realise((), 1, "block").interface("rock", "soil").restitution == 0.9
 
 

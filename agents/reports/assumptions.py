@@ -28,10 +28,18 @@ from rigdda.model.prices import Consequences, Prices
 PROPERTIES = {
     "friction_deg": ("friction angle", "deg"),
     "restitution": ("restitution", "-"),
-    "damping": ("damping in contact", "1/s"),
+    "rolling": ("rolling resistance", "-"),
+    "restitution_speed": ("impact speed of half restitution", "m/s"),
     "roughness": ("depth of pits", "m"),
 }
 """Words and units of the properties of a ground."""
+
+SPREADS = {
+    "friction_deg": "friction_sd_deg",
+    "restitution": "restitution_sd",
+    "rolling": "rolling_sd",
+}
+"""Fields with the standard deviations of properties that vary."""
 
 
 def the_site(site: Site) -> Iterator[Block]:
@@ -101,10 +109,10 @@ def _surface(name: str, surface: Surface) -> Iterator[tuple[str, ...]]:
         value = getattr(surface, field)
         if value is None or (value == 0.0 and field == "roughness"):
             continue
-        spread = getattr(surface, f"{field}_sd", getattr(surface, "friction_sd_deg", 0.0))
-        spread = 0.0 if field == "roughness" else spread
+        spread = getattr(surface, SPREADS[field]) if field in SPREADS else 0.0
         text = plain(value) + (f"\u00a0±\u00a0{plain(spread)}" if spread else "")
-        known: Span | None = getattr(ground, field) if ground else None
+        known = getattr(ground, field) if ground else None
+        known = known if isinstance(known, Span) else None
         ends = f"{plain(known.low)}\u00a0to\u00a0{plain(known.high)}" if known else "-"
         yield called, f"{words} [{unit}]", text, ends, _source(value, known)
         called = ""

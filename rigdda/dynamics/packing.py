@@ -300,13 +300,13 @@ def check_step(settings: Settings, areas: NDArray[np.float64], gravity: float) -
 def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
     """Return the interface properties of each pair of surfaces.
 
-    The surface of fences comes last. It is the surface of barriers without restitution, strength
-    and friction, because a net moves along with what it holds. A surface without a damping
-    coefficient has that of the scene.
+    The surface of fences comes last. It has no restitution, strength, friction and rolling
+    resistance, because a net moves along with what it holds.
     """
     fences = any(isinstance(b, Fence) for b in scene.barriers)
     every = [*names, scene.barrier_surface] if fences else names
     found = np.zeros((len(every), len(every)), dtype=INTERFACE)
+    found["restitution_speed"] = math.inf
     found["friction"] = frictions(scene, len(every))
     found["friction"][len(names) :] = found["friction"][:, len(names) :] = 0.0
     for i, a in enumerate(names):
@@ -315,7 +315,9 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
             plain = surface.restitution is None
             found["restitution"][i, j] = PLAIN_CONTACT if plain else surface.restitution
             found["cohesion"][i, j], found["tension"][i, j] = surface.cohesion, surface.tension
-    found["rolling"], found["restitution_speed"] = 0.0, math.inf
+            found["rolling"][i, j] = surface.rolling
+            if surface.restitution_speed is not None:
+                found["restitution_speed"][i, j] = surface.restitution_speed
     return found.view(np.recarray)
 
 
@@ -324,14 +326,6 @@ def frictions(scene: Scene, size: int) -> list[list[float]]:
     every = list(scene.surfaces)
     every += [scene.barrier_surface] * (size - len(every))
     return [[math.tan(math.radians(scene.friction_deg(a, b))) for b in every] for a in every]
-
-
-def dampings(scene: Scene, size: int) -> list[list[float]]:
-    """Return the damping of each pair of `size` surfaces [1/s], see `pack_interfaces`."""
-    every = list(scene.surfaces)
-    every += [scene.barrier_surface] * (size - len(every))
-    pairs = [[scene.interface(a, b).damping for b in every] for a in every]
-    return [[scene.damping if d is None else d for d in row] for row in pairs]
 
 
 def rock_numbers(scene: Scene, settings: Settings, bodies: Bodies) -> dict[str, float]:

@@ -69,11 +69,12 @@ class SingleArrays(NamedTuple):
 
 
 class PairProperties(NamedTuple):
-    """Properties of each pair of surfaces that releases vary, see `Meetings`; (n, n) each."""
+    """Properties of each pair of surfaces of a site, see `Meetings`; (n, n) each."""
 
     friction_deg: NDArray
     restitution: NDArray
-    damping: NDArray
+    rolling: NDArray
+    restitution_speed: NDArray
 
 
 @short_kernel
@@ -147,14 +148,15 @@ def _near(corners: NDArray, boxes: NDArray) -> bool:
 
 @kernel
 def _set_interfaces(pairs: PairProperties, interfaces: Interfaces) -> None:
-    """Write the interface properties that releases vary; fences come last, without friction."""
+    """Write the properties of pairs; fences come last, without friction and rolling resistance."""
     for i in range(len(interfaces)):
         for j in range(len(interfaces)):
             interface = interfaces[i, j]
-            interface.rolling, interface.restitution_speed = 0.0, math.inf
             if i < len(pairs.restitution) and j < len(pairs.restitution):
                 interface.friction = math.tan(math.radians(pairs.friction_deg[i, j]))
                 interface.restitution = pairs.restitution[i, j]
+                interface.rolling = pairs.rolling[i, j]
+                interface.restitution_speed = pairs.restitution_speed[i, j]
 
 
 @short_kernel
@@ -294,7 +296,12 @@ class SingleBlock:
             corners,
             self._traits,
             self._around,
-            PairProperties(meetings.friction_deg, meetings.restitution, meetings.damping),
+            PairProperties(
+                meetings.friction_deg,
+                meetings.restitution,
+                meetings.rolling,
+                meetings.restitution_speed,
+            ),
             self._written,
         )
         if not clear:

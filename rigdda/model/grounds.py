@@ -1,10 +1,10 @@
-"""Library of grounds: friction, restitution, damping and roughness of common slope materials.
+"""Library of grounds: contact properties and roughness of common slope materials.
 
 A surface refers to its ground (``ground = "meadow"``) and overrides known values. Each value has a
 typical value, a plausible range and a source. The values are those of rigid blocks with corners:
-restitution is that of a central impact, friction that of a sliding corner, and damping is the
-additional loss of a block in contact with the ground. They are not the coefficients of a point
-mass, whose normal restitution also depends on the rotation of the block.
+restitution is that of a central impact, friction that of a sliding corner, and rolling resistance
+is a moment against the rotation of a block in contact with the ground. They are not the
+coefficients of a point mass, whose normal restitution also depends on the rotation of the block.
 """
 
 from __future__ import annotations
@@ -30,28 +30,31 @@ class Ground(NamedTuple):
     """Coulomb friction angle of rock on it [deg]."""
     restitution: Span
     """Coefficient of restitution of a central impact [-]."""
-    damping: Span
-    """Mass-proportional damping of a block in contact with it [1/s]."""
+    rolling: Span
+    """Coefficient of rolling resistance of a block in contact with it [-]."""
     roughness: Span
     """Root-mean-square depth of its pits at the scale of a block [m]."""
     friction_sd_deg: float
     """Standard deviation of friction from release to release [deg]."""
     restitution_sd: float
     """Standard deviation of restitution from release to release [-]."""
-    damping_sd: float
-    """Standard deviation of damping from release to release [1/s]."""
+    rolling_sd: float
+    """Standard deviation of rolling resistance from release to release [-]."""
+    restitution_speed: float | None = None
+    """Impact speed at which restitution has fallen to half [m/s]; None: it does not fall."""
 
     @property
-    def values(self) -> dict[str, float]:
+    def values(self) -> dict[str, float | None]:
         """The fields of a `Surface` that it provides, at their typical values."""
         return {
             "friction_deg": self.friction_deg.typical,
             "restitution": self.restitution.typical,
-            "damping": self.damping.typical,
+            "rolling": self.rolling.typical,
             "friction_sd_deg": self.friction_sd_deg,
             "restitution_sd": self.restitution_sd,
-            "damping_sd": self.damping_sd,
+            "rolling_sd": self.rolling_sd,
             "roughness": self.roughness.typical,
+            "restitution_speed": self.restitution_speed,
         }
 
 
@@ -60,57 +63,57 @@ GROUNDS: dict[str, Ground] = {
         "bare hard rock",
         Span(35.0, 25.0, 42.0, "RocFall's default for rigid bodies 27, RAMMS 39; high end assumed"),
         Span(0.3, 0.15, 0.55, "Wyllie (2014), square impacts .2; STONE, points .65"),
-        Span(0.5, 0.1, 1.5, "assumed: less than weathered rock"),
+        Span(0.1, 0.02, 0.25, "assumed"),
         Span(0.0, 0.0, 0.1, "assumed"),
         3.0,
         0.05,
-        0.15,
+        0.05,
     ),
     "weathered_rock": Ground(
         "weathered or shattered rock, benches of a mine",
         Span(32.0, 20.0, 38.0, "PyRockfall, coal measures 20; RAMMS 29; high end assumed"),
         Span(0.3, 0.1, 0.45, "PyRockfall, points .35; Wyllie (2014), square impacts .2"),
-        Span(1.4, 0.8, 1.9, "fitted to the catch bench of Restrepo et al. (2025)"),
+        Span(0.3, 0.1, 0.45, "assumed"),
         Span(0.0, 0.0, 0.15, "assumed"),
         4.0,
         0.06,
-        0.2,
+        0.05,
     ),
     "coarse_talus": Ground(
         "talus of blocks",
         Span(38.0, 30.0, 50.0, "PyRockfall, talus 35; angle of repose 35 to 40, from memory"),
         Span(0.2, 0.05, 0.38, "PyRockfall, points .30; Wyllie (2014), square impacts .2"),
-        Span(1.0, 0.3, 2.0, "assumed: between rock and scree"),
+        Span(0.3, 0.1, 0.6, "assumed"),
         Span(0.0, 0.0, 0.3, "assumed"),
         4.0,
         0.05,
-        0.25,
+        0.05,
     ),
     "fine_scree": Ground(
         "fine scree",
         Span(35.0, 28.0, 40.0, "angle of repose, from memory"),
         Span(0.12, 0.02, 0.33, "STONE, points .45; Rockyfor3D, points .33, from memory"),
-        Span(1.5, 0.5, 2.5, "assumed"),
+        Span(0.4, 0.15, 0.7, "assumed"),
         Span(0.0, 0.0, 0.1, "assumed"),
         3.0,
         0.04,
-        0.25,
+        0.05,
     ),
     "hard_soil": Ground(
         "firm soil, gravel, compacted fill",
         Span(32.0, 20.0, 38.0, "RAMMS medium 19; PyRockfall, floor 30; high end assumed"),
         Span(0.2, 0.05, 0.35, "STONE, points .15 to .35; RocFall, points .30, from memory"),
-        Span(0.8, 0.3, 1.6, "assumed: a little less than meadow"),
+        Span(0.25, 0.08, 0.45, "assumed"),
         Span(0.0, 0.0, 0.1, "assumed"),
         3.0,
         0.05,
-        0.2,
+        0.05,
     ),
     "meadow": Ground(
         "meadow, soft soil",
         Span(46.6, 34.0, 60.0, "fitted to Tschamut and Chant Sura"),
         Span(0.36, 0.1, 0.65, "fitted to Tschamut and Chant Sura"),
-        Span(0.71, 0.5, 1.3, "fitted to Tschamut and Chant Sura"),
+        Span(0.25, 0.1, 0.5, "assumed"),
         Span(0.0, 0.0, 0.06, "assumed; roughness did not improve the fit to Tschamut"),
         3.3,
         0.05,
@@ -120,21 +123,21 @@ GROUNDS: dict[str, Ground] = {
         "asphalt",
         Span(33.0, 27.0, 38.0, "from memory"),
         Span(0.25, 0.1, 0.4, "Wyllie (2014), square impacts .2; RocFall, points .40, from memory"),
-        Span(0.3, 0.0, 1.0, "assumed"),
+        Span(0.05, 0.0, 0.15, "assumed"),
         Span(0.0, 0.0, 0.02, "assumed"),
         2.0,
         0.04,
-        0.1,
+        0.02,
     ),
     "concrete": Ground(
         "concrete",
         Span(33.0, 27.0, 38.0, "from memory"),
         Span(0.3, 0.15, 0.5, "Wyllie (2014), square impacts .2; ends assumed"),
-        Span(0.3, 0.0, 1.0, "assumed"),
+        Span(0.05, 0.0, 0.15, "assumed"),
         Span(0.0, 0.0, 0.01, "assumed"),
         2.0,
         0.04,
-        0.1,
+        0.02,
     ),
 }
 """Grounds of the library by name."""

@@ -42,6 +42,7 @@ from rigdda.model.loads import (
     history,
 )
 from rigdda.model.overlap import check_apart, deepest, in_ground
+from rigdda.model.settings import check_damping
 from rigdda.model.surface import Surface, smaller
 from rigdda.model.terrain import Roughness, Terrain
 
@@ -221,12 +222,12 @@ class Scene:
     gravity : float or (gx, gy)
         Gravity [m/s2]; a number acts downwards.
     damping : float
-        Mass-proportional damping coefficient alpha [1/s] (Koo and Chern 1998, damping force) of
-        contacts whose surfaces do not specify one, and in flight if `damping_when` is "always".
+        Mass-proportional damping coefficient alpha [1/s] (Koo and Chern 1998, damping force). It
+        acts on all blocks, also in flight, and limits the speed of a fall to g/alpha, 16 m/s for
+        0.6 1/s, so that energies at a barrier are too low.
     damping_when : {"always", "contact"}
-        "always" is the method of the paper. It limits the speed of a fall to g/alpha, 16 m/s for
-        0.6 1/s, so that energies at a barrier are too low. "contact" damps only blocks that touch
-        something, or did so within the last 0.1 s.
+        "contact" is permitted without damping only: losses in contact are described by the rolling
+        resistance of the surfaces.
     base_motion : (m, 3) array_like, optional
         Time [s] and acceleration of the ground, x and y [m/s2], with linear interpolation; a
         repeated time makes a jump. Before the first and after the last time the acceleration is
@@ -272,6 +273,7 @@ class Scene:
             check.set_number(self, "gravity", 0.0)
         check.set_number(self, "damping", 0.0)
         check.one_of("damping_when", self.damping_when, ("always", "contact"))
+        check_damping(self.damping, self.damping_when)
         check_blocks(self.blocks)
         check_indices(self)
         if self.base_motion is not None:

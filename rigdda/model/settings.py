@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import check
+from rigdda.errors import BadInput
 
 USUAL_DT = 5e-3
 """Default time step [s]. The error of the outcome of a rockfall is below the scatter between
@@ -132,3 +133,19 @@ def longest_step_of_single(area: float, gravity: float) -> float:
 def _longest_step(mean_area: float, least_area: float, gravity: float) -> float:
     mean, least, g = math.sqrt(mean_area), math.sqrt(least_area), gravity or EARTH
     return min(LONGEST_STEP * math.sqrt(mean / g), SMALLEST * math.sqrt(least / g))
+
+
+def check_damping(damping: float, when: str, prefix: str = "") -> None:
+    """Check that mass-proportional damping [1/s] acts always, if there is any.
+
+    Raises
+    ------
+    BadInput
+        If it is to act in contact only; `prefix` precedes the name of the field.
+    """
+    if damping > 0.0 and when == "contact":
+        mend = (
+            "damping in contact was replaced by rolling resistance: give `rolling` to the "
+            'surfaces, or use "always"'
+        )
+        raise BadInput(f"{prefix}damping_when", when, mend)

@@ -39,9 +39,9 @@ from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
 from rigdda.model.site_generator import generate
 from rigdda.model.site_tables import Drawn, Event, SiteTables
-from rigdda.model.soundness import check_damping, check_site
+from rigdda.model.soundness import check_site
 from rigdda.model.source import Source
-from rigdda.model.surface import MOST_DAMPING, Surface, smaller
+from rigdda.model.surface import Surface, smaller
 from rigdda.model.survey import SURVEYS
 from rigdda.model.terrain import Roughness
 from rigdda.model.traffic import Toll
@@ -80,9 +80,6 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             if not usual:
                 raise BadInput("events", (), "give at least one event with its rate")
             msgspec.structs.force_setattr(self, "events", usual)
-        if self.motion.damping is None:
-            check_damping(self.motion)
-            msgspec.structs.force_setattr(self, "surfaces", _with_damping(self.surfaces))
         check_site(self)
         if not self.rooms:
             mend = "leave room for barriers: bands of loose rock cover the whole zone"
@@ -119,8 +116,16 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         ------
         BadInput
             If it is not a valid site.
+
+        Warns
+        -----
+        DoubtfulInput
+            If a surface has neither a ground nor a coefficient of rolling resistance.
         """
-        return cls(**fields.checked(cls, fields.parse("site file", name, text)))
+        tables = fields.parse("site file", name, text)
+        found = fields.checked(cls, tables)
+        found["surfaces"] = _with_rolling(found["surfaces"], tables["surfaces"])
+        return cls(**found)
 
     @classmethod
     def named(cls, name: str) -> Site:
@@ -154,15 +159,19 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         laws = {f"surfaces.{name}": table for name, table in data["surfaces"].items()}
         laws |= {f"interfaces[{i}]": table for i, table in enumerate(data["interfaces"])}
         for where, table in laws.items():
-            if table["damping"] is None:
-                del table["damping"]
             if table.get("ground") in GROUNDS:
                 for name, value in GROUNDS[table["ground"]].values.items():
                     if table.get(name) == value:
                         del table[name]
+                if table.get("restitution_speed", 0.0) is None:
+                    mend = "give a number: a file without it means that of the ground"
+                    raise BadInput(f"{where}.restitution_speed", None, mend)
             if table.get("restitution", 0.0) is None:
                 mend = "give a number: None (plain contact) is possible in Python only"
                 raise BadInput(f"{where}.restitution", None, mend)
+            for name in ("rolling", "restitution_speed"):
+                if table.get(name, 0.0) is None:
+                    del table[name]
         with atomic(path) as part:
             part.write_text(tomli_w.dumps(data), encoding="utf-8")
 
@@ -316,7 +325,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             surfaces=surfaces,
             interfaces=interfaces,
             barriers=tuple(barriers),
-            damping=self.motion.damping or 0.0,
+            damping=self.motion.damping,
             damping_when=self.motion.damping_when,
             roughness=drawn.roughness,
         )
@@ -353,8 +362,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         surfaces, normals = self.surfaces, drawn.strengths
         if normals:
             each = zip(surfaces.items(), normals, strict=True)
-            fallback = self.motion.damping
-            surfaces = {name: _varied(s, fallback, *normal) for (name, s), normal in each}
+            surfaces = {name: _varied(s, *normal) for (name, s), normal in each}
         if drawn.friction_deg != 0.0:
             surfaces = {name: _shifted(s, drawn.friction_deg) for name, s in surfaces.items()}
         found = pairs(self, surfaces)
@@ -363,8 +371,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             usual = found.pop(ends[::-1], None) or found.get(ends)
             usual = usual or smaller(surfaces[pair.first], surfaces[pair.second])
             meets = _shifted(pair.surface, drawn.friction_deg)
-            if meets.damping is None:
-                meets = msgspec.structs.replace(meets, damping=usual.damping)
+            if pair.rolling is None:
+                meets = msgspec.structs.replace(meets, rolling=usual.rolling)
             found[ends] = meets
         return surfaces, found
 
@@ -546,26 +554,30 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return display.png(self.section(), self.name)
 
 
-def _with_damping(surfaces: dict[str, Surface]) -> dict[str, Surface]:
-    """Return surfaces in which a missing damping is replaced by that of their usual ground.
+def _with_rolling(
+    surfaces: Mapping[str, Surface], tables: Mapping[str, Mapping[str, object]]
+) -> dict[str, Surface]:
+    """Return surfaces in which a missing rolling resistance is that of their usual ground.
+
+    `tables` are the tables of the surfaces in the site file.
 
     Warns
     -----
     DoubtfulInput
-        For each surface without damping.
+        For each surface without ground and rolling resistance.
     """
     found = dict(surfaces)
     for name, surface in surfaces.items():
-        if surface.damping is None:
+        if not surface.ground and "rolling" not in tables[name]:
             ground = USUAL.get(name, OTHER)
-            value = GROUNDS[ground].damping.typical
+            value = GROUNDS[ground].rolling.typical
             warnings.warn(
-                f"neither surfaces.{name}.damping nor motion.damping is given: {value:g} 1/s is "
-                f"used, which is typical of {ground!r}; set surfaces.{name}.ground or .damping",
+                f"neither surfaces.{name}.rolling nor .ground is given: rolling resistance "
+                f"{value:g} is used, which is typical of {ground!r}; set one of them",
                 DoubtfulInput,
                 stacklevel=4,
             )
-            found[name] = msgspec.structs.replace(surface, damping=value)
+            found[name] = msgspec.structs.replace(surface, rolling=value)
     return found
 
 
@@ -650,17 +662,11 @@ def _taken(site: Site) -> list[tuple[float, float]]:
     return found
 
 
-def _varied(
-    surface: Surface, fallback: float | None, friction: float, restitution: float, damping: float
-) -> Surface:
-    """Return a surface whose values deviate by the given numbers of standard deviations.
-
-    `fallback` is the damping of the site [1/s].
-    """
+def _varied(surface: Surface, friction: float, restitution: float, rolling: float) -> Surface:
+    """Return a surface whose values deviate by the given numbers of standard deviations."""
     if not surface.varies:
         return surface
     rebound = surface.restitution
-    loss = fallback if surface.damping is None else surface.damping
     angle = surface.friction_deg + friction * surface.friction_sd_deg
     return msgspec.structs.replace(
         surface,
@@ -668,9 +674,7 @@ def _varied(
         restitution=None
         if rebound is None
         else min(max(rebound + restitution * surface.restitution_sd, 0.0), 1.0),
-        damping=None
-        if loss is None
-        else min(max(loss + damping * surface.damping_sd, 0.0), MOST_DAMPING),
+        rolling=min(max(surface.rolling + rolling * surface.rolling_sd, 0.0), 1.0),
     )
 
 

@@ -170,7 +170,7 @@ def _surfaces(base: SiteTables, rng: np.random.Generator) -> dict[str, Surface]:
             surface,
             friction_deg=round(surface.friction_deg + shift, 2),
             restitution=round((surface.restitution or 0.0) * factor, 3),
-            damping=None if surface.damping is None else round(surface.damping * loss, 3),
+            rolling=min(round(surface.rolling * loss, 3), 1.0),
         )
         for name, surface in base.surfaces.items()
     }

@@ -20,9 +20,9 @@ from rigdda.model.block import Block
 from rigdda.model.existing import Existing
 from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.prices import Consequences, Prices
-from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT
+from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT, check_damping
 from rigdda.model.source import Point, Source
-from rigdda.model.surface import Damping, Interface, Surface
+from rigdda.model.surface import Interface, Surface
 from rigdda.model.terrain import Roughness, Terrain
 from rigdda.model.traffic import Traffic
 
@@ -329,8 +329,8 @@ class Drawn(NamedTuple):
     friction_deg: float
     """Shift of all friction angles [deg]."""
     strengths: tuple[tuple[float, float, float], ...] = ()
-    """Standard normal numbers for friction, restitution and damping of each surface of the site in
-    order; empty if no surface varies."""
+    """Standard normal numbers for friction, restitution and rolling resistance of each surface of
+    the site in order; empty if no surface varies."""
     roughness: Roughness | None = None
     """Pits in the ground; None if it is smooth."""
 
@@ -420,24 +420,25 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Raises
     ------
     BadInput
-        If a value is of the wrong type or outside its range.
+        If a value is of the wrong type or outside its range, or damping would act only in contact.
     """
 
     damping: Annotated[
-        Damping | None,
+        float,
         about(
-            "Mass-proportional damping on surfaces without their own damping. By default, they "
-            "have the damping of the library ground that matches the name of the surface, and a "
-            "warning is given.",
+            "Mass-proportional damping of all blocks, also in flight, as in the paper. It requires "
+            '`damping_when` = "always".',
             "1/s",
+            ge=0.0,
+            le=100.0,
         ),
-    ] = None
+    ] = 0.0
     damping_when: Annotated[
         str,
         about(
-            'When blocks are damped. With "contact", they are damped while they touch something '
-            'and for 0.1 s afterwards. With "always", they are also damped in flight, as in the '
-            "paper; energies at a barrier are then too low by a factor of four to ten.",
+            'Damping above 0 is permitted with "always" only. It limits the speed of a fall, so '
+            "that energies at a barrier are too low by a factor of four to ten. Loss of energy at "
+            "the ground is described by the rolling resistance of the surfaces.",
             choices=("always", "contact"),
         ),
     ] = "contact"
@@ -457,6 +458,7 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         fields.check(self, "motion.")
+        check_damping(self.damping, self.damping_when, "motion.")
 
 
 @documented

@@ -14,7 +14,7 @@ from rigdda.geometry import overlap
 from rigdda.model import loose_blocks
 from rigdda.model.prices import DITCHES
 from rigdda.model.settings import Settings
-from rigdda.model.site_tables import Motion, SiteTables
+from rigdda.model.site_tables import SiteTables
 from rigdda.model.source import NEAR, Point, Source
 from rigdda.model.surface import check_surface
 
@@ -49,10 +49,11 @@ def check_site(site: SiteTables) -> None:
     _check_zone(site)
     _check_meshes(site)
     motion = site.motion
-    if motion.damping and motion.damping_when == "always" and site.family != "paper":
+    if motion.damping > 0.0 and site.family != "paper":
         _warn(
-            "motion.damping_when",
-            "give 'contact': with 'always', energies at a barrier are four to ten times too low",
+            "motion.damping",
+            "leave it out: it also acts in flight, and energies at a barrier are four to ten times "
+            "too low",
         )
     steps = motion.duration / motion.dt
     if steps > MANY_STEPS:
@@ -65,19 +66,6 @@ def check_site(site: SiteTables) -> None:
     if 0.0 < site.consequences.closure < CHEAPEST:
         _warn("consequences.closure", "give EUR per day, not thousands of EUR")
     Settings(dt=motion.dt)
-
-
-def check_damping(motion: Motion) -> None:
-    """Check that the damping in flight is given if it is required.
-
-    Raises
-    ------
-    BadInput
-        If `motion.damping_when` is "always" and `motion.damping` is missing.
-    """
-    if motion.damping is None and motion.damping_when == "always":
-        mend = "also give motion.damping, which acts in flight"
-        raise BadInput("motion.damping_when", motion.damping_when, mend)
 
 
 def _warn(field: str, mend: str) -> None:

@@ -1,8 +1,8 @@
-"""Surfaces and interfaces: friction, strength, restitution and damping of contacts."""
+"""Surfaces and interfaces: friction, strength, restitution and rolling resistance of contacts."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import msgspec
 
@@ -11,39 +11,41 @@ from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.model.grounds import GROUNDS
 
-MOST_DAMPING = 100.0
-"""Maximum plausible damping [1/s]."""
-
-
 _OPEN: Any = msgspec.UNSET
 """Default of the fields that a surface takes from its ground."""
 
 PLAIN = {
     "friction_deg": 30.0,
     "restitution": 0.0,
-    "damping": None,
+    "rolling": 0.0,
     "friction_sd_deg": 0.0,
     "restitution_sd": 0.0,
-    "damping_sd": 0.0,
+    "rolling_sd": 0.0,
     "roughness": 0.0,
+    "restitution_speed": None,
 }
 """Values of a surface without a ground."""
 
 
-Damping = Annotated[float, about(ge=0.0, le=MOST_DAMPING)]
+RETIRED = {
+    name: "remove it: damping was replaced by rolling resistance; give `rolling`, or name a ground"
+    for name in ("damping", "damping_sd")
+}
+"""Former keys of surfaces and interfaces, and what to do about them."""
+
 Share = Annotated[float, about(ge=0.0, le=1.0)]
+Speed = Annotated[float, about(gt=0.0)]
 
 
 @documented
 class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Friction, strength, restitution and damping of a surface.
+    """Friction, strength, restitution and rolling resistance of a surface.
 
     A surface with a `ground` of the library takes from it all values that it does not specify
     itself. `Site.realise` varies the values that have a standard deviation, and the pits of the
     ground, for each release; scenes built directly use the values unchanged. In Python
     `restitution` may be None, which gives the plain penalty contact of the paper, whose rebound
-    follows from time step and stiffness. With `damping` None, the damping of the scene or of the
-    site is used.
+    follows from time step and stiffness.
 
     Raises
     ------
@@ -74,13 +76,14 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "-",
         ),
     ] = _OPEN
-    damping: Annotated[
-        Damping | None,
+    rolling: Annotated[
+        Share,
         about(
-            "Mass-proportional damping of a block while it touches the surface, and for 0.1 s "
-            "afterwards. If a block touches several surfaces, the greatest damping applies. "
-            "Without a ground, the damping of the site.",
-            "1/s",
+            "Coefficient c of rolling resistance. In each contact, a moment of at most c N R acts "
+            "against the rotation of a block, with the normal force N and R = sqrt(2 I/m) from its "
+            "moment of inertia I and mass m. Without a ground 0; in a site file, that of the "
+            "library ground that matches the name of the surface, with a warning.",
+            "-",
         ),
     ] = _OPEN
     friction_sd_deg: Annotated[
@@ -101,10 +104,14 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             le=0.5,
         ),
     ] = _OPEN
-    damping_sd: Annotated[
-        Damping,
+    rolling_sd: Annotated[
+        float,
         about(
-            "Standard deviation of the damping from release to release. Without a ground 0.", "1/s"
+            "Standard deviation of the coefficient of rolling resistance from release to release. "
+            "Without a ground 0.",
+            "-",
+            ge=0.0,
+            le=0.5,
         ),
     ] = _OPEN
     roughness: Annotated[
@@ -125,6 +132,17 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             choices=(*GROUNDS, ""),
         ),
     ] = ""
+    restitution_speed: Annotated[
+        Speed | None,
+        about(
+            "Impact speed K at which restitution has fallen to half: at speed v it is "
+            "e/(1 + (v/K)^2), where e is `restitution` (Pfeiffer and Bowen 1989, with K = "
+            "9.144 m/s in RocFall). Without a ground, restitution does not depend on speed.",
+            "m/s",
+        ),
+    ] = _OPEN
+
+    retired: ClassVar[dict[str, str]] = RETIRED
 
     def __post_init__(self) -> None:
         fields.check(self)
@@ -135,18 +153,19 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def varies(self) -> bool:
-        """Whether its friction, restitution or damping vary from release to release."""
-        return self.friction_sd_deg > 0.0 or self.restitution_sd > 0.0 or self.damping_sd > 0.0
+        """Whether its friction, restitution or rolling resistance vary from release to release."""
+        return self.friction_sd_deg > 0.0 or self.restitution_sd > 0.0 or self.rolling_sd > 0.0
 
 
 def smaller(a: Surface, b: Surface) -> Surface:
     """Return the contact properties of two surfaces: the smaller value of each.
 
-    If only one of the surfaces specifies a damping, that one is used.
+    A `restitution_speed` of None counts as infinite.
     """
-    stated = [x.damping for x in (a, b) if x.damping is not None]
+    speeds = [s.restitution_speed for s in (a, b) if s.restitution_speed is not None]
     return Surface(
-        damping=min(stated, default=None),
+        rolling=min(a.rolling, b.rolling),
+        restitution_speed=min(speeds, default=None),
         friction_deg=min(a.friction_deg, b.friction_deg),
         cohesion=min(a.cohesion, b.cohesion),
         tension=min(a.tension, b.tension),
@@ -181,24 +200,35 @@ class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     restitution: Annotated[
         Share | None, about("Coefficient of restitution of a central impact.", "-")
     ] = 0.0
-    damping: Annotated[
-        Damping | None,
+    rolling: Annotated[
+        Share | None,
         about(
-            "Mass-proportional damping of blocks in contact. The default is the damping that the "
-            "two surfaces have without this table.",
-            "1/s",
+            "Coefficient of rolling resistance. The default is that which the two surfaces have "
+            "without this table.",
+            "-",
+        ),
+    ] = None
+    restitution_speed: Annotated[
+        Speed | None,
+        about(
+            "Impact speed at which restitution has fallen to half. By default, restitution does "
+            "not depend on speed.",
+            "m/s",
         ),
     ] = None
 
+    retired: ClassVar[dict[str, str]] = RETIRED
+
     @property
     def surface(self) -> Surface:
-        """Its contact properties as a `Surface`."""
+        """Its contact properties as a `Surface`, with rolling resistance 0 if it is not given."""
         return Surface(
             friction_deg=self.friction_deg,
             cohesion=self.cohesion,
             tension=self.tension,
             restitution=self.restitution,
-            damping=self.damping,
+            rolling=0.0 if self.rolling is None else self.rolling,
+            restitution_speed=self.restitution_speed,
         )
 
 

@@ -67,9 +67,9 @@ GROUND_TEXT = """\
 The key `ground` of a surface refers to this library of typical values and, in brackets, plausible
 ranges. A surface takes the typical values except those that it specifies itself. The values are
 those of rigid blocks with corners, not those of a point mass, whose normal restitution also depends
-on the rotation of the block. Damping acts while a block touches the ground and for 0.1 s
-afterwards; it represents the losses that friction and restitution do not cover, and is the least
-certain of the four properties. If you have no measurements, design for both ends of its range.
+on the rotation of the block. Rolling resistance acts while a block touches the ground. It is the
+loss of rotating blocks that friction and restitution do not cover, and the least certain of the
+four properties. If you have no measurements, design for both ends of its range.
 """
 
 LAYOUT = """\
@@ -149,17 +149,17 @@ def document() -> str:
 def grounds() -> str:
     """Return the library of grounds as a Markdown table, followed by a list of its sources."""
     rows = [
-        "| ground | friction_deg | restitution | damping [1/s] | roughness [m] | "
-        "friction_sd_deg, restitution_sd, damping_sd |",
+        "| ground | friction_deg | restitution | rolling | roughness [m] | "
+        "friction_sd_deg, restitution_sd, rolling_sd |",
         "|---|---|---|---|---|---|",
     ]
     sources = []
     for name, ground in GROUNDS.items():
-        spans = (ground.friction_deg, ground.restitution, ground.damping, ground.roughness)
+        spans = (ground.friction_deg, ground.restitution, ground.rolling, ground.roughness)
         cells = [f"{s.typical:g} ({s.low:g} to {s.high:g})" for s in spans]
-        spread = f"{ground.friction_sd_deg:g}, {ground.restitution_sd:g}, {ground.damping_sd:g}"
+        spread = f"{ground.friction_sd_deg:g}, {ground.restitution_sd:g}, {ground.rolling_sd:g}"
         rows.append(f"| `{name}`: {ground.words} | {' | '.join(cells)} | {spread} |")
-        fields = ("friction", "restitution", "damping", "roughness")
+        fields = ("friction", "restitution", "rolling", "roughness")
         told = "; ".join(f"{f}: {s.source}" for f, s in zip(fields, spans, strict=True))
         sources.append(f"- `{name}`: {told}.")
     return "\n".join([*rows, "", *sources]) + "\n"

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rigdda.model.loads import PointLoad
-from rigdda.model.scene import Scene, Surface, Terrain
+from rigdda.model.scene import Scene, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured, Metered
 from rigdda.validation.scenes import FLAT, GRAVITY, box, incline, masses, rock, shifts
 
@@ -15,7 +15,7 @@ LOW = 0.4
 """Height of a block 1 m wide that slides at 45 degrees without toppling [m]."""
 
 DAMPING = 1.0
-"""Damping of a ground surface [1/s]."""
+"""Mass-proportional damping [1/s]."""
 
 PULSE, YIELD, PULSE_TIME = 0.5, 0.2, 0.3
 """Newmark's pulse: base acceleration and friction coefficient [g], duration [s]."""
@@ -29,9 +29,9 @@ def slide(slope_deg: float, friction_deg: float, time: float) -> float:
 
 
 def damped_slide(slope_deg: float, friction_deg: float, damping: float, time: float) -> float:
-    """Return the distance [m] from rest on a damping ground: s = a/c (t - (1 - exp(-c t))/c).
+    """Return the distance [m] from rest with damping: s = a/c (t - (1 - exp(-c t))/c).
 
-    From v' = a - c v, with a = g (sin th - cos th tan phi) and the damping c of the ground.
+    From v' = a - c v, with a = g (sin th - cos th tan phi) and the damping c.
     """
     pull = 2.0 * slide(slope_deg, friction_deg, 1.0)
     return pull / damping * (time - (1.0 - math.exp(-damping * time)) / damping)
@@ -59,12 +59,9 @@ def measure_slide(
 
 
 def measure_damped(lab: Lab) -> tuple[Measured]:
-    """Simulate a slide from rest on a ground with damping, in a scene without damping."""
+    """Simulate a slide from rest with mass-proportional damping."""
     plain, down = incline(30.0, 20.0)
-    surfaces = rock(20.0) | {"ground": Surface(20.0, damping=DAMPING)}
-    assert plain.terrain is not None
-    terrain = Terrain(plain.terrain.points, ["ground"] * len(plain.terrain.surfaces))
-    sim = lab.simulate(Scene(terrain, plain.blocks, surfaces, damping_when="contact"))
+    sim = lab.simulate(Scene(plain.terrain, plain.blocks, plain.surfaces, damping=DAMPING))
     start = sim.poses
     sim.step(lab.steps(2.0))
     way = shifts(start, sim.poses, down)

@@ -69,13 +69,13 @@ def test_blocks_are_fitted_from_the_command_line(tmp_path):
     seen = tmp_path / "seen.csv"
     seen.write_text('event,run_out_m\nblock,11.2\nblock,14.0\nblock,12.5\n"small, face",9.0\n')
     code = main(["fit", "verge", str(seen), "--parameters", "surfaces.soil.restitution",
-                 "--parameters", "surfaces.soil.damping=0:1", "--budget", "8", "--releases", "10",
+                 "--parameters", "surfaces.soil.rolling=0:1", "--budget", "8", "--releases", "10",
                  "--out", str(tmp_path / "out")])  # fmt: skip
     assert code == 0
     fitted = Site.load(tmp_path / "out" / "site.toml")
     rows = list(csv.DictReader((tmp_path / "out" / "fit.csv").read_text().splitlines()))
     values = {row["what"]: float(row["fitted"]) for row in rows}
-    assert fitted.surfaces["soil"].damping == pytest.approx(values["surfaces.soil.damping"])
+    assert fitted.surfaces["soil"].rolling == pytest.approx(values["surfaces.soil.rolling"])
     assert fitted.surfaces["soil"].restitution == pytest.approx(values["surfaces.soil.restitution"])
     assert 5.0 < values["mean run-out"] < 25.0
     assert (tmp_path / "out" / "fit.png").stat().st_size > 5000
@@ -85,6 +85,31 @@ def test_blocks_are_fitted_from_the_command_line(tmp_path):
 def test_limits_are_checked(text):
     with pytest.raises(BadInput, match="parameters"):
         parse(text)
+
+
+@pytest.mark.parametrize(
+    ("path", "named"),
+    [
+        ("surfaces.rock.damping", "surfaces.rock.rolling"),
+        ("surfaces.rock.damping_sd=0:1", "surfaces.rock.rolling_sd"),
+        ("motion.damping", "surfaces.NAME.rolling"),
+    ],
+)
+def test_damping_of_grounds_is_not_fitted(path, named):
+    with pytest.raises(BadInput, match=r"^--parameters = '[a-z_.]+': name .*rolling resist") as bad:
+        with_values(SITE, [parse(path)], [0.4])
+    assert f"name {named}:" in bad.value.mend
+
+
+def test_damping_in_flight_and_the_rolling_resistance_have_limits():
+    assert parse("motion.damping") == Parameter("motion.damping", 0.0, 3.0)
+    assert parse("surfaces.soil.rolling") == Parameter("surfaces.soil.rolling", 0.0, 1.0)
+    assert parse("surfaces.soil.rolling_sd").high == 0.3
+    speed = parse("surfaces.soil.restitution_speed")
+    assert (speed.low, speed.high) == (2.0, 50.0)
+    assert with_values(SITE, [speed], [9.0]).surfaces["soil"].restitution_speed == 9.0
+    paper = Site.load("shu-hwa-paper")
+    assert with_values(paper, [parse("motion.damping")], [0.4]).motion.damping == 0.4
 
 
 def test_scatter_has_limits_of_its_own():

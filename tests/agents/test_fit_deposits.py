@@ -19,8 +19,8 @@ from rigdda.passages import passages
 
 SITE = Site.load("quick")
 EDGES = np.array([0.0, 16, 20, 24, 28, 32, 36, 40, 44, 48, 52, 56, 60, 64, 68, 72, 80])
-PATHS = ("surfaces.rock.damping", "surfaces.rock.restitution")
-TRUE = ((0.4, 0.2), (0.8, 0.3), (1.5, 0.15), (1.1, 0.4), (0.6, 0.45))
+PATHS = ("surfaces.rock.rolling", "surfaces.rock.restitution")
+TRUE = ((0.1, 0.2), (0.25, 0.3), (0.4, 0.15), (0.3, 0.4), (0.15, 0.45))
 
 
 def deposit(site: Site, first: int, releases: int) -> DataSet:
@@ -46,7 +46,7 @@ def holds(found: fit.Fit, i: int) -> bool:
 
 
 @pytest.mark.slow
-def test_a_synthetic_deposit_gives_back_its_damping() -> None:
+def test_a_synthetic_deposit_gives_back_its_rolling_resistance() -> None:
     found = fitted(1, PATHS[:1], 40, 16, 40)
     assert holds(found, 1)
     low, high = found.posterior.interval(0.9)
@@ -88,8 +88,8 @@ def test_the_least_place_of_noisy_scores_is_found_with_its_error() -> None:
 
 @pytest.mark.slow
 def test_passages_and_run_outs_are_fitted_together(tmp_path: Path) -> None:
-    parameters = [parse("surfaces.rock.damping")]
-    real = with_values(SITE, parameters, (0.9,))
+    parameters = [parse("surfaces.rock.rolling")]
+    real = with_values(SITE, parameters, (0.25,))
     found = passages(real, (), [(s, "block") for s in range(7000, 7040)], [20.0]).table
     lines = ["event,station_m,quantity,value"]
     lines += [f"block,20,velocity,{np.hypot(v, w)}" for v, w in found[["vx", "vy"]].tolist()]
@@ -148,7 +148,7 @@ def test_a_deposit_is_spread_evenly_within_its_intervals() -> None:
 )
 def test_a_table_of_observations_is_checked(text: str, named: str, tmp_path: Path) -> None:
     (tmp_path / "seen.csv").write_text(text)
-    options = ("--parameters", "surfaces.rock.damping")
+    options = ("--parameters", "surfaces.rock.rolling")
     line = refused("fit", "quick", "seen.csv", *options, folder=tmp_path)
     assert named in line
 
@@ -165,7 +165,7 @@ def test_points_are_fitted_to_run_outs_only(tmp_path: Path) -> None:
 def test_the_same_observations_in_two_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "seen.csv").write_text("event,run_out_m\n" + 3 * "block,20\n")
     line = refused("fit", "quick", "seen.csv", "seen.csv", "--parameters",
-                   "surfaces.rock.damping", folder=tmp_path)  # fmt: skip
+                   "surfaces.rock.rolling", folder=tmp_path)  # fmt: skip
     assert "in one file only" in line
 
 

@@ -94,10 +94,10 @@ def test_a_killed_band_goes_on(designed: tuple[Path, str]) -> None:
 
 def test_a_posterior_replaces_its_numbers() -> None:
     site = Site.load("narrow")
-    joint = Posterior.of(("surfaces.rock.damping",), np.array([[0.4], [0.6]]), np.ones(2))
+    joint = Posterior.of(("surfaces.rock.rolling",), np.array([[0.4], [0.6]]), np.ones(2))
     asked = inputs(site, joint)
     assert asked[0] is joint
-    assert "surfaces.rock.damping" not in [one.path for one in asked[1:]]
+    assert "surfaces.rock.rolling" not in [one.path for one in asked[1:]]
     assert len(asked) == len(inputs(site, None))
 
 

@@ -150,7 +150,7 @@ def test_sizes_are_factors_on_volumes() -> None:
 
 
 def test_a_posterior_is_one_input(tmp_path: Path) -> None:
-    paths = ("surfaces.rock.damping", "surfaces.rock.restitution")
+    paths = ("surfaces.rock.rolling", "surfaces.rock.restitution")
     rng = np.random.default_rng(0)
     values = np.column_stack([rng.uniform(0.5, 1.0, 50), rng.uniform(0.2, 0.3, 50)])
     joint = Posterior.of(paths, values, np.ones(50))
@@ -172,12 +172,12 @@ def test_a_posterior_is_one_input(tmp_path: Path) -> None:
     [
         ("", "give a column weight"),
         ("weight\n1\n", "give a column weight"),
-        ("weight,surfaces.rock.damping\n", "give a column weight"),
-        ("weight,surfaces.rock.damping\n1,x\n", "give a column weight"),
-        ("weight,surfaces.rock.damping\n0,1\n", "weights above 0"),
-        ("weight,surfaces.rock.damping\n1,nan\n", "finite numbers"),
-        ("weight,surfaces.clay.damping\n1,1\n", "name a number of the site file"),
-        ("weight,surfaces.rock.damping\n1,500\n", "surfaces.rock.damping = 500"),
+        ("weight,surfaces.rock.rolling\n", "give a column weight"),
+        ("weight,surfaces.rock.rolling\n1,x\n", "give a column weight"),
+        ("weight,surfaces.rock.rolling\n0,1\n", "weights above 0"),
+        ("weight,surfaces.rock.rolling\n1,nan\n", "finite numbers"),
+        ("weight,surfaces.clay.rolling\n1,1\n", "name a number of the site file"),
+        ("weight,surfaces.rock.rolling\n1,500\n", "surfaces.rock.rolling = 500"),
         ("weight,a,a\n1,1,1\n", "a different name"),
     ],
 )
@@ -198,8 +198,8 @@ def test_a_posterior_file_is_checked(text: str, named: str, tmp_path: Path) -> N
         (("--releases", 3), ("--releases = 3", "8")),
         (("--parameters", "weather"), ("--parameters", "weather=LOW:HIGH")),
         (("--parameters", "ground", "--parameters", "ground"), ("name each number once",)),
-        (("--parameters", "surfaces.rock.damping=2:1"), ("LOW below HIGH",)),
-        (("--parameters", "surfaces.rock.damping=2:500"), ("surfaces.rock.damping", "500")),
+        (("--parameters", "surfaces.rock.rolling=2:1"), ("LOW below HIGH",)),
+        (("--parameters", "surfaces.rock.rolling=0.2:500"), ("surfaces.rock.rolling", "500")),
         (("--parameters", "events.none.rate=1:2"), ("events.none.rate", "name a number")),
         (("--posterior", "none.csv"), ("--posterior", "none.csv", "rigdda fit")),
         (("--layout", "none.toml"), ("none.toml",)),

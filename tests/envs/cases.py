@@ -49,14 +49,17 @@ def cut(prices: Prices | None = None, consequences: Consequences | None = None) 
         ),
         road=Road(18.0, 26.0),
         barrier_zone=BarrierZone(4.0, 17.8),
-        surfaces={"rock": Surface(32.0, restitution=0.4), "soil": Surface(30.0, restitution=0.2)},
+        surfaces={
+            "rock": Surface(32.0, restitution=0.4, rolling=0.1),
+            "soil": Surface(30.0, restitution=0.2, rolling=0.1),
+        },
         meshes=(
             MeshOption("light", 10.0, 60.0, {"small": 0.4}),
             MeshOption("heavy", 10.0, 120.0, {"small": 0.1, "block": 0.5}),
         ),
         prices=prices or Prices(),
         consequences=consequences or Consequences(),
-        motion=Motion(damping=0.3, duration=8.0, dt=0.01),
+        motion=Motion(duration=8.0, dt=0.01),
     )
 
 

@@ -26,6 +26,6 @@ def ramp() -> Site:
         ),
         road=Road(24.0, 32.0),
         barrier_zone=BarrierZone(10.0, 22.0),
-        surfaces={"rock": Surface(25.0)},
-        motion=Motion(damping=0.3, duration=4.0, dt=0.01),
+        surfaces={"rock": Surface(25.0, rolling=0.1)},
+        motion=Motion(duration=4.0, dt=0.01),
     )

@@ -90,8 +90,8 @@ def test_equal_releases_are_simulated_once_and_other_sites_anew(site: Site) -> N
     found = outcome_cache.outcomes([job, job, (site, (), 4, "small")])
     assert found.ran == (True, False, True)
     assert found[0] == found[1] == rigdda.release(*job)[1]
-    slower = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, damping=0.2))
-    assert outcome_cache.outcomes([(slower, (), 3, "small")]).simulated == 1
+    short = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, duration=7.0))
+    assert outcome_cache.outcomes([(short, (), 3, "small")]).simulated == 1
 
 
 def repriced(site: Site) -> Site:
@@ -143,7 +143,7 @@ MOTION: dict[str, Callable[[Site], object]] = {
     "barrier_zone": lambda s: BarrierZone(4.0, 17.0),
     "surfaces": lambda s: s.surfaces | {"soil": Surface(31.0)},
     "interfaces": lambda s: (Interface("rock", "soil", 31.0),),
-    "motion": lambda s: msgspec.structs.replace(s.motion, damping=0.2),
+    "motion": lambda s: msgspec.structs.replace(s.motion, duration=7.0),
     "scatter": lambda s: msgspec.structs.replace(s.scatter, friction_deg=1.0),
 }
 

@@ -105,6 +105,7 @@ CASES = {
     "negative gravity": (lambda _: scene(gravity=-9.81), "gravity"),
     "negative damping": (lambda _: scene(damping=-0.1), "damping"),
     "damping when": (lambda _: scene(damping_when="never"), "damping_when"),
+    "damping in contact": (lambda _: scene(damping=0.1, damping_when="contact"), "damping_when"),
     "friction 95": (lambda _: Surface(friction_deg=95.0), "friction_deg"),
     "restitution 1.5": (lambda _: Surface(restitution=1.5), "restitution"),
     "NaN friction": (lambda _: Surface(friction_deg=NAN), "friction_deg"),

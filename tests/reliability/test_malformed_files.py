@@ -92,7 +92,7 @@ max_height = 4.0
 
 [surfaces.rock]
 ground = "hard_rock"
-damping = 0.6
+rolling = 0.2
 
 [surfaces.soil]
 ground = "hard_soil"
@@ -186,7 +186,7 @@ FILES: dict[str, tuple[str, Reader, Callable[[str], list[str]]]] = {
     "observed.csv": (
         OBSERVED,
         lambda path: observations.read([path], Site.load("quick")),
-        lambda f: ["fit", "quick", f, "--parameters", "surfaces.soil.damping"],
+        lambda f: ["fit", "quick", f, "--parameters", "surfaces.soil.rolling"],
     ),
 }
 """Sound text of a file, what reads it, and a command that does."""

@@ -32,17 +32,17 @@ def varied(site: Site) -> Site:
     """Return a site on which all that may differ from release to release does."""
     pairs = (
         Interface("soil", "rock", 35.0, restitution=0.2),
-        Interface("rock", "asphalt", 25.0, damping=0.4),
+        Interface("rock", "asphalt", 25.0, rolling=0.4, restitution_speed=6.0),
         Interface("asphalt", "soil", 28.0, restitution=0.1),
     )
     surfaces = dict(site.surfaces)
-    surfaces["asphalt"] = rigdda.Surface(33.0, restitution=0.3)  # varies not, and has no damping
+    surfaces["asphalt"] = rigdda.Surface(33.0, restitution=0.3)  # varies not
+    surfaces["soil"] = msgspec.structs.replace(surfaces["soil"], restitution_speed=9.0)
     return msgspec.structs.replace(
         site,
         surfaces=surfaces,
         interfaces=pairs,
         scatter=Scatter(friction_deg=4.0),
-        motion=msgspec.structs.replace(site.motion, damping=0.5),
     )
 
 
@@ -72,15 +72,17 @@ def test_how_surfaces_meet(site, barriers):
     for seed in range(20):
         drawn = site.draw(seed, "block")
         scene = site.scene(drawn, barriers)
-        meetings = Meetings(site, scene.barrier_surface if barriers else None)
+        meetings = Meetings(site)
         meetings.draw(drawn)
         wanted, names = pack_interfaces(scene, list(scene.surfaces)), len(scene.surfaces)
         tangents = np.vectorize(lambda angle: np.tan(np.radians(angle)))(meetings.friction_deg)
-        own = slice(0, names)
-        np.testing.assert_allclose(wanted["friction"][own, own], tangents[own, own], rtol=1e-15)
-        assert (wanted["friction"][names:] == 0.0).all()  # fences
-        np.testing.assert_array_equal(wanted["damping"], meetings.damping)
-        np.testing.assert_array_equal(wanted["restitution"][:names, :names], meetings.restitution)
+        np.testing.assert_allclose(wanted["friction"][:names, :names], tangents, rtol=1e-15)
+        for field in ("restitution", "rolling", "restitution_speed"):
+            np.testing.assert_array_equal(wanted[field][:names, :names], getattr(meetings, field))
+        for fences in (wanted[names:], wanted[:, names:]):
+            for field in ("friction", "restitution", "rolling"):
+                assert (fences[field] == 0.0).all()
+            assert (fences["restitution_speed"] == np.inf).all()
         least = min(surface.friction_deg for surface in scene.surfaces.values())
         assert meetings.least_friction_deg == least
 

@@ -82,9 +82,7 @@ def along(e: tuple[float, float, float], d: NDArray) -> float:
 
 
 @kernel
-def relative_displacement(
-    c: Contact, d: NDArray, i: int, j: int
-) -> tuple[float, float, float]:
+def relative_displacement(c: Contact, d: NDArray, i: int, j: int) -> tuple[float, float, float]:
     """Return the normal, shear and rolling displacement at a contact of slots i and j [m].
 
     Slot -1 is at rest. The rolling displacement is R times the relative rotation.

@@ -44,9 +44,7 @@ from rigdda.kernel import inlined, kernel
 
 
 @inlined
-def spring_forces(
-    c: Contact, d: NDArray, i: int, j: int, dt: float
-) -> tuple[float, float, float]:
+def spring_forces(c: Contact, d: NDArray, i: int, j: int, dt: float) -> tuple[float, float, float]:
     """Return the normal force of a contact, and its shear and rolling force if it sticks [N]."""
     dn, ds, dr = relative_displacement(c, d, i, j)
     normal = c.kappa * (c.bias - (2.0 * dn - dt * c.un))
@@ -234,7 +232,9 @@ def take_solution(
         slow = body.mass * (d[0] ** 2 + d[1] ** 2) + body.inertia * d[2] ** 2
         ledger[2] -= p.damping * slow / p.dt
         slot[FIELD] = (body.mass * p.field_x + body.force_x) * d[0]
-        slot[FIELD] += (body.mass * p.field_y + body.force_y) * d[1] + load_moment(body, p.dt) * d[2]
+        slot[FIELD] += (body.mass * p.field_y + body.force_y) * d[1] + load_moment(body, p.dt) * d[
+            2
+        ]
         for q in range(3):
             slot[NOW + q] = 2.0 * d[q] / (p.dt * rows.scale[s, q]) - slot[NOW + q]
         slot[X] += d[0]

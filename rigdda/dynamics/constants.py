@@ -15,9 +15,9 @@ NEW_SHARE = 1e-3
 stiffness set by `RIGID` [-]."""
 
 AT_ONCE = 1e-4
-"""Shortest substep of a lone body over the step [-], which is that of an impact. With 2e-2, in steps
-of 10 ms with a restitution of 0.5, the velocity of a square that lands on one corner is wrong by 5 %
-if the next corner is 1 mm above the ground, and by up to 43 % at other heights."""
+"""Shortest substep of a lone body over the step, which is that of an impact [-]. With 2e-2, in
+steps of 10 ms with a restitution of 0.5, the velocity of a square that lands on one corner is wrong
+by 5 % if the next corner is 1 mm above the ground, and by up to 43 % at other heights."""
 
 ROUNDING = 1e-12
 """Relative error of sums of work [-], by which the energy of an elastic impact may seem to grow."""

@@ -137,8 +137,8 @@ def is_tried_whole(
     """Return whether an island is solved as a whole before relaxation is tried.
 
     That is the case in static mode, for islands with the paper's contacts, for a lone block with
-    supports, for blocks that touch nothing but their supports, and for `quiet` islands with supports, with unbroken joints, or that were solved as a
-    whole in the last step. It is never the case for an island with a fence, because a fence has no
+    supports, for blocks that touch nothing but their supports, and for `quiet` islands with
+    supports, with unbroken joints, or that were solved as a whole in the last step. It is never the case for an island with a fence, because a fence has no
     entries in the system of equations.
     """
     required, bonds, rested, only = p.static, False, True, True

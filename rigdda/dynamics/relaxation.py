@@ -19,9 +19,11 @@ within the substep. The distance that a wheel of sixteen sides rolls is too larg
 The impulses are found by projected Gauss-Seidel sweeps, which decide the state of each contact as
 they visit it. The normal impulse cannot pull. It limits the closing velocity of an open contact to
 that which just closes its gap within the substep, and stops the approach of a closed contact. The
-shear impulse stops slip within the friction limit. Many short substeps with few sweeps resolve the
-path of an impact better than one step with many sweeps (Macklin et al. 2019, Small steps in physics
-simulation).
+two contacts of a face are solved together (`press_face`). The shear impulse stops slip within the
+friction limit. Many short substeps with few sweeps resolve the path of an impact better than one
+step with many sweeps (Macklin et al. 2019, Small steps in physics simulation). After each
+`SET_OF_SWEEPS` sweeps, the impulses are extrapolated (`extrapolate`), without which heavy bodies on
+light ones would rebound from plastic impacts.
 
 Rolling resistance is a moment of at most c N R against the relative rotation of the bodies of a
 contact, where R is the radius of gyration of `law.rolling_radius`. As an impulse along e_r = (0, 0,
@@ -223,9 +225,9 @@ def aim_row(
 ) -> None:
     """Set the quantities that a visit of a row needs in a substep h.
 
-    A contact whose gap exceeds `touch` [m] may close by its gap in the time `left` [s], corrected for
-    the opening that rotation of the bodies causes. A spring acts with its force in the middle of the substep, so
-    that it conserves energy at any step length.
+    A contact whose gap exceeds `touch` [m] may close by its gap in the time `left` [s], corrected
+    for the opening that rotation of the bodies causes. A spring acts with its force in the middle
+    of the substep, so that it conserves energy at any step length.
     """
     flexible = rolling = cross = 0.0
     for q in range(6):
@@ -447,8 +449,8 @@ def sweep(
     Returns the greatest change of a normal velocity, or of R times a rate of rotation [m/s];
     changes of shear velocities do not count. An open contact is not visited again until it could
     close at its current speed plus `reach` [m/s]. A slot has moved if its velocity changed by more
-    than `quiet` [m/s]; slot `still` never moves. Unsigned indices avoid numba's handling of negative
-    ones.
+    than `quiet` [m/s]; slot `still` never moves. Unsigned indices avoid numba's handling of
+    negative ones.
     """
     worst = 0.0
     for q in range(visits):
@@ -674,11 +676,11 @@ def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance:
 def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
     """Extrapolate the impulses from their changes by the last sweeps and by those before.
 
-    `SET_OF_SWEEPS` sweeps are a step of a fixed-point iteration x -> G(x) with the residual r = G(x)
-    - x. In Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the change since the last extrapolation and
-    theta = r dr / dr^2. It removes the error that decreases most slowly, as that of a heavy body
-    that rests or falls on a light one. If the residual has grown, the last extrapolation is taken
-    back.
+    A set of sweeps is a step of a fixed-point iteration x -> G(x) with the residual r = G(x) - x. In
+    Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the
+    change since the last extrapolation and theta = r dr / dr^2. It removes the error that decreases
+    most slowly, as that of a heavy body that rests or falls on a light one. If the residual has
+    grown, the last extrapolation is taken back.
 
     Parameters
     ----------

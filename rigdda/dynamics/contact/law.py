@@ -22,9 +22,9 @@ plain    b = -2 g with w_0 taken as 0: a penalty spring on the gap, the paper's 
 
 The shear spring acts in the same way on the shear velocity, starting from the shear force of the
 last step, and is limited by Coulomb friction in a return mapping. So does a spring on R times the
-relative rate of rotation, limited by rolling resistance: its force times R is the moment. Islands in motion, and at first
-also islands at rest, are relaxed instead, with rigid contacts (`rigdda.dynamics.relaxation`).
-Restitution acts only there (`relaxation.rebound`).
+relative rate of rotation, limited by rolling resistance: its force times R is the moment. Islands
+in motion, and at first also islands at rest, are relaxed instead, with rigid contacts
+(`rigdda.dynamics.relaxation`). Restitution acts only there (`relaxation.rebound`).
 """
 
 from __future__ import annotations

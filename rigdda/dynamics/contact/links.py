@@ -4,8 +4,9 @@ Supports enter the system of equations, the exchange of forces and the ledger li
 and follow the same law (`contact.law`). A pin has b = 0. A bolt has w_0 = 0, kappa = k / 4 and b =
 -T / kappa, so that N is minus its mean tension over the step, T + k d / 2. It acts along the mean
 of its directions before and after the step, so that d is its change of length. Both together
-conserve energy for any step length. The state of a support is decided in `open_close.next_state_of_link`, and in
-relaxation by `relaxation.aim_row` and the limits in `relaxation.sweep`.
+conserve energy for any step length. The state of a support is decided in
+`open_close.next_state_of_link`, and in relaxation by `relaxation.aim_row` and the limits in
+`relaxation.press_row` and `relaxation.drag_row`.
 """
 
 from __future__ import annotations

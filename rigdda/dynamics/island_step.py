@@ -138,8 +138,8 @@ def is_tried_whole(
 
     That is the case in static mode, for islands with the paper's contacts, for a lone block with
     supports, for blocks that touch nothing but their supports, and for `quiet` islands with
-    supports, with unbroken joints, or that were solved as a whole in the last step. It is never the case for an island with a fence, because a fence has no
-    entries in the system of equations.
+    supports, with unbroken joints, or that were solved as a whole in the last step. It is never the
+    case for an island with a fence, because a fence has no entries in the system of equations.
     """
     required, bonds, rested, only = p.static, False, True, True
     low, high = islands.block_start[island], islands.block_start[island + 1]

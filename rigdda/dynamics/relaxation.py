@@ -676,8 +676,8 @@ def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance:
 def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
     """Extrapolate the impulses from their changes by the last sweeps and by those before.
 
-    A set of sweeps is a step of a fixed-point iteration x -> G(x) with the residual r = G(x) - x. In
-    Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the
+    A set of sweeps is a step of a fixed-point iteration x -> G(x) with the residual r = G(x) - x.
+    In Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the
     change since the last extrapolation and theta = r dr / dr^2. It removes the error that decreases
     most slowly, as that of a heavy body that rests or falls on a light one. If the residual has
     grown, the last extrapolation is taken back.

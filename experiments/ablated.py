@@ -29,7 +29,6 @@ import click
 VARIANTS = (
     "RIGID=1e4",
     "NEW_SHARE=1",
-    "IMPACT_STEPS=0",
     "AT_ONCE=2e-2",
     "RECOVERY_SWEEPS=0",
     "RETARDATION_TIME=0",
@@ -44,7 +43,6 @@ VARIANTS = (
     "SLEEP_SPEED=0.1",
     "SLEEP_TIME=0.05",
     "GROWN=1e9",
-    "APART=0",
     "LONGEST_FLIGHT=1",
 )
 """Changed value of each constant, except for those that only stop a run or warn."""

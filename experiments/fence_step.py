@@ -69,7 +69,7 @@ def measure(layout: str, dt_s: float, releases: int) -> Row:
     """
     name, barriers = LAYOUTS[layout]
     site = Site.load(name)
-    site = replace(site, motion=replace(site.motion, dt=dt_s, damping_when="contact"))
+    site = replace(site, motion=replace(site.motion, dt=dt_s))
     outcomes = release_many([(site, barriers, seed, "mass") for seed in range(releases)])
     debris, half = interval(outcome.debris_fraction for outcome in outcomes)
     failures, half_failures = interval(sum(b.failed for b in o.barriers) for o in outcomes)

@@ -37,7 +37,7 @@ RAMP = Site(
     road=Road(23.0, 31.0),
     barrier_zone=BarrierZone(10.0, 22.0),
     surfaces={"rock": Surface(22.0)},
-    motion=Motion(damping=0.2, duration=8.0),
+    motion=Motion(duration=8.0),
 )
 
 SITES = {"ramp": RAMP, "quick": Site.load("quick")}

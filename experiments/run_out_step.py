@@ -54,7 +54,7 @@ def site(area: float, restitution: float, dt: float) -> Site:
         road=Road(HEIGHT + 1.0, 400.0),
         barrier_zone=BarrierZone(HEIGHT - 2.0, HEIGHT - 1.0),
         surfaces={"rock": Surface(30.0, restitution=restitution)},
-        motion=Motion(damping=0.0, duration=60.0, dt=dt),
+        motion=Motion(duration=60.0, dt=dt),
     )
 
 

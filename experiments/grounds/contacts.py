@@ -22,7 +22,6 @@ import numpy as np
 
 from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
 from rigdda.agents.fit import Floats
-from rigdda.dynamics.constants import APART
 from rigdda.model.site import FARTHEST
 from rigdda.model.terrain import Roughness
 
@@ -54,6 +53,9 @@ SPIN = 2.0
 
 DT = 5e-3
 """Step [s]."""
+
+APART = 0.1
+"""Least duration of a flight that separates two contacts [s]."""
 
 LONGEST = 2.0
 """Time without another flight after which a block is rolling or at rest [s]."""
@@ -91,15 +93,15 @@ def section(name: str, rng: np.random.Generator) -> tuple[Floats, float]:
 
 
 def drawn(surface: Surface, rng: np.random.Generator) -> Surface:
-    """Return a surface with random friction, restitution and damping as in a release."""
+    """Return a surface with random friction, restitution and rolling resistance as in a release."""
     normal = np.clip(rng.standard_normal(3), -FARTHEST, FARTHEST)
-    spread = (surface.friction_sd_deg, surface.restitution_sd, surface.damping_sd)
-    friction, restitution, damping = normal * spread
+    spread = (surface.friction_sd_deg, surface.restitution_sd, surface.rolling_sd)
+    friction, restitution, rolling = normal * spread
     return msgspec.structs.replace(
         surface,
         friction_deg=float(np.clip(surface.friction_deg + friction, 0.0, 85.0)),
         restitution=float(np.clip((surface.restitution or 0.0) + restitution, 0.0, 1.0)),
-        damping=float(max((surface.damping or 0.0) + damping, 0.0)),
+        rolling=float(np.clip(surface.rolling + rolling, 0.0, 1.0)),
     )
 
 
@@ -120,7 +122,6 @@ def scene(
         Terrain([-30.0 * down, 300.0 * down], ["ground"]),
         (Block(turned, DENSITY, velocity=tuple(velocity.tolist())),),
         {"rock": surface, "ground": surface},
-        damping_when="contact",
         roughness=pits,
     )
 
@@ -140,7 +141,7 @@ def contacts(
     for step in range(round(duration / DT)):
         sim.step()
         last, velocity = velocity, sim.velocities[0, :2].copy()
-        if body["apart"][0] < DT:
+        if body["touching"][0]:
             if began < 0:
                 began, before = step, last
             touched = step

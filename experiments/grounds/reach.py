@@ -14,14 +14,11 @@ from rigdda.model.grounds import GROUNDS
 
 SLOPE = Path(__file__).parent / "slope.toml"
 
-FALLBACK = (0.0, 0.5, 1.0, 1.7)
-"""Site-wide damping for surfaces without damping of their own [1/s]."""
-
 replace = msgspec.structs.replace
 
 
 def variants() -> dict[str, Site]:
-    """Return the slope with other grounds of the talus, and with other site-wide damping."""
+    """Return the slope with other grounds of the talus, and other properties of its ground."""
     site, found = Site.load(SLOPE), dict[str, Site]()
 
     def talus(surface: Surface) -> Site:
@@ -29,20 +26,13 @@ def variants() -> dict[str, Site]:
 
     ground = GROUNDS["coarse_talus"]
     found["talus as it is"] = site
-    for field in ("damping", "friction_deg", "restitution"):
+    for field in ("rolling", "friction_deg", "restitution"):
         span = getattr(ground, field)
         for value in (span.low, span.high):
             named = Surface(ground="coarse_talus", **{field: value})
             found[f"talus: {field} {value:g}"] = talus(named)
     for name in ("hard_rock", "fine_scree", "hard_soil", "meadow"):
         found[f"talus: {name}"] = talus(Surface(ground=name))
-    for value in FALLBACK:
-        motion = replace(site.motion, damping=value)
-        found[f"site: damping {value:g}"] = replace(site, motion=motion)
-    for value in FALLBACK:  # surfaces without damping of their own
-        motion = replace(site.motion, damping=value)
-        plain = Surface(ground.friction_deg.typical, restitution=ground.restitution.typical)
-        found[f"no ground named: damping {value:g}"] = replace(talus(plain), motion=motion)
     return found
 
 

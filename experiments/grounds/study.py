@@ -40,7 +40,7 @@ RANGES = {
     "blocks": {
         "friction_deg": (25.0, 62.0),
         "restitution": (0.0, 0.8),
-        "damping": (0.0, 3.0),
+        "rolling": (0.0, 0.6),
         "friction_sd_deg": (0.0, 8.0),
     },
     "lumped": {
@@ -51,6 +51,9 @@ RANGES = {
     },
 }
 """Fitted parameters of each model and their ranges."""
+
+SLOWED_AT = 9.144
+"""Closing speed at which restitution has fallen to half (Pfeiffer and Bowen 1989) [m/s]."""
 
 BUDGET, QUICK_BUDGET = 192, 16
 """Number of parameter sets that are computed for each fit."""
@@ -100,13 +103,13 @@ class Field:
     def site(self, site: Site, surface: str, values: Floats) -> Site:
         """Return a site with a ground of these values."""
         named = dict(zip(self.names, values.tolist(), strict=True))
-        quiet = msgspec.structs.replace(site.motion, damping=0.0)
         if self.model == "blocks":
-            surfaces = site.surfaces | {surface: Surface(**named)}
-            return msgspec.structs.replace(site, surfaces=surfaces, motion=quiet, scatter=Scatter())
+            ground = Surface(**named, restitution_speed=SLOWED_AT)
+            surfaces = site.surfaces | {surface: ground}
+            return msgspec.structs.replace(site, surfaces=surfaces, scatter=Scatter())
         scatter = Scatter(named.pop("friction_sd_deg"))
         lumped = {surface: Rebound(**named)}
-        return msgspec.structs.replace(site, lumped=lumped, motion=quiet, scatter=scatter)
+        return msgspec.structs.replace(site, lumped=lumped, scatter=scatter)
 
     def tschamut(self, values: Floats, seeds: range) -> dict[str, Floats]:
         """Return the run-outs at Tschamut by block [m]."""
@@ -117,7 +120,8 @@ class Field:
         """Return the shares of energy kept in contacts at Chant Sura [-]."""
         if self.model == "lumped":
             return lumped_share(values[0], values[1])
-        surface = Surface(**dict(zip(self.names, values.tolist(), strict=True)))
+        named = dict(zip(self.names, values.tolist(), strict=True))
+        surface = Surface(**named, restitution_speed=SLOWED_AT)
         return shares(surface, len(seeds), seeds.start)
 
     def widths(self, values: Floats, seeds: range) -> Floats:

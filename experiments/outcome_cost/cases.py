@@ -72,12 +72,12 @@ def everywhere(site: Site) -> Site:
     plain = {
         name: Surface(s.friction_deg, s.cohesion, s.tension, s.restitution)
         for name, s in site.surfaces.items()
-    }  # the peers model neither surface damping nor scatter
-    damping = OF_ALL if site.motion.damping is None else site.motion.damping
+    }  # the peers model neither rolling resistance nor scatter
+    damping = site.motion.damping or OF_ALL
     floor = (*site.slope.points, (RUN_OUT, level))
     return replace(
         site,
-        family="paper",  # other families permit contact damping only
+        family="paper",  # other families warn of damping in flight
         surfaces=plain,
         motion=replace(site.motion, damping=damping, damping_when="always"),
         slope=replace(site.slope, points=floor),

@@ -38,7 +38,7 @@ MODELS: dict[fit.Model, tuple[str, ...]] = {
     "blocks": (
         "surfaces.soil.friction_deg=15:65",
         "surfaces.soil.restitution=0:0.8",
-        "surfaces.soil.damping=0:3",
+        "surfaces.soil.rolling=0:0.6",
         "surfaces.soil.friction_sd_deg=0:10",
     ),
     "lumped": (

@@ -15,7 +15,7 @@ RECORDED = Path(__file__).parents[2] / "experiments" / "results"
 
 def test_it_fits_one_width_and_predicts_another(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "FACES", (75.0,))
-    monkeypatch.setattr(study, "VARIANTS", {"damping": study.VARIANTS["damping"]})
+    monkeypatch.setattr(study, "VARIANTS", {"rolling": study.VARIANTS["rolling"]})
     number = study.run(True, tmp_path)
     (row,) = csv.DictReader((tmp_path / "catch_bench.csv").read_text().splitlines())
     assert float(row["within_9.4_m"]) == pytest.approx(number.value, rel=1e-5)
@@ -24,14 +24,14 @@ def test_it_fits_one_width_and_predicts_another(tmp_path, monkeypatch):
 
 
 def test_a_width_that_no_value_retains_is_told():
-    variant = study.VARIANTS["damping"]
-    narrow = variant.fitted._replace(low=5.0, high=6.0)  # so much damping retains all
+    variant = study.VARIANTS["rolling"]
+    narrow = variant.fitted._replace(low=0.95, high=1.0)  # so much resistance retains all
     assert study.fitted(study.below(75.0), variant._replace(fitted=narrow), 40) is None
 
 
 def test_the_recorded_prediction_is_within_its_bar_at_every_face():
     rows = list(csv.DictReader((RECORDED / "catch_bench.csv").read_text().splitlines()))
-    shares = [float(r["within_9.4_m"]) for r in rows if r["fitted"] == "surfaces.rock.damping"]
+    shares = [float(r["within_9.4_m"]) for r in rows if r["fitted"] == "surfaces.rock.rolling"]
     assert len(shares) == len(study.FACES)
     assert all(share == pytest.approx(study.PREDICTED[1], abs=study.BAR) for share in shares)
 

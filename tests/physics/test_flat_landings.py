@@ -16,7 +16,7 @@ COLUMNS = [(0.2, 0.8), (0.2, 2.0), (0.2, 4.0), (0.2, 8.0), (1.0, 4.0), (0.5, 5.0
 
 
 def rectangle(width: float, height: float, above: float, x: float = 0.0, first: int = 0) -> Block:
-    """Return an upright rectangle `above` the ground [m] whose list of corners begins at `first`."""
+    """Return a rectangle `above` the ground [m]; its list of corners begins at `first`."""
     corners = box(x, above + height / 2.0, width, height).vertices
     return Block(np.roll(corners, -first, axis=0))
 

@@ -14,7 +14,7 @@ from rigdda.validation.scenes import FLAT
 
 
 @pytest.mark.parametrize("dt", STEPS)
-@pytest.mark.parametrize("speed", [0.03, 0.1, 0.3, 0.6])
+@pytest.mark.parametrize("speed", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("where", ["floor", "space", "space with gravity", "pushed apart"])
 def test_slow_blocks_rebound_from_one_another(where, speed, dt):
     """By half of their speed of approach, long after they have met."""

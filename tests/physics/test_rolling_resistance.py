@@ -69,9 +69,7 @@ def test_a_slab_that_slides_keeps_to_coulomb(rolling, kink_deg, dt):
 # --- the rimless wheel
 
 
-def forces(
-    angle: float, rate: float, slope: float, k2: float, lever: float
-) -> tuple[float, float]:
+def forces(angle: float, rate: float, slope: float, k2: float, lever: float) -> tuple[float, float]:
     """Return the angular acceleration and the normal force over the mass of a wheel on a corner.
 
     The wheel of radius 1 m rotates clockwise about a corner at rest, `angle` after it is above it.
@@ -114,10 +112,12 @@ def after_impact(half: float, rate: float, k2: float, lever: float) -> float:
     return float(np.linalg.solve(system, [*before, 0.0, 0.0])[2])
 
 
-def resisted_wheel(sides: int, slope: float, rate: float, time: float, rolling: float) -> float:
-    """Return the way [m] of the centre of a wheel of radius 1 m, until it stops or for a time [s].
+def resisted_wheel(
+    sides: int, slope: float, rate: float, time: float, rolling: float
+) -> tuple[float, float]:
+    """Return the way [m] of the centre of a wheel of radius 1 m, and the time [s] that it takes.
 
-    It starts flat and rotates about its lower corner. Where it would rotate back, it is at the end.
+    It starts flat and rotates about its lower corner, until it stops or for `time`.
     """
     half = math.pi / sides
     k2 = (1.0 + 2.0 * math.cos(half) ** 2) / 6.0
@@ -142,11 +142,11 @@ def resisted_wheel(sides: int, slope: float, rate: float, time: float, rolling: 
         pressed = [forces(*state, slope, k2, lever)[1] for state in part.y.T]
         assert min(pressed) > 0.0, "the wheel lifts off: choose a smaller rate or slope"
         if part.status == 0 or len(part.t_events[1]):
-            return float(way + math.sin(angle) + math.sin(half))
+            return float(way + math.sin(angle) + math.sin(half)), part.t[-1]
         way += 2.0 * math.sin(half)
         now, angle, rate = part.t[-1], -half, after_impact(half, rate, k2, lever)
         if rate <= 0.0:
-            return float(way)
+            return way, now
 
 
 def on_a_face(sides: int, slope: float, rate: float) -> Block:
@@ -178,17 +178,16 @@ WHEELS = [(6, 16.0, 2.0), (8, 15.0, 2.0), (16, 8.0, 2.2), (30, 5.0, 2.0)]
 def test_the_reference_without_resistance_is_that_of_mcgeer(sides, slope_deg, rate):
     slope = math.radians(slope_deg)
     mcgeer = wheel(sides, 1.0, slope, rate, 3.0)
-    assert resisted_wheel(sides, slope, rate, 3.0, 0.0) == pytest.approx(mcgeer, rel=1e-6)
+    assert resisted_wheel(sides, slope, rate, 3.0, 0.0)[0] == pytest.approx(mcgeer, rel=1e-6)
 
 
 @pytest.mark.parametrize("rolling", [0.03, 0.1, 0.3])
 def test_the_reference_with_many_sides_is_a_disc(rolling):
     """Its way to a stop on level ground is w^2 (r^2 + k^2)/(2 c g R), with k^2 = r^2/2 and R = r.
 
-    That a wheel loses at impacts is a moment as well: of 2 pi/n times its radius at n sides,
-    see `test_a_disc_rolls_to_a_stop`.
+    What impacts take falls with the number of sides: ways of two numbers are extrapolated.
     """
-    ways = [resisted_wheel(n, 0.0, 1.0, 60.0, rolling) for n in (100, 200)]
+    ways = [resisted_wheel(n, 0.0, 1.0, 60.0, rolling)[0] for n in (100, 200)]
     disc = 1.5 / (2.0 * rolling * GRAVITY)
     assert 2.0 * ways[1] - ways[0] == pytest.approx(disc, rel=0.05)
 
@@ -197,10 +196,10 @@ def test_the_reference_with_many_sides_is_a_disc(rolling):
 @pytest.mark.parametrize("rolling", [0.02, 0.05, 0.1, 0.2])
 @pytest.mark.parametrize(("sides", "slope_deg", "rate"), WHEELS)
 def test_a_wheel_is_resisted_by_a_moment(sides, slope_deg, rate, rolling, dt):
-    """In 3 s, or up to where it stops: within 1 % and, there, on the same face."""
+    """In 3 s, or up to where it stops before it falls back on its face, within 1 % or 2 cm."""
     slope = math.radians(slope_deg)
-    exact = resisted_wheel(sides, slope, rate, 3.0, rolling)
-    way, _ = rolled(sides, slope, rate, 3.0, rolling, dt)
+    exact, time = resisted_wheel(sides, slope, rate, 3.0, rolling)
+    way, _ = rolled(sides, slope, rate, time, rolling, dt)
     assert way == pytest.approx(exact, rel=1e-2, abs=0.02)
 
 
@@ -230,11 +229,18 @@ def test_a_disc_rolls_to_a_stop(rolling, dt):
 @pytest.mark.parametrize("dt", STEPS)
 @pytest.mark.parametrize("rolling", [0.2, 0.5])
 def test_a_disc_stays_on_a_slope_below_the_limit_of_rolling(rolling, dt):
-    """It rolls if tan th > c R/r + tan(pi/n), as one force at c R and half a face bears it."""
+    """The force on its face may be c R and half a face beside its centre: else it rolls.
+
+    In the first step it may fall, before contacts are known to rest; it does not creep.
+    """
     sides, face = 60, math.sin(math.pi / 60.0)
     k2 = (1.0 + 2.0 * math.cos(math.pi / sides) ** 2) / 6.0
     limit = math.atan((rolling * math.sqrt(2.0 * k2) + face) / math.cos(math.pi / sides))
-    assert abs(rolled(sides, 0.9 * limit, 0.0, 5.0, rolling, dt)[0]) < 1e-4
+    first, sim = rolled(sides, 0.9 * limit, 0.0, 0.5, rolling, dt)
+    assert abs(first) < GRAVITY * dt**2
+    before = sim.poses
+    sim.step(round(10.0 / dt))
+    assert np.abs(sim.poses - before).max() < 1e-9
     assert rolled(sides, 1.1 * limit, 0.0, 5.0, rolling, dt)[0] > 0.5
 
 
@@ -243,7 +249,10 @@ def test_a_disc_stays_on_a_slope_below_the_limit_of_rolling(rolling, dt):
 
 @pytest.mark.parametrize("dt", accepted(0.5))
 def test_rolling_resistance_gives_no_energy(dt):
-    """Thirty random polygons, thrown onto random ground, with e and c in 0..1; 3 s."""
+    """Thirty random polygons, thrown onto random ground, with e and c in 0..1; 3 s.
+
+    Position correction may lift a block by a millimetre or two: 5e-4 of the energy at the start.
+    """
     for seed in range(30):
         rng = np.random.default_rng(seed)
         corners = polygon(rough(rng, int(rng.integers(3, 9))), (0.0, 3.0), rng.uniform(0.0, 6.0))
@@ -258,5 +267,5 @@ def test_rolling_resistance_gives_no_energy(dt):
         for _ in range(round(3.0 / dt)):
             sim.step()
             now = mechanical(sim)
-            assert now < least + 2e-4 * scale and now <= start + 2e-4 * scale, (seed, e, rolling)
+            assert now < least + 5e-4 * scale and now < start + 1e-4 * scale, (seed, e, rolling)
             least = min(least, now)

@@ -170,8 +170,11 @@ def rolled(
     return float((sim.poses[0, :2] - start) @ (math.cos(slope), -math.sin(slope))), sim
 
 
-WHEELS = [(6, 16.0, 2.0), (8, 15.0, 2.0), (16, 8.0, 2.2), (30, 5.0, 2.0)]
-"""Numbers of sides, slopes [deg] and first rates [rad/s] of wheels that do not lift off in 3 s."""
+WHEELS = [(6, 15.0, 2.0), (8, 15.0, 2.0), (16, 8.0, 2.2), (30, 5.0, 2.0)]
+"""Numbers of sides, slopes [deg] and first rates [rad/s] of wheels that do not lift off in 3 s.
+
+None of them stops close to where it would stand on a corner: there a way says nothing.
+"""
 
 
 @pytest.mark.parametrize(("sides", "slope_deg", "rate"), WHEELS)

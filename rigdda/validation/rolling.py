@@ -169,7 +169,7 @@ def case(name: str, bar: float, dt: float | None = None) -> Case:
 
 def resisted(sides: int, slope_deg: float, rate: float, resistance: float) -> Case:
     """Return the case of a polygon that rolls against a moment of at most c N R."""
-    check = Check("way in 3 s", "rimless wheel with the moment c N R", "m", 0.01, "relative")
+    check = Check("way in 3 s", "rimless wheel with the moment c N R", "m", 2e-3, "relative")
     return Case(
         f"{sides}-gon-c{resistance:g}",
         (check,),

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from rigdda.model.loads import PointLoad
-from rigdda.model.scene import Scene, Terrain
+from rigdda.model.scene import Scene, Surface, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured, Metered
-from rigdda.validation.scenes import FLAT, GRAVITY, box, incline, masses, rock, shifts
+from rigdda.validation.scenes import FLAT, GRAVITY, Floats, box, incline, masses, rock, shifts
 
 LOW = 0.4
 """Height of a block 1 m wide that slides at 45 degrees without toppling [m]."""
 
 DAMPING = 1.0
 """Mass-proportional damping [1/s]."""
+
+STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
+"""Steps at which slabs slide [s]."""
 
 PULSE, YIELD, PULSE_TIME = 0.5, 0.2, 0.3
 """Newmark's pulse: base acceleration and friction coefficient [g], duration [s]."""
@@ -56,6 +61,46 @@ def measure_slide(
     sim.step(lab.steps(time))
     way = shifts(start, sim.poses, down)
     return (Measured(way, slide(slope_deg, friction_deg, time)),)
+
+
+def slab_scene(
+    slope_deg: float, friction_deg: float, speed: float, kink_deg: float = 0.0, rolling: float = 0.3
+) -> tuple[Scene, Floats]:
+    """Return a scene with a slab of 3.5 x 1 m on a slope, and the downslope direction.
+
+    With kinks, the line changes its direction at every metre, by this angle [deg] to either side in
+    turn: its slopes are half of it above and below the mean slope, and its crests lie on the plane.
+    """
+    slope, half = math.radians(slope_deg), math.radians(0.5 * kink_deg)
+    down = np.array([math.cos(slope), -math.sin(slope)])
+    out = np.array([math.sin(slope), math.cos(slope)])
+    block = box(*(0.5 * out), 3.5, 1.0, -slope, velocity=(*(speed * down), 0.0))
+    if kink_deg:
+        places = np.arange(-5, 101)
+        depth = math.sin(half) * (places % 2)
+        line = places[:, None] * math.cos(half) * down - depth[:, None] * out
+    else:
+        line = np.array([-5.0 * down, 100.0 * down])
+    surfaces = {"rock": Surface(friction_deg=friction_deg, restitution=0.0, rolling=rolling)}
+    return Scene(Terrain(line), (block,), surfaces), down
+
+
+def measure_slab(
+    lab: Lab, kink_deg: float = 0.0, rolling: float = 0.3, steps: Sequence[float] = STEPS
+) -> tuple[Measured, Measured]:
+    """Simulate slabs that slide for 2 s, from rest and with speed, at several steps."""
+    ways, speeds = [], []
+    for slope_deg, friction_deg, speed, dt in itertools.product(
+        (35.0, 60.0), (20.0, 32.0), (0.0, 5.0), steps
+    ):
+        scene, down = slab_scene(slope_deg, friction_deg, speed, kink_deg, rolling)
+        sim = lab.simulate(scene, dt, sleeping=False)
+        start = sim.poses
+        sim.step(round(2.0 / dt))
+        from_rest = slide(slope_deg, friction_deg, 2.0)
+        ways.append((shifts(start, sim.poses, down), 2.0 * speed + from_rest))
+        speeds.append((float(sim.velocities[0, :2] @ down), speed + from_rest))
+    return Measured(*np.transpose(ways)), Measured(*np.transpose(speeds))
 
 
 def measure_damped(lab: Lab) -> tuple[Measured]:
@@ -137,7 +182,14 @@ HOLDS = (
     Check("creep, 10-60 s", "none: phi > th", "m", 1e-8, "bound"),
 )
 
+SLABS = (
+    Check("way", "v t + g t^2/2 (sin th - cos th tan phi)", "m", 5e-3, "relative"),
+    Check("speed", "v + g t (sin th - cos th tan phi)", "m/s", 5e-3, "relative"),
+)
+
 CASES = (
+    Case("slab", SLABS, measure_slab),
+    Case("slab-kinks", SLABS, lambda lab: measure_slab(lab, 1.0)),
     slide_case("slide-30-20", 30.0, 20.0, 1.0, 2.0, 1e-4),
     slide_case("slide-45-30", 45.0, 30.0, LOW, 2.0, 1e-4),
     slide_case("slide-35-34-2s", 35.0, 34.0, 1.0, 2.0, 2e-3),

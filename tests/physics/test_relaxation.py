@@ -82,7 +82,7 @@ def test_a_thin_block_on_rough_ground_takes_few_substeps() -> None:
         [-0.252, 0.77], [-0.329, 0.783], [-0.533, 0.715], [-0.669, 0.576],
         [-0.635, 0.513], [-0.558, 0.507], [-0.407, 0.554], [-0.267, 0.653],
     ]  # fmt: skip
-    surfaces = {"rock": Surface(friction_deg=52.5, restitution=0.21, damping=1.46)}
+    surfaces = {"rock": Surface(friction_deg=52.5, restitution=0.21, rolling=0.3)}
     block = Block(np.array(plate), velocity=(0.5, 0.0, 0.0))
     scene = Scene(Terrain([(-5.0, 2.5), (5.0, -2.5), (9.0, -4.5)]), (block,), surfaces)
     sim = Simulation(scene, Settings(dt=5e-3))

@@ -439,10 +439,11 @@ def test_bad_layouts_and_seeds_are_refused(
 
 def test_layouts_are_compared_in_the_same_releases(problem: DesignProblem, site: Site) -> None:
     """Sums by hand; what both let past does not widen the interval."""
-    weak, seeds = (Fence(12.0, 1.0, energy_class=100),), range(200)
-    found = compare(problem, FENCE, weak, seeds)
-    one, two = (problem.evaluate(layout, seeds) for layout in (FENCE, weak))
-    by_hand = site.annual(FENCE) - site.annual(weak)
+    strong, weak = ((Fence(12.0, height, energy_class=100),) for height in (1.2, 1.0))
+    seeds = range(400)
+    found = compare(problem, strong, weak, seeds)
+    one, two = (problem.evaluate(layout, seeds) for layout in (strong, weak))
+    by_hand = site.annual(strong) - site.annual(weak)
     for event in site.events:
         for sign, e in ((1.0, one), (-1.0, two)):
             own = [site.bill(e.layout, o) for o in e.outcomes if o.event == event.name]
@@ -452,13 +453,13 @@ def test_layouts_are_compared_in_the_same_releases(problem: DesignProblem, site:
     assert found.value == pytest.approx(one.objective - two.objective, abs=1e-6)
     assert found.ci[0] < found.value < found.ci[1]
     assert np.ptp(found.ci) < np.hypot(np.ptp(one.ci), np.ptp(two.ci))
-    assert 0 < found.differ < found.releases == 200
-    same = compare(problem, FENCE, FENCE, seeds)
+    assert 0 < found.differ < found.releases == 400
+    same = compare(problem, strong, strong, seeds)
     assert (same.value, same.ci, same.differ) == (0.0, (0.0, 0.0), 0)
-    other = compare(problem, weak, FENCE, seeds)
+    other = compare(problem, weak, strong, seeds)
     assert (other.value, other.ci[0]) == pytest.approx((-found.value, -found.ci[1]))
     with pytest.raises(BadInput, match=r"seeds = .*: give 2 or more per event"):
-        compare(problem, FENCE, weak, range(2))
+        compare(problem, strong, weak, range(2))
 
 
 @pytest.mark.slow

@@ -468,11 +468,11 @@ def sweep(
             continue
         drag = drag_row(row, a, b)
         if row[ROLL_LIMIT] > 0.0:
-            worst = max(worst, roll_row(row, a, b))
+            change = max(change, roll_row(row, a, b))
         if pair:
             drag += drag_row(other, a, b)
             if other[ROLL_LIMIT] > 0.0:
-                worst = max(worst, roll_row(other, a, b))
+                change = max(change, roll_row(other, a, b))
         worst = max(worst, change)
         if change + drag * row[FLEXIBLE] > quiet:
             rows.moved_in[i] = tries
@@ -643,6 +643,8 @@ def rebound(
         if lost + work <= -ROUNDING * lost:
             break
         share = min(max(-lost / work, 0.0), 1.0) if attempt == 0 else 0.0
+        if attempt == 2:  # the sweeps do not converge: no rebound
+            take_back(rows, n, count, number)
     for k in range(count):
         row, fact = rows.row[k], rows.fact[k]
         if rows.idle[k] > number or row[STIFFNESS] > 0.0:
@@ -660,16 +662,64 @@ def rebound(
 
 
 @kernel
+def take_back(rows: Rows, n: int, count: int, number: int) -> None:
+    """Take back the rebound of an island."""
+    for s in range(n):
+        for q in range(3):
+            rows.slot[s, NOW + q] = rows.slot[s, BEFORE + q]
+    for k in range(count):
+        row, fact = rows.row[k], rows.fact[k]
+        if rows.idle[k] <= number and row[STIFFNESS] == 0.0:
+            kept = 1.0 if fact[BOUNCE] > 0.0 else 0.0
+            row[IMPULSE], row[IMPULSE + 1] = kept * fact[LOAD], kept * fact[LOAD + 1]
+            row[ROLLED] = kept * fact[LOAD + 2]
+
+
+@kernel
 def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float) -> int:
     """Sweep until no velocity changes by more than a tolerance; return the sweeps.
 
     Normal velocities count, and R times rates of rotation where rolling is resisted. See the module
     docstring on the second set of sweeps.
     """
-    sweeps = sweep_until(rows, n, count, number, reach, tolerance)
+    sweeps = sweep_until(rows, n, count, number, reach, tolerance, math.inf)
     if limit_rolling(rows, count, number):
-        sweeps = max(sweeps, sweep_until(rows, n, count, number, reach, tolerance))
+        again = sweep_until(rows, n, count, number, reach, tolerance, math.inf)
+        sweeps = max(sweeps, again)
     return sweeps
+
+
+@kernel
+def kinetic(slots: Floats, n: int, first: int) -> float:
+    """Return the kinetic energy of the velocities in three columns of the slots [J]."""
+    energy = 0.0
+    for s in range(n):
+        for q in range(3):
+            energy += 0.5 * slots[s, first + q] * slots[s, first + q]
+    return energy
+
+
+@kernel
+def settle_safely(
+    rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float
+) -> int:
+    """Settle a substep without increasing the energy; return the sweeps.
+
+    If the sweeps neither converge nor lose energy, as where a heavy body squeezes a light one
+    aside, they are repeated from contacts without impulses and without extrapolation, which never
+    increases the energy.
+    """
+    sweeps = settle(rows, n, count, number, reach, tolerance)
+    if sweeps < MOST_SWEEPS or kinetic(rows.slot, n, NOW) <= kinetic(rows.slot, n, FREE):
+        return sweeps
+    for s in range(n):
+        for q in range(3):
+            rows.slot[s, NOW + q] = rows.slot[s, FREE + q]
+    for k in range(count):
+        row = rows.row[k]
+        if rows.idle[k] <= number:
+            row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = row[ROLL_LIMIT] = 0.0
+    return sweep_until(rows, n, count, number, reach, tolerance, -1.0)
 
 
 @kernel
@@ -721,9 +771,13 @@ def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
 
 
 @kernel
-def sweep_until(rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float) -> int:
-    """Sweep until no velocity changes by more than a tolerance, or `MOST_SWEEPS` times."""
-    square = math.inf
+def sweep_until(
+    rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float, square: float
+) -> int:
+    """Sweep until no velocity changes by more than a tolerance, or `MOST_SWEEPS` times.
+
+    `square` is inf, or -1 to sweep without extrapolation, see `extrapolate`.
+    """
     start_extrapolation(rows, count)
     for s in range(n + 1):
         rows.moved_in[s] = -1
@@ -935,7 +989,7 @@ def relax(
         if fenced:
             ledger[1] -= hold_fences(rows.slot, rows.scale, n)
         start_rows(rows, count, number, h, h - gone * h, h / last, touch)
-        swept = settle(rows, n, count, number, reach, tolerance)
+        swept = settle_safely(rows, n, count, number, reach, tolerance)
         sweeps += swept
         while fenced and release_fences(rows, n, count, number, h, touch, ledger):
             sweeps += settle(rows, n, count, number, reach, tolerance)

@@ -254,7 +254,7 @@ def test_a_disc_stays_on_a_slope_below_the_limit_of_rolling(rolling, dt):
 def test_rolling_resistance_gives_no_energy(dt):
     """Thirty random polygons, thrown onto random ground, with e and c in 0..1; 3 s.
 
-    Position correction may lift a block by a millimetre or two: 5e-4 of the energy at the start.
+    Position correction may lift a block by some millimetres: 1e-3 of the energy at the start.
     """
     for seed in range(30):
         rng = np.random.default_rng(seed)
@@ -270,5 +270,5 @@ def test_rolling_resistance_gives_no_energy(dt):
         for _ in range(round(3.0 / dt)):
             sim.step()
             now = mechanical(sim)
-            assert now < least + 5e-4 * scale and now < start + 1e-4 * scale, (seed, e, rolling)
+            assert now < least + 1e-3 * scale and now < start + 1e-4 * scale, (seed, e, rolling)
             least = min(least, now)

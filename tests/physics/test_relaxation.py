@@ -53,7 +53,7 @@ def test_forces_of_an_avalanche_press_and_stay_within_friction(
         c = c[(c["kind"] == REST) & (c["state"] != OPEN)]
         limit = c["friction"] * c["normal"] + c["cohesion"]
         assert (c["normal"] >= 0.0).all()
-        assert (np.abs(c["shear"]) <= limit * (1.0 + 1e-12)).all()
+        assert (np.abs(c["shear"]) <= limit * (1.0 + 1e-12) + 1e-6).all()  # sums of 1e5 N
         tried += len(c)
     assert tried > 100
 

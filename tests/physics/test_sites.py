@@ -82,7 +82,8 @@ def test_rock_comes_down_and_is_accounted_for(name, event):
     drawn = site.draw(1, event)
     scene = site.scene(drawn)
     sim = Simulation(scene, site.settings(scene), stations(site, ()), watch(site))
-    run = sim.run(12.0)  # a block of `verge` hardly moves in the first seconds
+    alone = len(scene.blocks) == 1  # a block of `verge` hardly moves in the first seconds
+    run = sim.run(12.0 if alone else 4.0)
     assert sim.diagnostics.penetration < 0.1
     fell = run.poses[0, :, 1] - run.poses[-1, :, 1]
     assert (fell > 1.0).mean() > 0.4  # below a joint that dips into the slope some blocks stay

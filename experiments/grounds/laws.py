@@ -24,7 +24,8 @@ from scipy.stats import qmc
 from experiments.catch_bench import study as bench
 from experiments.catch_bench.study import FITTED, PREDICTED, Variant, within
 from experiments.grounds.contacts import mid_slope
-from experiments.grounds.study import FACE, FRESH, RANGES, SLOWED_AT, Field, tschamut_figures
+from experiments.grounds.reach import SLOWED_AT
+from experiments.grounds.study import FACE, FRESH, RANGES, Field, tschamut_figures
 from experiments.script import Number, main, say, write
 from rigdda import Scene, Settings, Simulation, Site, Surface
 from rigdda.agents.fit import Floats, scores

@@ -25,6 +25,7 @@ from experiments import tschamut
 from experiments.catch_bench.study import FITTED, PREDICTED, below, within
 from experiments.grounds import contacts, reach
 from experiments.grounds.contacts import MASSES, early_contacts, lumped_share, mid_slope, observed
+from experiments.grounds.reach import SLOWED_AT
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
 from experiments.tschamut.study import observed_run_outs, runs
 from rigdda import Site, Surface
@@ -53,9 +54,6 @@ RANGES = {
     },
 }
 """Fitted parameters of each model and their ranges."""
-
-SLOWED_AT = 9.144
-"""Closing speed at which restitution has fallen to half (Pfeiffer and Bowen 1989) [m/s]."""
 
 BUDGET, QUICK_BUDGET = 192, 16
 """Number of parameter sets that are computed for each fit."""

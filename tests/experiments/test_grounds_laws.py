@@ -7,7 +7,8 @@ import pytest
 
 from experiments.grounds import __main__ as package
 from experiments.grounds import laws, road_cut
-from experiments.grounds.study import RANGES, SLOWED_AT, Field
+from experiments.grounds.reach import SLOWED_AT
+from experiments.grounds.study import RANGES, Field
 from experiments.script import Number
 from experiments.stale import stale
 from rigdda import Site, Surface
@@ -16,11 +17,12 @@ from rigdda import Site, Surface
 @pytest.mark.parametrize("law", laws.LAWS)
 def test_a_law_fixes_its_values_and_leaves_the_others_to_the_fit(law):
     field = laws.field(law, laws.DT)
-    ground = field.ground(np.linspace(0.2, 0.4, len(field.names)))
+    values = 0.5 * (field.low + field.high)
+    ground = field.ground(values)
     assert set(field.names) == set(laws.PARAMETERS) - set(laws.LAWS[law])
     assert ground.restitution_speed == laws.LAWS[law]["restitution_speed"]
     assert (ground.rolling > 0.0) == ("rolling" in field.names)
-    site = field.site(field.slope, "soil", np.linspace(0.2, 0.4, len(field.names)))
+    site = field.site(field.slope, "soil", values)
     assert site.surfaces["soil"] == ground and site.motion.dt == laws.DT
 
 

@@ -34,7 +34,7 @@ from rigdda.model.grounds import GROUNDS
 from rigdda.validation.scenes import GRAVITY
 from rigdda.validation.slides import slab_scene
 
-LAWS: dict[str, dict[str, float | None]] = {
+LAWS: dict[str, dict[str, Any]] = {
     "none": {"rolling": 0.0, "restitution_speed": None},
     "rolling resistance": {"restitution_speed": None},
     "rolling resistance and falling restitution": {"restitution_speed": SLOWED_AT},

@@ -97,7 +97,7 @@ class Field:
     def __init__(
         self,
         model: fit.Model,
-        fixed: Mapping[str, float | None] = MappingProxyType({"restitution_speed": SLOWED_AT}),
+        fixed: Mapping[str, Any] = MappingProxyType({"restitution_speed": SLOWED_AT}),
     ):
         self.model, self.fixed = model, fixed
         self.slope = Site.load(TSCHAMUT / "site.toml")

@@ -14,6 +14,9 @@ from rigdda.model.grounds import GROUNDS
 
 SLOPE = Path(__file__).parent / "slope.toml"
 
+SLOWED_AT = 9.144
+"""Closing speed at which restitution has fallen to half (Pfeiffer and Bowen 1989) [m/s]."""
+
 replace = msgspec.structs.replace
 
 
@@ -31,6 +34,8 @@ def variants() -> dict[str, Site]:
         for value in (span.low, span.high):
             named = Surface(ground="coarse_talus", **{field: value})
             found[f"talus: {field} {value:g}"] = talus(named)
+    slowed = Surface(ground="coarse_talus", restitution_speed=SLOWED_AT)
+    found[f"talus: restitution_speed {SLOWED_AT:g}"] = talus(slowed)
     for name in ("hard_rock", "fine_scree", "hard_soil", "meadow"):
         found[f"talus: {name}"] = talus(Surface(ground=name))
     return found

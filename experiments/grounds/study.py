@@ -12,7 +12,9 @@ Judged by the mean share of energy kept in contacts, predicted by the fit to Tsc
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import msgspec
@@ -23,6 +25,7 @@ from experiments import tschamut
 from experiments.catch_bench.study import FITTED, PREDICTED, below, within
 from experiments.grounds import contacts, reach
 from experiments.grounds.contacts import MASSES, early_contacts, lumped_share, mid_slope, observed
+from experiments.grounds.reach import SLOWED_AT
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
 from experiments.tschamut.study import observed_run_outs, runs
 from rigdda import Site, Surface
@@ -51,9 +54,6 @@ RANGES = {
     },
 }
 """Fitted parameters of each model and their ranges."""
-
-SLOWED_AT = 9.144
-"""Closing speed at which restitution has fallen to half (Pfeiffer and Bowen 1989) [m/s]."""
 
 BUDGET, QUICK_BUDGET = 192, 16
 """Number of parameter sets that are computed for each fit."""
@@ -89,24 +89,34 @@ class Field:
     ----------
     model : {"blocks", "lumped"}
         The model.
+    fixed : mapping, optional
+        Values of the ground of the block model that are not fitted. By default, restitution falls
+        with the speed of impact.
     """
 
-    def __init__(self, model: fit.Model):
-        self.model = model
+    def __init__(
+        self,
+        model: fit.Model,
+        fixed: Mapping[str, Any] = MappingProxyType({"restitution_speed": SLOWED_AT}),
+    ):
+        self.model, self.fixed = model, fixed
         self.slope = Site.load(TSCHAMUT / "site.toml")
         self.seen = observed_run_outs(TSCHAMUT / "observed.csv", self.slope)
         self.bench = below(FACE)
         self.kept = observed()[:, 2]
-        self.names = tuple(RANGES[model])
-        self.low, self.high = np.array(list(RANGES[model].values())).T
+        self.names = tuple(name for name in RANGES[model] if name not in fixed)
+        self.low, self.high = np.array([RANGES[model][name] for name in self.names]).T
+
+    def ground(self, values: Floats) -> Surface:
+        """Return the ground of the block model with these values."""
+        return Surface(**dict(zip(self.names, values.tolist(), strict=True)), **self.fixed)
 
     def site(self, site: Site, surface: str, values: Floats) -> Site:
         """Return a site with a ground of these values."""
-        named = dict(zip(self.names, values.tolist(), strict=True))
         if self.model == "blocks":
-            ground = Surface(**named, restitution_speed=SLOWED_AT)
-            surfaces = site.surfaces | {surface: ground}
+            surfaces = site.surfaces | {surface: self.ground(values)}
             return msgspec.structs.replace(site, surfaces=surfaces, scatter=Scatter())
+        named = dict(zip(self.names, values.tolist(), strict=True))
         scatter = Scatter(named.pop("friction_sd_deg"))
         lumped = {surface: Rebound(**named)}
         return msgspec.structs.replace(site, lumped=lumped, scatter=scatter)
@@ -120,9 +130,7 @@ class Field:
         """Return the shares of energy kept in contacts at Chant Sura [-]."""
         if self.model == "lumped":
             return lumped_share(values[0], values[1])
-        named = dict(zip(self.names, values.tolist(), strict=True))
-        surface = Surface(**named, restitution_speed=SLOWED_AT)
-        return shares(surface, len(seeds), seeds.start)
+        return shares(self.ground(values), len(seeds), seeds.start)
 
     def widths(self, values: Floats, seeds: range) -> Floats:
         """Return the distances from the toe at which blocks stop on the mine bench [m]."""
@@ -203,7 +211,7 @@ def row(field: Field, fitted: str, values: Floats, count: int) -> tuple[dict[str
         "mid_slope_median": "",
     }
     if field.model == "blocks":
-        surface = Surface(**dict(zip(field.names, values.tolist(), strict=True)))
+        surface = field.ground(values)
         out["second_contacts_mean"] = shares(surface, max(count // 5, 6), FRESH, 2).mean()
         kept = [c.kept for c in mid_slope(surface, max(count // 10, 6), FRESH)]
         if kept:

@@ -85,6 +85,16 @@ def test_an_embankment_is_pushed_by_more_than_its_friction(dt):
     assert pushed.ground.height(2.0) == pytest.approx(0.0, abs=1e-9) != held.ground.height(2.0)
 
 
+@pytest.mark.parametrize("count", [3, 4, 5])
+def test_the_thrust_of_a_row_on_a_heavy_embankment_does_not_depend_on_the_step(count):
+    """Contacts count as soon as they press on its face, also from uphill of its foot."""
+    heavy = row(count, replace(DAM, density=10.0 * DAM.density))
+    taken = [
+        Simulation(heavy, Settings(dt=dt)).run(6.0).thrust[0] for dt in (1e-2, 5e-3, 2.5e-3, 1e-3)
+    ]
+    assert max(taken) / min(taken) < 1.1
+
+
 def test_thrust_on_an_embankment_does_not_depend_on_the_step():
     taken = [Simulation(row(4), Settings(dt=dt)).run(6.0).thrust[0] for dt in (1e-2, 2.5e-3)]
     assert taken[0] == pytest.approx(taken[1], rel=0.2)

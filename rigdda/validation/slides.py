@@ -74,7 +74,8 @@ def slab_scene(
     slope, half = math.radians(slope_deg), math.radians(0.5 * kink_deg)
     down = np.array([math.cos(slope), -math.sin(slope)])
     out = np.array([math.sin(slope), math.cos(slope)])
-    block = box(*(0.5 * out), 3.5, 1.0, -slope, velocity=(*(speed * down), 0.0))
+    x, y = (0.5 * out).tolist()
+    block = box(x, y, 3.5, 1.0, -slope, velocity=(*(speed * down), 0.0))
     if kink_deg:
         places = np.arange(-5, 101)
         depth = math.sin(half) * (places % 2)

@@ -10,8 +10,9 @@ from rigdda import BadInput, Ditch, Fence, Site
 from rigdda.agents.barrier_checks import check_layout
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.reports.headline import Answer, FailedCheck, headline
-from rigdda.envs import BarrierDesign, DesignProblem, design_envelope
+from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.barrier_formulas import checks_of
+from rigdda.envs.environments import BarrierDesign
 from rigdda.envs.fence_checks import demand_at
 from rigdda.model.existing import Existing
 
@@ -42,7 +43,8 @@ def test_a_barrier_that_fails_a_check_is_not_feasible(required: DesignProblem) -
     assert required.fits(()) and required != free and hash(required) != hash(free)
 
 
-def test_all_that_may_be_built_meets_its_checks(required: DesignProblem) -> None:
+def test_all_that_may_be_built_meets_its_checks() -> None:
+    required = DesignProblem("quick", checks="required")
     site, menu = required.site, Menu(required)
     envelope = design_envelope.of(site, required.zone)
     for kind in ("fence", "ditch", "embankment", "gravity_wall"):
@@ -79,7 +81,7 @@ def test_existing_barriers_are_checked() -> None:
     site = Site.load("verge")
     old = (
         Existing("gravity_wall", 7.0, height=1.0, thickness=0.3),
-        Existing("fence", 4.0, height=2.0, energy_class=500, condition=0.5),
+        Existing("fence", 5.2, height=2.0, energy_class=500, condition=0.5),
     )
     stands = DesignProblem(replace(site, existing=old))
     checks = check_layout(stands, ())
@@ -96,13 +98,13 @@ def test_existing_barriers_are_checked() -> None:
 def test_an_existing_barrier_outside_the_zone_is_checked() -> None:
     site = Site.load("verge")
     x = site.barrier_zone.start - 1.0
-    stands = replace(site, existing=(Existing("ditch", x, depth=0.3, width=0.5),))
+    stands = replace(site, existing=(Existing("ditch", x, depth=0.3, width=2.5),))
     assert [c.check for c in check_layout(DesignProblem(stands), ()).failed] == ["width", "depth"]
 
 
 def answer(**values: object) -> Answer:
     usual = Answer("ditch at x = 9", "without barriers", (80.0, 70.0, 90.0),
-                   (100.0, 95.0, 105.0), None, "rock arrives with at most 5 %", True, ())  # fmt: skip
+                   (100.0, 95.0, 105.0), None, "rock arrives in 5 %", True, ())  # fmt: skip
     return usual._replace(**values)
 
 
@@ -121,7 +123,7 @@ DEAR = (130.0, 120.0, 140.0)
         ({"layout": ""}, "Build nothing: no layout was found that meets every check and is worth "),
         ({"layout": "", "required": False}, "Build nothing: no layout was found that is worth"),
         ({"layout": "", "targets": "met"}, "Build nothing: the slope without barriers meets"),
-        ({"layout": "", "targets": "missed"}, "No layout that was found meets the target that rock"),
+        ({"layout": "", "targets": "missed"}, "No layout that was found meets the target that"),
         ({"targets": "missed"}, "No layout that was found meets the target that rock arrives"),
         ({"targets": "missed", "failed": (ENERGY,)}, "No layout that was found meets the target"),
         ({"failed": (ENERGY, HEIGHT)}, "Do not build this as it is: ditch at x = 9. It fails its "),

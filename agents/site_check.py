@@ -543,7 +543,7 @@ def draw(path: str | os.PathLike[str], site: Site) -> None:
     long, tall = np.ptp(points, axis=0)
     wide, low, high = INCHES
     height = min(max(low, 1.9 + (wide - 1.0) * 1.2 * tall / long), high)
-    with rc_context(FONT):
+    with rc_context({**FONT, "text.parse_math": False}):  # names may have the sign of a dollar
         figure = Figure((wide, height), dpi=DPI, layout="constrained")
         axes = figure.subplots()
         bottom = float(points[:, 1].min() - 0.12 * tall)

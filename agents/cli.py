@@ -160,9 +160,9 @@ def new(
     new_site.write(file, text)
     for words in found.notes:
         note(words)
-    count = text.count("placeholder: replace.")
+    count = counted(new_site.placeholders(text), "placeholder")
     click.echo(
-        f"{len(found.points)} points; {file} is written, with {count} placeholders to replace. "
+        f"{len(found.points)} points; {file} is written, with {count} to replace. "
         f"To draw and check it: rigdda check {file}"
     )
 

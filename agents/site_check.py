@@ -15,6 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from rigdda import Block, Event, Site, Source
+from rigdda.agents import new_site
 from rigdda.agents.reports.pictures import DPI, FONT, save, sources
 from rigdda.agents.reports.tables import empty_table
 from rigdda.agents.reports.wording import surveyed
@@ -148,8 +149,7 @@ def placeholders(path: str) -> int:
     file = Path(path)
     if not file.is_file():
         return 0
-    lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-    return sum(line.startswith("#") and line.endswith("placeholder: replace.") for line in lines)
+    return new_site.placeholders(file.read_text(encoding="utf-8", errors="replace"))
 
 
 def _origin(site: Site) -> Iterator[str]:

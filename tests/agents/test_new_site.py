@@ -16,6 +16,8 @@ import rigdda
 from rigdda import Event, Site
 from rigdda.agents import site_check
 from rigdda.agents.site_check import Trial, oddities
+from rigdda.model.site_tables import Motion
+from rigdda.model.traffic import Traffic
 
 GRID = """chainage,elevation
 2683400.0,1892.0
@@ -41,7 +43,9 @@ def test_from_a_survey_to_a_checked_site(tmp_path):
               folder=tmp_path)  # fmt: skip
     assert "x = 0 is chainage 2,683,400" in out and "9 points; slope.toml is written" in out
     text = (tmp_path / "slope.toml").read_text()
-    assert f"with {text.count('placeholder: replace.')} placeholders" in out
+    marked = [line for line in text.splitlines() if line.endswith("placeholder: replace.")]
+    count = sum(not line.startswith("# #") for line in marked)
+    assert f"with {count} placeholders" in out and count < len(marked)
     site = Site.load(tmp_path / "slope.toml")
     assert site.origin.chainage_of(site.road.start) == 2683512.0
     assert site.surface_at(30.0) == "talus"
@@ -49,6 +53,7 @@ def test_from_a_survey_to_a_checked_site(tmp_path):
     assert "the road is at chainage 2,683,512 to 2,683,521" in told
     assert "talus (coarse_talus) x = 22 to 112 m" in told
     assert "0.2 events a year on 100 m of slope, one in 5 years" in told
+    assert f"the site file marks {count} values as placeholders" in told
     assert "nothing looks odd; site.png is in checked" in told
     width, height = png_size(tmp_path / "checked" / "site.png")
     assert width >= 1200 and height >= 600
@@ -67,6 +72,113 @@ def test_a_jointed_mass_is_taken_out_of_the_ground(tmp_path):
     assert site.profile.height(17.0) == pytest.approx(70.0 + np.tan(np.radians(30.0)), abs=1e-3)
     told = run("check", "slope.toml", folder=tmp_path)
     assert "source pillar: a jointed mass" in told and "odd: sources" not in told
+
+
+@pytest.mark.parametrize(
+    ("zone", "rooms", "band"),
+    [
+        ((60, 112), [(60, 112)], (10, 38)),  # wider than the zone by default at both ends
+        ((20, 111), [(20, 111)], None),  # into the placeholder of the band, which gives way
+        ((15, 20), [(15, 20)], None),  # within it
+        ((10, 20), [(10, 20)], None),  # from its upper end on, so that it lies below the zone
+        ((0, 112), None, (10, 38)),  # the whole slope: no place is left for the band
+    ],
+)
+def test_a_zone_may_be_wider_than_the_one_by_default(tmp_path, zone, rooms, band):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "usual", "--profile", "survey.csv", *ASKED, folder=tmp_path)
+    assert Site.load(tmp_path / "usual.toml").rooms == ((79.0, 111.5),)
+    run("new", "slope", "--profile", "survey.csv", *ASKED, "--zone", *zone, folder=tmp_path)
+    site = Site.load(tmp_path / "slope.toml")
+    assert (site.barrier_zone.start, site.barrier_zone.end) == zone
+    if rooms is not None:
+        np.testing.assert_allclose(site.rooms, rooms)
+    if band is not None:
+        assert site.sources[0].band == band
+
+
+def test_the_placeholder_of_the_road_lies_below_a_zone_that_is_given(tmp_path):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "usual", "--profile", "survey.csv", folder=tmp_path)
+    assert Site.load(tmp_path / "usual.toml").road.start == 96.0
+    run("new", "slope", "--profile", "survey.csv", "--zone", 110, 60, folder=tmp_path)
+    site = Site.load(tmp_path / "slope.toml")
+    assert site.rooms == ((60.0, 110.0),) and (site.road.start, site.road.end) == (110.0, 117.0)
+
+
+def test_the_time_step_is_that_of_the_format(tmp_path):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *ASKED, folder=tmp_path)
+    assert Site.load(tmp_path / "slope.toml").motion.dt == Motion().dt == 0.005
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        (*ASKED,),
+        (*ASKED, "--zone", 15, 20),
+        (*ASKED, "--zone", 60, 112, "--source", "low:100-108"),
+        (*ASKED, "--zone", 60, 112, "--source", "low:60-111"),
+        (*ASKED, "--mass", "pillar:12-18:30"),
+        (),
+    ],
+)
+def test_traffic_and_existing_barriers_are_templates(tmp_path, asked):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *asked, folder=tmp_path)
+    text = (tmp_path / "slope.toml").read_text()
+    site = Site.parse(text, "slope")
+    assert site.traffic is None and site.existing == ()
+    head, *templates = re.split(r"\n\n(?=# # )", text)
+    assert len(templates) == 2
+    uncommented = [re.sub(r"(?m)^# ", "", template) for template in templates]
+    (fence,) = Site.parse(f"{head}\n{uncommented[1]}", "slope").existing
+    assert (fence.kind, fence.height, fence.energy_class) == ("fence", 2.0, 250)
+    whole = Site.parse("\n\n".join([head, *uncommented]), "slope")
+    assert whole.existing == (fence,)
+    assert whole.traffic == Traffic(2000.0, 60.0, 100.0)
+    for unit in ("[1/day]", "[km/h]", "[m]", "[kJ]", "[EUR/m]"):
+        assert any(unit in template for template in templates)
+
+
+BACK = "it lies uphill of slope.points[{}] at x = {}: correct one of the two"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ("[22.0, 60.0]", "[2.0, 60.0]", "slope.points[2] = [2.0, 60.0]: " + BACK.format(1, 10)),
+        ("[72.0, 20.0]", "[7.2, 20.0]", "slope.points[3] = [7.2, 20.0]: " + BACK.format(2, 22)),
+        ("[104.0, 4.5]", "[114.0, 4.5]", "slope.points[6] = [112.0, 4.0]: " + BACK.format(5, 114)),
+        ("[22.0, 60.0]", "[-22.0, 60.0]", "slope.points[2] = [-22.0, 60.0]: give an x between 0"),
+        ("[22.0, 60.0]", "[2200, 60.0]", "slope.points[2] = [2200.0, 60.0]: give an x between 0"),
+        ("[22.0, 60.0]", "[10.0, 90.0]", "slope.points[2] = [10.0, 90.0]: remove it"),
+        ("[22.0, 60.0]", "[20.0, 60.0], [5.0, 95.0], [22.0, 60.0]", "crosses itself"),
+        ("[161.0, 0.0]", "[161.0, 95.0]", "to [161.0, 95.0]': list them downhill"),
+    ],
+)
+def test_points_that_go_back_are_blamed_themselves(tmp_path, old, new, part):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *ASKED, folder=tmp_path)
+    text = (tmp_path / "slope.toml").read_text()
+    assert old in text
+    (tmp_path / "slope.toml").write_text(text.replace(old, new))
+    line = refused("check", "slope.toml", folder=tmp_path)
+    assert line.startswith("rigdda: slope.points") and part in line
+
+
+def test_ground_may_overhang_below_a_mass(slope):
+    points = [*slope.slope.points]
+    points[2:2] = [(13.0, 84.0), (12.0, 80.0)]
+    ground = replace(slope.slope, points=tuple(points))
+    square = ((80.0, 40.0), (82.0, 40.0), (82.0, 42.0), (80.0, 42.0))
+    source = rigdda.Source("face", blocks=(square,))
+    event = Event("block", 0.2, "face")
+    zone = replace(slope.barrier_zone, start=90.0)
+    rock = replace(slope, slope=ground, sources=(source,), events=(event,), barrier_zone=zone)
+    assert len(rock.profile.points) == len(slope.profile.points) + 2
+    with pytest.raises(rigdda.BadInput, match=r"slope.points\[3\] = \[12.0, 80.0\]: it lies"):
+        replace(slope, slope=ground)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +309,9 @@ OPTIONS = {
     "half a road": (("--road", 112), "--road"),
     "road of text": (("--road", "a", "b"), "'a'"),
     "toe beyond the road": ((*ASKED, "--toe", 130), "--toe = 130.0"),
-    "zone on the road": ((*ASKED, "--zone", 100, 115), "barrier_zone.end"),
+    "zone on the road": ((*ASKED, "--zone", 100, 115), "--zone = [100.0, 115.0]: let it lie "),
+    "zone above the crest": ((*ASKED, "--zone", -5, 110), "the crest at 0 and the uphill edge"),
+    "zone beyond the ground": (("--zone", 100, 170), "the end of the ground at 161"),
     "zone of no length": ((*ASKED, "--zone", 100, 100), "--zone"),
     "unknown ground": ((*ASKED, "--ground", "lava:10-20"), "'lava'"),
     "several grounds": ((*ASKED, "--ground", "hard:10-20"), "hard_rock, hard_soil"),
@@ -210,6 +324,9 @@ OPTIONS = {
     "source without range": ((*ASKED, "--source", "cliff"), "cliff:2-8"),
     "source on the road": ((*ASKED, "--source", "cliff:100-115"), "uphill of the road"),
     "source beyond": ((*ASKED, "--source", "cliff:-50--40"), "uphill of the road"),
+    "source everywhere": (
+        (*ASKED, "--source", "cliff:1-110.9", "--zone", 20, 111), "cover the whole zone",
+    ),
     "layer of a table": ((*ASKED, "--layer", "0"), "--layer"),
     "out of other kind": ((*ASKED, "--out", "site.csv"), "--out"),
     "out that is there": ((*ASKED, "--out", "there.toml"), "there.toml"),

@@ -190,7 +190,7 @@ def check(site: str, seed: int, out: Path | None) -> None:
     show(site_check.table(where, trials))
     click.echo(site_check.time_of(where, trials))
     _warn_of_placeholders(site)
-    odd = site_check.oddities(where, trials)
+    odd = site_check.oddities(where, trials, site_check.written_events(site))
     for line in odd:
         finding(f"odd: {line}")
     words = f"{len(odd)} things look odd" if len(odd) != 1 else "1 thing looks odd"

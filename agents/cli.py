@@ -120,9 +120,11 @@ def sites() -> None:
               help="Surveyed profile: a CSV file with columns such as chainage and elevation, or a "
               "DXF drawing with a polyline (extra `dxf`).")  # fmt: skip
 @click.option("--layer", metavar="LAYER", help="Layer of the polyline in a DXF drawing.")
-@click.option("--road", type=float, nargs=2, metavar="START END", help="Edges of the road.")
-@click.option("--toe", type=float, metavar="X", help="Foot of the slope.")
-@click.option("--zone", type=float, nargs=2, metavar="START END", help="Where barriers may stand.")
+@click.option("--road", type=RealNumber(), nargs=2, metavar="START END", help="Edges of the road.")
+@click.option("--toe", type=RealNumber(), metavar="X", help="Foot of the slope.")
+@click.option(
+    "--zone", type=RealNumber(), nargs=2, metavar="START END", help="Where barriers may stand."
+)
 @click.option("--ground", "grounds", multiple=True, metavar="NAME:START-END",
               help="Stretch of a ground of the library, such as talus:12-30, or only its name for "
               "all other ground. May be repeated.")  # fmt: skip
@@ -230,7 +232,7 @@ def schema(file: str) -> None:
     help="Simulate only this event.  [default: draw events by their rates]",
 )
 @count_option("--releases", 1, 100, "Number of releases.")
-@click.option("--station", "at", type=float, multiple=True, metavar="X",
+@click.option("--station", "at", type=RealNumber(), multiple=True, metavar="X",
               help="Chainage at which passing blocks are recorded [m], as in the site file, not "
               "of its survey. May be repeated.  "
               "[default: the uphill edge of the road]")  # fmt: skip
@@ -439,7 +441,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               "a table [traffic].")  # fmt: skip
 @click.option("--max-cost", type=RealNumber(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
-@click.option("--zone", type=float, nargs=2, metavar="A B",
+@click.option("--zone", type=RealNumber(), nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m], as in the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")

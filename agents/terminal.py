@@ -58,8 +58,10 @@ class _InRange(click.ParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, context: click.Context | None
     ) -> Any:
-        """Return the number."""
+        """Return the number; an underscore between digits is a typing error, not a separator."""
         try:
+            if isinstance(value, str) and "_" in value:
+                self.fail(value, param, context)
             return super().convert(value, param, context)
         except click.BadParameter:
             from rigdda import BadInput
@@ -74,7 +76,7 @@ class _InRange(click.ParamType):
             ends.append(f"{'above' if own.min_open else 'of at least'} {own.min:,}")
         if own.max is not None:
             ends.append(f"{'below' if own.max_open else 'at most'} {own.max:,}")
-        return " " + " and ".join(ends)
+        return f" {' and '.join(ends)}" if ends else ""
 
 
 class WholeNumber(_InRange, click.IntRange):

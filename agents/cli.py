@@ -120,9 +120,11 @@ def sites() -> None:
               help="Surveyed profile: a CSV file with columns such as chainage and elevation, or a "
               "DXF drawing with a polyline (extra `dxf`).")  # fmt: skip
 @click.option("--layer", metavar="LAYER", help="Layer of the polyline in a DXF drawing.")
-@click.option("--road", type=float, nargs=2, metavar="START END", help="Edges of the road.")
-@click.option("--toe", type=float, metavar="X", help="Foot of the slope.")
-@click.option("--zone", type=float, nargs=2, metavar="START END", help="Where barriers may stand.")
+@click.option("--road", type=RealNumber(), nargs=2, metavar="START END", help="Edges of the road.")
+@click.option("--toe", type=RealNumber(), metavar="X", help="Foot of the slope.")
+@click.option(
+    "--zone", type=RealNumber(), nargs=2, metavar="START END", help="Where barriers may stand."
+)
 @click.option("--ground", "grounds", multiple=True, metavar="NAME:START-END",
               help="Stretch of a ground of the library, such as talus:12-30, or only its name for "
               "all other ground. May be repeated.")  # fmt: skip
@@ -160,9 +162,9 @@ def new(
     new_site.write(file, text)
     for words in found.notes:
         note(words)
-    count = text.count("placeholder: replace.")
+    count = counted(new_site.placeholders(text), "placeholder")
     click.echo(
-        f"{len(found.points)} points; {file} is written, with {count} placeholders to replace. "
+        f"{len(found.points)} points; {file} is written, with {count} to replace. "
         f"To draw and check it: rigdda check {file}"
     )
 
@@ -190,7 +192,7 @@ def check(site: str, seed: int, out: Path | None) -> None:
     show(site_check.table(where, trials))
     click.echo(site_check.time_of(where, trials))
     _warn_of_placeholders(site)
-    odd = site_check.oddities(where, trials)
+    odd = site_check.oddities(where, trials, site_check.written_events(site))
     for line in odd:
         finding(f"odd: {line}")
     words = f"{len(odd)} things look odd" if len(odd) != 1 else "1 thing looks odd"
@@ -230,7 +232,7 @@ def schema(file: str) -> None:
     help="Simulate only this event.  [default: draw events by their rates]",
 )
 @count_option("--releases", 1, 100, "Number of releases.")
-@click.option("--station", "at", type=float, multiple=True, metavar="X",
+@click.option("--station", "at", type=RealNumber(), multiple=True, metavar="X",
               help="Chainage at which passing blocks are recorded [m], as in the site file, not "
               "of its survey. May be repeated.  "
               "[default: the uphill edge of the road]")  # fmt: skip
@@ -446,7 +448,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               "a table [traffic].")  # fmt: skip
 @click.option("--max-cost", type=RealNumber(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
-@click.option("--zone", type=float, nargs=2, metavar="A B",
+@click.option("--zone", type=RealNumber(), nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m], as in the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +19,7 @@ from rigdda.files import atomic
 from rigdda.model import loose_blocks
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.block import convex_polygon
+from rigdda.model.existing import Existing
 from rigdda.model.grounds import GROUNDS, USUAL
 from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.prices import Consequences, Prices
@@ -35,6 +36,7 @@ from rigdda.model.source import Source
 from rigdda.model.surface import Surface
 from rigdda.model.survey import Profile, profile_of, read_survey
 from rigdda.model.terrain import Terrain
+from rigdda.model.traffic import Traffic
 
 Floats = NDArray[np.float64]
 Span = tuple[float, float]
@@ -57,6 +59,9 @@ UPHILL = 15.0
 CLEARANCE = 0.5
 """Distance of the barrier zone from the road, and from loose rock, where it is not given [m]."""
 
+SHORTEST = 0.5
+"""Length of the shortest placeholder of a band of loose rock [m]."""
+
 VOLUME = (0.1, 1.0)
 """Placeholder of the volume of blocks [m3]."""
 
@@ -66,14 +71,21 @@ PERIOD, MASS_PERIOD = 5.0, 50.0
 JOINTS = ((70.0, 1.0), (-20.0, 1.0))
 """Placeholders of the dip [deg] and the spacing [m] of the joints of a mass."""
 
+TRAFFIC = (2000.0, 60.0, 100.0)
+"""Placeholders of the vehicles per day, their speed [km/h] and the length of the road [m]."""
+
+FENCE, FENCE_ROOM, REMOVAL = (250, 2.0), 3.0, 100.0
+"""Placeholders of a fence that stands already: class [kJ] and height [m], distance from the lower
+end of the zone [m], which leaves room for its elongation, and cost of its removal [EUR/m]."""
+
+TEMPLATE = '# To use this table, remove the first "# " of each of its lines.'
+"""First line of a template."""
+
 BLOCK = 0.8
 """Edge of the placeholder of a block on ground that overhangs [m]."""
 
 CLEAR = 0.01
 """Height of this block above the ground [m]: it shall not reach into it by rounding."""
-
-STEP = 0.01
-"""Time step [s]: single blocks and groups need no shorter one."""
 
 SPEED = 3.0
 """Mean speed along the whole profile for which the simulated time is enough [m/s]."""
@@ -192,6 +204,8 @@ class Part(NamedTuple):
     """The value of each field that is written, and how sure it is."""
     comments: Sequence[str] = ()
     """Lines after the fields."""
+    template: bool = False
+    """Whether all of it is written as a comment, because the site is complete without it."""
 
 
 class _Draft:
@@ -201,6 +215,7 @@ class _Draft:
         self.profile, self.request = profile, request
         self.x, self.y = profile.points.T
         self.overhangs = bool((np.diff(self.x) < 0.0).any())
+        self.asked = self._asked()
         self.road = self._road()
         self.toe = self._toe(self.road[0])
         self.masses = [self._mass(text) for text in request.masses]
@@ -255,9 +270,11 @@ class _Draft:
                 Motion,
                 {
                     "duration": (self._duration(), DEFAULT),
-                    "dt": (STEP, DEFAULT),
+                    "dt": (Motion().dt, DEFAULT),
                 },
             ),
+            _traffic(),
+            self._existing(),
         ]
 
     def _inclinations(self) -> Floats:
@@ -278,13 +295,32 @@ class _Draft:
             return round(float(max(self.x[0], min(most, self.x[-1]))), 3)
         return round(float(min(self.x[1:][steep][-1], most)), 3)
 
+    def _asked(self) -> Span | None:
+        """Return the zone for barriers that is asked for, which lies from the crest to the road."""
+        if self.request.zone is None:
+            return None
+        origin, road = self.profile.origin, self.request.road
+        low, high = sorted(map(origin.x_of, _sorted("--zone", self.request.zone)))
+        ends = float(self.x[0]), float(self.x[-1])
+        edge = "the end of the ground"
+        if road is not None:
+            ends, edge = (ends[0], min(map(origin.x_of, road))), "the uphill edge of the road"
+        if not ends[0] <= low < high <= ends[1]:
+            first, last = map(origin.chainage_of, ends)
+            mend = f"let it lie between the crest at {first:.10g} and {edge} at {last:.10g}"
+            raise BadInput("--zone", list(self.request.zone), mend)
+        return round(low, 3), round(high, 3)
+
     def _road(self) -> Span:
-        """Return the edges of the road, and check that the ground goes on beyond it."""
+        """Return the edges of the road, and check that the ground goes on beyond it.
+
+        A road that is not given lies below the zone for barriers that is.
+        """
         origin, end = self.profile.origin, float(self.x[-1])
         if self.request.road is not None:
             low, high = sorted(map(origin.x_of, self.request.road))
         else:
-            low = self._toe(end) + VERGE
+            low = max(self._toe(end) + VERGE, self.asked[1] if self.asked else -np.inf)
             high = low + LANES
         need = high + BEYOND
         if end < need:
@@ -365,17 +401,27 @@ class _Draft:
         return f"{SURVEYED}, without the rock of {names}" if names else SURVEYED
 
     def _face(self) -> Span:
-        """Return the upper third of the face, where blocks of the placeholder are on the ground."""
+        """Return the upper third of the face, where blocks of the placeholder are on the ground.
+
+        Where it can, it keeps clear of a zone for barriers that is given: barriers may not stand in
+        a band of loose rock, and a placeholder must not make the zone smaller.
+        """
         reach = _reach()
         angle = np.where(self.x[:-1] < self.toe, self._inclinations(), -90.0)
         steep = np.flatnonzero(angle >= min(FACE, angle.max()))
         low = max(float(self.x[:-1][steep].min()), float(self.x[0]) + reach)
-        high = low + max((self.toe - low) / 3.0, 0.5)
+        high = low + max((self.toe - low) / 3.0, SHORTEST)
         most = self.road[0] - 2.0 * reach
         if not low < most:
             mend = "give where loose rock lies by --source NAME:START-END, clear of the road"
             raise BadInput("--source", None, mend)
-        return round(low, 3), round(min(high, most), 3)
+        high = min(high, most)
+        if self.asked is not None:
+            clear = reach + CLEARANCE
+            above, below = (low, self.asked[0] - clear), (self.asked[1] + clear, high)
+            spans = ((max(a, low), min(b, high)) for a, b in (above, below))
+            low, high = next((span for span in spans if span[1] - span[0] >= SHORTEST), (low, high))
+        return round(low, 3), round(high, 3)
 
     def _rock(self) -> list[Part]:
         """Return the tables of sources and events."""
@@ -419,9 +465,8 @@ class _Draft:
 
     def _zone(self) -> Span:
         """Return where barriers may stand."""
-        if self.request.zone is not None:
-            low, high = sorted(map(self.profile.origin.x_of, _sorted("--zone", self.request.zone)))
-            return round(low, 3), round(high, 3)
+        if self.asked is not None:
+            return self.asked
         high = self.road[0] - CLEARANCE
         free = [span[1] + _reach() + CLEARANCE for _, span, _ in self.sources]
         free += [mass.span[1] + CLEARANCE for mass in self.masses]
@@ -430,6 +475,28 @@ class _Draft:
             mend = f"give the zone for barriers: loose rock reaches x = {low:g}, close to the road"
             raise BadInput("--zone", None, mend)
         return round(low, 3), round(high, 3)
+
+    def _existing(self) -> Part:
+        """Return the template of a barrier that stands already, at the lower end of the zone."""
+        reach, start, free = _reach(), float(self.x[0]), []
+        for low, high in sorted(span for _, span, _ in self.sources):
+            free.append((start, low - reach))
+            start = max(start, high + reach)
+        free.append((start, self.zone[1]))
+        clear = [(a, min(b, self.zone[1])) for a, b in free]
+        low, high = ([(a, b) for a, b in clear if b - a > CLEARANCE] or [self.zone])[-1]
+        low = max(low, min(self.zone[0], high - CLEARANCE))
+        at = round(max(high - FENCE_ROOM, 0.5 * (low + high)), 3)
+        values = {
+            "kind": ("fence", PLACEHOLDER),
+            "x": (at, PLACEHOLDER),
+            "height": (FENCE[1], PLACEHOLDER),
+            "energy_class": (FENCE[0], PLACEHOLDER),
+            "condition": (Existing("fence", 0.0).condition, DEFAULT),
+            "removable": (True, PLACEHOLDER),
+            "removal": (REMOVAL, PLACEHOLDER),
+        }
+        return Part("[[existing]]", Existing, values, template=True)
 
     def _grounds(self) -> tuple[str, list[dict[str, Any]], dict[str, str]]:
         """Return the surface of all that is not listed, the stretches, and the grounds."""
@@ -492,6 +559,16 @@ class _Draft:
         """Return how long a release is simulated [s], in steps of 5 s."""
         length = float(np.hypot(np.diff(self.x), np.diff(self.y)).sum())
         return min(max(25.0, 5.0 * np.ceil(length / SPEED / 5.0)), 300.0)
+
+
+def _traffic() -> Part:
+    """Return the template of the traffic, without which the risk to life is not computed."""
+    usual = Traffic(*TRAFFIC)
+    given = dict(zip(("vehicles_per_day", "speed", "section_length"), TRAFFIC, strict=True))
+    kept = ("vehicle_length", "occupancy", "vulnerability_run_into", "commuter_trips")
+    values = {name: (value, PLACEHOLDER) for name, value in given.items()}
+    values |= {name: (getattr(usual, name), DEFAULT) for name in kept}
+    return Part("[traffic]", Traffic, values, template=True)
 
 
 def _mass_tables(mass: Mass) -> tuple[Part, Part]:
@@ -604,16 +681,31 @@ def _render(head: Sequence[str], parts: Iterable[Part]) -> str:
     lines = [f"# {''.join(c if c.isprintable() else ' ' for c in line)}" for line in head]
     for part in parts:
         lines.append("")
-        if part.head:
-            lines += [f"# {_first_sentence(part.table.__doc__ or '')}", part.head]
-        about = {field.name: field for field in described(part.table)}
-        for key, (value, sure) in part.values.items():
-            field = about[key]
-            unit = "" if field.unit in ("", "-") else f" [{field.unit}]"
-            lines.append(f"# {_first_sentence(field.text).rstrip('.')}{unit}; {sure}.")
-            lines.append(f"{key} = {_toml(value)}")
-        lines += [f"# {line}" for line in part.comments]
+        if part.template:
+            lines += [f"# {line}" for line in (TEMPLATE, *_table(part))]
+        else:
+            lines += _table(part)
     return "\n".join(lines) + "\n"
+
+
+def _table(part: Part) -> Iterator[str]:
+    """Yield the lines of a table, with a comment before it and before each of its values."""
+    if part.head:
+        yield f"# {_first_sentence(part.table.__doc__ or '')}"
+        yield part.head
+    about = {field.name: field for field in described(part.table)}
+    for key, (value, sure) in part.values.items():
+        field = about[key]
+        unit = "" if field.unit in ("", "-") else f" [{field.unit}]"
+        yield f"# {_first_sentence(field.text).rstrip('.')}{unit}; {sure}."
+        yield f"{key} = {_toml(value)}"
+    yield from (f"# {line}" for line in part.comments)
+
+
+def placeholders(text: str) -> int:
+    """Return how many values of a site file are marked as placeholders, without its templates."""
+    lines = (line for line in text.splitlines() if re.match(r"#(?!\s*#)", line))
+    return sum(line.endswith(f"{PLACEHOLDER}.") for line in lines)
 
 
 def _first_sentence(text: str) -> str:

@@ -158,8 +158,7 @@ def _table(path: Path, only: str) -> tuple[list[str], list[list[str]]]:
     if sum(forms) != 1 or not ("event" in names or only):
         mend = f"name its columns event and {FORMS} in the first row"
         raise BadInput("observed", ", ".join(names), mend)
-    if len(set(names)) < len(names):
-        raise BadInput("observed", ", ".join(names), "give each column a different name")
+    check.distinct("observed", names)
     return names, rows
 
 
@@ -176,7 +175,7 @@ def _number(row: Row, name: str, low: float = -check.LARGEST, high: float = chec
     """Return the number in a cell, between two limits."""
     where, text = f"{row[0]} {name}", row[1][name]
     try:
-        value = float(text if "_" not in text else "")  # Python would read 4_0 as 40
+        value = check.parsed(text)
     except ValueError:
         raise BadInput(where, text, "give a number") from None
     return check.number(where, value, low, high)

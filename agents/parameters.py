@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import BadInput, Layout, Site, fields
+from rigdda import BadInput, Layout, Site, check, fields
 from rigdda.files import read as read_text
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.site_tables import VOLUME_EXPONENT, Rebound
@@ -403,7 +403,7 @@ def read_posterior(path: Path, site: Site) -> Posterior:
         raise BadInput("--posterior", str(path), "name a file posterior.csv of `rigdda fit`")
     try:
         head, *rows = csv.reader(io.StringIO(read_text("--posterior", path), newline=""))
-        table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
+        table = np.array([[check.parsed(cell) for cell in row] for row in rows], dtype=np.float64)
     except (ValueError, csv.Error):
         table, head = np.zeros(0), [""]
     mend = "give a column weight and one for each number, with finite numbers and weights above 0"
@@ -411,8 +411,7 @@ def read_posterior(path: Path, site: Site) -> Posterior:
         raise BadInput("--posterior", str(path), mend)
     if not np.isfinite(table).all() or (table[:, 0] < 0.0).any() or not table[:, 0].any():
         raise BadInput("--posterior", str(path), mend)
-    if len(set(head)) < len(head):
-        raise BadInput("--posterior", ", ".join(head), "give each column a different name")
+    check.distinct("--posterior", head)
     for ends in (table.min(axis=0), table.max(axis=0)):
         set_numbers(site, head[1:], ends[1:].tolist())
     return Posterior.of(head[1:], table[:, 1:], table[:, 0])

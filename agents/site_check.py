@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from rigdda import Block, Event, Site, Source
+from rigdda.agents import new_site
 from rigdda.agents.reports.pictures import DPI, FONT, save, sources
 from rigdda.agents.reports.tables import empty_table
 from rigdda.agents.reports.wording import surveyed
@@ -22,10 +24,16 @@ from rigdda.barriers import Earthwork, earthworks
 from rigdda.barriers.fence import FENCE_CLASSES
 from rigdda.display import OLD
 from rigdda.envs.rendering import ROAD, ROCK, Label, draw_barrier, top_of, write_labels
+from rigdda.fields import Described, described, parse
+from rigdda.files import read
 from rigdda.geometry import polygon_properties
+from rigdda.model import site_names
+from rigdda.model.existing import Existing
+from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import spaced_area
 from rigdda.model.site_tables import Origin
 from rigdda.model.soundness import BEYOND
+from rigdda.model.surface import PLAIN
 from rigdda.releases import Batch
 
 if TYPE_CHECKING:
@@ -33,6 +41,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 Floats = NDArray[np.float64]
+
+Written = Mapping[str, Mapping[str, Any]]
+"""Tables of events as they are written, by the name of the event."""
 
 DRAWS = 20
 """Times that a jointed mass is cut to tell its blocks."""
@@ -55,8 +66,49 @@ HUGE = 20.0
 HANGING = 0.05
 """Distance from the ground above which rock hangs in mid-air [m]."""
 
-FLAT = 20.0
-"""Inclination of a band below which loose blocks may stay where they are [deg]."""
+TINY = 5e-4
+"""Volume of a block up to which its unit is doubted [m3]: half a litre weighs 1.3 kg."""
+
+MANY, CROWDED = 100, 1000
+"""Numbers of loose blocks, and of blocks of a mass, from which on a release is slow."""
+
+LEAST_SHARE = 0.01
+"""Share of a band that is worth a word if blocks may stay where they are on it [-]."""
+
+FARTHER = 3.0
+"""Length of the road over that of the slope on which events were counted, from which on it is
+doubted whether their rates hold for all of the road."""
+
+TALLEST = {"wall": 6.0, "gravity_wall": 8.0, "embankment": 12.0}
+"""Heights above which a barrier is unusual for its kind [m]; assumed."""
+
+LIMITS = {"height": "max_height", "depth": "max_depth", "width": "max_width",
+          "thickness": "max_thickness"}  # fmt: skip
+"""Limits of the zone for sizes of barriers."""
+
+FAR = 20.0
+"""Factor on a usual price, either way, beyond which its unit is doubted."""
+
+NO_CHARGE = ("fence_base", "ditch_base", "removal", "clearing")
+"""Prices that may well be 0."""
+
+CLOSURES = (1e3, 5e6)
+"""Costs of a day of closure beyond which its unit is doubted [EUR]."""
+
+DAYS = 20.0
+"""Days of closure for any rock, or for 1 m3, above which their unit is doubted."""
+
+SHARES = {"interest": 0.15, "upkeep": 0.1}
+"""Shares per year above which they may have been meant as percentages [1/year]."""
+
+LIVES = (5.0, 150.0)
+"""Service lives beyond which they are unusual [years]."""
+
+DEAR = 5000.0
+"""Cost of the removal of a barrier above which its unit is doubted [EUR/m]."""
+
+LAWS = ("friction_deg", "restitution", "rolling", "roughness")
+"""Values of a surface for which its ground has a plausible range."""
 
 SHORT = 1.2 * BEYOND
 """Length of the ground beyond the road that leaves a run-out little room [m]."""
@@ -148,8 +200,7 @@ def placeholders(path: str) -> int:
     file = Path(path)
     if not file.is_file():
         return 0
-    lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-    return sum(line.startswith("#") and line.endswith("placeholder: replace.") for line in lines)
+    return new_site.placeholders(file.read_text(encoding="utf-8", errors="replace"))
 
 
 def _origin(site: Site) -> Iterator[str]:
@@ -336,15 +387,51 @@ def time_of(site: Site, trials: Sequence[Trial]) -> str:
     )
 
 
-def oddities(site: Site, trials: Sequence[Trial] = ()) -> list[str]:
-    """Return values of a site that may be mistakes, each with its field and what to check."""
+def written_events(source: str) -> Written:
+    """Return the table of each event by its name, as it is written in a file or a built-in site.
+
+    A site has the area and the rate that follow from a volume and a return period, and no longer
+    knows what was written. The result is empty for other names.
+    """
+    if source in site_names.names():
+        text = site_names.text(source)
+    elif Path(source).is_file():
+        text = read("site file", Path(source))
+    else:
+        return {}
+    tables = parse("site file", source, text).get("events", [])
+    return {str(table.get("name")): table for table in tables}
+
+
+def oddities(
+    site: Site, trials: Sequence[Trial] = (), written: Written = MappingProxyType({})
+) -> list[str]:
+    """Return values of a site that may be mistakes, each with its field and what to check.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    trials : sequence of Trial
+        Releases that were tried.
+    written : mapping
+        Tables of the events as they are written, see `written_events`. Values are then called what
+        they are called there.
+    """
     return [
         *_odd_profile(site),
+        *_odd_surfaces(site),
         *_odd_zone(site),
         *_odd_existing(site),
-        *_odd_traffic(site),
+        *_odd_traffic(site, written),
+        *_odd_prices(site),
         *(words for source in site.sources for words in _odd_source(site, source)),
-        *(words for event in site.events for words in _odd_event(site, event)),
+        *(
+            words
+            for event in site.events
+            for words in _odd_event(site, event, written.get(event.name, {}))
+        ),
+        *_odd_design(site),
         *(
             f"motion.duration = {site.motion.duration:g} s: rock of {trial.event!r} still moves "
             "above the road as releases end; give more"
@@ -387,6 +474,36 @@ def _odd_profile(site: Site) -> Iterator[str]:
         )
 
 
+def _odd_surfaces(site: Site) -> Iterator[str]:
+    """Yield contact properties that are plausible for none of the grounds they may belong to."""
+    for name, surface in site.surfaces.items():
+        for law in LAWS:
+            value = getattr(surface, law)
+            if value is None or (not surface.ground and value == PLAIN[law]):
+                continue
+            low, high, whose = _plausible(surface.ground, law)
+            if not low <= value <= high:
+                yield (
+                    f"surfaces.{name}.{law} = {value:g}: {low:g} to {high:g} is plausible for "
+                    f"{whose}; correct it, or name another ground"
+                )
+    for i, pair in enumerate(site.interfaces):
+        for law in ("restitution", "rolling"):
+            value, (_, high, whose) = getattr(pair, law), _plausible("", law)
+            if value is not None and value > high:
+                yield (
+                    f"interfaces[{i}].{law} = {value:g}: up to {high:g} is plausible for {whose}; "
+                    "correct it"
+                )
+
+
+def _plausible(ground: str, law: str) -> tuple[float, float, str]:
+    """Return the plausible range of a value of a ground, or of all grounds, and its words."""
+    spans = [getattr(GROUNDS[name], law) for name in ([ground] if ground else GROUNDS)]
+    whose = f"the ground {ground!r}" if ground else "the grounds of the library"
+    return min(span.low for span in spans), max(span.high for span in spans), whose
+
+
 def _odd_zone(site: Site) -> Iterator[str]:
     """Yield what is odd about the place and size of barriers."""
     zone, rooms = site.barrier_zone, site.rooms
@@ -422,9 +539,80 @@ def _odd_existing(site: Site) -> Iterator[str]:
                 f"{barrier.deflection:g} m, {end - site.road.start:.1f} m onto the road; a new one "
                 "would not be allowed there"
             )
+    for i, one in enumerate(site.existing):
+        yield from _odd_sizes(site, f"existing[{i}]", one)
+        if (one.removal or 0.0) > DEAR:
+            yield f"existing[{i}].removal = {one.removal:g} EUR/m: is it the cost of one metre?"
 
 
-def _odd_traffic(site: Site) -> Iterator[str]:
+def _odd_sizes(site: Site, where: str, one: Existing) -> Iterator[str]:
+    """Yield the sizes of an existing barrier that are beyond the zone or unusual for its kind."""
+    kind = one.kind.replace("_", " ")
+    for name, bound in LIMITS.items():
+        value, most = getattr(one, name), getattr(site.barrier_zone, bound)
+        fixed = (one.kind, name) in (("fence", "thickness"), ("embankment", "width"))
+        if value is not None and value > most and not fixed:
+            yield (
+                f"{where}.{name} = {value:g} m: barrier_zone.{bound} = {most:g} allows no new "
+                f"{kind} of this size; is it in metres?"
+            )
+        elif name == "height" and value is not None and value > TALLEST.get(one.kind, math.inf):
+            yield (
+                f"{where}.{name} = {value:g} m: few barriers of the kind {kind} are higher than "
+                f"{TALLEST[one.kind]:g} m; is it in metres?"
+            )
+
+
+def _odd_prices(site: Site) -> Iterator[str]:
+    """Yield prices and consequences whose unit may be another one."""
+    for where, given in (("prices", site.prices), ("consequences", site.consequences)):
+        usual = type(given)()
+        for field in described(type(given)):
+            if field.unit.startswith("EUR/m"):
+                told = _odd_price(where, field, getattr(given, field.name), usual)
+                yield from told
+    daily = site.consequences.closure
+    if 0.0 < daily < CLOSURES[0] or daily > CLOSURES[1]:
+        yield (
+            f"consequences.closure = {daily:g} EUR/day: a day of closure usually costs thousands "
+            "to millions of EUR; is it in EUR, and for a day?"
+        )
+    for name in ("days_base", "days_factor"):
+        days = getattr(site.consequences, name)
+        if days > DAYS:
+            yield f"consequences.{name} = {days:g} days: is it in hours?"
+    shares = {"interest": site.prices.interest}
+    shares |= {f"upkeep.{kind}": share for kind, share in site.prices.upkeep.items()}
+    for name, share in shares.items():
+        if share > SHARES[name.partition(".")[0]]:
+            yield f"prices.{name} = {share:g}: this is {100.0 * share:g} % a year; give a share"
+    lives = {"life": site.prices.life}
+    lives |= {f"lives.{kind}": life for kind, life in site.prices.lives.items()}
+    for name, life in lives.items():
+        if not LIVES[0] <= life <= LIVES[1]:
+            yield f"prices.{name} = {life:g} years: barriers last for 10 to 100 years"
+
+
+def _odd_price(where: str, field: Described, value: Any, usual: Any) -> Iterator[str]:
+    """Yield the first price of a field that is far from the usual one."""
+    known = getattr(usual, field.name)
+    pairs = {field.name: (value, known)}
+    if isinstance(value, dict):
+        most = max(known.values())
+        pairs = {f"{field.name}.{key}": (v, known.get(key, most)) for key, v in value.items()}
+    for name, (price, order) in pairs.items():
+        if price == 0.0 and field.name not in NO_CHARGE:
+            yield f"{where}.{name} = 0 {field.unit}: it would cost nothing; give its price"
+            return
+        if price > 0.0 and not 1.0 / FAR <= price / order <= FAR:
+            yield (
+                f"{where}.{name} = {price:g} {field.unit}: a usual value is {order:g}; is it in "
+                f"{field.unit}, and in EUR, not in thousands of EUR?"
+            )
+            return
+
+
+def _odd_traffic(site: Site, written: Written) -> Iterator[str]:
     """Yield what is odd about the traffic."""
     traffic = site.traffic
     if traffic is None:
@@ -444,6 +632,16 @@ def _odd_traffic(site: Site) -> Iterator[str]:
             f"traffic.fatality_value = {traffic.fatality_value:g}: give EUR; values of a prevented "
             "fatality are millions"
         )
+    lengths = {name: table["section_length"] for name, table in written.items()
+               if "section_length" in table}  # fmt: skip
+    if lengths:
+        name = min(lengths, key=lambda name: lengths[name])
+        if traffic.section_length >= FARTHER * lengths[name]:
+            yield (
+                f"traffic.section_length = {traffic.section_length:g} m: events.{name} was counted "
+                f"on section_length = {lengths[name]:g} m; give the length of road below this "
+                "slope, or check that its rate holds for all of the road"
+            )
 
 
 def _size(site: Site, event: Event) -> float:
@@ -459,13 +657,7 @@ def _odd_source(site: Site, source: Source) -> Iterator[str]:
         yield f"{source.words}.density = {source.density:g} kg/m3: rock has 2,000 to 3,100"
     if source.band is not None:
         start, end = source.band
-        fall = site.profile.height(start) - site.profile.height(end)
-        steep = math.degrees(math.atan2(fall, end - start))
-        if steep < FLAT:
-            yield (
-                f"{source.words}.band = [{start:g}, {end:g}]: the ground is {steep:.0f} deg steep "
-                "there, so that blocks may stay where they are"
-            )
+        yield from _odd_band(site, source)
         if start > site.slope.toe:
             yield f"{source.words}.band = [{start:g}, {end:g}]: it lies below slope.toe"
         return
@@ -483,6 +675,40 @@ def _odd_source(site: Site, source: Source) -> Iterator[str]:
         yield f"{source.words}.joints: the mass is hardly cut; are the spacings in metres?"
 
 
+def _odd_band(site: Site, source: Source) -> Iterator[str]:
+    """Yield the parts of a band that are flatter than the friction angle of their ground."""
+    start, end = source.band or (0.0, 0.0)
+    pairs = {frozenset((pair.first, pair.second)): pair.friction_deg for pair in site.interfaces}
+    points, names = site.slope.chain()
+    flat: list[tuple[float, float]] = []
+    steep, rough = [], []
+    for (a, ya), (b, yb), name in zip(points, points[1:], names, strict=False):
+        low, high = max(a, start), min(b, end)
+        usual = site.surfaces[name].friction_deg
+        friction = pairs.get(frozenset((source.surface, name)), usual)
+        angle = math.degrees(math.atan2(ya - yb, b - a))
+        if low < high and angle < friction:
+            if flat and flat[-1][1] == low:
+                low = flat.pop()[0]
+            flat.append((low, high))
+            steep.append(angle)
+            rough.append(friction)
+    share = sum(high - low for low, high in flat) / (end - start)
+    if share >= LEAST_SHARE:
+        parts = " and ".join(f"{low:g} to {high:g}" for low, high in flat)
+        yield (
+            f"{source.words}.band = [{start:g}, {end:g}]: at x = {parts} m, {100.0 * share:.0f} % "
+            f"of it, the ground is {_angles(steep)} deg steep, less than its friction angle of "
+            f"{_angles(rough)} deg, so that blocks may stay where they are; leave this part out"
+        )
+
+
+def _angles(angles: Sequence[float]) -> str:
+    """Return the least and the greatest of some angles [deg], in words."""
+    low, high = f"{min(angles):.0f}", f"{max(angles):.0f}"
+    return low if low == high else f"{low} to {high}"
+
+
 def _hanging(site: Site, source: Source) -> Iterator[tuple[str, float]]:
     """Yield the name of each heap of rock in mid-air and its height above the ground [m]."""
     ground = site.profile.solid
@@ -496,20 +722,72 @@ def _hanging(site: Site, source: Source) -> Iterator[tuple[str, float]]:
             yield names[inside[0]], high
 
 
-def _odd_event(site: Site, event: Event) -> Iterator[str]:
-    """Yield what is odd about an event."""
+def _odd_event(site: Site, event: Event, table: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is odd about an event, whose table may be known as it is written."""
+    source = site.source(event.source)
     if event.rate >= OFTEN:
-        yield (
-            f"{event.words}.rate = {event.rate:g}: so many a year on 100 m of slope; if it happens "
-            f"once in {event.rate:g} years, write return_period = {event.rate:g}"
-        )
-    if event.area is not None:
-        most = event.area[1]
-        if most**1.5 > HUGE:
+        often = f"{event.rate:.3g} events a year on 100 m of slope"
+        if "return_period" in table:
+            period, length = table["return_period"], table.get("section_length")
+            on = "" if length is None else f" on section_length = {length:g} m"
             yield (
-                f"{event.words}.area = [{event.area[0]:.3g}, {most:.3g}] m2: blocks of up to "
-                f"{most**1.5:.3g} m3; if the numbers are volumes, write volume"
+                f"{event.words}.return_period = {period:g} years{on}: this makes {often}; if it "
+                f"happens {period:g} times a year, write rate = {period:g}"
             )
+        else:
+            yield (
+                f"{event.words}.rate = {event.rate:g}: this makes {often}; if it happens once in "
+                f"{event.rate:g} years, write return_period = {event.rate:g}"
+            )
+    yield from _odd_volume(event, source, table)
+    if source.band is not None and event.number[1] >= MANY:
+        low, high = event.number
+        yield (
+            f"{event.words}.number = [{low}, {high}]: releases of so many blocks are slow; check "
+            "that the rate is that of releases, not of blocks"
+        )
+    elif source.band is None and (count := event.block_count(source)) >= CROWDED:
+        yield (
+            f"{event.words}: a release has about {count:,.0f} blocks and is slow; give fewer, "
+            f"larger blocks of {source.words} if this is enough"
+        )
+
+
+def _odd_volume(event: Event, source: Source, table: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is odd about the size of the blocks of an event."""
+    if source.edges is not None:
+        volume = math.prod(source.edges)
+        low, high, what = volume, volume, f"{source.words}.edges = {_numbers(source.edges)} m"
+        unit = "are the edges in metres?"
+    elif event.area is not None:
+        low, high = (area**1.5 for area in event.area)
+        given = table.get("volume")
+        what = f"{event.words}.area = {_numbers(event.area)} m2"
+        unit = "if the numbers are volumes, write volume"
+        if given is not None:
+            what, unit = f"{event.words}.volume = {_numbers(given)} m3", "is it in m3?"
+    else:
+        low, high = source.mean_block_area**1.5, 0.0  # a mass may have blocks of any size
+        what, unit = f"{event.words}: {source.words}", "are its lengths in metres?"
+    if high > HUGE:
+        yield f"{what}: blocks of up to {high:.3g} m3; {unit}"
+    if low < (1.0 + 1e-9) * TINY:
+        weight = low * source.density
+        yield f"{what}: blocks of {1e3 * low:.2g} litres, {weight:.2g} kg; {unit}"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    """Return numbers as a list of TOML."""
+    return f"[{', '.join(f'{value:.3g}' for value in values)}]"
+
+
+def _odd_design(site: Site) -> Iterator[str]:
+    """Yield that no event is a design event."""
+    if not any(event.design for event in site.events):
+        yield (
+            "events: none has design = true, so that no target can be set; mark those that "
+            "barriers must withstand"
+        )
 
 
 COLOURS = {
@@ -543,7 +821,7 @@ def draw(path: str | os.PathLike[str], site: Site) -> None:
     long, tall = np.ptp(points, axis=0)
     wide, low, high = INCHES
     height = min(max(low, 1.9 + (wide - 1.0) * 1.2 * tall / long), high)
-    with rc_context(FONT):
+    with rc_context({**FONT, "text.parse_math": False}):  # names may have the sign of a dollar
         figure = Figure((wide, height), dpi=DPI, layout="constrained")
         axes = figure.subplots()
         bottom = float(points[:, 1].min() - 0.12 * tall)

@@ -291,7 +291,7 @@ def _sound(row: dict[str, Any], study: Study, job: Job) -> bool:
 def _number(text: str) -> float:
     """Return the number in a cell: 1 for True, 0 for False and NaN if it is not a number."""
     try:
-        return float({"True": "1", "False": "0"}.get(text, text))
+        return check.parsed({"True": "1", "False": "0"}.get(text, text))
     except ValueError:
         return math.nan
 

@@ -58,8 +58,10 @@ class _InRange(click.ParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, context: click.Context | None
     ) -> Any:
-        """Return the number."""
+        """Return the number; an underscore between digits is a typing error, not a separator."""
         try:
+            if isinstance(value, str) and "_" in value:
+                self.fail(value, param, context)
             return super().convert(value, param, context)
         except click.BadParameter:
             from rigdda import BadInput
@@ -74,7 +76,7 @@ class _InRange(click.ParamType):
             ends.append(f"{'above' if own.min_open else 'of at least'} {own.min:,}")
         if own.max is not None:
             ends.append(f"{'below' if own.max_open else 'at most'} {own.max:,}")
-        return " " + " and ".join(ends)
+        return f" {' and '.join(ends)}" if ends else ""
 
 
 class WholeNumber(_InRange, click.IntRange):
@@ -147,7 +149,7 @@ def read_layout(path: str | None) -> Layout:
 
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from rich.console import Console, RenderableType
 
 FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
 """Characters that some operating system does not allow in the name of a folder."""
@@ -378,20 +380,24 @@ def _stamps(folder: Path) -> set[Stamp]:
 def progress(total: int) -> Iterator[Callable[[int, str], None]]:
     """Yield a function that reports the progress of a job on standard error.
 
-    On a terminal it is a progress bar, otherwise an occasional line.
+    On a terminal it is a progress bar, otherwise an occasional line. The words may contain names
+    that a user gave; they are shown as they are.
     """
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
     from rich.progress import TimeRemainingColumn as Remaining
 
-    console = Console(stderr=True)
+    console = _console(stderr=True)
     if not console.is_terminal:
         yield _lines(total)
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Remaining())
-    with Progress(*columns, console=console, transient=True) as bar:
+    words = TextColumn("{task.description}", markup=False)  # the column has markup of its own
+    with Progress(
+        words, BarColumn(), MofNCompleteColumn(), Remaining(), console=console, transient=True
+    ) as bar:
         task = bar.add_task("starting", total=total)
-        yield lambda done, words: bar.update(task, completed=done, description=words)
+        yield lambda done, words: bar.update(
+            task, completed=done, description=" ".join(words.split())
+        )
 
 
 def _lines(total: int) -> Callable[[int, str], None]:
@@ -408,7 +414,16 @@ def _lines(total: int) -> Callable[[int, str], None]:
 
 
 def show(table: RenderableType) -> None:
-    """Print a rich table on standard output."""
+    """Print a rich table on standard output, with all text as it is."""
+    _console().print(table)
+
+
+def _console(stderr: bool = False) -> Console:
+    """Return a console that shows all text as it is.
+
+    Texts contain units such as [m] and names that a user gave, which must not be read as markup,
+    as codes of emojis or as anything to highlight.
+    """
     from rich.console import Console
 
-    Console(markup=False, highlight=False).print(table)  # [m] is a unit, not a style
+    return Console(stderr=stderr, markup=False, emoji=False, highlight=False)

@@ -6,6 +6,7 @@ Each function raises one error that names the field, the value and what to give 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -60,6 +61,39 @@ def number(
         mend = f"give a number {bounds}" + (f" [{unit}]" if unit else "")
         raise BadInput(field, value, mend)
     return out
+
+
+PLAIN = re.compile(r"\s*[+-]?(([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|nan|inf(inity)?)\s*", re.I)
+"""A number as tables have it. Python's float would also read 1_20, as 120, and digits of other
+scripts."""
+
+
+def parsed(text: str) -> float:
+    """Return the number in a text, for example in a cell of a table.
+
+    Raises
+    ------
+    ValueError
+        If it is not a plain number: underscores between digits, which Python permits in its own
+        source text, are typing errors here.
+    """
+    if PLAIN.fullmatch(text) is None:
+        raise ValueError(f"{text!r} is not a number")
+    return float(text)
+
+
+def distinct(field: str, names: Sequence[str]) -> None:
+    """Check that no column of a table is given twice.
+
+    Raises
+    ------
+    BadInput
+        If one is.
+    """
+    for name in names:
+        if names.count(name) > 1:
+            mend = f"give each column a different name: {names.count(name)} have this one"
+            raise BadInput(field, name, mend)
 
 
 def boolean(field: str, value: Any) -> bool:

@@ -356,19 +356,23 @@ def _rows(path: Path) -> tuple[SectionTable, ...]:
     """
     if not is_file(path):
         raise BadInput("table", str(path), "name an existing CSV file")
-    lines = csv.DictReader(io.StringIO(read("table", path), newline=""))
+    lines = csv.reader(io.StringIO(read("table", path), newline=""))
+    try:
+        rows = [(lines.line_num, [cell.strip() for cell in row]) for row in lines if row]
+    except csv.Error as error:
+        raise BadInput("table", str(path), f"repair line {lines.line_num}: {error}") from None
     known = [field.name for field in fields.described(SectionTable)]
-    head = [name.strip() for name in lines.fieldnames or ()]
+    head = rows[0][1] if rows else []
     for name in head:
         if name not in known:
             raise BadInput("table", name, f"use the columns {', '.join(known)}")
-    lines.fieldnames = head
+    check.distinct("table", head)
     found = []
-    for i, row in enumerate(lines):
-        where = f"{path.name} row {i + 2}"
-        if None in row or None in row.values():
+    for line, row in rows[1:]:
+        where = f"{path.name} row {line}"
+        if len(row) != len(head):
             raise BadInput(where, len(row), f"give {len(head)} cells, as in the first row")
-        cells = {name: text.strip() for name, text in row.items() if text.strip()}
+        cells = {name: text for name, text in zip(head, row, strict=True) if text}
         found.append(fields.read(SectionTable, _numbers(cells, where), where))
     if not found:
         raise BadInput("table", str(path), "give at least one row below the first")
@@ -381,7 +385,7 @@ def _numbers(cells: dict[str, str], where: str) -> dict[str, Any]:
     for name in ("length", *TARGETS):
         if name in cells:
             try:
-                out[name] = float(cells[name])
+                out[name] = check.parsed(cells[name])
             except ValueError:
                 raise BadInput(f"{where}.{name}", cells[name], "give a number") from None
     return out

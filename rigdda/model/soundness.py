@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from rigdda import check, fields
 from rigdda.errors import BadInput, DoubtfulInput
@@ -21,6 +22,9 @@ from rigdda.model.surface import check_surface
 BEYOND = 30.0
 """Minimum length of the ground beyond the road [m], so that blocks that cross the road count as
 beyond before they reach the end of the ground."""
+
+SAME = 1e-9
+"""Distance below which two points of the ground are the same [m]."""
 
 HIGHEST, LONGEST = 5_000.0, 20_000.0
 """Height and length of a slope [m] above which the unit is probably wrong (millimetres)."""
@@ -116,13 +120,18 @@ def _check_surfaces(site: SiteTables) -> None:
 def _check_slope(site: SiteTables) -> None:
     points, road = np.array(site.slope.points), site.road
     x, (low, high) = points[:, 0], points[[0, -1], 0]
-    downhill = low < high and (low <= x).all() and (x <= high).all()
-    if not downhill or points[0, 1] <= points[-1, 1]:
-        raise BadInput(
-            "slope.points",
-            f"{len(points)} points",
-            "list them downhill, from the least x to the greatest x",
+    if not low < high or points[0, 1] <= points[-1, 1]:
+        ends = f"from {points[0].tolist()} to {points[-1].tolist()}"
+        mend = "list them downhill, from the crest at the least x to the end at the greatest x"
+        raise BadInput("slope.points", ends, mend)
+    outside = np.flatnonzero((x < low) | (x > high))
+    if outside.size:
+        mend = (
+            f"give an x between {low:g} and {high:g}, those of the first and the last point: the "
+            "points go downhill from the least x to the greatest x"
         )
+        raise BadInput(f"slope.points[{outside[0]}]", points[outside[0]].tolist(), mend)
+    _check_chain(points)
     tall, long = np.ptp(points[:, 1]), high - low
     if tall > HIGHEST or long > LONGEST:
         mend = f"give metres: at most {HIGHEST:g} m high and {LONGEST:g} m long"
@@ -147,6 +156,20 @@ def _check_slope(site: SiteTables) -> None:
         )
 
 
+def _check_chain(points: NDArray[np.float64]) -> None:
+    """Check that no point of the ground repeats the one before, and that it crosses nowhere."""
+    same = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) < SAME) + 1
+    if same.size:
+        mend = "remove it: it repeats the point before it"
+        raise BadInput(f"slope.points[{same[0]}]", points[same[0]].tolist(), mend)
+    if shapely.LineString(points).is_simple:
+        return
+    for k in range(2, len(points)):  # the first point whose piece meets an earlier one
+        if not shapely.LineString(points[: k + 1]).is_simple:
+            mend = "correct it or the points before it: the ground crosses itself on the way there"
+            raise BadInput(f"slope.points[{k}]", points[k].tolist(), mend)
+
+
 def _check_events(site: SiteTables) -> None:
     check_names("sources", (source.name for source in site.sources))
     check_names("events", (event.name for event in site.events))
@@ -166,9 +189,7 @@ def _check_source(site: SiteTables, source: Source) -> None:
     deep = min([float(chain[:, 1].min()), *lowest]) - 1.0
     ground = shapely.Polygon([*chain, (chain[-1, 0], deep), (chain[0, 0], deep)])
     if source.band is not None:
-        if (np.diff(chain[:, 0]) < 0.0).any():
-            mend = "give a polygon or blocks: a band needs ground without overhangs"
-            raise BadInput(f"{source.words}.band", source.band, mend)
+        _check_onward(site, source)
         room = max((loose_blocks.reach(source, e) for e in site.events_of(source)), default=0.0)
         low, high = source.band
         if low - room < chain[0, 0] or high + room >= site.road.start:
@@ -177,6 +198,20 @@ def _check_source(site: SiteTables, source: Source) -> None:
             raise BadInput(f"{source.words}.band", source.band, mend)
     for where, piece in source.pieces():
         _check_piece(site, where, piece, ground)
+
+
+def _check_onward(site: SiteTables, source: Source) -> None:
+    """Check that no chainage of the ground goes back, as the band of a source requires."""
+    x = np.array(site.slope.points)[:, 0]
+    back = np.flatnonzero(np.diff(x) < 0.0) + 1
+    if back.size:
+        k = int(back[0])
+        mend = (
+            f"it lies uphill of slope.points[{k - 1}] at x = {x[k - 1]:g}: correct one of the two, "
+            f"or, if the ground overhangs there, give {source.words} a polygon or blocks instead "
+            "of a band"
+        )
+        raise BadInput(f"slope.points[{k}]", list(site.slope.points[k]), mend)
 
 
 def _check_piece(

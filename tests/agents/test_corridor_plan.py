@@ -363,10 +363,18 @@ def test_malformed_corridors_are_one_line(
         ("name,site,metres\na,quick,3\n", "metres"),
         ("name,site,length\na,quick,far\n", "far"),
         ("name,site,length\na,quick,-3\n", "-3"),
+        ("name,site,length\na,quick,1_20\n", "s.csv row 2.length = '1_20': give a number"),
+        ("name,site,length,reach\n\na,quick,5,0_1\n", "s.csv row 3.reach = '0_1': give a number"),
+        ("name,site,length\na,quick,\uff13\n", "row 2.length = .*: give a number"),
+        ("name,site,length\na,quick,1e999\n", "row 2.length = inf: give a finite number"),
+        ("name,site,length,length\na,quick,3,4\n", "table = 'length': .* 2 have this one"),
+        ("name,site, name,length\na,quick,b,4\n", "table = 'name': give each column a different"),
+        ("name,site,length\na,quick,4,5\n", "s.csv row 2 = 4: give 3 cells"),
+        ('name,site,length\n"a,quick,' + 140_000 * "3" + "\n", "repair line 2"),
     ],
 )
 def test_malformed_tables_are_told(text: str, named: str, tmp_path: Path) -> None:
-    (tmp_path / "s.csv").write_text(text)
+    (tmp_path / "s.csv").write_text(text, encoding="utf-8")
     (tmp_path / "t.toml").write_text('name = "t"\nbudget = 1\ntable = "s.csv"\n')
     with pytest.raises(BadInput, match=named):
         Corridor.load(tmp_path / "t.toml")

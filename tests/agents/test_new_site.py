@@ -16,6 +16,11 @@ import rigdda
 from rigdda import Event, Site
 from rigdda.agents import site_check
 from rigdda.agents.site_check import Trial, oddities
+from rigdda.model.existing import Existing
+from rigdda.model.grounds import GROUNDS
+from rigdda.model.site_tables import Motion
+from rigdda.model.surface import Interface
+from rigdda.model.traffic import Traffic
 
 GRID = """chainage,elevation
 2683400.0,1892.0
@@ -41,7 +46,9 @@ def test_from_a_survey_to_a_checked_site(tmp_path):
               folder=tmp_path)  # fmt: skip
     assert "x = 0 is chainage 2,683,400" in out and "9 points; slope.toml is written" in out
     text = (tmp_path / "slope.toml").read_text()
-    assert f"with {text.count('placeholder: replace.')} placeholders" in out
+    marked = [line for line in text.splitlines() if line.endswith("placeholder: replace.")]
+    count = sum(not line.startswith("# #") for line in marked)
+    assert f"with {count} placeholders" in out and count < len(marked)
     site = Site.load(tmp_path / "slope.toml")
     assert site.origin.chainage_of(site.road.start) == 2683512.0
     assert site.surface_at(30.0) == "talus"
@@ -49,6 +56,7 @@ def test_from_a_survey_to_a_checked_site(tmp_path):
     assert "the road is at chainage 2,683,512 to 2,683,521" in told
     assert "talus (coarse_talus) x = 22 to 112 m" in told
     assert "0.2 events a year on 100 m of slope, one in 5 years" in told
+    assert f"the site file marks {count} values as placeholders" in told
     assert "nothing looks odd; site.png is in checked" in told
     width, height = png_size(tmp_path / "checked" / "site.png")
     assert width >= 1200 and height >= 600
@@ -67,6 +75,113 @@ def test_a_jointed_mass_is_taken_out_of_the_ground(tmp_path):
     assert site.profile.height(17.0) == pytest.approx(70.0 + np.tan(np.radians(30.0)), abs=1e-3)
     told = run("check", "slope.toml", folder=tmp_path)
     assert "source pillar: a jointed mass" in told and "odd: sources" not in told
+
+
+@pytest.mark.parametrize(
+    ("zone", "rooms", "band"),
+    [
+        ((60, 112), [(60, 112)], (10, 38)),  # wider than the zone by default at both ends
+        ((20, 111), [(20, 111)], None),  # into the placeholder of the band, which gives way
+        ((15, 20), [(15, 20)], None),  # within it
+        ((10, 20), [(10, 20)], None),  # from its upper end on, so that it lies below the zone
+        ((0, 112), None, (10, 38)),  # the whole slope: no place is left for the band
+    ],
+)
+def test_a_zone_may_be_wider_than_the_one_by_default(tmp_path, zone, rooms, band):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "usual", "--profile", "survey.csv", *ASKED, folder=tmp_path)
+    assert Site.load(tmp_path / "usual.toml").rooms == ((79.0, 111.5),)
+    run("new", "slope", "--profile", "survey.csv", *ASKED, "--zone", *zone, folder=tmp_path)
+    site = Site.load(tmp_path / "slope.toml")
+    assert (site.barrier_zone.start, site.barrier_zone.end) == zone
+    if rooms is not None:
+        np.testing.assert_allclose(site.rooms, rooms)
+    if band is not None:
+        assert site.sources[0].band == band
+
+
+def test_the_placeholder_of_the_road_lies_below_a_zone_that_is_given(tmp_path):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "usual", "--profile", "survey.csv", folder=tmp_path)
+    assert Site.load(tmp_path / "usual.toml").road.start == 96.0
+    run("new", "slope", "--profile", "survey.csv", "--zone", 110, 60, folder=tmp_path)
+    site = Site.load(tmp_path / "slope.toml")
+    assert site.rooms == ((60.0, 110.0),) and (site.road.start, site.road.end) == (110.0, 117.0)
+
+
+def test_the_time_step_is_that_of_the_format(tmp_path):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *ASKED, folder=tmp_path)
+    assert Site.load(tmp_path / "slope.toml").motion.dt == Motion().dt == 0.005
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        (*ASKED,),
+        (*ASKED, "--zone", 15, 20),
+        (*ASKED, "--zone", 60, 112, "--source", "low:100-108"),
+        (*ASKED, "--zone", 60, 112, "--source", "low:60-111"),
+        (*ASKED, "--mass", "pillar:12-18:30"),
+        (),
+    ],
+)
+def test_traffic_and_existing_barriers_are_templates(tmp_path, asked):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *asked, folder=tmp_path)
+    text = (tmp_path / "slope.toml").read_text()
+    site = Site.parse(text, "slope")
+    assert site.traffic is None and site.existing == ()
+    head, *templates = re.split(r"\n\n(?=# # )", text)
+    assert len(templates) == 2
+    uncommented = [re.sub(r"(?m)^# ", "", template) for template in templates]
+    (fence,) = Site.parse(f"{head}\n{uncommented[1]}", "slope").existing
+    assert (fence.kind, fence.height, fence.energy_class) == ("fence", 2.0, 250)
+    whole = Site.parse("\n\n".join([head, *uncommented]), "slope")
+    assert whole.existing == (fence,)
+    assert whole.traffic == Traffic(2000.0, 60.0, 100.0)
+    for unit in ("[1/day]", "[km/h]", "[m]", "[kJ]", "[EUR/m]"):
+        assert any(unit in template for template in templates)
+
+
+BACK = "it lies uphill of slope.points[{}] at x = {}: correct one of the two"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ("[22.0, 60.0]", "[2.0, 60.0]", "slope.points[2] = [2.0, 60.0]: " + BACK.format(1, 10)),
+        ("[72.0, 20.0]", "[7.2, 20.0]", "slope.points[3] = [7.2, 20.0]: " + BACK.format(2, 22)),
+        ("[104.0, 4.5]", "[114.0, 4.5]", "slope.points[6] = [112.0, 4.0]: " + BACK.format(5, 114)),
+        ("[22.0, 60.0]", "[-22.0, 60.0]", "slope.points[2] = [-22.0, 60.0]: give an x between 0"),
+        ("[22.0, 60.0]", "[2200, 60.0]", "slope.points[2] = [2200.0, 60.0]: give an x between 0"),
+        ("[22.0, 60.0]", "[10.0, 90.0]", "slope.points[2] = [10.0, 90.0]: remove it"),
+        ("[22.0, 60.0]", "[20.0, 60.0], [5.0, 95.0], [22.0, 60.0]", "crosses itself"),
+        ("[161.0, 0.0]", "[161.0, 95.0]", "to [161.0, 95.0]': list them downhill"),
+    ],
+)
+def test_points_that_go_back_are_blamed_themselves(tmp_path, old, new, part):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *ASKED, folder=tmp_path)
+    text = (tmp_path / "slope.toml").read_text()
+    assert old in text
+    (tmp_path / "slope.toml").write_text(text.replace(old, new))
+    line = refused("check", "slope.toml", folder=tmp_path)
+    assert line.startswith("rigdda: slope.points") and part in line
+
+
+def test_ground_may_overhang_below_a_mass(slope):
+    points = [*slope.slope.points]
+    points[2:2] = [(13.0, 84.0), (12.0, 80.0)]
+    ground = replace(slope.slope, points=tuple(points))
+    square = ((80.0, 40.0), (82.0, 40.0), (82.0, 42.0), (80.0, 42.0))
+    source = rigdda.Source("face", blocks=(square,))
+    event = Event("block", 0.2, "face")
+    zone = replace(slope.barrier_zone, start=90.0)
+    rock = replace(slope, slope=ground, sources=(source,), events=(event,), barrier_zone=zone)
+    assert len(rock.profile.points) == len(slope.profile.points) + 2
+    with pytest.raises(rigdda.BadInput, match=r"slope.points\[3\] = \[12.0, 80.0\]: it lies"):
+        replace(slope, slope=ground)
 
 
 @pytest.mark.parametrize(
@@ -196,8 +311,12 @@ OPTIONS = {
     "road on the crest": (("--road", 2, 8), "--source"),
     "half a road": (("--road", 112), "--road"),
     "road of text": (("--road", "a", "b"), "'a'"),
+    "road with an underscore": (("--road", "1_12", 121), "--road = '1_12': give a number"),
+    "toe with an underscore": ((*ASKED, "--toe", "9_4"), "--toe = '9_4': give a number"),
     "toe beyond the road": ((*ASKED, "--toe", 130), "--toe = 130.0"),
-    "zone on the road": ((*ASKED, "--zone", 100, 115), "barrier_zone.end"),
+    "zone on the road": ((*ASKED, "--zone", 100, 115), "--zone = [100.0, 115.0]: let it lie "),
+    "zone above the crest": ((*ASKED, "--zone", -5, 110), "the crest at 0 and the uphill edge"),
+    "zone beyond the ground": (("--zone", 100, 170), "the end of the ground at 161"),
     "zone of no length": ((*ASKED, "--zone", 100, 100), "--zone"),
     "unknown ground": ((*ASKED, "--ground", "lava:10-20"), "'lava'"),
     "several grounds": ((*ASKED, "--ground", "hard:10-20"), "hard_rock, hard_soil"),
@@ -210,6 +329,9 @@ OPTIONS = {
     "source without range": ((*ASKED, "--source", "cliff"), "cliff:2-8"),
     "source on the road": ((*ASKED, "--source", "cliff:100-115"), "uphill of the road"),
     "source beyond": ((*ASKED, "--source", "cliff:-50--40"), "uphill of the road"),
+    "source everywhere": (
+        (*ASKED, "--source", "cliff:1-110.9", "--zone", 20, 111), "cover the whole zone",
+    ),
     "layer of a table": ((*ASKED, "--layer", "0"), "--layer"),
     "out of other kind": ((*ASKED, "--out", "site.csv"), "--out"),
     "out that is there": ((*ASKED, "--out", "there.toml"), "there.toml"),
@@ -279,8 +401,37 @@ def test_the_new_site_is_not_odd(slope):
     ("table", "values", "part"),
     [
         ("sources", {"density": 900.0}, "density = 900 kg/m3"),
-        ("sources", {"band": (95.0, 100.0)}, "the ground is 9 deg steep"),
+        (
+            "sources",
+            {"band": (95.0, 100.0)},
+            "at x = 95 to 100 m, 100 % of it, the ground is 9 deg steep, less than its friction "
+            "angle of 32 deg",
+        ),
+        ("sources", {"band": (5.0, 25.0)}, "at x = 5 to 10 m, 25 % of it, the ground is 11 deg"),
+        (
+            "sources",
+            {"band": (5.0, 99.0)},
+            "at x = 5 to 10 and 72 to 99 m, 34 % of it, the ground is 9 to 32 deg steep, less than "
+            "its friction angle of 32 to 35 deg",
+        ),
+        ("events", {"rate": 30.0}, "events.block, face.rate = 30: this makes 30 events a year"),
         ("events", {"rate": 30.0}, "return_period = 30"),
+        ("events", {"area": (5e-4 ** (2 / 3), 0.1)}, "blocks of 0.5 litres, 1.3 kg"),
+        ("events", {"number": (1, 900), "width": 20.0}, "number = [1, 900]: releases of so many"),
+        ("events", {"design": False}, "none has design = true, so that no target can be set"),
+        ("consequences", {"closure": 500.0}, "consequences.closure = 500 EUR/day: a day of"),
+        ("consequences", {"closure": 5e7}, "consequences.closure = 5e+07 EUR/day"),
+        ("consequences", {"clearing": 0.3}, "consequences.clearing = 0.3 EUR/m3: a usual value"),
+        ("consequences", {"days_base": 24.0}, "consequences.days_base = 24 days: is it in hours?"),
+        ("consequences", {"days_factor": 48.0}, "consequences.days_factor = 48 days"),
+        ("prices", {"fence": {"500": 0.25}}, "prices.fence.500 = 0.25 EUR/m2: a usual value"),
+        ("prices", {"ditch": {"rock": 40_000.0}}, "prices.ditch.rock = 40000 EUR/m3: a usual"),
+        ("prices", {"concrete": 0.35}, "prices.concrete = 0.35 EUR/m3"),
+        ("prices", {"concrete": 0.0}, "prices.concrete = 0 EUR/m3: it would cost nothing"),
+        ("prices", {"interest": 0.3}, "prices.interest = 0.3: this is 30 % a year"),
+        ("prices", {"upkeep": {"fence": 0.5}}, "prices.upkeep.fence = 0.5: this is 50 % a year"),
+        ("prices", {"life": 1.0}, "prices.life = 1 years: barriers last"),
+        ("prices", {"lives": {"fence": 500.0}}, "prices.lives.fence = 500 years"),
         ("events", {"area": (1.0, 15.0)}, "if the numbers are volumes"),
         ("road", {"end": 113.0}, "it is 1 m wide"),
         ("road", {"end": 130.5}, "30.5 m beyond the road"),
@@ -293,6 +444,143 @@ def test_the_new_site_is_not_odd(slope):
 )  # fmt: skip
 def test_what_looks_odd_is_told(slope, table, values, part):
     assert [line for line in oddities(changed(slope, table, **values)) if part in line]
+
+
+@pytest.mark.parametrize(
+    ("values", "part"),
+    [
+        ({"restitution": 0.85}, "surfaces.soil.restitution = 0.85: 0.05 to 0.38 is plausible for"),
+        ({"rolling": 0.014}, "surfaces.soil.rolling = 0.014: 0.05 to 0.4 is plausible for"),
+        ({"rolling": 0.9}, "surfaces.soil.rolling = 0.9: 0.05 to 0.4 is plausible for the ground"),
+        ({"friction_deg": 12.0}, "surfaces.soil.friction_deg = 12: 30 to 50 is plausible for"),
+        ({"roughness": 1.5}, "surfaces.soil.roughness = 1.5: 0 to 0.3 is plausible for the ground"),
+    ],
+)
+def test_values_outside_the_range_of_their_ground_look_odd(slope, values, part):
+    talus = rigdda.Surface(ground="coarse_talus")
+    usual = replace(slope, surfaces={**slope.surfaces, "soil": talus})
+    assert oddities(usual) == []
+    odd = replace(usual, surfaces={**usual.surfaces, "soil": replace(talus, **values)})
+    (line,) = oddities(odd)
+    assert line.startswith(part) and "coarse_talus" in line
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_both_ends_of_the_range_of_a_ground_are_plausible(slope, ground):
+    spans = {law: getattr(GROUNDS[ground], law) for law in site_check.LAWS}
+    for end in ("typical", "low", "high"):
+        values = {law: getattr(span, end) for law, span in spans.items()}
+        surfaces = {**slope.surfaces, "other": rigdda.Surface(ground=ground, **values)}
+        assert oddities(replace(slope, surfaces=surfaces)) == []
+
+
+def test_a_surface_without_a_ground_is_compared_with_all_grounds(slope):
+    def lines(surface: rigdda.Surface) -> list[str]:
+        return oddities(replace(slope, surfaces={**slope.surfaces, "other": surface}))
+
+    assert lines(rigdda.Surface()) == []
+    assert lines(rigdda.Surface(friction_deg=55.0, restitution=0.7, rolling=0.45)) == []
+    (line,) = lines(rigdda.Surface(restitution=0.85))
+    assert "surfaces.other.restitution = 0.85: 0.02 to 0.75 is plausible for the grounds" in line
+    pair = Interface("rock", "soil", restitution=0.85, rolling=0.9)
+    found = oddities(replace(slope, interfaces=(pair,)))
+    assert [line.partition(":")[0] for line in found] == [
+        "interfaces[0].restitution = 0.85", "interfaces[0].rolling = 0.9",
+    ]  # fmt: skip
+
+
+def test_rolling_above_one_is_refused(tmp_path):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *ASKED, folder=tmp_path)
+    text = (tmp_path / "slope.toml").read_text()
+    wrong = text.replace("[surfaces.soil]\n", "[surfaces.soil]\nrolling = 1.4\n")
+    (tmp_path / "slope.toml").write_text(wrong)
+    line = refused("check", "slope.toml", folder=tmp_path)
+    assert "surfaces.soil.rolling = 1.4: give a number of at least 0 and at most 1" in line
+
+
+def test_a_band_that_slides_by_an_interface_is_not_flat(slope):
+    site = changed(slope, "sources", band=(5.0, 25.0))
+    assert len(oddities(site)) == 1
+    smooth = Interface("rock", "rock", friction_deg=8.0, restitution=0.2)
+    assert oddities(replace(site, interfaces=(smooth,))) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        (
+            "return_period = 5.0",
+            "return_period = 0.12",
+            "return_period = 0.12 years on section_length = 100 m: this makes 8.33 events a "
+            "year on 100 m of slope; if it happens 0.12 times a year, write rate = 0.12",
+        ),
+        (
+            "section_length = 100.0",
+            "section_length = 0.1",
+            "return_period = 5 years on section_length = 0.1 m: this makes 200 events a year",
+        ),
+        ("volume = [0.1, 1.0]", "volume = [0.0005, 0.0005]",
+         "volume = [0.0005, 0.0005] m3: blocks of 0.5 litres, 1.3 kg; is it in m3?"),
+        ("volume = [0.1, 1.0]", "volume = [10, 500]", "volume = [10, 500] m3: blocks of up to 500"),
+        ("[road]", "[traffic]\nvehicles_per_day = 2e3\nspeed = 60\nsection_length = 2000\n[road]",
+         "traffic.section_length = 2000 m: events.block, face was counted on section_length = 100"),
+    ],
+)  # fmt: skip
+def test_odd_values_are_called_as_they_are_written(tmp_path, old, new, part):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    run("new", "slope", "--profile", "survey.csv", *ASKED, folder=tmp_path)
+    text = (tmp_path / "slope.toml").read_text()
+    assert text.count(f"\n{old}\n") == 1
+    file = tmp_path / "slope.toml"
+    file.write_text(text.replace(f"\n{old}\n", f"\n{new}\n"))
+    site = Site.load(file)
+    found = oddities(site, (), site_check.written_events(str(file)))
+    assert len([line for line in found if part in line]) == 1, found
+
+
+def test_events_of_built_in_sites_are_known_as_they_are_written():
+    assert site_check.written_events("quick")["block"]["area"] == [0.3, 2.0]
+    assert site_check.written_events("verge-301") == {}
+
+
+def test_measured_blocks_that_are_tiny_look_odd(slope):
+    source = replace(slope.sources[0], edges=(0.1, 0.08, 0.06))
+    site = replace(slope, sources=(source,), events=(replace(slope.events[0], area=None),))
+    (line,) = [line for line in oddities(site) if "litres" in line]
+    assert "sources.face.edges = [0.1, 0.08, 0.06] m: blocks of 0.48 litres, 1.2 kg" in line
+
+
+@pytest.mark.parametrize(
+    ("one", "part"),
+    [
+        (Existing("wall", 100.0, 10.0, thickness=1.0),
+         "existing[0].height = 10 m: barrier_zone.max_height = 5 allows no new wall of this size"),
+        (Existing("ditch", 100.0, depth=4.0, width=5.0), "existing[0].depth = 4 m"),
+        (Existing("ditch", 95.0, depth=1.0, width=12.0), "existing[0].width = 12 m"),
+        (Existing("wall", 100.0, 3.0, thickness=2.5), "existing[0].thickness = 2.5 m"),
+        (Existing("fence", 100.0, 2.0, energy_class=250, removable=True, removal=8e3),
+         "existing[0].removal = 8000 EUR/m"),
+    ],
+)  # fmt: skip
+def test_unusual_barriers_that_stand_look_odd(slope, one, part):
+    assert any(part in line for line in oddities(replace(slope, existing=(one,))))
+    usual = Existing("wall", 100.0, 3.0, thickness=1.0)
+    assert oddities(replace(slope, existing=(usual,))) == []
+
+
+def test_a_closure_for_fifty_euros_looks_odd(slope):
+    with pytest.warns(rigdda.errors.DoubtfulInput, match="consequences.closure"):
+        site = changed(slope, "consequences", closure=50.0)
+    (line,) = oddities(site)
+    assert line.startswith("consequences.closure = 50 EUR/day: a day of closure usually costs")
+
+
+def test_a_height_that_is_unusual_for_its_kind_looks_odd_in_a_zone_of_high_barriers(slope):
+    site = changed(slope, "barrier_zone", max_height=20.0)
+    wall = Existing("wall", 100.0, 10.0, thickness=1.0)
+    (line,) = oddities(replace(site, existing=(wall,)))
+    assert line.startswith("existing[0].height = 10 m: few barriers of the kind wall are higher")
 
 
 def test_coordinates_in_other_units_look_odd(slope):

@@ -178,6 +178,7 @@ def test_a_posterior_is_one_input(tmp_path: Path) -> None:
         ("weight,surfaces.rock.rolling\n1,nan\n", "finite numbers"),
         ("weight,surfaces.clay.rolling\n1,1\n", "name a number of the site file"),
         ("weight,surfaces.rock.rolling\n1,500\n", "surfaces.rock.rolling = 500"),
+        ("weight,surfaces.rock.rolling\n1,0_1\n", "give a column weight"),
         ("weight,a,a\n1,1,1\n", "a different name"),
     ],
 )

@@ -96,10 +96,11 @@ def test_existing_barriers_are_checked() -> None:
 
 
 def test_an_existing_barrier_outside_the_zone_is_checked() -> None:
-    site = Site.load("verge")
-    x = site.barrier_zone.start - 1.0
-    stands = replace(site, existing=(Existing("ditch", x, depth=0.3, width=2.5),))
-    assert [c.check for c in check_layout(DesignProblem(stands), ()).failed] == ["width", "depth"]
+    site = replace(
+        Site.load("verge"), existing=(Existing("fence", 5.0, height=1.0, energy_class=100),)
+    )
+    stands = DesignProblem(site, zone=(7.0, site.barrier_zone.end))
+    assert [c.check for c in check_layout(stands, ()).failed][:2] == ["energy", "height"]
 
 
 def answer(**values: object) -> Answer:

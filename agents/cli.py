@@ -257,8 +257,8 @@ def simulate(
     that its forces do against all blocks.
 
     Writes, each as CSV and Parquet: stations and along_slope (energies, velocity, bounce height and
-    passing rate, with quantiles and intervals), passages (every passage at a station), run_out and
-    stops (where blocks stop, also beyond the road). Writes pictures (section.png,
+    passing rate, with quantiles and intervals), passages (every passage at a station), run_out,
+    stopping and stops (where rock stops, also beyond the road). Writes pictures (section.png,
     along_slope.png, run_out.png, and one for each station), outcomes.csv and run.npz (the first
     release). With --model lumped, writes points.csv only. A run that was interrupted continues
     where it stopped.
@@ -293,9 +293,9 @@ def simulate(
         tables.write_outcomes(folder / "outcomes.csv", seeds, found.outcomes)
         found.run.save(folder / "run.npz")
         passing = Passing.of(where, barriers, event, found.passages)
-        rows = simulation_folder.write(folder, passing, barriers, asked)
+        rows, rest = simulation_folder.write(folder, passing, barriers, asked)
         jobs.forget(folder)
-    show(tables.outcomes(where, barriers, found.outcomes))
+    show(tables.outcomes(where, barriers, found.outcomes, stations.stopped(rest)))
     for line, table in stations.tables(rows):
         click.echo(line)
         show(table)
@@ -303,6 +303,7 @@ def simulate(
     note(findings.of_layout(where, barriers, event))
     _warn_of_placeholders(site)
     note(stations.undecided(passing))
+    note(stations.lower_bound(rest))
     if passing.not_drawn:
         names = ", ".join(passing.not_drawn)
         note(f"no release is of {names}: give --event to simulate one of them, or more releases")

@@ -26,6 +26,7 @@ from rigdda.barriers.base import MIN_HEIGHT
 from rigdda.barriers.fence import CLASSES
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.design_envelope import DesignEnvelope
+from rigdda.rounding import between
 
 COVERED = 0.95
 """Least share of the design blocks that reach the road which must cross the station of a fence [-].
@@ -74,7 +75,7 @@ class RuleAnswer:
         if sure or not possible:
             return ""
         words = ", ".join(
-            f"{name} {low:.2f} to {high:.2f}"
+            f"{name} {between(low, high, '.2f')}"
             for name, (low, high) in ranges.items()
             if low < 1.0 <= high
         )

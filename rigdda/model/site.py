@@ -500,7 +500,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return volume, reached
 
     def toll(self, layout: Sequence[Barrier], outcome: Outcome) -> Toll:
-        """Return the expected consequences of a release for the traffic.
+        """Return the expected consequences for the traffic of the rock of a release.
+
+        A wall that was pushed onto the road does not count; its harm is part of `bill`.
 
         Raises
         ------
@@ -509,10 +511,10 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """
         if self.traffic is None:
             raise BadInput("traffic", None, f"add the table [traffic] to site {self.name}")
-        volume, reached = self.on_road(layout, outcome)
-        lies = outcome.debris_on_road > 0.0 or volume > outcome.road_volume
+        lies = outcome.debris_on_road > 0.0
         energy = outcome.max_energy_on_road * outcome.width
-        return self.traffic.toll(reached, lies, outcome.width, volume, energy)
+        width, volume = outcome.width, outcome.road_volume
+        return self.traffic.toll(outcome.reached, lies, width, volume, energy)
 
     def shed(self) -> float:
         """Return the annual cost of a rock shed over the road [EUR per metre of road and year].

@@ -177,10 +177,10 @@ def check(site: str, seed: int, out: Path | None) -> None:
     SITE is the name of a built-in site or a TOML file. A few releases are simulated to estimate the
     time that others take. Writes site.png.
     """
-    import rigdda
     from rigdda.agents import site_check
+    from rigdda.agents.released import released
 
-    where = rigdda.Site.load(site)
+    where = released(site)
     folder = folder_for(out, f"check-{where.name}", "site.png")
     with recorded_run(folder, where):
         site_check.draw(folder / "site.png", where)
@@ -265,11 +265,12 @@ def simulate(
     """
     import rigdda
     from rigdda.agents import jobs
+    from rigdda.agents.released import released
     from rigdda.agents.reports import findings, simulation_folder, stations, tables
     from rigdda.agents.reports.stations import Passing
     from rigdda.passages import check_stations
 
-    where, barriers = rigdda.Site.load(site), read_layout(layout)
+    where, barriers = released(site), read_layout(layout)
     seeds = range(seed, seed + releases)
     if model == "lumped":
         if at:
@@ -323,9 +324,9 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
     with the layout of the engineering rule. Writes fidelity.csv.
     """
     from rigdda.agents import fidelity_bias
-    from rigdda.envs import DesignProblem
+    from rigdda.agents.released import released
 
-    where = DesignProblem(site).site
+    where = released(site)
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
     with recorded_run(folder, where), progress(6 * releases) as tick:
         found = fidelity_bias.compare(where, releases, seed, tick)
@@ -351,6 +352,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     FILE.rrd and opened. For a site, one release is simulated and episode.rrd is written.
     """
     import rigdda
+    from rigdda.agents.released import released
     from rigdda.agents.reports import findings
     from rigdda.envs.replay_record import release_record
     from rigdda.replay.recording import Marks
@@ -366,7 +368,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     if file.suffix == ".rrd":
         open_viewer(file)
         return
-    where, barriers = rigdda.Site.load(target), read_layout(layout)
+    where, barriers = released(target), read_layout(layout)
     where.realise(barriers, seed, event)
     folder = folder_for(out, f"replay-{where.name}", "episode.rrd")
     with recorded_run(folder, where):
@@ -540,13 +542,14 @@ def _pose(
 
     `targets` are the greatest acceptable probabilities of reach and failure and individual risk.
     """
+    from rigdda.agents.released import released
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
     asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None, "max_cost": max_cost}
     if any(target is not None for target in targets):
         asked["targets"] = Targets(*targets)
-    return DesignProblem(site, **asked)
+    return DesignProblem(released(site), **asked)
 
 
 def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
@@ -727,10 +730,14 @@ def study(file: str, seed: int, out: Path | None) -> None:
     sections.png, costs.png and, of a site with traffic, risk.csv. An interrupted study continues
     from study.csv.
     """
+    from dataclasses import replace
+
     from rigdda.agents import studies
+    from rigdda.agents.released import released
     from rigdda.agents.reports import findings, study_report
 
     asked = studies.load(file)
+    asked = replace(asked, site=released(asked.site))
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.FILES)
     with recorded_run(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
@@ -786,10 +793,13 @@ def corridor(
 
     import rigdda
     from rigdda.agents.corridor.planning import Planner
+    from rigdda.agents.released import released
     from rigdda.agents.reports import corridor_folder as report
     from rigdda.envs import CorridorProblem
 
     where = rigdda.Corridor.load(file)
+    sections = tuple(replace(section, site=released(section.site)) for section in where.sections)
+    where = replace(where, sections=sections)
     if budgets:
         where = replace(where, budgets=budgets)
     problem = CorridorProblem(where)
@@ -919,12 +929,12 @@ def sensitivity(
     Writes sensitivity.csv (indices with intervals), samples.csv (inputs and outputs at each point)
     and tornado.png. A run that was interrupted continues where it stopped.
     """
-    import rigdda
     from rigdda.agents import parameters
     from rigdda.agents import sensitivity as job
+    from rigdda.agents.released import released
     from rigdda.agents.reports import sensitivity_report
 
-    where, barriers = rigdda.Site.load(site), read_layout(layout)
+    where, barriers = released(site), read_layout(layout)
     where.realise(barriers)
     inputs = parameters.inputs(names, where, barriers, posterior)
     asked = job.plan(where, barriers, inputs, method, samples, releases, seed)

@@ -176,8 +176,14 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             part.write_text(tomli_w.dumps(data), encoding="utf-8")
 
     def pick(self, seed: int) -> str:
-        """Return the name of the event that a seed selects at random in proportion to the rates."""
-        rates = np.array([event.rate for event in self.events])
+        """Return the name of the event that a seed selects at random in proportion to the rates.
+
+        Raises
+        ------
+        BadInput
+            If the seed is invalid, or a rate is that of arrivals, see `Event.release_rate`.
+        """
+        rates = np.array([event.release_rate for event in self.events])
         rng = np.random.default_rng([check.integer("seed", seed, 0), len(rates)])
         return self.events[rng.choice(len(rates), p=rates / rates.sum())].name
 
@@ -390,9 +396,10 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         Raises
         ------
         BadInput
-            If there is no such event or mesh option, or the layout has an option twice.
+            If there is no such event or mesh option, the layout has an option twice, or the rate is
+            that of arrivals, see `Event.release_rate`.
         """
-        often, used = self.event(event).rate / 100.0, set()
+        often, used = self.event(event).release_rate / 100.0, set()
         for barrier in layout:
             if isinstance(barrier, Mesh):
                 if barrier.option in used:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -112,7 +113,9 @@ def test_the_commands_tell_both_rates(
     assert cli.main(["design", "site.toml", *options]) == 0
     assert re.search("note: " + words, capsys.readouterr().out)
     assert cli.main(["report", "d"]) == 0
-    page = Path("d/report.html").read_text(encoding="utf-8").replace("&#39;", "'")
+    page = Path("d/report.html").read_text(encoding="utf-8")
+    page = page.replace("&#39;", "'").replace("\u00a0", " ")
     assert re.search(words.replace("event", "Event", 1), page)
-    used = Site.load("d/site.toml").event("block")
+    record = json.loads(Path("d/run.json").read_text(encoding="utf-8"))["design"]
+    used = Site.parse(record["site"], "run.json").event("block")
     assert (used.rate, used.rate_of) == (pytest.approx(rate.releases), "release")

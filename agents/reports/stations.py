@@ -351,6 +351,7 @@ def _stopping(passing: Passing, group: str) -> Iterator[dict[str, Any]]:
         float(weight[table["state"] == state].sum() / weight.sum()) if len(table) else math.nan
         for state in (LEFT, MOVING)
     )
+    nowhere = dict.fromkeys(survey_place(passing.site, passing.site.road.start), math.nan)
     pairs = zip(quantiles(sample, ROCK), quantiles(beyond, ROCK), strict=True)
     for share, (least, most) in zip(ROCK, pairs, strict=True):
         high = most.high if math.isfinite(most.high) else math.nan
@@ -360,7 +361,7 @@ def _stopping(passing: Passing, group: str) -> Iterator[dict[str, Any]]:
             "releases": len(passing.releases(group)),
             "n": len(table),
             **_ends("x_m", Quantile(least.value, least.low, high)),
-            **(survey_place(passing.site, least.value) if len(table) else {}),
+            **(survey_place(passing.site, least.value) if len(table) else nowhere),
             "bound": "lower bound" if most.value > least.value else "",
             "left": left,
             "moving": moving,

@@ -7,6 +7,7 @@ import time
 from fractions import Fraction
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -230,6 +231,20 @@ def test_the_run_out_is_not_cut_at_the_road(
     assert site.road.end < 196.5 and table[-1]["bound"] == bound
     assert stations.stopped(table) == words
     assert bool(stations.lower_bound(table)) == bool(bound)
+
+
+def test_events_without_a_release_have_empty_rows_of_the_run_out(tmp_path: Path) -> None:
+    site = Site.load("quick")
+    site = msgspec.structs.replace(site, origin=msgspec.structs.replace(site.origin, chainage=9.0))
+    found = passages(site, (), [(0, "block")], [])
+    table = stations.stopping(Passing.of(site, (), None, found))
+    stations.write(tmp_path / "stopping", table)
+    written = rows(tmp_path / "stopping.csv")
+    assert {row["event"] for row in written} == {*site.event_names, stations.ALL}
+    for row in written:
+        drawn = row["event"] in ("block", stations.ALL)
+        assert bool(row["x_m"]) == bool(row["chainage_m"]) == drawn
+    assert stations.stopped(table[2:4]) == ("-", "-") and not stations.lower_bound(table[2:4])
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
@@ -91,7 +91,7 @@ def connected(address: str) -> Iterator[Executor]:
         If the address is invalid, the extra `dask` is not installed, or no scheduler with workers
         answers.
     Error
-        If the scheduler has no worker, or does not answer, for `DESERTED` seconds.
+        If the scheduler stops, or has no worker for `DESERTED` seconds.
     """
     found = ADDRESS.match(address)
     if not found:
@@ -154,7 +154,7 @@ class _Scheduler(Executor):
         Raises
         ------
         Error
-            If the scheduler has no worker, or does not answer, for `DESERTED` seconds.
+            If the scheduler stops, or has no worker for `DESERTED` seconds.
         """
         end = None if timeout is None else time.monotonic() + timeout
         futures = deque(self._client.map(fn, *iterables, pure=False))
@@ -175,6 +175,16 @@ class _Scheduler(Executor):
 
     def _awaited(self, future: Any, end: float | None) -> Any:
         """Return the result of a future; `end` is the time at which to give up, if any [s]."""
+        try:
+            return self._followed(future, end)
+        except CancelledError:
+            raise Error(
+                f"the scheduler tcp://{self._where} stopped: start it and its workers, and run the "
+                "command again"
+            ) from None
+
+    def _followed(self, future: Any, end: float | None) -> Any:
+        """Return the result of a future, and watch the workers until it is there."""
         while not future.done():
             left = GLANCE if end is None else min(GLANCE, end - time.monotonic())
             try:

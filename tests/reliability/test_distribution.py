@@ -51,7 +51,7 @@ def wait_for(count: int, address: str) -> None:
 
 @contextmanager
 def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """Start a scheduler with two workers; yield its address and the workers."""
+    """Start a scheduler with two workers; yield its address, the workers and the scheduler."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -60,7 +60,7 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     try:
         made += [worker(address), worker(address)]
         wait_for(2, address)
-        yield address, made[1:]
+        yield address, [*made[1:], made[0]]
     finally:
         for process in made:
             process.kill()
@@ -134,9 +134,9 @@ def test_the_death_of_the_last_worker_is_told(
     monkeypatch.setattr(distribution, "GLANCE", 0.5)
     monkeypatch.setattr(distribution, "DESERTED", 120.0 if returns else 3.0)
     asked, more = jobs(200), []
-    with cluster() as (address, workers), distribution.connected(f"dask://{address}"):
+    with cluster() as (address, processes), distribution.connected(f"dask://{address}"):
         rigdda.release_many(asked[:2])
-        for process in workers:
+        for process in processes[:2]:
             process.kill()
             process.wait()
         told = f"no worker is left on tcp://{address}: waiting for one; start one by dask worker "
@@ -158,6 +158,18 @@ def test_the_death_of_the_last_worker_is_told(
     lines = capsys.readouterr().err.splitlines()
     assert sum(line.startswith(told) for line in lines) == 1
     assert any("a worker is back" in line for line in lines) == returns
+
+
+def test_the_death_of_the_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(distribution, "GLANCE", 0.5)
+    with cluster() as (address, processes), distribution.connected(f"dask://{address}"):
+        rigdda.release_many(jobs(2))
+        kill = threading.Timer(0.3, processes[-1].kill)
+        kill.start()
+        with pytest.raises(rigdda.Error, match=f"the scheduler tcp://{address} stopped: start it"):
+            for _ in range(200):
+                rigdda.release_many(jobs(400))
+        kill.join()
 
 
 STUDY = """site = "verge"

@@ -1,84 +1,20 @@
-"""Checks of every barrier of a layout by hand formulas, as demand and capacity.
+"""Checks of every barrier of a layout, each under what the barriers uphill of it let pass.
 
-Fences: energy, height and elongation by the rule (`rigdda.agents.fence_checks`). Gravity walls and
-embankments: height, sliding under the design impact and, for walls, overturning and bearing, under
-the impact and with rock at rest up to the crest (`rigdda.limit_equilibrium`). Ditches: the width
-and the depth of Ritchie. The demand on a barrier is that of the blocks that the barriers uphill of
-it let pass.
+The formulas are those of `rigdda.envs.barrier_formulas`.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
-from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, limit_equilibrium
-from rigdda.agents.fence_checks import Action, Demand, FenceCheck, demand_at
-from rigdda.agents.ritchie_ditch import RitchieDitch
-from rigdda.barriers import section, standing
-from rigdda.barriers.base import ELEMENT, surfaces_below
-from rigdda.barriers.gravity_wall import SLID
+import msgspec
+
+from rigdda import Barrier, Ditch, Fence, Layout
+from rigdda.barriers import standing
 from rigdda.envs import DesignProblem, design_envelope
-from rigdda.limit_equilibrium import Impact
-
-ROCK, OTHER = 1e6, 2e5
-"""Admissible pressure on rock and on other ground [Pa]; presumed values of BS 8004:1986, from
-memory."""
-
-LOOSE, REPOSE = 18e3, 38.0
-"""Weight [N/m3] and friction angle [deg] of the rock that lies behind a wall."""
-
-PUSHED = 0.5
-"""Displacement that an embankment may suffer in the design impact [m]. In full-scale tests,
-embankments of reinforced soil held impacts that displaced them by more (Peila et al. 2007,
-Landslides 4, 255-265, from memory)."""
-
-SLIDING, OVERTURNING = 1.5, 2.0
-"""Factors of safety that are customary under permanent loads [-]. Under the design impact, which
-has its own partial factors and is accidental, 1 is enough."""
-
-
-class BarrierCheck(NamedTuple):
-    """A check of a barrier.
-
-    Parameters
-    ----------
-    barrier : str
-        The barrier in words.
-    x : float
-        Its chainage [m].
-    check : str
-        What is checked.
-    demand, capacity : float
-        Demand and capacity in `unit`.
-    unit : str
-        Their unit.
-    limit : float
-        Largest acceptable utilisation [-].
-    note : str
-        Event, load or doubt.
-    """
-
-    barrier: str
-    x: float
-    check: str
-    demand: float
-    capacity: float
-    unit: str
-    limit: float
-    note: str
-
-    @property
-    def use(self) -> float:
-        """Demand divided by capacity [-]."""
-        return self.demand / self.capacity if self.capacity > 0.0 else float("inf")
-
-    @property
-    def satisfied(self) -> bool:
-        """Whether the utilisation is acceptable."""
-        return self.use <= self.limit + 1e-9
+from rigdda.envs.barrier_formulas import BarrierCheck, checks_of, fence_check
+from rigdda.envs.fence_checks import FenceCheck, demand_at
+from rigdda.model.barrier_zone import BarrierZone
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +35,19 @@ class LayoutChecks:
     table: tuple[BarrierCheck, ...]
     idle: tuple[str, ...]
 
+    @property
+    def failed(self) -> tuple[BarrierCheck, ...]:
+        """The checks that are not met."""
+        return tuple(check for check in self.table if not check.satisfied)
+
+    @property
+    def satisfied(self) -> bool:
+        """Whether all checks are met."""
+        return not self.failed
+
 
 def check_layout(problem: DesignProblem, layout: Layout, seed: int = 0) -> LayoutChecks:
-    """Return the checks of every barrier of a layout.
-
-    Barriers that stand already are not checked, but keep off what they stop.
+    """Return the checks of every barrier that stands with a layout, existing ones included.
 
     Parameters
     ----------
@@ -121,164 +65,30 @@ def check_layout(problem: DesignProblem, layout: Layout, seed: int = 0) -> Layou
     Diverged
         If a simulation diverges.
     """
+    site = problem.site
     own = standing(problem.check(layout))
-    built = sorted(problem.site.standing(layout), key=lambda barrier: barrier.x)
+    built = sorted(site.standing(layout), key=lambda barrier: barrier.x)
     fences: list[FenceCheck] = []
     table: list[BarrierCheck] = []
     idle: list[str] = []
     for i, barrier in enumerate(built):
-        if barrier not in own:
-            continue
-        if isinstance(barrier, Ditch):
-            table += _ditch(problem, barrier)
-            continue
-        site = problem.site
-        envelope = design_envelope.of(site, problem.zone, seed, layout=built[:i])
-        demand = demand_at(envelope, site.rule, barrier.x)
-        if demand is None:
-            idle.append(f"{barrier.label}, at {barrier.x:.1f} m")
-        elif isinstance(barrier, Fence):
-            fences.append(FenceCheck(barrier, demand, site.road.start - barrier.end))
-            table += _fence(fences[-1])
-        elif isinstance(barrier, GravityWall | Embankment):
-            table += _structure(problem, barrier, demand)
+        label = barrier.label if barrier in own else f"existing {barrier.label}"
+        demand = None
+        if not isinstance(barrier, Ditch):
+            zone = including(problem.zone, barrier)
+            envelope = design_envelope.of(site, zone, seed, layout=built[:i])
+            demand = demand_at(envelope, site.rule, barrier.x)
+            if demand is None:
+                idle.append(f"{label}, at {barrier.x:.1f} m")
+        if demand is not None and isinstance(barrier, Fence):
+            fences.append(fence_check(site, barrier, demand))
+        table += [c._replace(barrier=label) for c in checks_of(site, barrier, demand)]
     return LayoutChecks(tuple(fences), tuple(table), tuple(idle))
 
 
-def _fence(check: FenceCheck) -> Iterator[BarrierCheck]:
-    """Yield the checks of a fence by the rule."""
-    fence, hard, high = check.fence, check.demand.hard, check.demand.high
-    head = fence.label, fence.x
-    note = f"{_who(hard)}; design energy {1e-3 * hard.energy():,.0f} kJ"
-    demand = check.factors.energy * hard.energy()
-    yield BarrierCheck(*head, "energy", 1e-3 * demand, 1e-3 * check.factors.rated(fence.rated),
-                       "kJ", 1.0, note)  # fmt: skip
-    yield BarrierCheck(*head, "height", high.needed_height(), fence.height, "m", 1.0,
-                       _who(high))  # fmt: skip
-    yield BarrierCheck(*head, "elongation", check.design_elongation, check.clearance, "m", 1.0,
-                       f"{check.factors.elongation:g} times {fence.deflection:g} m")  # fmt: skip
-
-
-def _who(action: Action) -> str:
-    """Return in words which blocks arrive."""
-    event = action.event
-    few = "" if action.enough else ", too few for a quantile"
-    return f"{event.name}, {action.passing:,.0f} of {event.blocks:,} blocks arrive{few}"
-
-
-def _structure(
-    problem: DesignProblem, barrier: GravityWall | Embankment, demand: Demand
-) -> Iterator[BarrierCheck]:
-    """Yield the checks of a gravity wall or an embankment."""
-    high, head = demand.high, (barrier.label, barrier.x)
-    yield BarrierCheck(*head, "height", high.needed_height(), barrier.height, "m", 1.0,
-                       _who(high))  # fmt: skip
-    base = Base.of(problem, barrier)
-    hard = demand.hard
-    length, way = ELEMENT, SLID
-    if isinstance(barrier, Embankment):  # the load spreads at 45 degrees
-        length, way = 2.0 * (hard.event.radius + barrier.height), PUSHED
-    impact = design_impact(hard, barrier.height, base.restitution)
-    mass = base.weight / base.gravity * length
-    load = limit_equilibrium.equivalent_load(impact, mass, way) / length
-    note = f"impact of {_who(hard)}; {impact.mass:,.0f} kg at {impact.speed:.1f} m/s"
-    yield from _stands(head, base, "impact", load, impact.height, 1.0, 1.0, note)
-    if isinstance(barrier, GravityWall):
-        thrust = limit_equilibrium.rock_thrust(barrier.height, LOOSE, REPOSE)
-        lever, note = barrier.height / 3.0, "rock at rest up to its crest"
-        yield from _stands(head, base, "rock", thrust, lever, SLIDING, OVERTURNING, note)
-
-
-class Base(NamedTuple):
-    """How a gravity structure stands.
-
-    Parameters
-    ----------
-    weight : float
-        Weight per metre [N/m].
-    width : float
-        Width of its base [m]; 0 for an embankment, which slides but does not overturn.
-    friction : float
-        Coefficient of friction on the ground [-].
-    bearing : float
-        Admissible pressure on the ground [Pa].
-    restitution : float
-        Coefficient of restitution of rock on it [-].
-    gravity : float
-        Acceleration of gravity [m/s2].
-    """
-
-    weight: float
-    width: float
-    friction: float
-    bearing: float
-    restitution: float
-    gravity: float
-
-    @classmethod
-    def of(cls, problem: DesignProblem, barrier: GravityWall | Embankment) -> Base:
-        """Return how a barrier stands on the ground of a site."""
-        site = problem.site
-        scene = site.realise((barrier,), 0, site.event_names[0])
-        outline, gravity = scene.outline(0), -scene.gravity_vector[1]
-        wall = isinstance(barrier, GravityWall)
-        own = scene.barrier_surface if wall else scene.fill
-        assert scene.terrain is not None
-        below = surfaces_below(scene.terrain, outline)
-        weight = gravity * barrier.density * section(outline)
-        touched = "rock" if "rock" in scene.surfaces else next(iter(scene.surfaces))
-        return cls(
-            weight=weight,
-            width=barrier.thickness if isinstance(barrier, GravityWall) else 0.0,
-            friction=math.tan(math.radians(min(scene.friction_deg(own, name) for name in below))),
-            bearing=ROCK if set(below) == {"rock"} else OTHER,
-            restitution=scene.interface(touched, own).restitution or 0.0,
-            gravity=gravity,
-        )
-
-
-def design_impact(action: Action, height: float, restitution: float) -> Impact:
-    """Return the design impact of an event on a structure of a height [m], taken as horizontal."""
-    at = min(action.design_height(), height)
-    return Impact(action.design_mass, action.design_speed(), at, restitution)
-
-
-def _stands(
-    head: tuple[str, float],
-    base: Base,
-    case: str,
-    load: float,
-    lever: float,
-    sliding: float,
-    overturning: float,
-    note: str,
-) -> Iterator[BarrierCheck]:
-    """Yield the checks of stability under a load [N/m] with the wanted factors of safety."""
-    found = limit_equilibrium.stability(
-        base.weight, max(base.width, 1e-3), base.friction, base.bearing, load, lever
-    )
-
-    def check(
-        name: str, demand: float, capacity: float, unit: str, factor: float, least: float
-    ) -> BarrierCheck:
-        words = f"{note}; factor of safety {factor:.2f}, at least {least:g}"
-        ends = 1e-3 * demand, 1e-3 * capacity
-        return BarrierCheck(*head, f"{name}, {case}", *ends, unit, 1.0 / least, words)
-
-    resists = base.friction * base.weight
-    yield check("sliding", load, resists, "kN/m", found.sliding, sliding)
-    if base.width > 0.0:
-        rights = 0.5 * base.weight * base.width
-        moment = load * lever
-        yield check("overturning", moment, rights, "kNm/m", found.overturning, overturning)
-        yield check("bearing", found.pressure, base.bearing, "kPa", found.bearing, 1.0)
-
-
-def _ditch(problem: DesignProblem, ditch: Ditch) -> Iterator[BarrierCheck]:
-    """Yield the comparison of a ditch with that of Ritchie."""
-    ritchie = RitchieDitch.of(problem.site)
-    note = f"Ritchie, {ritchie.height:.0f} m high at {ritchie.inclination:.0f} deg"
-    note += f"; {ritchie.caveat}" if ritchie.caveat else ""
-    head = ditch.label, ditch.x
-    yield BarrierCheck(*head, "width", ritchie.width, ditch.width, "m", 1.0, note)
-    yield BarrierCheck(*head, "depth", ritchie.depth, ditch.depth, "m", 1.0, note)
+def including(zone: BarrierZone, barrier: Barrier) -> BarrierZone:
+    """Return a zone, extended to a barrier that stands outside it."""
+    if zone.start <= barrier.x <= zone.end:
+        return zone
+    start, end = min(zone.start, barrier.x), max(zone.end, barrier.x)
+    return msgspec.structs.replace(zone, start=start, end=end)

@@ -413,10 +413,17 @@ RELEASES = 3_000
 """Default number of releases for the verification of a layout; Z is then known to a few per
 cent."""
 
-CASES = 4
-"""Number of layouts that are verified: no barrier, the rule, the constant and the result."""
+CASES = 5
+"""Greatest number of layouts that are verified: no barrier, the rule, the constant, the layout
+without required checks and the result."""
 
 Kinds = tuple[str, ...] | None
+
+checks_option = click.option(
+    "--checks", type=click.Choice(("required", "reported")), default="required", show_default=True,
+    help="Whether every barrier must meet the checks of its kind, such as energy and height of a "
+    "fence, or they are only reported.",
+)  # fmt: skip
 
 
 def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
@@ -446,6 +453,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               help="Place barriers between the chainages A and B [m], as in the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
+@checks_option
 @count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
 @click.option("--ground-samples", "grounds", type=WholeNumber(0, 1000), default=6,
               show_default=True, help="Number of grounds within the plausible range on which the "
@@ -464,6 +472,7 @@ def design(
     max_cost: float | None,
     zone: tuple[float, float] | None,
     budget: int,
+    checks: str,
     verify: int,
     grounds: int,
     posterior: Path | None,
@@ -473,9 +482,10 @@ def design(
     """Find the best layout of barriers on SITE and verify it.
 
     SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
-    search did not use. The best layout has the least cost Z. Z is the sum of capital and upkeep,
-    expected harm on the road and expected repair, in EUR per metre of road and year. At the end,
-    the layouts are compared on other grounds within the plausible range.
+    search did not use. The best layout has the least cost Z of those whose barriers meet their
+    checks; a second search with half of the budget shows what this condition costs. Z is the sum of
+    capital and upkeep, expected harm on the road and expected repair, in EUR per metre of road and
+    year. At the end, the layouts are compared on other grounds within the plausible range.
 
     If the layout misses a target, the cheapest layout for each level of P(reach) is reported and
     written to frontier.csv and frontier.png.
@@ -495,15 +505,16 @@ def design(
     from rigdda.agents.reports import band_report
     from rigdda.agents.reports.folder import FILES, write
 
-    problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone)
+    problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
     fitted = None if posterior is None else read_posterior(posterior, problem.site)
     folder = folder_for(out, f"design-{problem.site.name}", *FILES, *band_report.FILES, FILE)
     record_problem(folder, problem, *FILES)
     band = None
     with recorded_run(folder, problem.site):
-        with progress(budget + CASES * verify) as tick:
+        total = jobs.search_budget(problem, designer, budget) + CASES * verify
+        with progress(total) as tick:
             done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
-            tick(budget + CASES * verify, "pictures")
+            tick(total, "pictures")
             write(done, folder, seed)
         if grounds:
             with progress(grounds) as tick:
@@ -537,6 +548,7 @@ def _pose(
     targets: tuple[float | None, float | None, float | None],
     max_cost: float | None,
     zone: tuple[float, float] | None,
+    checks: str,
 ) -> DesignProblem:
     """Return the design problem that the options describe.
 
@@ -546,7 +558,9 @@ def _pose(
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
-    asked: dict[str, Any] = {"kinds": kinds, "zone": zone or None, "max_cost": max_cost}
+    asked: dict[str, Any] = {
+        "kinds": kinds, "zone": zone or None, "max_cost": max_cost, "checks": checks,
+    }  # fmt: skip
     if any(target is not None for target in targets):
         asked["targets"] = Targets(*targets)
     return DesignProblem(released(site), **asked)
@@ -554,11 +568,12 @@ def _pose(
 
 def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
-    from rigdda.agents.reports import checks, findings, frontier_report, tables
+    from rigdda.agents.reports import checks, findings, frontier_report, headline, tables
     from rigdda.agents.reports.folder import FILES
     from rigdda.agents.reports.wording import order, unchanged
 
     chosen, result = done.chosen.evaluation, done.result
+    click.echo(f"{headline.headline(findings.answer(done))}\n")
     click.echo(
         "Z, capital, harm and repair in EUR per metre of road and year; to build in EUR per\n"
         "metre; debris: rock on the road, relative to the first layout"
@@ -772,11 +787,18 @@ def study(file: str, seed: int, out: Path | None) -> None:
 @count_option("--releases", 200, 4_000, "Number of releases per section.")
 @click.option("--robust", is_flag=True, help="Choose by the mean of the highest fifth of the "
               "estimates of the cost (conditional value at risk).")  # fmt: skip
+@checks_option
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("corridor-NAME")
 @executor_option
 def corridor(
-    file: str, budgets: tuple[float, ...], releases: int, robust: bool, seed: int, out: Path | None
+    file: str,
+    budgets: tuple[float, ...],
+    releases: int,
+    robust: bool,
+    checks: str,
+    seed: int,
+    out: Path | None,
 ) -> None:
     """Choose the barriers of all sections of CORRIDOR within a common budget.
 
@@ -802,7 +824,7 @@ def corridor(
     where = replace(where, sections=sections)
     if budgets:
         where = replace(where, budgets=budgets)
-    problem = CorridorProblem(where)
+    problem = CorridorProblem(where, checks=checks)
     folder = folder_for(out, f"corridor-{where.name}", *report.FILES)
     stored = folder / "evaluations"
     stored.mkdir(exist_ok=True)

@@ -13,6 +13,9 @@ from rigdda.envs import DesignProblem, Evaluation
 
 NOTHING, CONSTANT, SHED = "nothing", "constant", "rock shed"
 
+WITHOUT_CHECKS = "without checks"
+"""Name of the layout that is found if checks are not required."""
+
 AS_IT_STANDS = "as it stands"
 """Name of the case without new barriers on a site with existing ones."""
 
@@ -31,6 +34,22 @@ class VerifiedLayout:
 
     name: str
     evaluation: Evaluation
+
+
+@dataclass(frozen=True, slots=True)
+class UncheckedLayout:
+    """A layout that was found without the condition that all checks are met.
+
+    Parameters
+    ----------
+    case : VerifiedLayout
+        The layout, verified.
+    checks : LayoutChecks
+        Its checks.
+    """
+
+    case: VerifiedLayout
+    checks: LayoutChecks
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +73,11 @@ class ComparedLayouts:
         return self.cases[0]
 
     @property
+    def comparable(self) -> tuple[VerifiedLayout, ...]:
+        """The cases without the layout that was found without required checks."""
+        return tuple(case for case in self.cases if case.name != WITHOUT_CHECKS)
+
+    @property
     def chosen(self) -> VerifiedLayout:
         """The case with the layout that is recommended."""
         return self.cases[-1]
@@ -63,7 +87,8 @@ class ComparedLayouts:
 class DesignStudy(ComparedLayouts):
     """A designed layout and the layouts with which it is compared.
 
-    The cases are no barrier, the rule, the constant and, as the last, the layout found.
+    The cases are no barrier, the rule, the constant, the layout found without required checks if
+    they are required, and, as the last, the layout found.
 
     Parameters
     ----------
@@ -80,6 +105,8 @@ class DesignStudy(ComparedLayouts):
         P(reach) among all that were evaluated.
     replaced : bool
         Whether the layout found is one of the frontier, which is better than that of the designer.
+    unchecked : UncheckedLayout or None
+        If checks are required: the layout that the designer finds without this condition.
     """
 
     result: DesignResult
@@ -88,6 +115,7 @@ class DesignStudy(ComparedLayouts):
     checks: LayoutChecks
     frontier: tuple[TriedLayout, ...] = ()
     replaced: bool = False
+    unchecked: UncheckedLayout | None = None
 
 
 def design_events(site: Site) -> tuple[str, ...]:

@@ -174,8 +174,8 @@ def assess(
 
     problem, asked = done.problem, inputs(done.problem.site, posterior)
     cube = qmc.LatinHypercube(len(asked), rng=np.random.default_rng(seed)).random(grounds)
-    layouts = [case.evaluation.layout for case in done.cases]
-    names = [case.name for case in done.cases]
+    layouts = [case.evaluation.layout for case in done.comparable]
+    names = [case.name for case in done.comparable]
     seeds, events = _seeds(problem, seed), design_events(problem.site)
     samples = []
     for i, place in enumerate(cube):

@@ -22,7 +22,9 @@ from rigdda.agents.design_study import (
     AS_IT_STANDS,
     CONSTANT,
     NOTHING,
+    WITHOUT_CHECKS,
     DesignStudy,
+    UncheckedLayout,
     VerifiedLayout,
     design_events,
 )
@@ -34,6 +36,7 @@ from rigdda.agents.designers.protocol import (
     DesignResult,
     Entry,
     best_of_finals,
+    final_score,
     release_seeds,
     verify,
 )
@@ -176,32 +179,46 @@ def study(
     front: tuple[TriedLayout, ...] = ()
     replaced = False
     with EvaluationsFile(out / "evaluations.csv", problem.site) as file:
+        begun = 0  # releases of searches that are finished
 
         def progress(entry: Entry) -> None:
             file.add(entry)
-            tick(entry.simulations, f"{name}: {entry.stage}")
+            tick(begun + entry.simulations, f"{name}: {entry.stage}")
 
-        result = designers.module(name).design(problem, simulations, seed, progress, store)
-        rule = answer(problem)
+        search = designers.module(name).design
+        result = search(problem, simulations, seed, progress, store)
+        free = problem.with_checks("reported")  # in which all layouts can be compared
+        unchecked = None
+        if problem.checks == "required" and name not in SEARCHLESS:
+            begun = simulations
+            tick(begun, "searching without required checks")
+            more = search_budget(problem, name, simulations) - simulations
+            unchecked = search(free, more, seed, progress, store)
+            both = result.simulations + unchecked.simulations
+            if _is_better(free, unchecked, result):
+                result, unchecked = unchecked, None
+            result = replace(result, simulations=both)
+        begun = search_budget(problem, name, simulations)
+        rule = answer(free)
         cases: list[VerifiedLayout] = []
-        for case, layout in _compared(problem, name, result, rule):
-            tick(simulations + releases * len(cases), f"verifying: {case}")
-            evaluation = verify(problem, layout, releases, seed, store)
+        for case, layout in _compared(problem, name, result, rule, unchecked):
+            tick(begun + releases * len(cases), f"verifying: {case}")
+            evaluation = verify(free, layout, releases, seed, store)
             file.add(Entry(result.simulations, "verification", evaluation))
             cases.append(VerifiedLayout(case, evaluation))
         if cases[-1].evaluation.targets == MISSED and design_events(problem.site):
-            tick(simulations + releases * len(cases), "verifying the frontier")
+            tick(begun + releases * len(cases), "verifying the frontier")
 
             def check(layout: Layout, stage: str) -> Evaluation:
                 stream = CHOICE if stage == "frontier" else stage
-                evaluation = verify(problem, layout, releases, seed, store, stream)
+                evaluation = verify(free, layout, releases, seed, store, stream)
                 file.add(Entry(result.simulations, stage, evaluation))
                 return evaluation
 
             searched = name not in SEARCHLESS
             result, front, replaced = with_frontier(problem, result, cases, check, searched)
-    tick(simulations + releases * len(cases), "analysing the remaining risk, checking barriers")
-    left = _left(problem, [case.evaluation for case in cases], result.tried, seed)
+    tick(begun + releases * len(cases), "analysing the remaining risk, checking barriers")
+    left = _left(free, [case.evaluation for case in cases], result.tried, seed)
     layouts = [(case.name, case.evaluation.layout) for case in cases]
     archive.write(out / archive.FILE, archive.archive(problem, seed, layouts, store))
     done = DesignStudy(
@@ -210,11 +227,41 @@ def study(
         result=result,
         left=left,
         rule=rule,
-        checks=check_layout(problem, cases[-1].evaluation.layout),
+        checks=check_layout(free, cases[-1].evaluation.layout),
         frontier=front,
         replaced=replaced,
+        unchecked=_unchecked(free, cases),
     )
     return done, store
+
+
+UNCHECKED = 0.5
+"""Budget of the search without required checks over that of the search with them [-]."""
+
+
+def search_budget(problem: DesignProblem, name: str, simulations: int) -> int:
+    """Return the releases of all searches of a study, of which the first has `simulations`."""
+    if problem.checks != "required" or name in SEARCHLESS:
+        return simulations
+    return simulations + max(2, int(UNCHECKED * simulations))
+
+
+def _is_better(free: DesignProblem, unchecked: DesignResult, result: DesignResult) -> bool:
+    """Return whether a layout that was found without required checks meets them and is better.
+
+    A barrier may meet its checks below another one although it would not on its own.
+    """
+    if final_score(free, unchecked.evaluation) >= final_score(free, result.evaluation):
+        return False
+    return check_layout(free, unchecked.layout).satisfied
+
+
+def _unchecked(free: DesignProblem, cases: Sequence[VerifiedLayout]) -> UncheckedLayout | None:
+    """Return the layout that was found without required checks, if there is one among the cases."""
+    for case in cases:
+        if case.name == WITHOUT_CHECKS:
+            return UncheckedLayout(case, check_layout(free, case.evaluation.layout))
+    return None
 
 
 SEARCHLESS = ("rule", "constant")
@@ -326,7 +373,11 @@ def _with_layout(
 
 
 def _compared(
-    problem: DesignProblem, name: str, result: DesignResult, rule: RuleAnswer
+    problem: DesignProblem,
+    name: str,
+    result: DesignResult,
+    rule: RuleAnswer,
+    unchecked: DesignResult | None,
 ) -> list[tuple[str, Layout]]:
     """Return the layouts to verify: no barrier, the rule, the constant and the designer's."""
     bare = AS_IT_STANDS if problem.site.existing else NOTHING
@@ -335,6 +386,8 @@ def _compared(
         out.append((rule.name, rule.layout))
     if name != CONSTANT:
         out.append((CONSTANT, constant(problem, Menu(problem))))
+    if unchecked is not None and unchecked.layout != result.layout:
+        out.append((WITHOUT_CHECKS, unchecked.layout))
     words = {"rule": rule.name, CONSTANT: CONSTANT}.get(name, f"optimised ({name})")
     return [*out, (words, result.layout)]
 

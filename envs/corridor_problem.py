@@ -71,6 +71,8 @@ class CorridorProblem:
         Kinds of barrier to choose from in each section. By default, all that are usual on its site.
     fidelity : {"full", "fast"}
         "fast" simulates cheaper approximations of the sites.
+    checks : {"reported", "required"}
+        Whether barriers must satisfy the checks of their kind, see `DesignProblem`.
 
     Raises
     ------
@@ -87,12 +89,14 @@ class CorridorProblem:
         max_barriers: int = 3,
         kinds: Sequence[str] | None = None,
         fidelity: str = "full",
+        checks: str = "reported",
     ):
         whole = corridor if isinstance(corridor, Corridor) else Corridor.load(corridor)
         problems = []
         for section in whole.sections:
             try:
-                own = DesignProblem(section.site, max_barriers, kinds, section.targets, fidelity)
+                limits = section.targets, fidelity, None, None, checks
+                own = DesignProblem(section.site, max_barriers, kinds, *limits)
             except BadInput as bad:
                 raise _of_section(section.name, bad) from None
             problems.append(own)

@@ -245,8 +245,10 @@ class BarrierEnv(LayoutEnv):
         record: str | os.PathLike[str] | None = None,
         record_trigger: Trigger | None = None,
         render_mode: str | None = None,
+        checks: str = "reported",
     ):
-        self.sites = EpisodeSites(site, max_barriers, kinds, fidelity, targets, max_cost)
+        limits = targets, max_cost, checks
+        self.sites = EpisodeSites(site, max_barriers, kinds, fidelity, *limits)
         self.problem, slots = self.sites.first, self.sites.slots
         space = observation.space(slots.size, max_barriers, self.looks)
         options = record, record_trigger, render_mode
@@ -387,6 +389,7 @@ class BarrierEnv(LayoutEnv):
             releases=self.releases,
             targets=self.sites.targets,
             max_cost=self.sites.max_cost,
+            checks=self.sites.checks,
             fidelity=self.sites.fidelity,
             site=self.problem.site,
             episode=self._episode,
@@ -462,10 +465,10 @@ class BarrierDesign(BarrierEnv):
         As for `DesignProblem`; "train", "validation" or "test" draws another site of the split in
         every episode, "random" is the same as "train", and a sequence of sites draws one of them.
         `reset(options={"site": ...})` takes the same values.
-    max_barriers, kinds, targets, max_cost, fidelity
-        See `DesignProblem`. A barrier that would exceed `max_cost` is not built. If every episode
-        draws its site, the default is all kinds; mesh is not available on sites without mesh
-        options.
+    max_barriers, kinds, targets, max_cost, fidelity, checks
+        See `DesignProblem`. A barrier that would exceed `max_cost` is not built, and neither is one
+        that fails a required check wherever it may stand. If every episode draws its site, the
+        default is all kinds; mesh is not available on sites without mesh options.
     releases : int
         Number of random releases over which an episode averages.
     flat : bool
@@ -523,7 +526,7 @@ class BarrierPlacement(BarrierEnv):
 
     Parameters
     ----------
-    site, max_barriers, kinds, releases, targets, max_cost, fidelity, flat
+    site, max_barriers, kinds, releases, targets, max_cost, fidelity, flat, checks
         See `BarrierDesign`.
     record_trigger, render_mode
         See `BarrierDesign`.

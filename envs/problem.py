@@ -7,6 +7,7 @@ are distributed over the events of the site.
 
 from __future__ import annotations
 
+import copy
 import math
 import os
 from collections import Counter
@@ -117,6 +118,9 @@ def excess(value: float, greatest: float) -> float:
     """
     return max(1.0 - greatest / value, 0.0) if value > 0.0 else 0.0
 
+
+CHECKS = ("reported", "required")
+"""What is done with the checks of barriers: they are reported, or a layout must satisfy them."""
 
 FIDELITIES = ("fast", "full")
 
@@ -332,6 +336,9 @@ class DesignProblem:
     max_cost : float, optional
         Largest capital cost of a layout [EUR per metre of road]. Layouts that cost more are not
         feasible.
+    checks : {"reported", "required"}
+        With "required", only layouts are feasible in which every barrier satisfies the checks of
+        its kind, such as energy and height of a fence, see `rigdda.envs.barrier_formulas`.
 
     Raises
     ------
@@ -346,6 +353,7 @@ class DesignProblem:
     fidelity: str
     zone: BarrierZone
     max_cost: float | None
+    checks: str
     place: FeasiblePlaces = field(compare=False, repr=False)
     key: bytes = field(compare=False, repr=False)
 
@@ -358,6 +366,7 @@ class DesignProblem:
         fidelity: str = "full",
         zone: tuple[float, float] | None = None,
         max_cost: float | None = None,
+        checks: str = "reported",
     ):
         where = checked_site(site, fidelity)
         limits, most = checked_zone(where, zone), checked_cost(max_cost)
@@ -369,14 +378,15 @@ class DesignProblem:
             "fidelity": fidelity,
             "zone": limits,
             "max_cost": most,
-            "place": FeasiblePlaces(where, limits, most),
+            "checks": check.one_of("checks", checks, CHECKS),
+            "place": FeasiblePlaces(where, limits, most, checks),
             "key": fingerprint(where),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def __hash__(self) -> int:
-        own = self.max_barriers, self.kinds, self.targets, self.zone, self.max_cost
+        own = self.max_barriers, self.kinds, self.targets, self.zone, self.max_cost, self.checks
         return hash((self.key, *own))
 
     @property
@@ -423,6 +433,14 @@ class DesignProblem:
         """
         return encoding.encode(self.place, self.check(layout), self.max_barriers, self.kinds)
 
+    def with_checks(self, checks: str) -> DesignProblem:
+        """Return the same problem with checks of barriers that are "reported" or "required"."""
+        other = copy.copy(self)
+        place = FeasiblePlaces(self.site, self.zone, self.max_cost, checks)
+        object.__setattr__(other, "checks", check.one_of("checks", checks, CHECKS))
+        object.__setattr__(other, "place", place)
+        return other
+
     def check(self, layout: Sequence[Barrier]) -> Layout:
         """Return a feasible layout, sorted downhill.
 
@@ -430,7 +448,8 @@ class DesignProblem:
         ------
         BadInput
             If barriers are too many, of other kinds or too large, outside the zone, on ground that
-            is too steep, or too close to the road or to each other, or cost more than `max_cost`.
+            is too steep, or too close to the road or to each other, or cost more than `max_cost`,
+            or fail a check that is required.
         """
         return self.place.check_layout(layout, self.kinds, self.max_barriers)
 

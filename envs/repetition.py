@@ -66,6 +66,7 @@ def _environment(record: EpisodeRecord) -> environments.BarrierEnv:
         releases=record.releases,
         targets=record.targets,
         max_cost=record.max_cost,
+        checks=record.checks,
     )
     return made
 

@@ -49,7 +49,7 @@ class EpisodeRecord(msgspec.Struct, frozen=True, tag="episode", forbid_unknown_f
     ----------
     environment : str
         Registered name of the environment.
-    max_barriers, kinds, releases, targets, max_cost
+    max_barriers, kinds, releases, targets, max_cost, checks
         Keywords of the environment.
     fidelity : str
         Fidelity at which `site` was derived.
@@ -86,6 +86,7 @@ class EpisodeRecord(msgspec.Struct, frozen=True, tag="episode", forbid_unknown_f
     actions: list[list[float]]
     rewards: list[float]
     versions: Versions
+    checks: str = "reported"
 
 
 class ReleaseRecord(msgspec.Struct, frozen=True, tag="release", forbid_unknown_fields=True):

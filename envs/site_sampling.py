@@ -17,6 +17,7 @@ from rigdda import BadInput, Barrier, Layout, Site, check, sites
 from rigdda.barriers import KINDS as ALL
 from rigdda.envs.encoding import NUMBERS, Floats, built_and_dropped, encode, slot_size
 from rigdda.envs.problem import (
+    CHECKS,
     FIDELITIES,
     DesignProblem,
     Targets,
@@ -161,6 +162,7 @@ def problem_of(
     fidelity: str,
     targets: Targets | None = None,
     max_cost: float | None = None,
+    checks: str = "reported",
 ) -> DesignProblem:
     """Return the design problem of a site; problems of named sites are cached.
 
@@ -170,8 +172,8 @@ def problem_of(
         As `DesignProblem` does.
     """
     if isinstance(site, str) and not os.path.exists(site) and isinstance(kinds, tuple | None):
-        return _named(site, slots, kinds, fidelity, targets, max_cost)
-    return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost)
+        return _named(site, slots, kinds, fidelity, targets, max_cost, checks)
+    return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost, checks)
 
 
 @lru_cache(MOST_PROBLEMS)
@@ -182,8 +184,9 @@ def _named(
     fidelity: str,
     targets: Targets | None,
     max_cost: float | None,
+    checks: str,
 ) -> DesignProblem:
-    return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost)
+    return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost, checks)
 
 
 class EpisodeSites:
@@ -193,7 +196,7 @@ class EpisodeSites:
     ----------
     site : Places
         A site, a split, or a sequence of sites.
-    max_barriers, kinds, fidelity, targets, max_cost
+    max_barriers, kinds, fidelity, targets, max_cost, checks
         As for `DesignProblem`; if every episode draws its site, the default is all kinds.
 
     Attributes
@@ -219,8 +222,10 @@ class EpisodeSites:
         fidelity: str,
         targets: Targets | Mapping[str, float | None] | None = None,
         max_cost: float | None = None,
+        checks: str = "reported",
     ):
         self.targets, self.max_cost = read_targets(targets), checked_cost(max_cost)
+        self.checks = check.one_of("checks", checks, CHECKS)
         self.fidelity = check.one_of("fidelity", fidelity, FIDELITIES)
         self.home: DesignProblem | None = None
         self._drawn = drawn_from(site)
@@ -231,7 +236,7 @@ class EpisodeSites:
                 self._check(self._drawn[1:])
         else:
             assert isinstance(site, str | os.PathLike | Site)
-            limits = self.targets, self.max_cost
+            limits = self.targets, self.max_cost, self.checks
             self.first = self.home = problem_of(site, max_barriers, kinds, fidelity, *limits)
             self.slots = Slots(self.first.kinds, max_barriers)
 
@@ -240,7 +245,8 @@ class EpisodeSites:
         count = self.slots.count
         whole = problem_of(site, count, None, self.fidelity)
         kinds = self.slots.shared(whole.site)
-        return problem_of(site, count, kinds, self.fidelity, self.targets, self.max_cost)
+        limits = self.targets, self.max_cost, self.checks
+        return problem_of(site, count, kinds, self.fidelity, *limits)
 
     def _check(self, places: Sequence[Place]) -> None:
         """Raise an error if there is no problem of one of some sites."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Iterator, Sequence
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +16,10 @@ from numpy.typing import NDArray
 from rigdda import BadInput, Barrier, GravityWall, Layout, Mesh, Site, check
 from rigdda.barriers import KINDS, Earthwork, Removal, as_layout, earthworks
 from rigdda.barriers.base import MIN_GAP, TOLERANCE, Span, meet, occupied
+from rigdda.envs import design_envelope
+from rigdda.envs.barrier_formulas import BarrierCheck, checks_of
+from rigdda.envs.design_envelope import DesignEnvelope
+from rigdda.envs.fence_checks import demand_at
 from rigdda.model.barrier_zone import BarrierZone
 
 
@@ -51,6 +56,9 @@ class Rules:
         Where barriers may stand, and how large they may be.
     max_cost : float, optional
         Largest capital cost of a layout [EUR per metre of road].
+    checks : {"reported", "required"}
+        Whether every barrier must satisfy the checks of `rigdda.envs.barrier_formulas`. The demand
+        on a barrier is that of the slope as it stands, without the other new barriers.
 
     Attributes
     ----------
@@ -65,8 +73,15 @@ class Rules:
         If there are no such parts.
     """
 
-    def __init__(self, site: Site, zone: BarrierZone, max_cost: float | None = None):
-        self.site, self.zone, self.max_cost = site, zone, max_cost
+    def __init__(
+        self,
+        site: Site,
+        zone: BarrierZone,
+        max_cost: float | None = None,
+        checks: str = "reported",
+    ):
+        self.site, self.zone, self.max_cost, self.checks = site, zone, max_cost, checks
+        self._failed: dict[Barrier, BarrierCheck | None] = {}
         cut = [(max(low, zone.start), min(high, zone.end)) for low, high in site.rooms]
         self.parts = [(low, high) for low, high in cut if low < high]
         if not self.parts:
@@ -231,7 +246,29 @@ class Rules:
             except BadInput as bad:
                 yield BadInput(f"{where}: {bad.field}", bad.value, bad.mend)
                 return None
+        if self.checks == "required":
+            yield from self._failed_checks(where, barrier)
         return start, end
+
+    def _failed_checks(self, where: str, barrier: Barrier) -> Iterator[BadInput]:
+        """Yield an error if a barrier fails a check of its kind."""
+        if barrier not in self._failed:
+            demand = demand_at(self._envelope, self.site.rule, barrier.x)
+            found = checks_of(self.site, barrier, demand)
+            self._failed[barrier] = next((c for c in found if not c.satisfied), None)
+        failed = self._failed[barrier]
+        if failed is not None:
+            mend = (
+                f"satisfy the check of {failed.check}, {failed.demand:.4g} of "
+                f"{failed.capacity:.4g} {failed.unit}, or report the checks only"
+            )
+            yield BadInput(where, barrier.label, mend)
+
+    @cached_property
+    def _envelope(self) -> DesignEnvelope:
+        """What the blocks of the design events do on the slope as it stands."""
+        kept = sorted(self.site.standing(()), key=lambda barrier: barrier.x)
+        return design_envelope.of(self.site, self.zone, layout=kept)
 
     def _on_steep_ground(
         self, where: str, barrier: Barrier, start: float, end: float

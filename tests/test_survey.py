@@ -18,7 +18,7 @@ from rigdda import BadInput, Site
 from rigdda.agents import new_site
 from rigdda.agents.new_site import SiteRequest, compose
 from rigdda.model.grounds import GROUNDS
-from rigdda.model.survey import Survey, parse_table, profile_of
+from rigdda.model.survey import Survey, parse_table, profile_of, read_survey
 from rigdda.sites.schema import schema
 
 TALUS = ((0.0, 92.0), (10.0, 90.0), (22.0, 60.0), (72.0, 20.0), (94.0, 6.0), (104.0, 4.5),
@@ -216,3 +216,244 @@ def test_ground_that_ends_close_beyond_the_road_is_not_extended(tmp_path):
         "long", survey_file(tmp_path, table([*short, (151.0, 2.42105)])), SiteRequest(ROAD)
     )
     assert loaded(text).slope.points[-1] == (151.0, 2.421)
+
+
+# --- spellings: the same points, or a refusal
+
+FEET = ("ft", "ft.", "FT", "feet", "Feet", "foot", "US ft", "ft US", "ftUS", "US survey feet",
+        "US survey foot", "sft", "us-ft", "intl ft", "international feet", "ft asl", "LF",
+        "'")  # fmt: skip
+OTHERS = (
+    "in",
+    "inches",
+    "yd",
+    "yards",
+    "dm",
+    "cm",
+    "mm",
+    "km",
+    "miles",
+    "furlong",
+    "Fuss",
+    "fathoms",
+)
+METRES = ("m", "M", "m.", "metres", "meters", "metre", "m a.s.l.", "m \xfc. M.", "m AHD", "mASL")
+
+
+@pytest.mark.parametrize(
+    "form", ["{name} ({unit})", "{name} [{unit}]", "{name}({unit})", "{name} {{{unit}}}"]
+)
+@pytest.mark.parametrize("at", [0, 1])
+def test_a_unit_that_is_not_metres_is_never_read(form, at):
+    rows = "\n0;92\n10;90\n161;0\n"
+    for unit in (*FEET, *OTHERS):
+        head = ["chainage", "elevation"]
+        head[at] = form.format(name=head[at], unit=unit)
+        with pytest.raises(BadInput, match="metres") as caught:
+            parse_table("survey.csv", ";".join(head) + rows)
+        assert caught.value.value == head[at]
+    for unit in METRES:
+        head = ";".join(form.format(name=name, unit=unit) for name in ("chainage", "elevation"))
+        assert len(parse_table("survey.csv", head + rows).points) == 3
+
+
+@pytest.mark.parametrize(
+    "head", ["x_ft,y_ft", "x ft,y ft", "x/ft,y", "dist-ft,elev", "chainage feet,elevation", "x',y'",
+             "chainage US survey feet,elevation", "x in feet,y", "x furlong,y", "sta_usft,elev"],
+)  # fmt: skip
+def test_units_without_brackets_are_not_taken_for_metres(head):
+    with pytest.raises(BadInput, match="line 1"):
+        parse_table("survey.csv", f"{head}\n0,92\n10,90\n161,0\n")
+
+
+def test_units_in_a_row_of_their_own():
+    rows = "0;92\n10;90\n161;0\n"
+    assert len(parse_table("survey.csv", f"chainage;elevation\nm;m\n{rows}").points) == 3
+    with pytest.raises(BadInput, match="feet"):
+        parse_table("survey.csv", f"chainage;elevation\nm;ft\n{rows}")
+    with pytest.raises(BadInput, match="feet"):
+        parse_table("survey.csv", "0 ft;92 ft\n10;90\n161;0\n")
+
+
+@pytest.mark.parametrize(
+    "first", ["P1,0,92", "0 m,92 m", "0m,92m", "\N{MINUS SIGN}0,92", "'0,92", "0,'92", "+0,92.",
+              "0+000,92", "\N{EN DASH}0,92"],
+)  # fmt: skip
+def test_the_first_row_of_a_table_without_names_is_kept(first):
+    code = first.count(",") == 2
+    rows = [("P2," if code else "") + row for row in ("10,90", "22,60", "161,0")]
+    points = parse_table("survey.csv", "\n".join([first, *rows])).points
+    assert points.tolist() == [[0.0, 92.0], [10.0, 90.0], [22.0, 60.0], [161.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("P1,0,high\nP2,10,90\nP3,161,0\n", "line 1: elevation = 'high'"),
+        ("0,no data\n10,90\n22,60\n161,0\n", "line 1: elevation = 'no data'"),
+        ("1,92\n2,90\n3,60\n4,0\n", "counts by ones"),
+        ("point,elevation\n1,92\n2,90\n3,0\n", "numbers of points are no chainages"),
+        ("slope distance (m),elevation\n0,92\n161,0\n", "distances along the slope"),
+        ("chainage,elevation,level\n0,92,91\n161,0,1\n", "keep one column of elevations"),
+        ("x,z,height\n0,92,91\n161,0,1\n", "keep one column of elevations"),
+        ("chainage,x,elevation\n0,0,91\n161,96.6,1\n", "keep one column of chainages"),
+        ('x,y\n0,"1,892"\n10,"1,870"\n161,"1,804"\n', "line 2: elevation = '1,892'"),
+        ("x;y\n0;1.892\n10,5;1.870\n161;1.804\n", "use one decimal sign"),
+        ("x;y\n0;1.892,5\n10;1.870\n161;1.804\n", "separators of thousands"),
+        ("x;y\n0+00;92\n0+10;90\n1+61;0\n", "kilometres and metres"),
+        ("x;y\n1_20;92\n130;90\n161;0\n", "give a number"),
+    ],
+)  # fmt: skip
+def test_what_could_be_read_in_two_ways_is_refused(text, part):
+    with pytest.raises(BadInput) as caught:
+        parse_table("survey.csv", text)
+    assert part in str(caught.value)
+
+
+def test_tables_with_a_stated_separator_and_with_stations():
+    text = "sep=;\r\nStation;Level\r\n0+000;92\r\n0+010,5;90\r\n1+161;0\r\n"
+    points = parse_table("survey.csv", text).points
+    assert points.tolist() == [[0.0, 92.0], [10.5, 90.0], [1161.0, 0.0]]
+
+
+def test_both_columns_of_plan_coordinates_make_the_chainage():
+    for head in ("X,Y,Elev", "x,y,h", "x,y,z", "E,N,RL", "easting,northing,level"):
+        survey = parse_table("survey.csv", f"{head}\n0,0,92\n6,8,90\n60,80,40\n96.6,128.8,0\n")
+        assert survey.points[:, 0] == pytest.approx([0.0, 10.0, 100.0, 161.0])
+        assert survey.points[:, 1].tolist() == [92.0, 90.0, 40.0, 0.0]
+
+
+def test_chainage_follows_a_line_that_bends_in_plan():
+    survey = parse_table("survey.csv", "x,y,z\n0,0,92\n60,80,40\n60,180,0\n")
+    assert survey.points[:, 0] == pytest.approx([0.0, 100.0, 200.0])
+    assert "bends" in survey.notes[0] and "200.0 m long" in survey.notes[0]
+
+
+@pytest.mark.parametrize("value", [-999.0, -9999.0, -32768.0, 9999.0, 1e38, 0.0])
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_value_that_stands_for_a_missing_elevation_is_refused(value, count):
+    points = np.add(TALUS, [0.0, 600.0])
+    points[3 : 3 + count, 1] = value
+    with pytest.raises(BadInput, match="missing value") as caught:
+        profile_of("survey.csv", Survey(points))
+    assert caught.value.field == "survey.csv point 4"
+
+
+def test_ground_at_sea_level_is_ground():
+    points = np.array([(0.0, 40.0), (30.0, 2.0), (60.0, 0.0), (70.0, 0.0), (120.0, 1.0)])
+    assert len(profile_of("survey.csv", Survey(points)).points) == 5
+
+
+@pytest.mark.parametrize(("wrong", "words"), [(604.2, "31.8 m below"), (655.2, "10.0 m above")])
+def test_a_point_far_from_both_neighbours_is_told(wrong, words):
+    points = np.array([(0.0, 692.0), (10.0, 645.2), (22.0, 640.2), (32.0, 636.0), (161.0, 600.0)])
+    assert profile_of("survey.csv", Survey(points)).notes == ()
+    points[2, 1] = wrong
+    notes = profile_of("survey.csv", Survey(points)).notes
+    assert any(f"chainage 22, elevation {wrong:g}" in note and words in note for note in notes)
+
+
+def number(value: float, decimal: str, minus: str, plus: bool) -> str:
+    text = f"{abs(value):.3f}".replace(".", decimal)
+    return (minus if value < 0 else "+" if plus else "") + text
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    slope=slopes(),
+    form=st.sampled_from([form for form in FORMS if form[0] != " "]),
+    chainage=st.sampled_from((0.0, -40.0, 12_345.0, 2_683_412.25)),
+    elevation=st.sampled_from((0.0, 300.0, 1_832.5)),
+    unit=st.sampled_from(("", *METRES, *FEET, *OTHERS)),
+    brackets=st.sampled_from(("{} ({})", "{} [{}]", "{}_{}")),
+    thousands=st.sampled_from(("", "", "'", ".", ",")),
+    minus=st.sampled_from(("-", "\N{MINUS SIGN}")),
+    plus=st.booleans(),
+    quoted=st.booleans(),
+    codes=st.booleans(),
+    stated=st.booleans(),
+    backward=st.booleans(),
+    end=st.sampled_from(("\n", "\r\n")),
+)
+def test_any_spelling_is_read_as_the_same_points_or_refused(
+    slope, form, chainage, elevation, unit, brackets, thousands, minus, plus, quoted, codes, stated,
+    backward, end,
+):  # fmt: skip
+    points = slope[0][::-1] if backward else slope[0]
+    points = np.add(points, [chainage, elevation])
+    separator, decimal = form
+    heads = [brackets.format(n, unit) if unit else n for n in ("chainage", "elevation")]
+    rows = [["code", *heads] if codes else heads]
+    for k, point in enumerate(points):
+        cells = [number(value, decimal, minus, plus) for value in point]
+        if thousands and abs(point[0]) >= 1000.0:
+            whole, rest = cells[0].split(decimal)
+            cells[0] = f"{whole[:-3]}{thousands}{whole[-3:]}{decimal}{rest}"
+        if quoted:
+            cells = [f'"{cell}"' for cell in cells]
+        rows.append([f"P{k}", *cells] if codes else cells)
+    lines = [f"sep={separator}"] if stated and separator != "\t" else []
+    lines += [separator.join(row) for row in rows]
+    try:
+        found = parse_table("survey.csv", end.join(lines) + end).points
+    except BadInput as refusal:
+        foreign = unit in FEET or unit in OTHERS or (unit in METRES and brackets == "{}_{}")
+        assert foreign or thousands, refusal
+    else:
+        assert not unit or unit in METRES
+        assert np.abs(found - points).max() < 1e-9
+
+
+def drawing(folder: Path, version: str = "R2010", **header: int):
+    """Return a new drawing and what saves it."""
+    ezdxf = pytest.importorskip("ezdxf")
+    document = ezdxf.new(version)
+    for key, value in header.items():
+        document.header[f"${key}"] = value
+    return document, lambda: document.saveas(folder / "survey.dxf")
+
+
+@pytest.mark.parametrize(
+    ("unit", "name"),
+    [(1, "inches"), (2, "feet"), (4, "millimetres"), (5, "centimetres"), (10, "yards"),
+     (14, "decimetres"), (21, "US survey feet"), (20, "unit 20")],
+)  # fmt: skip
+def test_a_drawing_in_other_units_is_refused(unit, name, tmp_path):
+    document, save = drawing(tmp_path, INSUNITS=unit)
+    document.modelspace().add_lwpolyline(TALUS)
+    save()
+    with pytest.raises(BadInput, match=name):
+        read_survey(tmp_path / "survey.dxf")
+
+
+def test_a_drawing_without_unit_is_read_with_a_note(tmp_path):
+    for unit, count in ((0, 1), (6, 0)):
+        document, save = drawing(tmp_path, INSUNITS=unit)
+        document.modelspace().add_lwpolyline(TALUS)
+        save()
+        survey = read_survey(tmp_path / "survey.dxf")
+        assert np.abs(survey.points - TALUS).max() < 1e-9
+        assert len(survey.notes) == count
+
+
+def test_a_level_line_is_no_profile(tmp_path):
+    plan = [(0.6 * x, 0.8 * x, 512.0) for x, _ in TALUS]
+    document, save = drawing(tmp_path, INSUNITS=6)
+    document.modelspace().add_polyline3d(plan)
+    save()
+    with pytest.raises(BadInput, match="elevation of each vertex"):
+        read_survey(tmp_path / "survey.dxf")
+    document, save = drawing(tmp_path, INSUNITS=6)
+    document.modelspace().add_polyline3d([(0.6 * x, 0.8 * x, y) for x, y in TALUS])
+    save()
+    assert np.abs(read_survey(tmp_path / "survey.dxf").points - TALUS).max() < 1e-6
+
+
+def test_the_curve_of_a_spline_of_release_12_is_read_and_not_its_frame(tmp_path):
+    document, save = drawing(tmp_path, "R12")
+    line = document.modelspace().add_polyline2d([], dxfattribs={"flags": 4})
+    frame = [(0.0, 92.0), (50.0, -40.0), (161.0, 0.0)]
+    line.append_formatted_vertices(frame, format="xy", dxfattribs={"flags": 16})
+    line.append_formatted_vertices(TALUS, format="xy", dxfattribs={"flags": 8})
+    save()
+    assert np.abs(read_survey(tmp_path / "survey.dxf").points - TALUS).max() < 1e-9

@@ -1,6 +1,6 @@
 """The engineering rule: the cheapest fence that a code of practice requires.
 
-The rule is that of `rigdda.agents.fence_checks`. Stations are compared by a price without the jumps
+The rule is that of `rigdda.envs.fence_checks`. Stations are compared by a price without the jumps
 between classes, and among prices that are nearly equal the station nearest the downhill end of the
 zone is taken, so that the answer hardly depends on the releases. If no fence fits, the answer is
 the ditch of Ritchie or else an embankment or a wall as high as the rule would have the fence, under
@@ -19,13 +19,13 @@ from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Site,
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress
 from rigdda.agents.designers.store import Store
-from rigdda.agents.fence_checks import Demand, FenceCheck, demand_at, demands
-from rigdda.agents.ritchie_ditch import RitchieDitch
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.barriers.base import MIN_HEIGHT
 from rigdda.barriers.fence import CLASSES
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.design_envelope import DesignEnvelope
+from rigdda.envs.fence_checks import Demand, FenceCheck, demand_at, demands
+from rigdda.envs.ritchie_ditch import RitchieDitch
 from rigdda.rounding import between
 
 COVERED = 0.95

@@ -70,6 +70,7 @@ def identity(problem: DesignProblem) -> dict[str, Any]:
         "max_barriers": problem.max_barriers,
         "max_cost": problem.max_cost,
         "fidelity": problem.fidelity,
+        "checks": problem.checks,
         "content": hashlib.sha256(msgspec.json.encode(problem.site)).hexdigest()[:16],
     }
 

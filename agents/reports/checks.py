@@ -12,11 +12,11 @@ from rigdda.agents.design_study import DesignStudy
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.rule import RuleAnswer
-from rigdda.agents.fence_checks import FenceCheck, demands
 from rigdda.agents.reports import demand_picture
 from rigdda.agents.reports.tables import empty_table, write_rows
 from rigdda.envs import DesignProblem
 from rigdda.envs.design_envelope import DesignEnvelope
+from rigdda.envs.fence_checks import FenceCheck, demands
 
 if TYPE_CHECKING:
     from rich.table import Table

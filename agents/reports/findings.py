@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigdda import BadInput, Layout, Mesh, Site
+from rigdda.agents.barrier_checks import LayoutChecks
 from rigdda.agents.design_study import ComparedLayouts, DesignStudy, design_events
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
-from rigdda.agents.reports.wording import at_most, before, euros, percent, percentage, span
+from rigdda.agents.reports.headline import Answer, FailedCheck, failed_words
+from rigdda.agents.reports.wording import at_most, before, euros, order, percent, percentage, span
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem, Evaluation
-from rigdda.envs.problem import MET, MISSED, UNDECIDED
+from rigdda.envs.problem import MET, MISSED, UNDECIDED, Targets
 from rigdda.envs.siting import FeasiblePlaces
 
 
@@ -234,14 +236,75 @@ def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
 def of_design(done: DesignStudy) -> list[str]:
     """Return all lines on the layout of a design, its limits, failures and targets."""
     chosen = done.chosen.evaluation
-    cases = [(case.name, case.evaluation) for case in done.cases]
+    cases = [(case.name, case.evaluation) for case in done.comparable]
     lines = [
+        compliance(done),
         limits(done.result, cases, done.left),
         *cheaper(cases),
         *failing(done.problem.site, chosen),
         undecided(done.problem, chosen),
     ]
     return [line for line in lines if line]
+
+
+def compliance(done: DesignStudy) -> str:
+    """Return a line on what it costs that all checks must be met; empty if they need not be."""
+    if done.problem.checks != "required":
+        return ""
+    other, chosen = done.unchecked, done.chosen.evaluation
+    if other is None:
+        return "checks are required, which costs nothing: no better layout was found without them"
+    free = other.case.evaluation
+    built = "; ".join(order(barrier, done.problem.site) for barrier in free.layout)
+    words = f"without required checks, the search finds: {built or 'no barrier'}"
+    more = chosen.objective - free.objective
+    money = (
+        f"Z is {euros(free.objective)} ({span(free.ci)}) with it and {euros(chosen.objective)} "
+        f"({span(chosen.ci)}) with the layout that meets them"
+    )
+    cost = f"meeting the checks costs {euros(more)} EUR per metre and year"
+    if free.ci[0] <= chosen.ci[1] and chosen.ci[0] <= free.ci[1]:
+        cost = f"it is not shown that meeting the checks costs anything ({euros(more)})"
+    failed = failed_checks(other.checks)
+    fails = f"it fails its checks ({failed_words(failed)}); " if failed else ""
+    return f"{words}; {fails}{money}: {cost}"
+
+
+def failed_checks(checks: LayoutChecks) -> list[FailedCheck]:
+    """Return the checks of a layout that are not met, for a headline."""
+    return [
+        FailedCheck(f"{c.barrier}, at {c.x:.1f} m", c.check, c.use / c.limit) for c in checks.failed
+    ]
+
+
+def answer(done: DesignStudy) -> Answer:
+    """Return what the first line of a design needs."""
+    site, chosen, nothing = done.problem.site, done.chosen.evaluation, done.nothing.evaluation
+    return Answer(
+        layout="; ".join(order(barrier, site) for barrier in chosen.layout),
+        bare=before(site),
+        z=(chosen.objective, *chosen.ci),
+        nothing=(nothing.objective, *nothing.ci),
+        targets=chosen.targets,
+        asked=asked_words(done.problem.targets),
+        required=done.problem.checks == "required",
+        failed=failed_checks(done.checks),
+    )
+
+
+def asked_words(targets: Targets) -> str:
+    """Return targets in words; empty without any."""
+    pairs = (
+        (targets.reach, "a block of a design event reaches the road"),
+        (targets.failure, "a barrier fails in a design event"),
+        (targets.individual, "a commuter is killed within a year"),
+    )
+    return " and that ".join(
+        f"{what} with a probability of at most "
+        + (f"{value:.2g}" if value is targets.individual else percent(value))
+        for value, what in pairs
+        if value is not None
+    )
 
 
 def left_over(evaluation: Evaluation) -> str:

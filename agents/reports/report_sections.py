@@ -12,6 +12,7 @@ import rigdda
 from rigdda import BadInput, Site
 from rigdda.agents.reports import assumptions, findings
 from rigdda.agents.reports.exhibits import EXHIBITS, RAW, Exhibit
+from rigdda.agents.reports.headline import Answer, FailedCheck, headline
 from rigdda.agents.reports.html_blocks import (
     Block,
     Figures,
@@ -135,21 +136,14 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
         raise BadInput(FIELD, str(folder.path / "layouts.csv"), mend)
     site, targets = folder.site, chosen["targets"]
     layout = rigdda.load_layout(folder.path / "layout.toml")
-    if layout and site is not None:
-        built = [order(barrier, site) for barrier in layout]
-        yield Paragraph(f"Build: {'; '.join(built)}.", "answer")
-    else:
-        yield Paragraph("Build nothing: no layout was found that is worth its cost.", "answer")
+    line = headline(_answer(folder, chosen, rows[0]))
+    yield Paragraph(line, "answer" if line.startswith("Build") else "warning")
     if site is not None and site.existing:
         yield Items(findings.existing_barriers(site, layout))
-    if targets:
-        asked = _asked(folder)
-        mood = "good" if targets == "met" else "warning"
-        yield Paragraph(_verdict(targets, asked), mood)
+    if targets == "met":
+        yield Paragraph(f"This layout meets the target that {_asked(folder)}.", "good")
     z, nothing = _money_of(chosen), _money_of(rows[0])
     bare = before(site) if site is not None else "without barriers"
-    if layout and (warning := _warning(chosen, rows[0], bool(targets), bare)):
-        yield Paragraph(warning, "warning")
     yield Figures([
         ("To build", f"{euros(float(chosen['cost']))} EUR", "per metre of road"),
         ("Annual cost Z", f"{z} EUR", f"per metre and year with it ({_ends_of(chosen)})"),
@@ -159,23 +153,32 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
     ])  # fmt: skip
 
 
-def _warning(chosen: Row, nothing: Row, targets: bool, bare: str) -> str:
-    """Return a warning if a layout costs more than it saves, or is not shown to save anything.
-
-    `bare` is what the case without the layout is called.
-    """
-    if float(chosen["objective_low"]) > float(nothing["objective_high"]):
-        reason = ", and only the target is a reason to build it" if targets else ""
-        return (
-            f"A year costs {_money_of(chosen)} EUR per metre of road with this layout and "
-            f"{_money_of(nothing)} EUR {bare}: it costs more than it saves{reason}."
+def _answer(folder: ResultsFolder, chosen: Row, nothing: Row) -> Answer:
+    """Return what the first line of a design needs, from its files."""
+    site, options = folder.site, folder.records["design"].options
+    layout = rigdda.load_layout(folder.path / "layout.toml")
+    words = [order(barrier, site) if site is not None else barrier.label for barrier in layout]
+    _, rows = folder.table("checks.csv") if folder.files("checks.csv") else ([], [])
+    failed = [
+        FailedCheck(
+            f"{row['barrier']}, at {float(row['x_m']):.1f} m",
+            row["check"],
+            float(row["use"]) / float(row["limit"]),
         )
-    if float(chosen["objective_high"]) >= float(nothing["objective_low"]):
-        return (
-            f"{int(chosen['releases']):,} releases do not show that this layout saves more than it "
-            "costs: verify it with more."
-        )
-    return ""
+        for row in rows
+        if row["satisfied"] == "False"
+    ]
+    names = ("objective", "objective_low", "objective_high")
+    return Answer(
+        layout="; ".join(words),
+        bare=before(site) if site is not None else "without barriers",
+        z=(float(chosen[names[0]]), float(chosen[names[1]]), float(chosen[names[2]])),
+        nothing=(float(nothing[names[0]]), float(nothing[names[1]]), float(nothing[names[2]])),
+        targets=chosen["targets"] or None,
+        asked=_asked(folder),
+        required=options.get("checks") == "required",
+        failed=failed,
+    )
 
 
 def _asked(folder: ResultsFolder) -> str:
@@ -197,16 +200,6 @@ def _asked(folder: ResultsFolder) -> str:
 def _limit(name: str, value: float) -> str:
     """Return the value of a target as text."""
     return f"{value:.6g}" if name == "target_risk" else percentage(value)
-
-
-def _verdict(state: str, asked: str) -> str:
-    """Return whether the targets are met, in words."""
-    goal = f"the target that {asked}"
-    if state == "met":
-        return f"This layout meets {goal}."
-    if state == "missed":
-        return f"This layout does not meet {goal}."
-    return f"The releases do not decide whether this layout meets {goal}: verify with more."
 
 
 def _money_of(row: Row) -> str:

@@ -25,20 +25,48 @@ TEXTS = (".csv", ".txt", ".tsv", ".xyz", ".dat")
 SURVEYS = (".csv", ".tsv", ".xyz", ".dat", ".dxf", ".dwg", ".xls", ".xlsx", ".ods")
 """Endings of files that hold a survey rather than a site."""
 
-CHAINAGES = ("chainage", "station", "stationing", "distance", "dist", "ch", "sta", "s", "x")
-ELEVATIONS = ("elevation", "elev", "level", "rl", "altitude", "alt", "z", "height", "h", "y")
+CHAINAGES = (
+    "chainage", "station", "stationing", "distance", "horizontal distance", "dist", "ch", "sta",
+    "s", "x",
+)  # fmt: skip
+ELEVATIONS = (
+    "elevation", "ground elevation", "elev", "level", "reduced level", "ground level", "rl",
+    "altitude", "alt", "z", "height", "h", "y",
+)  # fmt: skip
 EASTINGS = ("easting", "east", "e")
 NORTHINGS = ("northing", "north", "n")
-"""Names of columns, in the order in which they are preferred."""
+"""Names of columns, in small letters and without units."""
+
+METRES = {
+    "m", "metre", "metres", "meter", "meters", "mtr", "mtrs", "masl", "mamsl", "mahd", "mnn",
+    "mnhn", "mum", "m\xfcm", "m\xfcnn", "mslm", "msnm",
+}  # fmt: skip
+"""Spellings of metres, and of metres above a datum, with letters only."""
 
 FOREIGN = {
-    "mm": "millimetres", "cm": "centimetres", "km": "kilometres", "ft": "feet", "feet": "feet",
-    "in": "inches", "inch": "inches", "yd": "yards",
+    "mm": "millimetres", "millimetres": "millimetres", "millimeters": "millimetres",
+    "cm": "centimetres", "centimetres": "centimetres", "centimeters": "centimetres",
+    "dm": "decimetres", "decimetres": "decimetres", "decimeters": "decimetres",
+    "km": "kilometres", "kilometres": "kilometres", "kilometers": "kilometres",
+    "in": "inches", "inch": "inches", "inches": "inches",
+    "yd": "yards", "yds": "yards", "yard": "yards", "yards": "yards",
+    "mi": "miles", "mile": "miles", "miles": "miles",
+    **dict.fromkeys(
+        ("ft", "fts", "foot", "feet", "lf", "sft", "usft", "ftus", "usfeet", "ussft",
+         "ussurveyfeet", "ussurveyfoot", "surveyfeet", "surveyfoot", "internationalfeet", "intlft",
+         "ift", "ftasl", "ftamsl", "feetasl", "ftnavd"),
+        "feet",
+    ),
 }  # fmt: skip
-"""Units in the header of a column that are not metres."""
+"""Spellings of units that are not metres, with letters only."""
 
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 PLAIN = re.compile(r"[+-]?\d+([.,]\d+)?")
+STATION = re.compile(r"([+-]?)(\d+)\+(\d{3}(?:[.,]\d+)?)")
+"""A chainage with the kilometres before a plus sign, such as 12+345.60."""
+
+THOUSANDS = re.compile(r"[+-]?\d{1,3}([ '.,\u2019\u00a0\u202f]\d{3})+([.,]\d+)?")
+GROUPED = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
 
 CLOSE = 1e-3
 """Distance of two points of a survey below which one is taken for a repetition [m]."""
@@ -49,6 +77,13 @@ LOCAL = 1000.0
 
 ROUND = 100.0
 """An offset is a whole multiple of this [m], so that it is easily added in the head."""
+
+LOWEST, SUMMIT = -450.0, 9_000.0
+"""Elevations [m] beyond which there is no ground on land."""
+
+SPIKE, STEEP = 3.0, 0.3
+"""Height over both neighbours [m] from which a point is doubted, and the least slope down to each
+of them [-]."""
 
 DIGITS = 6
 """Decimals of the coordinates of a site in metres: subtraction leaves noise in later ones."""
@@ -95,9 +130,9 @@ def read_survey(path: Path, layer: str | None = None) -> Survey:
     Parameters
     ----------
     path : Path
-        The file. The columns of a table are found by their names, such as chainage and elevation,
-        or are its only two columns of numbers. They are separated by commas, semicolons, tabs or
-        spaces, and the decimal sign may be a comma.
+        The file. The columns of a table are found by their names, such as chainage and elevation;
+        without names, a table has two columns of numbers. Columns are separated by commas,
+        semicolons, tabs or spaces, and the decimal sign may be a comma.
     layer : str, optional
         Layer of the polyline of a drawing that has several.
 
@@ -110,7 +145,9 @@ def read_survey(path: Path, layer: str | None = None) -> Survey:
     if ending == ".dxf":
         from rigdda.model import drawing
 
-        return from_vertices(str(path), drawing.polyline(path, layer))
+        vertices, notes = drawing.polyline(path, layer)
+        survey = from_vertices(str(path), vertices)
+        return survey._replace(notes=(*notes, *survey.notes))
     if layer is not None:
         raise BadInput("--layer", layer, "leave it out: only a DXF drawing has layers")
     if ending not in TEXTS:
@@ -127,38 +164,53 @@ def parse_table(name: str, text: str) -> Survey:
     BadInput
         As `read_survey` does.
     """
-    rows = _rows(name, text)
-    head = [] if all(NUMBER.fullmatch(cell) for cell in rows[0][1][:2]) else rows[0][1]
-    body = rows[1:] if head else rows
+    separator, rows = _rows(name, text)
+    has_names = not any(map(_looks_numeric, rows[0][1]))
+    head, body = (rows[0][1], rows[1:]) if has_names else ([], rows)
+    if body and has_names and _are_units(body[0][1]):
+        _check_units(name, *body[0])
+        body = body[1:]
     for line, cells in body:
         if head and len(cells) > len(head) and any(cells[len(head) :]):
             mend = "name all columns in the first line; with decimal commas use semicolons"
             raise BadInput(f"{name} line {line}", f"{len(cells)} columns", mend)
     if not body:
         raise BadInput(name, "no numbers", "give at least two rows of chainage and elevation [m]")
-    columns = _columns(name, head, body)
+    columns = _named(name, rows[0]) if head else _unnamed(name, body)
+    _check_decimal_signs(name, separator, body, columns)
     values = np.array(
         [[_number(name, line, cells, what, at) for what, at in columns] for line, cells in body]
     )
     if len(values) < 2:
         raise BadInput(name, f"{len(values)} point", "give at least two points")
+    if not head and len(values) > 2 and (np.diff(values[:, 0]) == 1.0).all():
+        mend = (
+            "name the columns in the first line, chainage and elevation, if these are chainages "
+            "and not the numbers of points"
+        )
+        raise BadInput(f"{name} line {body[0][0]}", "a first column that counts by ones", mend)
     return Survey(values) if len(columns) == 2 else from_vertices(name, values)
 
 
-def _rows(name: str, text: str) -> list[tuple[int, list[str]]]:
-    """Return the cells of each line that is not empty, with the number of the line."""
+def _rows(name: str, text: str) -> tuple[str | None, list[tuple[int, list[str]]]]:
+    """Return what separates columns, and the cells of each line that is not empty.
+
+    The cells of a line stand beside its number.
+    """
     lines = [
         (i, line.strip())
         for i, line in enumerate(text.splitlines(), 1)
         if line.strip(" ,;\t") and not line.lstrip().startswith("#")
     ]
+    stated = re.fullmatch(r"(?i)sep=(.)", lines[0][1]) if lines else None
+    lines = lines[1:] if stated else lines
     if not lines:
         raise BadInput(name, "empty", "give a table of chainage and elevation [m]")
-    separator = _separator([line for _, line in lines])
+    separator = stated[1] if stated else _separator([line for _, line in lines])
     try:
         if separator is None:
-            return [(i, line.split()) for i, line in lines]
-        return [
+            return separator, [(i, line.split()) for i, line in lines]
+        return separator, [
             (i, [cell.strip() for cell in next(csv.reader([line], delimiter=separator))])
             for i, line in lines
         ]
@@ -172,77 +224,199 @@ def _separator(lines: Sequence[str]) -> str | None:
         if all(separator in line for line in lines):
             return separator
     words = [line.split() for line in lines[-1:]]
-    if all(len(cells) > 1 and all(map(PLAIN.fullmatch, cells)) for cells in words):
+    if all(len(cells) > 1 and all(map(_looks_numeric, cells)) for cells in words):
         return None
     return ","
 
 
-def _columns(
-    name: str, head: Sequence[str], body: Sequence[tuple[int, list[str]]]
-) -> list[tuple[str, int]]:
-    """Return what the columns that are read are called, and their places.
+def _plain(cell: str) -> tuple[str, str]:
+    """Return a cell without typographic signs and the mark of a text cell, and its unit."""
+    text = cell.strip().lstrip("'\u2019").strip()
+    text = text.replace("\u2212", "-").replace("\u2013", "-")
+    found = re.fullmatch(r"([+-]?[\d.,+]+(?:[eE][+-]?\d+)?)\s*([^\W\d_].*|\[.*\]|\(.*\))?", text)
+    return (found[1], _letters(found[2] or "")) if found else (text, "")
+
+
+def _letters(unit: str) -> str:
+    """Return the letters of a unit, in small letters."""
+    return "".join(c for c in unit.casefold() if c.isalpha())
+
+
+def _looks_numeric(cell: str) -> bool:
+    """Return whether a cell is meant as a number, also as one that cannot be read."""
+    text, unit = _plain(cell)
+    known = not unit or unit in METRES or unit in FOREIGN
+    number = NUMBER.fullmatch(text) or STATION.fullmatch(text) or THOUSANDS.fullmatch(text)
+    return known and number is not None
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Return whether a row holds the units of the columns."""
+    units = [_letters(cell) for cell in cells if cell]
+    return any(unit in METRES or unit in FOREIGN for unit in units) and not any(
+        map(_looks_numeric, cells)
+    )
+
+
+def _check_units(name: str, line: int, cells: Sequence[str]) -> None:
+    """Check that a row of units names metres only."""
+    for cell in cells:
+        if (unit := _letters(cell)) in FOREIGN:
+            mend = f"give metres: the column is in {FOREIGN[unit]}"
+            raise BadInput(f"{name} line {line}", cell, mend)
+
+
+def _named(name: str, row: tuple[int, list[str]]) -> list[tuple[str, int]]:
+    """Return the columns that are read, by the names in the first row, and their places.
 
     Two of them are chainage and elevation; three are easting, northing and elevation.
     """
-    names = [_plain_name(name, cell) for cell in head]
-    elevation = _first(names, ELEVATIONS)
-    plan = _first(names, EASTINGS), _first(names, NORTHINGS)
-    chainage = _first(names, CHAINAGES)
-    if {"x", "y", "z"} <= set(names) and names[chainage or 0] == "x":
-        plan, chainage = (names.index("x"), names.index("y")), None
-        elevation = names.index("z")
-    if elevation is not None and chainage is not None and chainage != elevation:
-        return [("chainage", chainage), ("elevation", elevation)]
-    if elevation is not None and plan[0] is not None and plan[1] is not None:
-        return [("easting", plan[0]), ("northing", plan[1]), ("elevation", elevation)]
+    line, head = row
+    where, names = f"{name} line {line}", [_plain_name(cell) for cell in head]
+
+    def places(known: Sequence[str], but: Sequence[str] = ()) -> list[int]:
+        return [k for k, word in enumerate(names) if word in known and word not in but]
+
+    east, north = places(EASTINGS), places(NORTHINGS)
+    elevation = places(ELEVATIONS, ("y",))
+    if "x" in names and "y" in names and elevation:  # a plan, as y is no elevation
+        east, north = east or places(("x",)), north or places(("y",))
+        chainage = places(CHAINAGES, ("x",))
+    else:
+        elevation, chainage = places(ELEVATIONS), places(CHAINAGES)
+    used = [elevation, chainage] if chainage else [elevation, east, north]
+    for found, what in zip(used, ("elevations", "chainages", "northings"), strict=False):
+        if len(found) > 1:
+            several = " and ".join(head[k] for k in found)
+            mend = f"keep one column of {what}, and delete or rename the others"
+            raise BadInput(where, several, mend)
+    if not all(used):
+        mend = (
+            "name its columns in the first line: chainage and elevation, or easting, northing and "
+            "elevation; distances along the slope and numbers of points are no chainages; with "
+            "decimal commas separate columns by semicolons"
+        )
+        raise BadInput(where, ", ".join(head), mend)
+    words = ("elevation", "chainage") if chainage else ("elevation", "easting", "northing")
+    columns = [(word, found[0]) for word, found in zip(words, used, strict=True)]
+    for _, at in columns:
+        _check_unit(where, head[at])
+    return columns[1:] + columns[:1]
+
+
+def _unnamed(name: str, body: Sequence[tuple[int, list[str]]]) -> list[tuple[str, int]]:
+    """Return the columns of chainage and elevation of a table without names: its two of numbers."""
     count = min(len(cells) for _, cells in body)
-    numeric = [k for k in range(count) if NUMBER.fullmatch(body[0][1][k])]
-    if len(numeric) == 2 and all(names[k] not in NORTHINGS for k in numeric if names):
-        return [("chainage", numeric[0]), ("elevation", numeric[1])]
-    found = ", ".join(head) or f"{len(body[0][1])} columns without names"
-    mend = (
-        "name its columns in the first line: chainage and elevation, or easting, northing and "
-        "elevation; with decimal commas separate columns by semicolons"
-    )
-    raise BadInput(f"{name} line {body[0][0] - bool(head)}", found, mend)
+    numeric = [
+        k
+        for k in range(count)
+        if 2 * sum(_looks_numeric(cells[k]) for _, cells in body) > len(body)
+    ]
+    if len(numeric) != 2:
+        mend = (
+            "name its columns in the first line: chainage and elevation, or easting, northing and "
+            "elevation; with decimal commas separate columns by semicolons"
+        )
+        found = f"{len(body[0][1])} columns without names"
+        raise BadInput(f"{name} line {body[0][0]}", found, mend)
+    return [("chainage", numeric[0]), ("elevation", numeric[1])]
 
 
-def _first(names: Sequence[str], known: Sequence[str]) -> int | None:
-    """Return the place of the column whose name comes first among those known."""
-    return next((names.index(name) for name in known if name in names), None)
+def _split_name(cell: str) -> tuple[str, str | None]:
+    """Return the name in the head of a column, and its unit if it has one.
+
+    A unit stands in brackets, or is the last of several words, such as in elev_ft.
+    """
+    found = re.fullmatch(r"([^\[({<]*)[\[({<](.*)[\])}>]?(.*)", cell.strip())
+    if found:
+        return _words(found[1] + " " + found[3].strip("])}>")), _letters(found[2])
+    if cell.rstrip().endswith(("'", '"', "\u2032", "\u2033")):
+        return _words(cell), "ft" if cell.rstrip()[-1] in "'\u2032" else "in"
+    words = _words(cell).split()
+    for first in range(1, len(words)):
+        unit = "".join(words[first:])
+        if unit in METRES or unit in FOREIGN:
+            return " ".join(words[:first]), unit
+    return " ".join(words), None
 
 
-def _plain_name(name: str, cell: str) -> str:
+def _words(text: str) -> str:
+    """Return the words of a name, in small letters."""
+    return " ".join(re.findall(r"[^\W_]+", text.casefold()))
+
+
+def _plain_name(cell: str) -> str:
     """Return the name of a column without its unit, in small letters."""
-    found = re.fullmatch(r"\s*(.*?)[\s_]*(?:[\[(]\s*(.*?)\s*[\])]|[\s_](\w+))?\s*", cell)
-    word, unit = (found[1], found[2] or found[3]) if found else (cell, None)
-    if unit is not None and unit.casefold() in FOREIGN:
-        mend = f"give metres: the column is in {FOREIGN[unit.casefold()]}"
-        raise BadInput(f"{name} line 1", cell, mend)
-    return str(word).casefold()
+    return _split_name(cell)[0]
+
+
+def _check_unit(where: str, cell: str) -> None:
+    """Check that the unit in the head of a column is metres; a unit that is not known is not."""
+    unit = _split_name(cell)[1]
+    if unit is None or unit in METRES:
+        return
+    what = f"the column is in {FOREIGN[unit]}" if unit in FOREIGN else "its unit is not known"
+    raise BadInput(where, cell, f"give metres, and write (m) after the name: {what}")
+
+
+def _check_decimal_signs(
+    name: str,
+    separator: str | None,
+    body: Sequence[tuple[int, list[str]]],
+    columns: Sequence[tuple[str, int]],
+) -> None:
+    """Check that all numbers have the same decimal sign and none has separators of thousands."""
+    found: dict[str, str] = {}
+    for line, cells in body:
+        for what, at in columns:
+            text = _plain(cells[at])[0] if at < len(cells) else ""
+            where = f"{name} line {line}: {what}"
+            signs = set(text) & set(".,")
+            if len(signs) > 1 or (separator == "," and GROUPED.fullmatch(text)):
+                raise BadInput(where, text, "write it without separators of thousands")
+            for sign in signs:
+                found.setdefault(sign, text)
+            if len(found) > 1:
+                one, other = found.values()
+                mend = (
+                    "use one decimal sign and no separators of thousands: the table also has "
+                    f"{one if text == other else other}"
+                )
+                raise BadInput(where, text, mend)
 
 
 def _number(name: str, line: int, cells: Sequence[str], what: str, at: int) -> float:
     """Return a number of a table; its decimal sign may be a comma."""
     where = f"{name} line {line}: {what}"
-    text = cells[at] if at < len(cells) else ""
-    if not text:
-        raise BadInput(where, text, "give a number in metres, or delete the line")
+    cell = cells[at] if at < len(cells) else ""
+    if not cell:
+        raise BadInput(where, cell, "give a number in metres, or delete the line")
+    text, unit = _plain(cell)
+    if unit and unit not in METRES:
+        what = f"it is in {FOREIGN[unit]}" if unit in FOREIGN else "its unit is not known"
+        raise BadInput(where, cell, f"give a number in metres: {what}")
+    if found := STATION.fullmatch(text):
+        size = 1000.0 * float(found[2]) + float(found[3].replace(",", "."))
+        return -size if found[1] == "-" else size
+    if re.fullmatch(r"[+-]?\d+\+[\d.,]+", text):
+        mend = "write stations as kilometres and metres, such as 0+150, or in metres"
+        raise BadInput(where, cell, mend)
     if not NUMBER.fullmatch(text):
-        packed = re.fullmatch(r"[+-]?\d{1,3}([ '.,\u2019\u00a0\u202f]\d{3})+([.,]\d+)?", text)
+        packed = THOUSANDS.fullmatch(text)
         mend = "write it without separators of thousands" if packed else "give a number in metres"
-        raise BadInput(where, text, mend)
+        raise BadInput(where, cell, mend)
     value = float(text.replace(",", "."))
     if not math.isfinite(value):
-        raise BadInput(where, text, "give a finite number in metres")
+        raise BadInput(where, cell, "give a finite number in metres")
     return value
 
 
 def from_vertices(name: str, vertices: Floats) -> Survey:
     """Return the profile of a line in space or in the plane, (n, 3) or (n, 2) [m].
 
-    In the plane x is the chainage and y the elevation. In space, chainage is measured from the
-    first point along the straight line in plan to the last one.
+    In the plane x is the chainage and y the elevation. In space, chainage is measured in plan from
+    the first point: along the straight line to the last one if no point lies far beside it, and
+    along the line itself if it bends.
 
     Raises
     ------
@@ -259,15 +433,17 @@ def from_vertices(name: str, vertices: Floats) -> Survey:
         raise BadInput(name, flat[-1].tolist(), mend)
     along = (flat - start) @ way / length
     aside = float(np.abs((flat - start) @ [-way[1], way[0]] / length).max())
-    notes = ["chainage is measured in plan, from the first point towards the last"]
+    note = "chainage is measured in plan, from the first point towards the last"
     if aside > OFF_LINE * length:
-        notes.append(
-            f"points lie up to {aside:.1f} m beside the straight line between the ends of the "
-            "profile, onto which they are projected: a fall line that bends is longer"
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
+        note = (
+            f"chainage is measured in plan along the line, which bends: it is {along[-1]:.1f} m "
+            f"long, and points lie up to {aside:.1f} m beside the straight line of {length:.1f} m "
+            "between its ends, to which positions in plan refer"
         )
     azimuth = math.degrees(math.atan2(way[0], way[1])) % 360.0
     plan = float(start[0]), float(start[1]), azimuth
-    return Survey(np.column_stack([along, vertices[:, 2]]), plan, tuple(notes))
+    return Survey(np.column_stack([along, vertices[:, 2]]), plan, (note,))
 
 
 def profile_of(name: str, survey: Survey, road: tuple[float, float] | None = None) -> Profile:
@@ -288,6 +464,8 @@ def profile_of(name: str, survey: Survey, road: tuple[float, float] | None = Non
         If the points are no profile from a crest to below a road, in metres.
     """
     notes = list(survey.notes)
+    _check_length(name, survey.points)
+    _check_elevations(name, survey.points)
     points = _distinct(name, survey.points, notes)
     if points[0, 0] == points[-1, 0]:
         mend = (
@@ -311,6 +489,11 @@ def profile_of(name: str, survey: Survey, road: tuple[float, float] | None = Non
             f"x = 0 is chainage {origin.chainage:,.10g} of the survey, and y = 0 is elevation "
             f"{origin.elevation:,.10g}"
         )
+    notes += [
+        f"point at chainage {points[k, 0]:,.10g}, elevation {points[k, 1]:,.10g}: "
+        + spike_words(height)
+        for k, height in spikes(points)
+    ]
     _add_warnings(moved, notes)
     return Profile(moved, origin, tuple(notes))
 
@@ -326,13 +509,72 @@ def _distinct(name: str, points: Floats, notes: list[str]) -> Floats:
     return left
 
 
+def _check_length(name: str, points: Floats) -> None:
+    """Check that a profile is no longer than one in metres can be."""
+    long, tall = np.ptp(points, axis=0).tolist()
+    if long > LONGEST:
+        mend = f"give metres: at most {LONGEST:g} m long and {HIGHEST:g} m high"
+        raise BadInput(name, f"{long:g} m long and {tall:g} m high", mend)
+
+
+def _check_elevations(name: str, points: Floats) -> None:
+    """Check that all elevations are those of ground, and none stands for a missing one."""
+    y = points[:, 1]
+    wrong = np.flatnonzero((y < LOWEST) | (y > SUMMIT))
+    if wrong.size == 0:
+        wrong = np.array(_zeros(points), dtype=np.intp)
+    if wrong.size:
+        k = int(wrong[0])
+        mend = (
+            f"delete the point or give its elevation: no ground lies at {y[k]:g} m there, which "
+            "may stand for a missing value"
+        )
+        raise BadInput(f"{name} point {k + 1}", points[k].tolist(), mend)
+
+
+def _zeros(points: Floats) -> list[int]:
+    """Return the points of elevation 0 far from the ground on both sides of them."""
+    y, found = points[:, 1], []
+    for k in np.flatnonzero(y == 0.0):
+        before, after = np.flatnonzero(y[:k] != 0.0), np.flatnonzero(y[k:] != 0.0) + k
+        if before.size and after.size:
+            sides = points[[before[-1], after[0]]]
+            runs = np.maximum(np.abs(sides[:, 0] - points[k, 0]), CLOSE)
+            same = sides[0, 1] * sides[1, 1] > 0.0
+            far = np.abs(sides[:, 1]) >= np.maximum(SPIKE, STEEP * runs)
+            if same and far.all():
+                found.append(int(k))
+    return found
+
+
+def spikes(points: Floats) -> list[tuple[int, float]]:
+    """Return the points that lie far above or below both neighbours, with the height above [m].
+
+    Such a point is often a typing error. Heights of pits are negative.
+    """
+    found = []
+    for k in range(1, len(points) - 1):
+        (x0, y0), (x, y), (x1, y1) = points[k - 1], points[k], points[k + 1]
+        up = y - max(y0, y1) if y > max(y0, y1) else min(0.0, y - min(y0, y1))
+        steep = min(abs(y - y0) / max(abs(x - x0), CLOSE), abs(y - y1) / max(abs(x1 - x), CLOSE))
+        if abs(up) >= SPIKE and steep >= STEEP:
+            found.append((k, float(up)))
+    return found
+
+
+def spike_words(height: float) -> str:
+    """Return what is odd about a point that lies `height` [m] above both of its neighbours."""
+    way = "above" if height > 0.0 else "below"
+    return f"it lies {abs(height):.1f} m {way} both of its neighbours; is it a typing error?"
+
+
 def _check_shape(name: str, points: Floats) -> None:
     """Check that points with growing chainage are a profile in metres."""
     x, y = points.T
-    long, tall = float(np.ptp(x)), float(np.ptp(y))
-    if long > LONGEST or tall > HIGHEST:
-        mend = f"give metres: at most {LONGEST:g} m long and {HIGHEST:g} m high"
-        raise BadInput(name, f"{long:g} m long and {tall:g} m high", mend)
+    tall = float(np.ptp(y))
+    if tall > HIGHEST:
+        mend = f"give metres: at most {HIGHEST:g} m high"
+        raise BadInput(name, f"{tall:g} m high", mend)
     if tall == 0.0:
         raise BadInput(name, f"all points at elevation {y[0]:g}", "give a profile with a slope")
     back = np.diff(x) < 0.0

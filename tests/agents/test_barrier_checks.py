@@ -19,9 +19,9 @@ from rigdda.agents.barrier_checks import (
 )
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.fence_checks import demand_at
-from rigdda.agents.ritchie_ditch import RitchieDitch
 from rigdda.envs import DesignProblem, design_envelope
+from rigdda.envs.fence_checks import demand_at
+from rigdda.envs.ritchie_ditch import RitchieDitch
 from rigdda.model.existing import Existing
 
 KINDS = ("fence", "ditch", "embankment", "gravity_wall")

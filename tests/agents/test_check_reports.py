@@ -13,9 +13,9 @@ from test_rule import envelope
 from rigdda import Fence
 from rigdda.agents.barrier_checks import BarrierCheck, LayoutChecks
 from rigdda.agents.designers.rule import judge
-from rigdda.agents.fence_checks import FenceCheck, demand_at
 from rigdda.agents.reports import checks, demand_picture
 from rigdda.envs import DesignProblem
+from rigdda.envs.fence_checks import FenceCheck, demand_at
 
 STATIONS = {11.3 + i: 8.0 + i for i in range(24)}
 

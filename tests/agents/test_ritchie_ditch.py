@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigdda import Ditch, Site
-from rigdda.agents.ritchie_ditch import CHART, RitchieDitch
+from rigdda.envs.ritchie_ditch import CHART, RitchieDitch
 
 
 def test_the_ditch_widens_with_the_height(site: Site) -> None:

@@ -14,13 +14,13 @@ from valley import SITE
 from rigdda import Ditch, Embankment, Fence, Site
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.rule import RuleAnswer, answer, judge
-from rigdda.agents.fence_checks import FenceCheck, demand_at, demands
-from rigdda.agents.ritchie_ditch import RitchieDitch
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.barriers.fence import CLASSES
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.design_envelope import DesignEnvelope, EventEnvelope
+from rigdda.envs.fence_checks import FenceCheck, demand_at, demands
 from rigdda.envs.quantiles import Quantile
+from rigdda.envs.ritchie_ditch import RitchieDitch
 from rigdda.model.partial_factors import PartialFactors
 
 TRAJECTORY, TOPOGRAPHY, SIZE, ENERGY, FREEBOARD, ELONGATION = 1.10, 1.02, 1.02, 1.2, 0.5, 1.3

@@ -18,6 +18,7 @@ from rigdda import Fence
 from rigdda.barriers.fence import FENCE_CLASSES, FenceClass
 from rigdda.envs.design_envelope import DesignEnvelope, EventEnvelope
 from rigdda.envs.quantiles import Quantile
+from rigdda.model.existing import WornFence
 from rigdda.model.partial_factors import PartialFactors
 from rigdda.rounding import between
 
@@ -192,9 +193,15 @@ class FenceCheck:
         return self.demand.hard.factors
 
     @property
+    def energy(self) -> float:
+        """Energy of the fence at the chosen level, for a worn one times its condition [J]."""
+        left = self.fence.condition if isinstance(self.fence, WornFence) else 1.0
+        return self.factors.rated(self.fence.rated) * left
+
+    @property
     def capacity(self) -> float:
         """Energy of the fence at the chosen level, divided by its factor [J]."""
-        return self.factors.rated(self.fence.rated) / self.factors.energy
+        return self.energy / self.factors.energy
 
     @property
     def design_elongation(self) -> float:
@@ -255,6 +262,10 @@ class FenceCheck:
             return f"largest of {action.passing:.0f}, too few for a {share}"
         return f"{share}, {between(value.low, value.high, '.3g')}"
 
+    def _worn(self) -> str:
+        fence = self.fence
+        return f", {fence.condition:.0%} of it left" if isinstance(fence, WornFence) else ""
+
     def _energy_rows(self) -> list[SheetRow]:
         hard, f = self.demand.hard, self.factors
         speed, use = self._quantile(hard.speed, hard), self.energy_use
@@ -275,8 +286,8 @@ class FenceCheck:
             SheetRow("factor of the fence", "g_E", f.energy, "-", f"at {f.level}"),
             SheetRow("demanded energy", "g_E E_d", 1e-3 * hard.energy() * f.energy, "kJ",
                      f"demanded class: {self.demand.least_class or 'none'}"),
-            SheetRow("energy of the fence", "E", 1e-3 * f.rated(self.fence.rated), "kJ",
-                     f"class {self.fence.rated:,} kJ at {f.level}"),
+            SheetRow("energy of the fence", "E", 1e-3 * self.energy, "kJ",
+                     f"class {self.fence.rated:,} kJ at {f.level}{self._worn()}"),
             SheetRow("utilisation, energy", "g_E E_d / E", use, "-", _verdict(use)),
         ]  # fmt: skip
 

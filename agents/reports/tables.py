@@ -196,7 +196,7 @@ def outcomes(
 
     def add(words: str, unit: str, factor: float, values: list[float]) -> None:
         sample = factor * np.array(values, dtype=np.float64)
-        ends = _interval(sample, unit == "%")
+        ends = _interval(sample, 0.0, unit == "%")
         table.add_row(f"{words} [{unit}]", f"{sample.mean():.4g}", _span(ends, ".4g"))
 
     chance = estimate(sum(outcome.reached for outcome in results), len(results))
@@ -222,14 +222,14 @@ def outcomes(
     return table
 
 
-def _interval(sample: NDArray[np.float64], percent: bool) -> Sequence[float]:
-    """Return the 95 % interval of a mean, cut at 0 and, for a percentage, at 100.
+def _interval(sample: NDArray[np.float64], low: float, percent: bool) -> Sequence[float]:
+    """Return the 95 % interval of a mean, cut at `low` and, for a percentage, at 100.
 
     If every value is 0 or 100 %, the interval is that of a probability.
     """
     if percent and np.isin(sample, (0.0, 100.0)).all():
         return [100.0 * end for end in mid_p(int(np.count_nonzero(sample)), len(sample))]
-    ends = np.clip(student_interval(sample), 0.0, 100.0 if percent else None)
+    ends = np.clip(student_interval(sample), low, 100.0 if percent else None)
     return [float(end) for end in ends]
 
 
